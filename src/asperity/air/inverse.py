@@ -1,0 +1,219 @@
+"""The patch radius, or the gap, that gives a measured eps_eff/eps.
+
+Eq. (epseff) of Bureau, Baumberger and Caroli (2000) read backwards. Below the vacuum resonance
+the fraction falls with R and rises with h0; above it the layer's stiffness may bring the slider
+back to resonance, and then two radii give one fraction. The bracket is therefore cut at every
+extremum and each monotone piece searched.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.air.layer import AirLayer
+from asperity.air.normal_contact import as_real
+from asperity.air.transfer import effective_modulation
+from asperity.errors import InputError
+
+#: Points of the logarithmic scan. However sharp an extremum of the curve is, its flanks are
+#: monotone over decades, so that a few points a decade reveal it.
+_SCAN = 513
+#: Differences of ln(eps_eff/eps) below this are round-off on a plateau, not an extremum.
+_FLAT = 1e-12
+#: A root must give the fraction back to this relative accuracy: a jump of "free-molecular"
+#: changes sign without being one.
+_CLOSE = 1e-8
+
+
+@dataclass(frozen=True)
+class InverseResult:
+    """What gives the measured fraction, or why nothing does.
+
+    Parameters
+    ----------
+    solutions : tuple of float
+        All values (m) within the bracket, ascending; empty when there is none.
+    reachable_min, reachable_max : float
+        Smallest and largest eps_eff/eps within the bracket.
+    result : str
+        "found", or one sentence that says what can be reached.
+    """
+
+    solutions: tuple[float, ...]
+    reachable_min: float
+    reachable_max: float
+    result: str
+
+    @property
+    def found(self) -> bool:
+        """Whether there is a solution."""
+        return bool(self.solutions)
+
+
+def patch_radius(
+    ratio: float,
+    frequency: float,
+    *,
+    W0: float,
+    M: float,
+    lambda_z: float,
+    layer: AirLayer,
+    bracket: tuple[float, float] = (1e-5, 10.0),
+) -> InverseResult:
+    """Radii R (m) of the patch of contacts at which eps_eff/eps equals `ratio`.
+
+    Parameters
+    ----------
+    ratio : float
+        Measured eps_eff/eps (dimensionless).
+    frequency : float
+        Frequency of the modulation (Hz).
+    W0, M, lambda_z : float
+        Mean load (N), mass (kg), normal elastic length (m).
+    layer : AirLayer
+        Numbers, not arrays; its R is not used.
+    bracket : (float, float)
+        Smallest and largest radius to consider (m).
+
+    Returns
+    -------
+    InverseResult
+        A fraction that no radius gives is no error: `result` names the reachable range.
+
+    Raises
+    ------
+    InputError
+        When an argument is not one finite positive number, or the bracket is empty.
+    """
+
+    def fraction(R: NDArray[np.float64]) -> NDArray[np.float64]:
+        return _fraction(frequency, W0, M, lambda_z, replace(layer, R=R))
+
+    _check_single(W0, M, lambda_z, frequency, layer)
+    return _invert("R", ratio, fraction, bracket)
+
+
+def gap(
+    ratio: float,
+    frequency: float,
+    *,
+    W0: float,
+    M: float,
+    lambda_z: float,
+    layer: AirLayer,
+    bracket: tuple[float, float] = (1e-8, 1e-2),
+) -> InverseResult:
+    """Gaps h0 (m) at which eps_eff/eps equals `ratio`.
+
+    Parameters, result and errors as in `patch_radius`, with h0 in the place of R.
+    """
+
+    def fraction(h0: NDArray[np.float64]) -> NDArray[np.float64]:
+        return _fraction(frequency, W0, M, lambda_z, replace(layer, h0=h0))
+
+    _check_single(W0, M, lambda_z, frequency, layer)
+    return _invert("h0", ratio, fraction, bracket)
+
+
+def _fraction(
+    frequency: float, W0: float, M: float, lambda_z: float, layer: AirLayer
+) -> NDArray[np.float64]:
+    value = effective_modulation(frequency, W0=W0, M=M, lambda_z=lambda_z, layer=layer)
+    return np.asarray(value)
+
+
+def _check_single(*values: object) -> None:
+    for value in values:
+        parts = vars(value).values() if isinstance(value, AirLayer) else (value,)
+        shape = next((np.shape(p) for p in parts if np.ndim(p)), None)  # type: ignore[arg-type]
+        if shape is not None:
+            raise InputError(
+                f"inverse.arguments must be single numbers, got an array of shape {shape}; "
+                "call once for each measured fraction, as each may have several solutions"
+            )
+
+
+def _invert(
+    field: str,
+    ratio: float,
+    fraction: Callable[[NDArray[np.float64]], NDArray[np.float64]],
+    bracket: tuple[float, float],
+) -> InverseResult:
+    _check_single(ratio)
+    wanted = as_real("inverse.ratio", ratio, "", "give the measured eps_eff/eps, a positive number")
+    target = float(np.log(wanted))
+    lower, upper = _limits(bracket)
+
+    def log_fraction(u: float) -> float:
+        return float(np.log(fraction(np.exp(np.asarray(u)))))
+
+    u = np.linspace(np.log(lower), np.log(upper), _SCAN)
+    scan = np.log(fraction(np.exp(u)))
+    knots = [u[0], *_extrema(log_fraction, u, scan), u[-1]]
+    roots = _roots(log_fraction, np.array(knots), target)
+    values = np.exp(np.append(scan, [log_fraction(k) for k in knots]))
+    lowest, highest = float(values.min()), float(values.max())
+    found = tuple(float(np.exp(r)) for r in roots)
+    text = "found"
+    if not found:
+        text = (
+            f"no {field} between {lower:g} and {upper:g} m gives eps_eff/eps = {ratio:g}; "
+            f"there it ranges from {lowest:.6g} to {highest:.6g}"
+        )
+    return InverseResult(found, lowest, highest, text)
+
+
+def _limits(bracket: tuple[float, float]) -> tuple[float, float]:
+    advice = "give the smallest and the largest length in metres"
+    ends = np.asarray(as_real("inverse.bracket", bracket, "m", advice))
+    if ends.shape != (2,) or not ends[0] < ends[1]:
+        raise InputError(
+            f"inverse.bracket must be two ascending lengths, got {bracket} m; {advice}"
+        )
+    return float(ends[0]), float(ends[1])
+
+
+def _extrema(
+    function: Callable[[float], float], u: NDArray[np.float64], scan: NDArray[np.float64]
+) -> list[float]:
+    """Abscissae of the interior extrema, each refined between the scan's points around it."""
+    from scipy.optimize import minimize_scalar
+
+    slope = np.diff(scan)
+    (steps,) = np.nonzero(np.abs(slope) > _FLAT)
+    found = []
+    for left, right in pairwise(steps):
+        if slope[left] * slope[right] < 0:
+            sign = np.sign(slope[right])
+            limits = (u[left], u[right + 1])
+            best = minimize_scalar(
+                lambda x, sign=sign: sign * function(x),
+                bounds=limits,
+                method="bounded",
+                options={"xatol": 1e-12},
+            )
+            found.append(float(best.x))
+    return found
+
+
+def _roots(
+    function: Callable[[float], float], knots: NDArray[np.float64], target: float
+) -> list[float]:
+    """One root for every monotone piece between `knots` that passes through `target`."""
+    from scipy.optimize import brentq
+
+    found: list[float] = []
+    excess = [function(k) - target for k in knots]
+    for i in range(len(knots) - 1):
+        if excess[i] * excess[i + 1] > 0:
+            continue
+        root = float(brentq(lambda x: function(x) - target, knots[i], knots[i + 1], xtol=1e-15))
+        new = not found or root - found[-1] > _FLAT
+        if new and abs(function(root) - target) < _CLOSE:
+            found.append(root)
+    return found

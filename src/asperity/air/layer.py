@@ -1,0 +1,269 @@
+"""The squeezed air layer: linearised Reynolds equation between two parallel discs.
+
+Source: Bureau, Baumberger and Caroli (2000), Appendix, Eqs. (stiffair), (cont)-(force).
+Isothermal air of mean pressure P0 leaks radially through a gap h0; the pressure excess vanishes at
+the rim r = R. All amplitudes are complex with the factor e^{+i w t}.
+
+Everything depends on the one number s = |gamma R| = sqrt(12 eta w R^2/(P0 h0^2)) ("squeeze"), for
+gamma R = (1 - i)/sqrt(2) s: s << 1 is a viscous leak, s >> 1 an elastic cushion.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from math import factorial
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity.air.normal_contact import Real, as_real, check_shapes
+from asperity.errors import InputError, closest
+
+GasFlow = Literal["continuum", "slip", "free-molecular"]
+#: sqrt(pi R_gas T/(2 m_air)) is the molecular speed in mfp = eta/P times it: R_gas of CODATA, in
+#: J/(mol K), the molar mass of dry air of the US Standard Atmosphere 1976, in kg/mol.
+_GAS_CONSTANT, _MOLAR_MASS_AIR = 8.314462618, 28.9644e-3
+
+#: Where the continued fraction hands over to the asymptotic series, and the terms each needs to
+#: reach 1e-15 there (37 levels and 14 powers were measured at s = 30; 16 powers at s = 25).
+_HANDOVER, _LEVELS, _POWERS = 30.0, 40, 16
+
+
+@cache
+def _asymptotic_coefficients() -> tuple[float, ...]:
+    """c_k of I1(x)/I0(x) ~ sum c_k x^-k, from its Riccati equation y' = 1 - y/x - y^2."""
+    c = [1.0]
+    for k in range(1, _POWERS + 1):
+        products = sum(c[i] * c[k - i] for i in range(1, k))
+        c.append(((k - 2) * c[k - 1] - products) / 2)
+    return tuple(c)
+
+
+def _ratio_by_fraction(s: NDArray[np.float64]) -> NDArray[np.complex128]:
+    # With (gamma R)^2 = -i q every level keeps both parts positive: no digit cancels, and the
+    # (tiny) elastic part of a nearly viscous layer is as accurate as its damping.
+    q = 1j * s**2
+    tail = np.full(s.shape, 2.0 * (_LEVELS + 1), dtype=complex)
+    for k in range(_LEVELS, 1, -1):
+        tail = 2.0 * k + q / tail
+    ratio: NDArray[np.complex128] = -q / (2 * tail + q)
+    return ratio
+
+
+def _ratio_by_asymptotics(s: NDArray[np.float64]) -> NDArray[np.complex128]:
+    u = np.exp(-0.25j * np.pi) / s
+    ratio: NDArray[np.complex128] = -1 + 2 * u * np.polyval(_asymptotic_coefficients()[::-1], u)
+    return ratio
+
+
+def bessel_ratio(squeeze: ArrayLike) -> Any:
+    """J2(gamma R)/J0(gamma R) at gamma R = (1 - i)/sqrt(2) s, for any s >= 0.
+
+    Continued fraction J2/J0 = z^2/(2C - z^2), C = 4 - z^2/(6 - z^2/(8 - ...)), z = gamma R, up to
+    s = 30, the asymptotic series of -I2/I0 above. Bessel functions themselves are never
+    formed, hence nothing overflows; real and imaginary part are each accurate to about 1e-15.
+
+    Parameters
+    ----------
+    squeeze : array
+        s = |gamma R| (dimensionless).
+
+    Returns
+    -------
+    complex array
+        Both parts are <= 0: an elastic and a damping force, whatever s.
+        -> -i s^2/8 - s^4/48 for s -> 0, -> -1 + sqrt(2) (1 - i)/s for s -> infinity.
+    """
+    advice = "give the modulus of gamma R"
+    s = np.asarray(as_real("layer.squeeze", squeeze, "", advice, zero=True))
+    large = s > _HANDOVER
+    ratio = np.empty(s.shape, dtype=complex)
+    ratio[large] = _ratio_by_asymptotics(s[large])
+    ratio[~large] = _ratio_by_fraction(s[~large])
+    return ratio[()]
+
+
+@dataclass(frozen=True)
+class AirLayer:
+    """A disc of gas between two smooth parallel discs.
+
+    Parameters
+    ----------
+    P0 : array
+        Ambient pressure (Pa).
+    h0 : array
+        Gap at rest (m).
+    eta : array
+        Dynamic viscosity of the bulk gas (Pa s), independent of the pressure.
+    R : array
+        Radius of the disc or of the patch of micro-contacts (m).
+    gas_flow : {"continuum", "slip", "free-molecular"}
+        How the leak feels a mean free path l that is no longer small against h0 (Kn = l/h0).
+        "continuum": as if it were, the paper's Eq. (poiseuille). "slip": Poiseuille flow with
+        Maxwell's slip at diffuse walls, eta/(1 + 6 Kn), right to first order in Kn and too
+        resistive far beyond. "free-molecular": the paper's argument for 1 mbar, zero viscosity
+        where l exceeds the gap (Kn > 1), the bulk's elsewhere.
+    temperature : array
+        Temperature (K); enters the mean free path only.
+
+    Raises
+    ------
+    InputError
+        When a field is not finite and positive, the shapes do not broadcast, or `gas_flow` is
+        unknown.
+    """
+
+    P0: Real
+    h0: Real
+    eta: Real
+    R: Real
+    gas_flow: GasFlow = "continuum"
+    temperature: Real = 300.0
+
+    def __post_init__(self) -> None:
+        advice = {
+            "P0": ("Pa", "give the ambient pressure in pascals, or no layer for a vacuum"),
+            "h0": ("m", "give the gap at rest in metres, about 5 times the roughness"),
+            "eta": ("Pa s", "give the viscosity of the gas in pascal seconds, 1.8e-5 for air"),
+            "R": ("m", "give the radius of the contact patch in metres"),
+            "temperature": ("K", "give the absolute temperature in kelvins"),
+        }
+        for field, (unit, what) in advice.items():
+            value = as_real(f"AirLayer.{field}", getattr(self, field), unit, what)
+            object.__setattr__(self, field, value)
+        check_shapes("AirLayer.fields", *(getattr(self, field) for field in advice))
+        if self.gas_flow not in get_args(GasFlow):
+            way_out = closest(str(self.gas_flow), get_args(GasFlow))
+            raise InputError(
+                f"AirLayer.gas_flow must be a known model, got {self.gas_flow!r}; {way_out}"
+            )
+
+    @property
+    def area(self) -> Real:
+        """Sigma0 = pi R^2 (m^2)."""
+        return np.pi * self.R**2
+
+    @property
+    def stiffness(self) -> Real:
+        """Stiffness kappa_air = P0 Sigma0/h0 (N/m) of a layer that cannot leak, Eq. (stiffair)."""
+        return self.P0 * self.area / self.h0
+
+    @property
+    def mean_free_path(self) -> Real:
+        """Kinetic estimate (eta/P0) sqrt(pi R_gas T/(2 m)) (m), m the molar mass of air."""
+        speed = np.sqrt(np.pi * _GAS_CONSTANT * self.temperature / (2 * _MOLAR_MASS_AIR))
+        path: Real = self.eta / self.P0 * speed
+        return path
+
+    @property
+    def knudsen(self) -> Real:
+        """Knudsen number Kn = mean free path/h0 (dimensionless)."""
+        return self.mean_free_path / self.h0
+
+    @property
+    def effective_viscosity(self) -> Real:
+        """Viscosity (Pa s) that resists the leak under the model `gas_flow`."""
+        if self.gas_flow == "slip":
+            return self.eta / (1 + 6 * self.knudsen)
+        if self.gas_flow == "free-molecular":
+            eta: Real = np.where(np.asarray(self.knudsen) > 1, 0.0, self.eta)[()]
+            return eta
+        return self.eta
+
+    def squeeze(self, omega: ArrayLike) -> Real:
+        """Return s = |gamma R| = sqrt(12 eta w R^2/(P0 h0^2)) at `omega` = w (rad/s)."""
+        advice = "give the angular frequency in rad/s, 2 pi times the frequency in hertz"
+        w = as_real("layer.omega", omega, "rad/s", advice, zero=True)
+        check_shapes("layer.omega", w, self.P0, self.h0, self.eta, self.R, self.temperature)
+        s: Real = np.sqrt(12 * self.effective_viscosity * w / self.P0) * (self.R / self.h0)
+        return s
+
+    def gamma(self, omega: ArrayLike) -> Any:
+        """Complex wave number gamma (1/m) of the pressure field, Eq. (defgamma)."""
+        return (1 - 1j) / np.sqrt(2) * (self.squeeze(omega) / self.R)
+
+    def dynamic_stiffness(self, omega: ArrayLike) -> Any:
+        """Complex stiffness -F_p/delta h = -kappa_air J2(gamma R)/J0(gamma R) (N/m), Eq. (force).
+
+        The real part is the spring, the imaginary part w times the damping constant (e^{+i w t});
+        both are >= 0. Limits: kappa_air for s -> infinity, i w 3 pi eta R^4/(2 h0^3) for s -> 0.
+
+        Parameters
+        ----------
+        omega : array
+            Angular frequency (rad/s), not negative.
+        """
+        return -self.stiffness * bessel_ratio(self.squeeze(omega))
+
+    def pressure(self, r: ArrayLike, omega: ArrayLike) -> Any:
+        """Pressure excess per unit widening of the gap, delta P/delta h (Pa/m), Eq. (dP).
+
+        -(P0/h0) [1 - J0(gamma r)/J0(gamma R)], stable for any s.
+
+        Parameters
+        ----------
+        r : array
+            Distance from the centre (m), 0 <= r <= R.
+        omega : array
+            Angular frequency (rad/s).
+
+        Raises
+        ------
+        InputError
+            When a radius lies outside the disc.
+        """
+        advice = "keep 0 <= r <= R"
+        radius = as_real("layer.r", r, "m", advice, zero=True)
+        s = self.squeeze(omega)
+        check_shapes("layer.r", radius, s, self.R)
+        rho = np.asarray(radius / self.R)
+        if (rho > 1).any():
+            worst = float(np.max(np.broadcast_to(radius, rho.shape)[rho > 1]))
+            raise InputError(f"layer.r must lie on the disc, got {worst:g} m; {advice}")
+        rho, squeeze = np.broadcast_arrays(rho, s)
+        return -self.P0 / self.h0 * _profile(rho, squeeze)[()]
+
+
+def _profile(rho: NDArray[np.float64], s: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """1 - J0(rho z)/J0(z) at z = (1 - i)/sqrt(2) s."""
+    from scipy.special import jve
+
+    # For s < 1 the difference cancels; sum_k y^k (1 - rho^2k)/k!^2, y = i s^2/4, does not.
+    y = 0.25j * np.minimum(s, 1.0) ** 2
+    terms = [y**k / factorial(k) ** 2 for k in range(11)]
+    top = sum(t * (1 - rho ** (2 * k)) for k, t in enumerate(terms))
+    # jve carries e^{-|Im|}: what it leaves out of the quotient is e^{-s (1 - rho)/sqrt 2}.
+    z = (1 - 1j) / np.sqrt(2) * np.maximum(s, 1.0)
+    bare = jve(0, rho * z) / jve(0, z) * np.exp(np.abs(z.imag) * (rho - 1))
+    return np.where(s < 1, top / sum(terms), 1 - bare)
+
+
+def shear_viscosity_ratio(
+    V: ArrayLike, *, W0: ArrayLike, A: ArrayLike, layer: AirLayer, as_printed: bool = False
+) -> Real:
+    """Viscous shear force of the layer over the rate term of friction, eta Sigma0 V/(A W0 h0).
+
+    A tangential oscillation of amplitude dx gives eta w dx Sigma0/h0 and A W0 w dx/V: their ratio
+    contains A. The paper's last formula prints eta Sigma0 V/(W0 h0), without it.
+
+    Parameters
+    ----------
+    V : array
+        Sliding velocity (m/s).
+    W0 : array
+        Mean normal load (N).
+    A : array
+        Rate coefficient of friction (dimensionless).
+    layer : AirLayer
+        Its bulk viscosity, area and gap enter.
+    as_printed : bool
+        Leave A out, as the paper does.
+    """
+    velocity = as_real("shear.V", V, "m/s", "give the sliding velocity in metres per second")
+    load = as_real("shear.W0", W0, "N", "give the mean normal load in newtons")
+    rate = as_real("shear.A", A, "", "give the rate coefficient, about 0.01")
+    check_shapes("shear arguments", velocity, load, rate, layer.eta, layer.R, layer.h0)
+    printed: Real = layer.eta * layer.area * velocity / (load * layer.h0)
+    return printed if as_printed else printed / rate

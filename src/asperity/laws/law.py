@@ -1,0 +1,110 @@
+"""What a friction law is: parameters, a friction coefficient, and the rates of its states.
+
+A law knows nothing of springs, masses or load programmes. Its methods are pure, element-wise
+functions of arrays: every argument may be a number or a JAX array of any shape, and
+shapes broadcast. `v` is always the velocity that enters the RATE term (m/s), `state` a tuple with
+one array per state variable, `w` the normal load over its mean, W/W0.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar, TypeAlias
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+State: TypeAlias = tuple[Array, ...]
+
+
+class Law(eqx.Module):
+    """A friction law. Subclass it, declare the parameters as fields, write the equations below.
+
+    Class attributes
+    ----------------
+    name : str
+        The name by which the command line and tables call the law.
+    source : str
+        Citation key(s) of the publication that states the law.
+    state_names : tuple of str
+        One name per state variable, in the order of the `state` tuple. States are dimensionless
+        and logarithmic where the physical quantity is positive (ln of an age, not the age), so
+        that no step of a solver can make them cross zero.
+    rate_dependent : bool
+        False for a law whose force does not depend on velocity; it then has no dynamics of its own.
+    """
+
+    name: ClassVar[str]
+    source: ClassVar[str]
+    state_names: ClassVar[tuple[str, ...]]
+    rate_dependent: ClassVar[bool] = True
+
+    @abstractmethod
+    def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
+        """Interface force over the instantaneous normal load, F_i/W (dimensionless)."""
+
+    @abstractmethod
+    def state_rate(self, v: ArrayLike, v_plastic: ArrayLike, state: State, w: ArrayLike) -> State:
+        """Time derivative of each state variable (1/s).
+
+        Parameters
+        ----------
+        v : array
+            Velocity of the slider dx/dt (m/s); may be negative for an instant when the asperities
+            unload elastically.
+        v_plastic : array
+            Plastic (irreversible) sliding velocity (m/s), always positive. Equal to `v`
+            when the law has no elastic asperities.
+        state : tuple of arrays
+        w : array
+            W/W0.
+
+        Notes
+        -----
+        No rate of change of the load appears. A law whose published form contains dW/dt is written
+        in a state variable that absorbs it (see `linker_dieterich`), which makes load
+        steps exact.
+        """
+
+    @abstractmethod
+    def steady_state(self, v: ArrayLike) -> State:
+        """State variables in steady sliding at velocity `v` (m/s) under the constant load w = 1."""
+
+    @property
+    def elastic_length(self) -> ArrayLike:
+        """Shear elastic length lambda of the asperities (m): their stiffness is W/lambda."""
+        return 0.0
+
+    def log_velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
+        """ln(v in m/s) at which the law carries the force `friction` = F_i/W: inverse of `friction`.
+
+        A law with a closed form overrides this; the default solves it by Newton's method on
+        ln v, in which every rate-and-state law is close to linear.
+        """
+        return _invert_friction(self, friction, state, w)
+
+    def mu_ss(self, v: ArrayLike) -> Array:
+        """Steady-sliding friction coefficient at velocity `v` (m/s) under constant load."""
+        return self.friction(v, self.steady_state(v), jnp.ones_like(jnp.asarray(v, float)))
+
+
+#: Newton steps of the generic inverse. Quadratic convergence from within a few units of ln v
+#: reaches round-off in far fewer; the loop is of fixed length so that it can be differentiated.
+_INVERSE_STEPS = 12
+
+
+def _invert_friction(law: Law, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
+    def value_and_slope(log_v: Array) -> tuple[Array, Array]:
+        return jax.jvp(
+            lambda q: law.friction(jnp.exp(q), state, w), (log_v,), (jnp.ones_like(log_v),)
+        )
+
+    shape = jnp.broadcast_shapes(*(jnp.shape(a) for a in (friction, w, *state)))
+    log_v = jnp.full(shape, jnp.log(1e-6))
+    for _ in range(_INVERSE_STEPS):
+        value, slope = value_and_slope(log_v)
+        log_v = log_v - (value - friction) / slope
+    return log_v

@@ -1,0 +1,56 @@
+"""Published numbers, one file a paper: ``materials.load("bureau2000")``.
+
+A material file is TOML; `asperity.materials.number` says what it holds. Loading one loads
+pydantic, importing this package does not.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+from typing import TYPE_CHECKING, Any
+
+from asperity.materials.bibliography import available_citations, citation
+
+if TYPE_CHECKING:
+    from asperity.materials.number import Number
+    from asperity.materials.record import Material
+
+__all__ = ["Material", "Number", "available", "available_citations", "citation", "load"]
+
+
+def available() -> tuple[str, ...]:
+    """Names of the materials that come with the package."""
+    from asperity.materials.loader import packaged
+
+    return tuple(sorted(packaged()))
+
+
+def load(name: str | PathLike[str]) -> Material:
+    """Load a material by name, or a file of your own by its path.
+
+    Parameters
+    ----------
+    name : str or path
+        One of `available`, or the path of a TOML file: anything that is a path object, ends in
+        ``.toml`` or has a folder in it.
+
+    Raises
+    ------
+    InputError
+        If there is no such material, or the file is not a valid material file.
+    """
+    from asperity.materials.loader import load_material
+
+    return load_material(name)
+
+
+def __getattr__(name: str) -> Any:
+    if name == "Material":
+        from asperity.materials.record import Material
+
+        return Material
+    if name == "Number":
+        from asperity.materials.number import Number
+
+        return Number
+    raise AttributeError(f"module 'asperity.materials' has no attribute '{name}'")

@@ -1,0 +1,40 @@
+"""BibTeX of the works that laws and materials name as their source."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+
+from asperity.errors import InputError, closest
+
+_ENTRY = re.compile(r"^@\w+\{(?P<key>[^,\s]+),.*?^\}", re.MULTILINE | re.DOTALL)
+
+
+def citation(key: str) -> str:
+    """Return the BibTeX entry of a source, such as ``"bureau2000"``.
+
+    Raises
+    ------
+    InputError
+        If no source has that key; the message gives the nearest one.
+    """
+    entries = _entries()
+    try:
+        return entries[key]
+    except KeyError:
+        raise InputError(
+            f"citation must be a known source, got '{key}'; {closest(key, entries)}"
+        ) from None
+
+
+def available_citations() -> tuple[str, ...]:
+    """Keys that `citation` knows."""
+    return tuple(sorted(_entries()))
+
+
+@cache
+def _entries() -> Mapping[str, str]:
+    text = files("asperity.materials").joinpath("CITATIONS.bib").read_text(encoding="utf-8")
+    return {match["key"]: match[0] for match in _ENTRY.finditer(text)}

@@ -1,0 +1,146 @@
+"""A material: the numbers of one paper by name, and the friction laws built from them.
+
+A material file is TOML with a ``title``, a ``source`` (key of `CITATIONS.bib`, or empty),
+``notes``, and one table ``[numbers.NAME]`` a number, with the fields of `Number`.
+"""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ConfigDict, field_validator
+
+from asperity.errors import InputError, closest
+from asperity.materials.number import Number
+from asperity.materials.signs import check_sign
+from asperity.units import to_si
+
+if TYPE_CHECKING:
+    from asperity.laws import Law
+
+
+class Material(BaseModel):
+    """The numbers of one paper.
+
+    ``material.K`` is a value in SI, ``material["K"]`` the `Number` with its unit, uncertainty,
+    place and kind. ``lambda``, a word of Python, is ``material.lambda_``.
+
+    Attributes
+    ----------
+    name, title, source, notes : str
+    numbers : mapping of str to Number
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    title: str
+    source: str = ""
+    notes: str = ""
+    numbers: Mapping[str, Number]
+
+    @field_validator("numbers")
+    @classmethod
+    def _usable(cls, numbers: Mapping[str, Number]) -> Mapping[str, Number]:
+        for name, number in numbers.items():
+            if not name.isidentifier() or name.startswith("_") or hasattr(cls, name):
+                raise InputError(
+                    f"numbers must have names that can follow a dot and are not taken, got "
+                    f"'{name}'; rename that number"
+                )
+            if number.value is not None:
+                check_sign(name, number.si, "numbers", number.si_unit)
+        return numbers
+
+    def __getitem__(self, name: str) -> Number:
+        try:
+            return self.numbers[_plain(name)]
+        except KeyError:
+            raise InputError(
+                f"{self.name} must have the number asked for, got '{name}'; "
+                f"{closest(name, self.numbers)}"
+            ) from None
+
+    def __getattr__(self, name: str) -> float:
+        # Underscored names are Python's and pydantic's own probes.
+        if name.startswith("_") or _plain(name) not in self.numbers:
+            raise AttributeError(
+                f"material '{self.name}' has no number '{name}'; {closest(name, self.numbers)}"
+            )
+        number = self.numbers[_plain(name)]
+        if number.value is None:
+            raise InputError(
+                f"{self.name}.{name} must be a single value here, got {number}; take si_range or "
+                f"si_values of material['{name}']"
+            )
+        return number.si
+
+    def __contains__(self, name: str) -> bool:
+        return _plain(name) in self.numbers
+
+    def __dir__(self) -> Iterator[str]:
+        yield from super().__dir__()
+        yield from (f"{n}_" if keyword.iskeyword(n) else n for n in self.numbers)
+
+    def law(self, name: str, **overrides: Any) -> Law:
+        """Build a friction law from the material's numbers.
+
+        Parameters
+        ----------
+        name : str
+            A registered law, such as ``"elasto-plastic"``.
+        **overrides : number, array or str
+            Parameters to use instead of the material's: SI numbers, or texts with a unit.
+            ``lambda`` is written ``lambda_``.
+
+        Returns
+        -------
+        Law
+
+        Raises
+        ------
+        InputError
+            If the law or a parameter is unknown, a value has the wrong unit or sign, or the law
+            needs a parameter that neither the material nor `overrides` has.
+        """
+        # The laws load JAX, which reading numbers does not need.
+        from asperity.laws import get_law, law_parameters
+
+        law = get_law(name)
+        wanted = law_parameters(law)
+        given = {_plain(parameter): value for parameter, value in overrides.items()}
+        for parameter in given:
+            if parameter not in wanted:
+                raise InputError(
+                    f"{name} must be given its own parameters, got '{parameter}'; "
+                    f"{closest(parameter, wanted)}"
+                )
+        values = {p: self._parameter(p, name, given) for p in wanted}
+        return law(**{_field(p, law): value for p, value in values.items()})
+
+    def _parameter(self, parameter: str, owner: str, given: Mapping[str, Any]) -> Any:
+        number = self.numbers.get(parameter)
+        if parameter not in given:
+            if number is None:
+                raise InputError(
+                    f"{owner}.{parameter} must be given, got nothing and '{self.name}' has no "
+                    f"such number; write {parameter}=... beside the law's name"
+                )
+            return number.si
+        # A parameter of a user's own law, of which no file tells the dimension, is taken as SI.
+        dimension = number.dimension if number is not None else "dimensionless"
+        value = to_si(given[parameter], dimension, f"{owner}.{parameter}")
+        check_sign(parameter, value, owner, number.si_unit if number is not None else "")
+        return value
+
+
+def _plain(name: str) -> str:
+    """`lambda_` is how Python has to write `lambda`."""
+    return name.removesuffix("_") if keyword.iskeyword(name.removesuffix("_")) else name
+
+
+def _field(parameter: str, law: type[Law]) -> str:
+    """The law's field of a parameter: with the underscore that a word of Python needs."""
+    return parameter if parameter in law.__dataclass_fields__ else f"{parameter}_"

@@ -1,0 +1,7 @@
+"""Periodic solutions, their stability, and the limits that check them."""
+
+from asperity.solve.outcome import Outcome
+from asperity.solve.periodic import periodic_response
+from asperity.solve.response import PeriodicResponse
+
+__all__ = ["Outcome", "PeriodicResponse", "periodic_response"]

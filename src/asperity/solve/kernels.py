@@ -1,0 +1,146 @@
+"""The compiled building blocks of the search: one jitted function per method and shape."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from asperity.solve.collocation import (
+    averaged_orbit,
+    collocation_response,
+    newton_orbit,
+    refined,
+)
+from asperity.solve.fourier import fourier_orbit, fourier_response, fourier_waveform
+from asperity.solve.linear import jacobian_columns
+from asperity.solve.mesh import Orbit, evaluate, split
+
+#: Bounds on an exponent's change per Newton step: bold from a rough guess, since the change of
+#: the slip rate is e to that.
+_LARGEST_CHANGE = 2.0
+_NEWTON_TOLERANCE = 1e-8
+
+
+class Problem(NamedTuple):
+    """Equations and load of many operating points, parameters along the last axis."""
+
+    system: Any
+    load: Any
+
+
+class Reading(NamedTuple):
+    """What every method reads off an orbit, points along the last axis."""
+
+    mean_friction: Array
+    harmonics: Array
+    monodromy: Array
+    log_scale: Array
+    log_determinant: Array
+    growth: Array
+    waveform: Array  # (2, phases, points): F/W0 and ln(v_pl/V)
+
+
+def _points(problem: Problem) -> int:
+    return jax.tree.leaves(problem)[0].shape[-1]
+
+
+@jax.jit
+def stiffness_of_steady_sliding(problem: Problem) -> Array:
+    """Largest rate per radian of a perturbation of steady sliding: small for fast modulation."""
+    system = problem.system
+    steady = jnp.broadcast_to(system.steady(), (system.size, _points(problem)))
+    one, flat = jnp.ones(steady.shape[1:]), jnp.zeros(steady.shape[1:])
+    _, columns = jacobian_columns(lambda Y: system.rates(Y, one, flat), steady)
+    matrix = jnp.moveaxis(jnp.stack(columns, axis=1), -1, 0)
+    return jnp.abs(jnp.linalg.eigvals(matrix)).max(-1)
+
+
+@partial(jax.jit, static_argnames=("nodes", "grading", "harmonics", "phases"))
+def fast_solve(
+    problem: Problem, *, nodes: int, grading: float, harmonics: int, phases: int
+) -> tuple[Reading, Array, Array]:
+    """Fourier collocation: the reading, its error estimate and the number of steps."""
+    system, load = problem
+    points = _points(problem)
+    orbit = fourier_orbit(
+        system, load, points, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
+    )
+    response = fourier_response(
+        system, load, orbit, grading=grading, harmonics=harmonics, max_steps=40
+    )
+    zero = jnp.zeros(points)
+    reading = Reading(
+        response.mean_friction,
+        response.harmonics,
+        response.monodromy,
+        zero,
+        response.log_determinant,
+        zero,
+        fourier_waveform(system, load, orbit, grading=grading, phases=phases),
+    )
+    return reading, response.error, jnp.full(points, orbit.steps)
+
+
+def _read(problem: Problem, orbit: Orbit, harmonics: int, phases: int) -> Reading:
+    system, load = problem
+    response = collocation_response(system, load, orbit, harmonics=harmonics)
+    theta = jnp.asarray(2 * np.pi * np.arange(phases) / max(phases, 1))[:, None]
+    theta = theta * jnp.ones(_points(problem))
+    if phases:
+        Y = orbit.centre[:, None] + evaluate(orbit, theta)[0]
+        w = load.load(theta)
+        waveform = jnp.stack([system.force(Y, w), system.log_slip(Y, w)])
+    else:
+        waveform = jnp.zeros((2, 0, _points(problem)))
+    return Reading(*response, waveform)
+
+
+@partial(jax.jit, static_argnames=("intervals",))
+def first_orbit(problem: Problem, *, intervals: int) -> tuple[Orbit, Array]:
+    """Collocation from the averaged limit."""
+    system, load = problem
+    guess = averaged_orbit(system, load, _points(problem), intervals=intervals, grading=0.5)
+    result = _newton(problem, guess, 30)
+    return result.orbit, result.error
+
+
+@partial(jax.jit, static_argnames=("intervals", "max_steps"))
+def follow_orbit(
+    problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, max_steps: int
+) -> tuple[Orbit, Array]:
+    """Collocation from a neighbouring orbit; the result lies on a mesh made for it."""
+    problem, guess = problem_and_orbit
+    result = _newton(problem, guess, max_steps)
+    return refined(*problem, result.orbit, intervals), result.error
+
+
+@partial(jax.jit, static_argnames=("intervals", "harmonics", "phases"))
+def refine_orbit(
+    problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, harmonics: int, phases: int
+) -> tuple[Orbit, Reading, Array]:
+    """The orbit on an equidistributed mesh of `intervals`, its reading and last Newton change."""
+    problem, guess = problem_and_orbit
+    result = _newton(problem, refined(*problem, guess, intervals), 15)
+    return result.orbit, _read(problem, result.orbit, harmonics, phases), result.error
+
+
+@partial(jax.jit, static_argnames=("parts",))
+def split_reading(problem_and_orbit: tuple[Problem, Orbit], *, parts: int) -> Reading:
+    """Multipliers by transfer maps over parts of the intervals, for stiff but smooth orbits."""
+    problem, orbit = problem_and_orbit
+    return _read(problem, split(orbit, parts), 1, 0)
+
+
+def _newton(problem: Problem, guess: Orbit, max_steps: int):
+    return newton_orbit(
+        *problem,
+        guess,
+        tolerance=_NEWTON_TOLERANCE,
+        max_steps=max_steps,
+        largest_change=_LARGEST_CHANGE,
+    )

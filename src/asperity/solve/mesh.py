@@ -1,0 +1,143 @@
+"""Meshes for collocation: graded start, equidistribution of the error, evaluation between nodes.
+
+A mesh is an array (intervals + 1, points) that rises from 0 to 2 pi for each operating point.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+#: Stages of the Gauss-Legendre collocation: order 8 at the nodes.
+STAGES = 4
+
+#: Share of a mesh that is spread evenly whatever the error estimate says.
+_EVEN_SHARE = 0.3
+
+
+def _gauss_legendre(stages: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes c, matrix a and weights b of the Gauss-Legendre method on [0, 1]."""
+    x, weights = np.polynomial.legendre.leggauss(stages)
+    c = (x + 1) / 2
+    powers = np.arange(1, stages + 1)
+    a = (c[:, None] ** powers / powers) @ np.linalg.inv(np.vander(c, stages, increasing=True))
+    return c, a, weights / 2
+
+
+GAUSS_C, GAUSS_A, GAUSS_B = _gauss_legendre(STAGES)
+_MONOMIALS = np.linalg.inv(np.vander(GAUSS_C, STAGES, increasing=True))
+_TOP_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(2 * GAUSS_C - 1, STAGES - 1))[-1]
+
+
+class Orbit(NamedTuple):
+    """A piecewise polynomial periodic orbit of every operating point.
+
+    Attributes
+    ----------
+    mesh : array, shape (intervals + 1, points)
+    centre : array, shape (size, points)
+        States at theta = 0.
+    nodes : array, shape (size, intervals, points)
+        States at the mesh points less `centre`, so that a small orbit keeps its relative accuracy.
+    slopes : array, shape (size, STAGES, intervals, points)
+        Derivatives at the collocation points.
+    """
+
+    mesh: Array
+    centre: Array
+    nodes: Array
+    slopes: Array
+
+    @property
+    def widths(self) -> Array:
+        """Interval widths, shape (intervals, points)."""
+        return jnp.diff(self.mesh, axis=0)
+
+    @property
+    def stage_phases(self) -> Array:
+        """Phases of the collocation points, shape (STAGES, intervals, points)."""
+        return self.mesh[:-1] + jnp.asarray(GAUSS_C)[:, None, None] * self.widths
+
+    @property
+    def stage_deviations(self) -> Array:
+        """States at the collocation points less `centre`, shape as `slopes`."""
+        return self.nodes[:, None] + self.widths * stage_sums(self.slopes)
+
+
+def stage_sums(slopes: Array) -> Array:
+    """a_jk slopes_k: increments of the states at the stages per unit width."""
+    return jnp.einsum("jk,nkmb->njmb", GAUSS_A, slopes)
+
+
+def graded_mesh(intervals: int, points: int, grading: float) -> Array:
+    """Mesh theta = tau + g sin(tau), finest at the weakest contact theta = pi."""
+    tau = jnp.linspace(0.0, 2 * jnp.pi, intervals + 1)[:, None]
+    return (tau + grading * jnp.sin(tau)) * jnp.ones(points)
+
+
+def evaluate(orbit: Orbit, theta: Array) -> tuple[Array, Array]:
+    """States less `centre`, and slopes, at the phases `theta` of shape (count, points)."""
+    intervals = orbit.mesh.shape[0] - 1
+    find = jax.vmap(lambda mesh, at: jnp.searchsorted(mesh, at, side="right"), (1, 1), 1)
+    index = jnp.clip(find(orbit.mesh, theta) - 1, 0, intervals - 1)
+
+    def pick(a: Array) -> Array:
+        return jnp.take_along_axis(a, index, 0)
+
+    width = pick(orbit.widths)
+    x = (theta - pick(orbit.mesh[:-1])) / width
+    coefficients = jnp.einsum("kj,njmb->nkmb", _MONOMIALS, orbit.slopes)
+    states, slopes = [], []
+    for node, coefficient in zip(orbit.nodes, coefficients, strict=True):
+        picked = [pick(c) for c in coefficient]
+        slopes.append(sum(c * x**k for k, c in enumerate(picked)))
+        rise = sum(c * x ** (k + 1) / (k + 1) for k, c in enumerate(picked))
+        states.append(pick(node) + width * rise)
+    return jnp.stack(states), jnp.stack(slopes)
+
+
+def on_mesh(orbit: Orbit, mesh: Array) -> Orbit:
+    """The same orbit represented on another mesh."""
+    nodes, _ = evaluate(orbit, mesh[:-1])
+    bare = Orbit(mesh, orbit.centre, nodes, orbit.slopes)
+    phases = bare.stage_phases
+    _, slopes = evaluate(orbit, phases.reshape(-1, phases.shape[-1]))
+    return bare._replace(slopes=slopes.reshape(nodes.shape[0], *phases.shape))
+
+
+def split(orbit: Orbit, parts: int) -> Orbit:
+    """Every interval cut into `parts` equal ones."""
+    fraction = jnp.arange(parts)[:, None] / parts
+    inner = orbit.mesh[:-1, None] + fraction * orbit.widths[:, None]
+    inner = inner.reshape(-1, orbit.mesh.shape[1])
+    return on_mesh(orbit, jnp.concatenate([inner, orbit.mesh[-1:]]))
+
+
+def equidistributed(orbit: Orbit, scales: Array, intervals: int) -> Orbit:
+    """The orbit on a mesh that spreads the collocation error evenly.
+
+    Parameters
+    ----------
+    orbit : Orbit
+    scales : array, shape (size, intervals, points)
+        Weight of each state's error.
+    intervals : int
+        Intervals of the new mesh.
+    """
+    widths = orbit.widths
+    top = jnp.einsum("k,nkmb->nmb", _TOP_LEGENDRE, orbit.slopes)
+    local = (jnp.abs(top) * widths * scales).max(0)
+    density = (local + 1e-14) ** (1 / (STAGES + 1)) / widths
+    density = density / (density * widths).sum(0)
+    density = (1 - _EVEN_SHARE) * density + _EVEN_SHARE / (2 * jnp.pi)
+    for _ in range(2):  # neighbouring intervals may differ by a small factor only
+        density = (jnp.roll(density, 1, 0) + 2 * density + jnp.roll(density, -1, 0)) / 4
+    mass = jnp.cumsum(density * widths, axis=0)
+    mass = jnp.concatenate([jnp.zeros_like(mass[:1]), mass]) / mass[-1]
+    share = jnp.linspace(0.0, 1.0, intervals + 1)
+    mesh = jax.vmap(lambda m, t: jnp.interp(share, m, t), (1, 1), 1)(mass, orbit.mesh)
+    return on_mesh(orbit, mesh.at[0].set(0.0).at[-1].set(2 * jnp.pi))

@@ -1,0 +1,47 @@
+"""What became of the solve of an operating point, as data and as a sentence."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Outcome(IntEnum):
+    """Outcome of a periodic solve."""
+
+    CONVERGED = 0
+    NO_ORBIT = 1
+    NOT_RESOLVED = 2
+    MULTIPLIERS_NOT_RESOLVED = 3
+
+
+_SENTENCES = {
+    Outcome.CONVERGED: "converged",
+    Outcome.NO_ORBIT: (
+        "no periodic orbit found: followed from steady sliding the branch stops at "
+        "epsilon = {detail:.4g}, short of the amplitude asked for; lower epsilon, or stiffen the spring"
+    ),
+    Outcome.NOT_RESOLVED: (
+        "an orbit was found but not resolved: refining the mesh still changes it by {detail:.1e} "
+        "relative, above 1e-8"
+    ),
+    Outcome.MULTIPLIERS_NOT_RESOLVED: (
+        "the orbit is resolved but its Floquet multipliers are not: refining the mesh still changes "
+        "them by {detail:.1e} relative, above 1e-8"
+    ),
+}
+
+
+def sentence(outcome: int, detail: float) -> str:
+    """The sentence that a user reads."""
+    return _SENTENCES[Outcome(outcome)].format(detail=detail)
+
+
+def sentences(outcomes: NDArray[np.int_], details: NDArray[np.float64]) -> NDArray[np.object_]:
+    """`sentence` for arrays."""
+    texts = np.full(outcomes.shape, _SENTENCES[Outcome.CONVERGED], dtype=object)
+    for i in map(tuple, np.argwhere(outcomes)):
+        texts[i] = sentence(outcomes[i], details[i])
+    return texts

@@ -1,0 +1,160 @@
+"""The periodic response of a slider to a harmonic modulation of its normal load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import numpy as np
+from jax.typing import ArrayLike
+
+from asperity.errors import InputError
+from asperity.loads import Harmonic
+from asperity.slider import QuasiStatic, Slider
+from asperity.solve.kernels import Problem
+from asperity.solve.response import PeriodicResponse
+from asperity.solve.search import Found, find_orbits
+from asperity.solve.outcome import Outcome
+from asperity.units import to_si
+
+
+def periodic_response(
+    slider: Slider,
+    *,
+    velocity: ArrayLike | str,
+    epsilon: ArrayLike | str,
+    frequency: ArrayLike | str,
+    harmonics: int = 8,
+    waveform: int = 0,
+    progress: Callable[[int], None] | None = None,
+    methods: tuple[str, ...] = ("fourier", "collocation"),
+) -> PeriodicResponse:
+    """Periodic response to W = W0 (1 + eps cos wt), stable or not, without inertia.
+
+    Arrays may stand wherever a number does, the parameters of the slider included; they
+    broadcast as NumPy's do, and every operating point is solved on its own.
+
+    Parameters
+    ----------
+    slider : Slider
+    velocity : array or str
+        Pulling velocity V (m/s), positive.
+    epsilon : array or str
+        Relative amplitude of the load that the contacts carry, 0 <= eps < 1.
+    frequency : array or str
+        Modulation frequency (Hz), positive; not rad/s.
+    harmonics : int
+        Number of harmonics of the force, at least 2.
+    waveform : int
+        Samples of the force and slip rate over the period to keep; 0 for none.
+    progress : callable, optional
+        Called with the number of points finished since the last call.
+    methods : tuple of str
+        Subset of ("fourier", "collocation"): the fast and the robust method. Both, unless they are
+        to be checked against each other.
+
+    Returns
+    -------
+    PeriodicResponse
+        A point that fails says why in `result`; its numbers are NaN and `converged` is False.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or shapes do not broadcast.
+
+    Notes
+    -----
+    Bureau et al. (2000), Eqs. (1), (2), (7), (10) and (33), quasi-static. Where converged,
+    mean, mu1, mu2 and multipliers are good to 1e-8 relative (multipliers of modulus below 1e-12:
+    to 1e-20 absolute).
+    """
+    V = _checked(velocity, "velocity", "velocity")
+    f = _checked(frequency, "frequency", "frequency")
+    eps = checked_epsilon(epsilon)
+    if harmonics < 2:
+        raise InputError(f"harmonics must be at least 2, got {harmonics}; ask for 2 or more")
+    problem = Problem(QuasiStatic(slider, V, 2 * np.pi * f), Harmonic(eps))
+    flat, shape = _flatten(problem)
+    points = int(np.prod(shape, dtype=int))
+    report = progress or (lambda _: None)
+    if slider.law.rate_dependent:
+        found = find_orbits(
+            flat, points, harmonics=harmonics, phases=waveform, progress=report, methods=methods
+        )
+    else:
+        found = _proportional(flat, points, harmonics, waveform)
+        report(points)
+    mu_ss = np.asarray(slider.law.mu_ss(V)) * np.ones(shape)
+    return PeriodicResponse.from_search(found, shape, mu_ss, slider, V, eps, f)
+
+
+def _checked(value: Any, kind: str, name: str) -> np.ndarray:
+    array = np.asarray(to_si(value, kind, name), dtype=float)
+    bad = array[~(array > 0)]
+    if bad.size:
+        unit = {"velocity": "m/s", "frequency": "Hz"}[kind]
+        raise InputError(
+            f"{name} must be positive, got {bad.flat[0]:g} {unit}; give a value above zero"
+        )
+    return array
+
+
+def checked_epsilon(value: Any) -> np.ndarray:
+    """Relative amplitude as an array, 0 <= eps < 1.
+
+    Raises
+    ------
+    InputError
+        Outside that range: contact would be lost.
+    """
+    array = np.asarray(to_si(value, "dimensionless", "epsilon"), dtype=float)
+    bad = array[~((array >= 0) & (array < 1))]
+    if bad.size:
+        raise InputError(
+            f"epsilon must be at least 0 and below 1, so that contact is never lost, "
+            f"got {bad.flat[0]:g}; give the relative amplitude of the load, such as 0.24 or '24 %'"
+        )
+    return array
+
+
+def _flatten(problem: Problem) -> tuple[Problem, tuple[int, ...]]:
+    """Broadcast all parameters against each other and lay the points out along one axis."""
+    leaves = jax.tree.leaves(problem)
+    try:
+        shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
+    except ValueError:
+        shapes = sorted({str(np.shape(leaf)) for leaf in leaves if np.shape(leaf)})
+        raise InputError(
+            f"parameters must have shapes that broadcast, got {', '.join(shapes)}; "
+            "give arrays of one shape, or add axes of length 1"
+        ) from None
+    return (
+        jax.tree.map(lambda a: np.ravel(np.broadcast_to(np.asarray(a, float), shape)), problem),
+        shape,
+    )
+
+
+def _proportional(problem: Problem, points: int, harmonics: int, phases: int) -> Found:
+    """A law without rate dependence: the force follows the load, without dynamics."""
+    system, load = problem
+    count = max(phases, 4 * harmonics)
+
+    def force(samples: int) -> np.ndarray:
+        theta = 2 * np.pi * np.arange(samples)[:, None] / max(samples, 1)
+        w = load.load(theta)
+        state = system.slider.law.steady_state(system.V)
+        return np.asarray(w * system.slider.law.friction(system.V, state, w))
+
+    spectrum = np.fft.rfft(force(count), axis=0) / count
+    wave = np.stack([force(phases), np.zeros((phases, points))])
+    return Found(
+        spectrum[0].real,
+        2 * spectrum[1 : harmonics + 1],
+        np.zeros((0, points), dtype=complex),
+        wave,
+        np.zeros(points, dtype=np.int64),
+        np.full(points, int(Outcome.CONVERGED)),
+        np.zeros(points),
+    )

@@ -1,0 +1,238 @@
+"""Exact first- and second-order response to a small modulation, for any law at any frequency.
+
+Steady sliding Y0 is expanded in the amplitude of w = 1 + eps cos(theta)::
+
+    Y = Y0 + eps Re(Y1 e^{i theta}) + eps^2 [Y20 + Re(Y22 e^{2i theta})] + O(eps^3)
+
+With the rates R(Y, w, dw/dtheta), their Jacobian J in Y at steady sliding, and the first-order
+direction u = (Y1, 1, i) of all three arguments (dw/dtheta = -sin theta = Re(i e^{i theta}))::
+
+    (i - J)  Y1  = R'[0, 1, i]
+       - J   Y20 = R''[u, u*] / 4
+    (2i - J) Y22 = R''[u, u] / 4
+
+R' and R'' are directional derivatives, taken by automatic differentiation, so that nothing here
+depends on the law. The output F/W0 is expanded in the same way. The expansion holds while the slip
+rate is weakly modulated, eps mu / A << 1 (Bureau et al. 2000, Eq. 24), which is far below the
+amplitudes of most experiments.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple, TypeAlias
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.laws.parameter import checked
+from asperity.slider import QuasiStatic, Slider
+from asperity.solve.linear import jacobian_columns, solve_points
+
+#: (Y, w, dw/dtheta): the three arguments of the rates.
+Point: TypeAlias = tuple[Array, Array, Array]
+
+
+class PerturbedHarmonics(NamedTuple):
+    """Response at one amplitude, to the order at which each quantity first appears.
+
+    Attributes
+    ----------
+    delta_mu : array
+        Mean of F/W0 minus its value in steady sliding.
+    mu1, mu2 : array
+        Peak amplitudes of the first and second harmonics of F/W0.
+    phase1, phase2 : array
+        Their phases in (-pi, pi]: F/W0 contains mu_n cos(n theta + phase_n).
+    """
+
+    delta_mu: Array
+    mu1: Array
+    mu2: Array
+    phase1: Array
+    phase2: Array
+
+
+class PerturbationResponse(eqx.Module):
+    """Coefficients of the expansion in eps; the trailing axes are the operating points.
+
+    Attributes
+    ----------
+    transfer : complex array, shape (...)
+        c1 / eps, with F/W0 = mean + sum Re(c_n e^{i n theta}).
+    mean_curvature : array, shape (...)
+        (mean - mu_ss) / eps^2.
+    second_harmonic : complex array, shape (...)
+        c2 / eps^2.
+    eigenvalues : complex array, shape (size, ...)
+        Growth rates of small disturbances of unmodulated sliding (1/s), fastest growing first;
+        empty for a law without rate or state.
+    omega : array, shape (...)
+        Angular frequency of the modulation (rad/s).
+    """
+
+    transfer: Array
+    mean_curvature: Array
+    second_harmonic: Array
+    eigenvalues: Array
+    omega: Array
+
+    @property
+    def eigenvalues_per_radian(self) -> Array:
+        """Growth rates per radian of the modulation, shape (size, ...)."""
+        return self.eigenvalues / self.omega
+
+    @property
+    def multipliers(self) -> Array:
+        """Floquet multipliers in the limit eps -> 0, shape (size, ...)."""
+        return jnp.exp(2 * jnp.pi * self.eigenvalues_per_radian)
+
+    @property
+    def stable(self) -> Array:
+        """Whether unmodulated sliding is stable, shape (...)."""
+        return jnp.all(self.eigenvalues.real < 0, axis=0)
+
+    def at(self, epsilon: ArrayLike) -> PerturbedHarmonics:
+        """Leading-order response at the amplitude `epsilon` (broadcasts with the points)."""
+        c1 = epsilon * self.transfer
+        c2 = jnp.square(epsilon) * self.second_harmonic
+        return PerturbedHarmonics(
+            delta_mu=jnp.square(epsilon) * self.mean_curvature,
+            mu1=jnp.abs(c1),
+            mu2=jnp.abs(c2),
+            phase1=jnp.angle(c1),
+            phase2=jnp.angle(c2),
+        )
+
+
+def perturbation_response(
+    slider: Slider, *, velocity: object, frequency: object
+) -> PerturbationResponse:
+    """First- and second-order response of a slider without inertia.
+
+    Parameters
+    ----------
+    slider : Slider
+        Its parameters may be arrays; they broadcast with the two below.
+    velocity : float, array or str
+        Pulling velocity: SI (m/s), or text with its unit ("1 um/s").
+    frequency : float, array or str
+        Frequency of the modulation: SI (Hz), or text with its unit ("120 Hz").
+
+    Returns
+    -------
+    PerturbationResponse
+
+    Raises
+    ------
+    InputError
+        If the velocity or the frequency is not positive, or has a wrong unit.
+    """
+    V = checked(velocity, name="velocity", kind="velocity", rule="positive")
+    f = checked(frequency, name="frequency", kind="frequency", rule="positive")
+    return perturb(QuasiStatic(slider, V, 2 * jnp.pi * f))
+
+
+def perturb(system: QuasiStatic) -> PerturbationResponse:
+    """First- and second-order response of an equation of motion.
+
+    Parameters
+    ----------
+    system : QuasiStatic
+        Or any module of the same form: arrays as its leaves, `omega`, `slider`, `steady`, `rates`
+        and `force`. The leaves broadcast against each other.
+
+    Returns
+    -------
+    PerturbationResponse
+        With the broadcast shape of the leaves as its trailing axes.
+    """
+    shape = jnp.broadcast_shapes(*(jnp.shape(leaf) for leaf in jax.tree.leaves(system)))
+    # One axis of points: what the linear solver takes, and one compiled shape less to know about.
+    points = jax.tree.map(lambda x: jnp.broadcast_to(jnp.asarray(x, float), shape).ravel(), system)
+    expand = _rate_independent if not system.slider.law.rate_dependent else _expand
+    response = expand(points)
+    return jax.tree.map(lambda leaf: leaf.reshape(leaf.shape[:-1] + shape), response)
+
+
+@eqx.filter_jit
+def _expand(system: QuasiStatic) -> PerturbationResponse:
+    """Solve the three linear problems; every leaf of `system` has shape (points,)."""
+    Y0 = system.steady()
+    one = jnp.ones_like(Y0[0])
+    steady: Point = (Y0, one, jnp.zeros_like(one))
+
+    def rates(point: Point) -> Array:
+        return system.rates(*point)
+
+    def force(point: Point) -> Array:
+        return system.force(point[0], point[1])[None]
+
+    jacobian = jnp.stack(jacobian_columns(lambda Y: rates((Y, *steady[1:])), Y0)[1], axis=1)
+    force_gradient = jnp.stack(jacobian_columns(lambda Y: force((Y, *steady[1:])), Y0)[1])[:, 0]
+    load = (jnp.zeros_like(Y0) + 0j, one + 0j, 1j * one)
+    Y1 = _harmonic_response(jacobian, _first(rates, steady, load), 1)
+    u: Point = (Y1, load[1], load[2])
+
+    mean_forcing, double_forcing = _quadratic(rates, steady, u)
+    mean_force, double_force = _quadratic(force, steady, u)
+    Y20 = solve_points(-jacobian, mean_forcing)
+    Y22 = _harmonic_response(jacobian, double_forcing, 2)
+    return PerturbationResponse(
+        transfer=_first(force, steady, u)[0],
+        mean_curvature=mean_force[0] + (force_gradient * Y20).sum(0),
+        second_harmonic=double_force[0] + (force_gradient * Y22).sum(0),
+        eigenvalues=_eigenvalues(jacobian) * system.omega,
+        omega=jnp.asarray(system.omega),
+    )
+
+
+def _rate_independent(system: QuasiStatic) -> PerturbationResponse:
+    """F = mu0 w: proportional to the load, whatever the spring and the frequency."""
+    omega = jnp.asarray(system.omega)
+    mu = system.slider.law.mu_ss(system.V)
+    return PerturbationResponse(
+        transfer=mu + 0j,
+        mean_curvature=jnp.zeros_like(mu),
+        second_harmonic=jnp.zeros_like(mu) + 0j,
+        eigenvalues=jnp.zeros((0, *omega.shape)) + 0j,
+        omega=omega,
+    )
+
+
+def _harmonic_response(jacobian: Array, forcing: Array, harmonic: int) -> Array:
+    """Solve (i n - J) Y = forcing at every point."""
+    identity = jnp.eye(jacobian.shape[0])[:, :, None]
+    return solve_points(1j * harmonic * identity - jacobian, forcing)
+
+
+def _first(function: Callable[[Point], Array], at: Point, u: Point) -> Array:
+    """Derivative of a real function along the complex direction `u`."""
+    real, imaginary = _parts(u)
+    return jax.jvp(function, (at,), (real,))[1] + 1j * jax.jvp(function, (at,), (imaginary,))[1]
+
+
+def _quadratic(function: Callable[[Point], Array], at: Point, u: Point) -> tuple[Array, Array]:
+    """Mean, and complex amplitude at 2 theta, of (1/2) function''[Re(u e^{i theta}), same]."""
+
+    def second(first: Point, then: Point) -> Array:
+        return jax.jvp(lambda point: jax.jvp(function, (point,), (first,))[1], (at,), (then,))[1]
+
+    a, b = _parts(u)
+    aa, ab, bb = second(a, a), second(a, b), second(b, b)
+    return (aa + bb) / 4, (aa - bb + 2j * ab) / 4
+
+
+def _parts(u: Point) -> tuple[Point, Point]:
+    """Real and imaginary parts of a complex direction."""
+    return tuple(part.real for part in u), tuple(part.imag for part in u)  # type: ignore[return-value]
+
+
+def _eigenvalues(jacobian: Array) -> Array:
+    """Eigenvalues at every point, shape (size, points), by decreasing real part."""
+    values = jnp.linalg.eigvals(jnp.moveaxis(jacobian, -1, 0))
+    order = jnp.argsort(-values.real, axis=-1)
+    return jnp.take_along_axis(values, order, axis=-1).T

@@ -1,0 +1,171 @@
+"""The record of a periodic response."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity._version import __version__
+from asperity.slider import Slider
+from asperity.solve.floquet import from_logs
+from asperity.solve.outcome import Outcome, sentences
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PeriodicResponse:
+    """Periodic response at one or many operating points.
+
+    Convention: w(t) = 1 + eps cos(wt) and F/W0 = mean_friction + sum mu_n cos(n wt + phase_n), with
+    peak amplitudes mu_n = |c_n| and phases arg c_n in (-pi, pi].
+
+    Attributes
+    ----------
+    mean_friction : array, shape (...)
+        Mean of F/W0.
+    delta_mu : array, shape (...)
+        mean_friction - mu_ss(V): negative where modulation lowers friction.
+    mu_ss : array, shape (...)
+        Friction coefficient of unmodulated steady sliding.
+    harmonics : complex array, shape (..., count)
+        c_1, c_2, ...
+    multipliers : complex array, shape (..., states)
+        Floquet multipliers, by falling modulus.
+    log_multipliers : complex array, shape (..., states)
+        ln|m| + i arg m, finite where a multiplier overflows.
+    stable : bool array, shape (...)
+        All multipliers inside the unit circle; False where not converged.
+    converged : bool array, shape (...)
+    iterations : int array, shape (...)
+        Steps of the fast method, or intervals of the mesh of the robust one.
+    outcome : int array, shape (...)
+        `Outcome` of each point.
+    result : str array, shape (...)
+        "converged", or why not.
+    waveform : array, shape (2, ..., samples)
+        F/W0 and ln(v_plastic / V) at the phases `theta`.
+    theta : array, shape (samples,)
+    slider, velocity, epsilon, frequency
+        What was asked, in SI.
+    """
+
+    mean_friction: Float
+    mu_ss: Float
+    harmonics: NDArray[np.complex128]
+    log_multipliers: NDArray[np.complex128]
+    waveform: Float
+    iterations: NDArray[np.int64]
+    outcome: NDArray[np.int64]
+    detail: Float
+    slider: Slider
+    velocity: Float
+    epsilon: Float
+    frequency: Float
+
+    @classmethod
+    def from_search(
+        cls,
+        found: Any,
+        shape: tuple[int, ...],
+        mu_ss: Float,
+        slider: Slider,
+        velocity: Float,
+        epsilon: Float,
+        frequency: Float,
+    ) -> PeriodicResponse:
+        """Lay the results of a search out in the shape of the question."""
+
+        def shaped(a: np.ndarray) -> np.ndarray:
+            return np.moveaxis(a, -1, 0).reshape((*shape, *a.shape[:-1]))
+
+        return cls(
+            mean_friction=shaped(found.mean_friction),
+            mu_ss=mu_ss,
+            harmonics=shaped(found.harmonics),
+            log_multipliers=shaped(found.log_multipliers),
+            waveform=np.stack([shaped(found.waveform[0]), shaped(found.waveform[1])]),
+            iterations=shaped(found.iterations),
+            outcome=shaped(found.outcome),
+            detail=shaped(found.detail),
+            slider=slider,
+            velocity=velocity,
+            epsilon=epsilon,
+            frequency=frequency,
+        )
+
+    @property
+    def delta_mu(self) -> Float:
+        """Change of the mean by the modulation."""
+        return self.mean_friction - self.mu_ss
+
+    @property
+    def mu1(self) -> Float:
+        """Amplitude of the first harmonic over W0."""
+        return np.abs(self.harmonics[..., 0])
+
+    @property
+    def mu2(self) -> Float:
+        """Amplitude of the second harmonic over W0."""
+        return np.abs(self.harmonics[..., 1])
+
+    @property
+    def phase1(self) -> Float:
+        """Phase of the first harmonic against the load (rad)."""
+        return np.angle(self.harmonics[..., 0])
+
+    @property
+    def phase2(self) -> Float:
+        """Phase of the second harmonic against the load's phase (rad)."""
+        return np.angle(self.harmonics[..., 1])
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers; beyond the range of doubles they are inf or 0."""
+        return from_logs(self.log_multipliers)
+
+    @property
+    def floquet_max(self) -> Float:
+        """Largest modulus of the multipliers; 0 for a law without dynamics."""
+        if self.log_multipliers.shape[-1] == 0:
+            return np.zeros(self.mean_friction.shape)
+        with np.errstate(over="ignore"):
+            return np.exp(self.log_multipliers[..., 0].real)
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Whether each point was solved."""
+        return np.asarray(self.outcome == Outcome.CONVERGED)
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether a small perturbation dies out."""
+        with np.errstate(invalid="ignore"):
+            return self.converged & np.asarray(self.floquet_max < 1)
+
+    @property
+    def result(self) -> NDArray[np.object_]:
+        """"converged", or the reason why not, for each point."""
+        return sentences(np.asarray(self.outcome), np.asarray(self.detail))
+
+    @property
+    def theta(self) -> Float:
+        """Phases of the waveform (rad)."""
+        samples = self.waveform.shape[-1]
+        return 2 * np.pi * np.arange(samples) / max(samples, 1)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Version, law, conventions, tolerance and source of the numbers."""
+        law = type(self.slider.law)
+        return {
+            "asperity_version": __version__,
+            "law": law.name,
+            "source": law.source,
+            "equation_of_motion": "quasi-static",
+            "relative_tolerance": 1e-8,
+            "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), w(t) = 1 + eps cos(w t)",
+        }

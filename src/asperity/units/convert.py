@@ -1,0 +1,182 @@
+"""What a user gives to SI, and SI back to text."""
+
+from __future__ import annotations
+
+import math
+import re
+import sys
+from decimal import Decimal
+from typing import Any, overload
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.units.factor import EXACT, normalised, unit_factor
+from asperity.units.kinds import Kind, kind_of
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.])\s*(.*?)\s*", re.S)
+
+
+@overload
+def to_si(value: str, kind: str, name: str, *, require_unit: bool = ...) -> float: ...
+@overload
+def to_si(value: float, kind: str, name: str, *, require_unit: bool = ...) -> float: ...
+@overload
+def to_si(value: Any, kind: str, name: str, *, require_unit: bool = ...) -> Any: ...
+def to_si(value: Any, kind: str, name: str, *, require_unit: bool = False) -> Any:
+    """Convert what a user gave to SI.
+
+    Parameters
+    ----------
+    value : str, number, array or sequence of these
+        A text carries its unit (``"1 um/s"``); a number or an array is taken as SI.
+    kind : str
+        A key of `KINDS`.
+    name : str
+        What messages call the value, as ``<object>.<field>``.
+    require_unit : bool
+        Refuse numbers without a unit too, as the command line and files do. A pure number
+        needs none.
+
+    Returns
+    -------
+    float or array
+        In the SI unit of `kind`. Arrays keep their type and shape; a JAX value under
+        transformation passes through untouched, since it has no value to check yet.
+
+    Raises
+    ------
+    InputError
+        If the value is not a finite number, lacks a unit it needs, or has the wrong one.
+    """
+    spec = kind_of(kind)
+    if isinstance(value, str):
+        return _text_to_si(value, kind, name)
+    if _is_traced(value):
+        return value
+    if getattr(getattr(value, "dtype", None), "kind", None) in ("U", "O"):
+        return to_si(np.asarray(value).tolist(), kind, name, require_unit=require_unit)
+    if isinstance(value, list | tuple):
+        return _stacked([to_si(v, kind, name, require_unit=require_unit) for v in value], name)
+    if require_unit and spec.si:
+        raise InputError(
+            f"{name} must carry a unit, got {_shown(value)}; write it like '{spec.example}'"
+        )
+    return _number_to_si(value, spec, name)
+
+
+def from_si(value: Any, unit: str, kind: str) -> Any:
+    """Express an SI value in another unit.
+
+    Parameters
+    ----------
+    value : float or array
+        In SI.
+    unit : str
+        The unit wanted, such as ``"um/s"``.
+    kind : str
+        A key of `KINDS`.
+
+    Returns
+    -------
+    float or array
+        The number in `unit`; a float is converted exactly in decimal.
+
+    Raises
+    ------
+    InputError
+        If `unit` is not a unit of `kind`.
+    """
+    kind_of(kind)
+    factor = unit_factor(normalised(unit), kind, "unit", unit)
+    if isinstance(value, int | float) and math.isfinite(value):
+        return float(EXACT.divide(Decimal(repr(float(value))), factor))
+    # One rounding instead of two: 10^-n is inexact in binary, 10^n is not.
+    if factor < 1:
+        return value * float(EXACT.divide(Decimal(1), factor))
+    return value / float(factor)
+
+
+def format_si(value: float, kind: str, digits: int = 4) -> str:
+    """Text of an SI value in the unit that reads best, such as ``"0.4 um"`` -> ``"400 nm"``.
+
+    Parameters
+    ----------
+    value : float
+        In the SI unit of `kind`.
+    kind : str
+        A key of `KINDS`.
+    digits : int
+        Significant digits.
+    """
+    spec = kind_of(kind)
+    value = float(value)
+    unit, power = spec.si, 0
+    if value and math.isfinite(value):
+        # The last unit not larger than the value as rounded, so that 0.99999 um reads 1 um.
+        size = abs(float(f"{value:.{digits}g}"))
+        fitting = [rung for rung in spec.ladder if size >= float(f"1e{rung[1]}")]
+        unit, power = fitting[-1] if fitting else spec.ladder[0]
+        value = float(Decimal(repr(value)).scaleb(-power))
+    return f"{value:.{digits}g} {unit}".rstrip()
+
+
+def _is_traced(value: Any) -> bool:
+    # Looked up, not imported: a program that has not loaded JAX has no tracers.
+    jax = sys.modules.get("jax")
+    return jax is not None and isinstance(value, jax.core.Tracer)
+
+
+def _shown(value: Any) -> str:
+    """The value in one line: arrays by their type, everything else as Python writes it."""
+    if np.ndim(value):
+        return f"an array of {np.asarray(value).dtype}"
+    return f"{value!r}" if isinstance(value, int | float | None) else f"a {type(value).__name__}"
+
+
+def _stacked(rows: list[Any], name: str) -> Any:
+    try:
+        return np.array(rows, dtype=float)
+    except ValueError:
+        raise InputError(
+            f"{name} must be a rectangular array, got rows of different lengths; "
+            "give every row the same length"
+        ) from None
+
+
+def _number_to_si(value: Any, spec: Kind, name: str) -> Any:
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf":
+        raise InputError(
+            f"{name} must be {spec.noun}, got {_shown(value)}; "
+            f"give a number in SI or a text like '{spec.example}'"
+        )
+    bad = array[~np.isfinite(array)]
+    if bad.size:
+        raise InputError(
+            f"{name} must be finite, got {bad.flat[0]} {spec.si}".rstrip()
+            + f"; give a value like '{spec.example}'"
+        )
+    if array.ndim == 0 and isinstance(value, int | float | np.generic):
+        return float(value)
+    return value if array.dtype == float else value.astype(float)
+
+
+def _text_to_si(text: str, kind: str, name: str) -> float:
+    spec = kind_of(kind)
+    match = _NUMBER.fullmatch(text)
+    if match is None:
+        raise InputError(
+            f"{name} must be a finite number{' with a unit' if spec.si else ''}, got '{text}'; "
+            f"write it like '{spec.example}'"
+        )
+    number, unit = Decimal(match[1]), normalised(match[2])
+    if spec.si and not unit:
+        raise InputError(f"{name} must carry a unit, got '{text}'; write it like '{spec.example}'")
+    value = float(EXACT.multiply(number, unit_factor(unit, kind, name, text)))
+    if math.isinf(value) or (value == 0 and number != 0):
+        raise InputError(
+            f"{name} must lie within the range of double precision, got '{text}'; "
+            f"write it like '{spec.example}'"
+        )
+    return value

@@ -1,0 +1,395 @@
+"""Identities that every registered law obeys, and mutated laws that must be caught by them."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from jax.test_util import check_grads
+
+from asperity.laws import (
+    ElastoPlastic,
+    Law,
+    LinkerDieterich,
+    RiceRuina,
+    StrengthArea,
+    get_law,
+    registered,
+    registry,
+)
+from asperity.slider import QuasiStatic, Slider
+from asperity.solve.perturbation import perturb
+
+#: Round-off, with room for the cancellation of terms some 1e3 times the result.
+EXACT = 1e-12
+
+RATE_AND_STATE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 3e-6}
+
+#: Exponents of (length, time, force) in the parameters that have a unit.
+DIMENSIONS = {"D0": (1, 0, 0), "V0": (1, -1, 0), "lambda_": (1, 0, 0)}
+
+
+@dataclasses.dataclass(frozen=True)
+class Example:
+    """Parameters of a law, and what its published equations say of it.
+
+    slope: d mu_ss / d ln v; limits: the law it becomes when a parameter vanishes; load_step: F/W
+    changes by -load_step ln(W_after/W_before) when W jumps at constant v; age_velocity: the
+    velocity that the state sees.
+    """
+
+    parameters: Mapping[str, float]
+    slope: Callable[[Mapping[str, float], float], float] = lambda p, v: p["A"] - p["B"]
+    limits: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    load_step: float = 0.0
+    age_velocity: str | None = "slider"
+    invertible: bool = True
+
+    def law(self, kind: type[Law], **changes: float) -> Law:
+        return kind(**{**self.parameters, **changes})
+
+
+def product_slope(p: Mapping[str, float], v: float) -> float:
+    """Derivative of mu0 (1 + eta L)(1 - m L), L = ln(v/V0): Eqs. (4) and (5) at Phi = D0/v."""
+    eta, m, log = p["A"] / p["mu0"], p["B"] / p["mu0"], np.log(v / p["V0"])
+    return p["mu0"] * (eta * (1 - m * log) - m * (1 + eta * log))
+
+
+EXAMPLES = {
+    "amontons": Example({"mu0": 0.5}, slope=lambda p, v: 0.0, age_velocity=None, invertible=False),
+    "rice-ruina": Example(RATE_AND_STATE),
+    "linker-dieterich": Example(
+        {**RATE_AND_STATE, "alpha": 0.2}, limits={"alpha": "rice-ruina"}, load_step=0.2
+    ),
+    "elasto-plastic": Example(
+        {**RATE_AND_STATE, "lambda_": 7e-7}, limits={"lambda_": "rice-ruina"}
+    ),
+    "elasto-plastic-age": Example(
+        {**RATE_AND_STATE, "lambda_": 7e-7},
+        limits={"lambda_": "rice-ruina"},
+        age_velocity="plastic",
+    ),
+    "strength-area": Example(RATE_AND_STATE, slope=product_slope),
+}
+
+ALL = sorted(EXAMPLES)
+INVERTIBLE = [name for name in ALL if EXAMPLES[name].invertible]
+
+SPEEDS = jnp.array([1e-9, 1e-6, 2e-5, 1e-3])
+
+
+def sample(law: Law, seed: int = 0) -> tuple[jax.Array, tuple[jax.Array, ...], jax.Array]:
+    """Velocities, states near steady sliding and loads at which an identity is tried."""
+    rng = np.random.default_rng(seed)
+    v = SPEEDS * rng.uniform(0.5, 2.0, SPEEDS.shape)
+    state = tuple(s + rng.normal(0, 0.5, SPEEDS.shape) for s in law.steady_state(v))
+    return v, state, jnp.asarray(rng.uniform(0.3, 1.7, SPEEDS.shape))
+
+
+def quasi_static(law: Law) -> QuasiStatic:
+    return QuasiStatic(Slider(law, spring=2e5, load=7.0), V=SPEEDS, omega=2 * jnp.pi * 120.0)
+
+
+def motion(system: QuasiStatic, seed: int = 0) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Y, w and dw/dtheta away from steady sliding."""
+    rng = np.random.default_rng(seed)
+    Y = system.steady() * (1 + 0.01 * rng.normal(size=(system.size, *SPEEDS.shape)))
+    w, slope = rng.uniform(0.95, 1.05, SPEEDS.shape), rng.uniform(-0.1, 0.1, SPEEDS.shape)
+    return Y, jnp.asarray(w), jnp.asarray(slope)
+
+
+# The identities. Each raises AssertionError where a law breaks it.
+
+
+def check_steady_state(law: Law, example: Example) -> None:
+    """Steady sliding is a zero of the rates, at every velocity."""
+    one = jnp.ones_like(SPEEDS)
+    steady = law.steady_state(SPEEDS)
+    assert len(steady) == len(law.state_names)
+    for rest, faster in zip(
+        law.state_rate(SPEEDS, SPEEDS, steady, one),
+        law.state_rate(2 * SPEEDS, 2 * SPEEDS, steady, one),
+        strict=True,
+    ):
+        assert np.all(np.abs(rest) <= EXACT * np.abs(faster))
+    np.testing.assert_allclose(law.friction(SPEEDS, steady, one), law.mu_ss(SPEEDS), rtol=EXACT)
+
+
+def check_slope(law: Law, example: Example) -> None:
+    """mu_ss = mu0 at V0, with the published dependence on velocity."""
+    for v in SPEEDS:
+        slope = jax.grad(lambda log_v: law.mu_ss(jnp.exp(log_v)))(jnp.log(v))
+        expected = example.slope(example.parameters, float(v))
+        np.testing.assert_allclose(slope, expected, rtol=1e-10, atol=EXACT)
+    reference = example.parameters.get("V0", 1e-6)
+    np.testing.assert_allclose(law.mu_ss(reference), example.parameters["mu0"], rtol=EXACT)
+
+
+def check_inverse(law: Law, example: Example) -> None:
+    """log_velocity inverts friction, and agrees with Newton's method on the friction itself."""
+    v, state, w = sample(law)
+    friction = law.friction(v, state, w)
+    for inverse in (law.log_velocity, lambda *a: Law.log_velocity(law, *a)):
+        np.testing.assert_allclose(inverse(friction, state, w), jnp.log(v), rtol=0, atol=1e-11)
+
+
+def check_load_step(law: Law, example: Example) -> None:
+    """A step of the load at constant velocity and continuous state changes F/W by -alpha ln."""
+    v, state, w = sample(law)
+    change = law.friction(v, state, 1.3 * w) - law.friction(v, state, w)
+    np.testing.assert_allclose(change, -example.load_step * np.log(1.3), rtol=1e-11, atol=EXACT)
+
+
+def check_age_velocity(law: Law, example: Example) -> None:
+    """The states see the velocity that the law's text names, and only that one."""
+    v, state, w = sample(law)
+    rates = law.state_rate(v, v, state, w)
+    for rate, other, same in zip(
+        rates,
+        law.state_rate(2 * v, v, state, w),
+        law.state_rate(v, 2 * v, state, w),
+        strict=True,
+    ):
+        idle, driven = (same, other) if example.age_velocity == "slider" else (other, same)
+        np.testing.assert_array_equal(idle, rate)
+        assert np.all(driven != rate)
+
+
+def check_limits(law: Law, example: Example) -> None:
+    """A vanishing parameter turns the law into the one it extends, continuously."""
+    for parameter, name in example.limits.items():
+        shared = {k: v for k, v in example.parameters.items() if k != parameter}
+        limit = quasi_static(get_law(name)(**shared))
+        where = motion(limit)
+        for value, rtol in ((0.0, EXACT), (1e-12 * example.parameters[parameter], 1e-6)):
+            system = quasi_static(example.law(type(law), **{parameter: value}))
+            np.testing.assert_allclose(system.rates(*where), limit.rates(*where), rtol=rtol)
+
+
+def check_no_memory(law: Law, example: Example) -> None:
+    """B -> 0: friction forgets the age and keeps the direct effect."""
+    p = example.parameters
+    tiny = {"B": 1e-200} | ({"alpha": 0.0} if "alpha" in p else {})
+    v, state, w = sample(law)
+    friction = example.law(type(law), **tiny).friction(v, state, w)
+    np.testing.assert_allclose(friction, p["mu0"] + p["A"] * np.log(v / p["V0"]), rtol=EXACT)
+
+
+def check_derivatives(law: Law, example: Example) -> None:
+    """First and second derivatives of friction and rates against finite differences."""
+    v, state, w = (jax.tree.map(lambda x: x[1], part) for part in sample(law))
+    kind = type(law)
+
+    def friction(parameters: dict[str, float], log_v, state, w):
+        return kind(**parameters).friction(jnp.exp(log_v), state, w)
+
+    def ageing(log_v, state, w):
+        return law.state_rate(jnp.exp(log_v), jnp.exp(log_v), state, w)
+
+    free = {k: v for k, v in example.parameters.items() if k not in DIMENSIONS}
+    fixed = {k: v for k, v in example.parameters.items() if k in DIMENSIONS}
+    options = {"order": 2, "modes": ["fwd", "rev"], "rtol": 1e-5, "atol": 1e-6, "eps": 1e-4}
+    args = (jnp.log(v), state, w)
+    check_grads(lambda p, *a: friction({**p, **fixed}, *a), (free, *args), **options)
+    if law.state_names:
+        check_grads(ageing, args, **options)
+
+
+def check_units(law: Law, example: Example) -> None:
+    """The dimensionless motion does not depend on the units of length, time and force."""
+    units = (1e6, 60.0, 1e-3)
+
+    def convert(value, dimensions: tuple[int, int, int]):
+        return value * np.prod([u**d for u, d in zip(units, dimensions, strict=True)])
+
+    scaled = {k: convert(v, DIMENSIONS.get(k, (0, 0, 0))) for k, v in example.parameters.items()}
+    system = quasi_static(law)
+    other = QuasiStatic(
+        Slider(type(law)(**scaled), spring=convert(2e5, (-1, 0, 1)), load=convert(7.0, (0, 0, 1))),
+        V=convert(SPEEDS, (1, -1, 0)),
+        omega=convert(system.omega, (0, -1, 0)),
+    )
+    where = motion(system)
+    np.testing.assert_allclose(other.steady(), system.steady(), rtol=EXACT)
+    np.testing.assert_allclose(other.force(*where[:2]), system.force(*where[:2]), rtol=EXACT)
+    if example.invertible:
+        # Exponents of some tens multiply round-off.
+        np.testing.assert_allclose(other.rates(*where), system.rates(*where), rtol=1e-9)
+    here, there = perturb(system), perturb(other)
+    np.testing.assert_allclose(there.transfer, here.transfer, rtol=1e-9)
+    np.testing.assert_allclose(there.mean_curvature, here.mean_curvature, rtol=1e-9)
+
+
+def check_kinematics(system: QuasiStatic) -> None:
+    """Spring and asperities in series: v = V - (dF/dt)/K, v_plastic = v - lambda d(F/W)/dt."""
+    law, omega = system.slider.law, system.omega
+    Y, w, slope = motion(system)
+    rates = system.rates(Y, w, slope)
+
+    def along(function):
+        return jax.jvp(function, (Y, w), (rates, slope))[1]
+
+    v = system.V * (1 - along(system.force) / system.kappa)
+    strain_rate = law.elastic_length * omega * along(lambda Y, w: system.force(Y, w) / w)
+    plastic = v - strain_rate
+    # What is left of V after subtracting the stretching of springs: cancellation of some 1e3.
+    np.testing.assert_allclose(
+        plastic / system.V, jnp.exp(system.log_slip(Y, w)), rtol=1e-9, atol=1e-10
+    )
+    expected = [r / omega for r in law.state_rate(v, plastic, tuple(Y[1:]), w)]
+    scale = np.abs(np.asarray(rates[1:])).max(0, initial=0)
+    np.testing.assert_allclose(rates[1:] / scale, np.stack(expected) / scale, rtol=0, atol=1e-8)
+
+
+GENERAL = [check_steady_state, check_slope, check_load_step, check_derivatives, check_units]
+RATE_DEPENDENT = [check_inverse, check_age_velocity, check_no_memory, check_limits]
+
+
+@pytest.mark.parametrize("name", ALL)
+@pytest.mark.parametrize("check", GENERAL)
+def test_every_law(check, name):
+    check(EXAMPLES[name].law(get_law(name)), EXAMPLES[name])
+
+
+@pytest.mark.parametrize("name", INVERTIBLE)
+@pytest.mark.parametrize("check", RATE_DEPENDENT)
+def test_every_rate_dependent_law(check, name):
+    check(EXAMPLES[name].law(get_law(name)), EXAMPLES[name])
+
+
+@pytest.mark.parametrize("name", INVERTIBLE)
+def test_kinematics(name):
+    check_kinematics(quasi_static(EXAMPLES[name].law(get_law(name))))
+
+
+def test_the_null_model_is_amontons():
+    v, state, w = sample(law := get_law("amontons")(mu0=0.5))
+    np.testing.assert_array_equal(law.friction(v, state, w), np.full(SPEEDS.shape, 0.5))
+
+
+def without_example(laws: Mapping[str, type[Law]]) -> set[str]:
+    """Laws of the package that the suite has no parameters for."""
+    return {name for name, law in laws.items() if law.__module__.startswith("asperity.")} - set(
+        EXAMPLES
+    )
+
+
+def test_every_registered_law_has_an_example():
+    assert without_example(registered()) == set()
+    assert set(EXAMPLES) <= set(registered())
+
+
+def test_a_law_without_an_example_is_noticed(monkeypatch):
+    monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
+
+    class Forgotten(RiceRuina):
+        name = "forgotten"
+
+    Forgotten.__module__ = "asperity.laws.forgotten"
+    registry.register(Forgotten)
+    assert without_example(registered()) == {"forgotten"}
+
+
+# Planted mistakes: each is one that has been made somewhere, and the identity that must catch it.
+
+
+class ProductTermDropped(StrengthArea):
+    friction = RiceRuina.friction
+
+
+class AlphaNotOverB(LinkerDieterich):
+    def log_age(self, state, w):
+        return state[0] - self.alpha * jnp.log(w)
+
+
+class LoadRateForgotten(LinkerDieterich):
+    def log_age(self, state, w):
+        return state[0]
+
+
+class AgeOnTheWrongVelocity(ElastoPlastic):
+    def state_rate(self, v, v_plastic, state, w):
+        return (self.ageing(v_plastic, state, w),)
+
+
+class StrengtheningSign(RiceRuina):
+    def friction(self, v, state, w):
+        return self.mu0 + self.A * jnp.log(v / self.V0) - self.B * self.log_age(state, w)
+
+
+class AgeUpsideDown(RiceRuina):
+    def steady_state(self, v):
+        return (jnp.log(v / self.V0),)
+
+
+class InverseOfAnotherLaw(RiceRuina):
+    def log_velocity(self, friction, state, w):
+        return jnp.log(self.V0) + (friction - self.mu0) / self.A - self.log_age(state, w)
+
+
+class NumberWithHiddenUnit(RiceRuina):
+    def ageing(self, v, state, w):
+        return (v * jnp.exp(-self.log_age(state, w) - jnp.log(v / self.V0)) - v) / 4e-7
+
+
+class LimitMissed(ElastoPlastic):
+    @property
+    def elastic_length(self):
+        return self.lambda_ + 1e-8
+
+
+class WrongDerivative(RiceRuina):
+    def friction(self, v, state, w):
+        value = super().friction(v, state, w)
+        return value + 0.1 * (state[0] - jax.lax.stop_gradient(state[0]))
+
+
+class AgeRemembered(RiceRuina):
+    def log_age(self, state, w):
+        return state[0] * (1 + self.A / self.B)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "name", "check"),
+    [
+        (ProductTermDropped, "strength-area", check_slope),
+        (AlphaNotOverB, "linker-dieterich", check_load_step),
+        (LoadRateForgotten, "linker-dieterich", check_load_step),
+        (AgeOnTheWrongVelocity, "elasto-plastic", check_age_velocity),
+        (StrengtheningSign, "rice-ruina", check_slope),
+        (AgeUpsideDown, "rice-ruina", check_steady_state),
+        (InverseOfAnotherLaw, "rice-ruina", check_inverse),
+        (NumberWithHiddenUnit, "rice-ruina", check_units),
+        (LimitMissed, "elasto-plastic", check_limits),
+        (WrongDerivative, "rice-ruina", check_derivatives),
+        (AgeRemembered, "rice-ruina", check_no_memory),
+    ],
+)
+def test_planted_mistake_is_caught(mistake, name, check):
+    law = EXAMPLES[name].law(mistake)
+    check(EXAMPLES[name].law(get_law(name)), EXAMPLES[name])
+    with pytest.raises(AssertionError):
+        check(law, EXAMPLES[name])
+
+
+class LoadRateDropped(QuasiStatic):
+    def rates(self, Y, w, w_slope):
+        return super().rates(Y, w, jnp.zeros_like(w_slope))
+
+
+class CompliancesSwapped(QuasiStatic):
+    def force(self, Y, w):
+        return Y[0] / (1 + self.compliance_ratio)
+
+
+@pytest.mark.parametrize("mistake", [LoadRateDropped, CompliancesSwapped])
+def test_planted_mistake_in_the_kinematics_is_caught(mistake):
+    law = EXAMPLES["elasto-plastic"].law(get_law("elasto-plastic"))
+    right = quasi_static(law)
+    wrong = mistake(right.slider, right.V, right.omega)
+    assert isinstance(wrong, eqx.Module)
+    with pytest.raises(AssertionError):
+        check_kinematics(wrong)

@@ -1,0 +1,230 @@
+"""Imports point one way, modules stay small, and nothing of one machine is left in a file."""
+
+import ast
+import re
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "src" / "asperity"
+
+#: What every room may use.
+_BASE = {"_jax", "_version", "errors", "units"}
+_EQUATIONS = _BASE | {"laws", "loads"}
+_RESULTS = _EQUATIONS | {"air", "materials", "slider", "solve", "instrument", "inference"}
+
+#: The rooms, and what each may import besides itself: the one place where the order is written.
+MAY_IMPORT: dict[str, set[str]] = {
+    "_version": set(),
+    "_jax": set(),
+    "errors": set(),
+    "units": {"errors"},
+    "laws": _BASE,  # knows no springs, no loads, no numbers of any paper
+    "loads": _BASE,  # knows no laws
+    "air": _BASE,  # knows no friction
+    "materials": _BASE | {"laws"},  # knows no solvers
+    "slider": _EQUATIONS,
+    "solve": _EQUATIONS | {"slider"},  # knows no instruments, no files
+    "instrument": _BASE | {"loads"},  # is handed a trajectory: knows no laws, no solvers
+    "inference": _EQUATIONS | {"materials", "slider", "solve", "instrument"},
+    "study": _RESULTS,
+    "figures": _BASE | {"study"},  # turns numbers into pictures, solves nothing
+    "cli": _RESULTS | {"study", "figures"},
+    "app": _RESULTS | {"study", "figures"},
+    "__main__": {"cli"},
+    # The package itself names its rooms as text, and imports them when they are asked for.
+    "__init__": {"_version"},
+}
+
+MOST_LINES = 300
+
+# Put together here, so that this file does not hold what it looks for.
+_HOSTS = ["pypi" + ".org", "files.python" + "hosted", "test.pypi" + ".org"]
+_FORBIDDEN = re.compile(
+    "|".join(
+        [
+            *map(re.escape, _HOSTS),
+            # An absolute path of the machine that a file was written on.
+            r"(?<![\w.$})-])/(?:root|work|home/\w+|Users/\w+)/",
+            r"--(?:extra-)?index-url[ =]",
+            r"--find-links[ =]",
+        ]
+    )
+)
+_TEXT = {".py", ".md", ".toml", ".txt", ".in", ".cff", ".bib", ".rst", ".yml", ".yaml", ".css"}
+_TEXT_NAMES = {"Makefile", "LICENSE", "run", ".gitignore"}
+
+
+def room_of(module: Path, package: Path = PACKAGE) -> str:
+    """The room a module lies in: the first part of its path inside the package."""
+    return module.relative_to(package).parts[0].removesuffix(".py")
+
+
+def imported_rooms(source: str) -> Iterator[tuple[str, int]]:
+    """Rooms that a module imports, with the line; imports inside functions count."""
+    for node in _running(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
+            whole = node.module == "asperity"
+            names = [f"asperity.{a.name}" for a in node.names] if whole else [node.module]
+        elif isinstance(node, ast.ImportFrom) and node.level > 0:
+            # Relative imports hide the direction.
+            names = ["asperity.relative-import"]
+        else:
+            continue
+        for name in names:
+            head, *rest = name.split(".")
+            if head == "asperity":
+                yield (rest[0] if rest else "__init__"), node.lineno
+
+
+def _running(node: ast.AST) -> Iterator[ast.AST]:
+    """Nodes that run: what only a type checker reads loads nothing."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+            yield from (n for other in child.orelse for n in (other, *_running(other)))
+        else:
+            yield child
+            yield from _running(child)
+
+
+def wrong_imports(package: Path) -> list[str]:
+    """Every import against the order, as ``file:line: room -> room``."""
+    found = []
+    for module in sorted(package.rglob("*.py")):
+        room = room_of(module, package)
+        for target, line in imported_rooms(module.read_text(encoding="utf-8")):
+            if target != room and target not in MAY_IMPORT.get(room, set()):
+                found.append(f"{module.relative_to(package)}:{line}: {room} -> {target}")
+    return found
+
+
+def repository_files() -> list[Path]:
+    """Text files that are, or would be, part of the repository."""
+    if shutil.which("git") and (ROOT / ".git").exists():
+        listed = subprocess.run(
+            ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"],
+            cwd=ROOT,
+            check=True,
+            capture_output=True,
+            text=True,
+        ).stdout.split("\0")
+        files = [ROOT / name for name in listed if name]
+    else:
+        files = [
+            f
+            for top in ("src", "tests", "docs", "examples", "benchmarks", "requirements")
+            for f in (ROOT / top).rglob("*")
+        ] + list(ROOT.glob("*"))
+    return [f for f in files if f.is_file() and (f.suffix in _TEXT or f.name in _TEXT_NAMES)]
+
+
+def test_imports_point_one_way() -> None:
+    assert wrong_imports(PACKAGE) == []
+
+
+def test_every_room_has_its_place_in_the_order() -> None:
+    rooms = {room_of(module) for module in PACKAGE.rglob("*.py")}
+    assert rooms <= set(MAY_IMPORT)
+    assert {"errors", "units", "laws", "materials"} <= rooms
+
+
+def test_the_order_has_no_cycle() -> None:
+    rest = {room: set(allowed) for room, allowed in MAY_IMPORT.items()}
+    while rest:
+        leaves = [room for room, allowed in rest.items() if not allowed & set(rest)]
+        assert leaves, f"a cycle among {sorted(rest)}"
+        for room in leaves:
+            del rest[room]
+
+
+@pytest.mark.parametrize(
+    ("room", "line", "target"),
+    [
+        ("laws", "from asperity.slider import Slider", "slider"),
+        ("laws", "import asperity.materials.loader", "materials"),
+        ("laws", "from asperity import solve", "solve"),
+        ("loads", "def f():\n    from asperity.laws import get_law", "laws"),
+        ("air", "from asperity.laws.law import Law", "laws"),
+        ("materials", "import numpy, asperity.solve", "solve"),
+        (
+            "figures",
+            "try:\n    from asperity.solve import x\nexcept ImportError:\n    x = 1",
+            "solve",
+        ),
+        ("units", "import asperity", "__init__"),
+        ("errors", "from .units import to_si", "relative-import"),
+        ("cli", "from asperity.app import serve", "app"),
+        ("utils", "from asperity.errors import InputError", "errors"),
+    ],
+)
+def test_a_planted_wrong_import_is_caught(
+    tmp_path: Path, room: str, line: str, target: str
+) -> None:
+    (tmp_path / room).mkdir()
+    (tmp_path / room / "planted.py").write_text(line, encoding="utf-8")
+    (found,) = wrong_imports(tmp_path)
+    assert found.endswith(f"{room} -> {target}")
+
+
+def test_right_imports_pass(tmp_path: Path) -> None:
+    (tmp_path / "solve").mkdir()
+    (tmp_path / "solve" / "right.py").write_text(
+        "from typing import TYPE_CHECKING\nimport numpy\nfrom asperity.slider import Slider\n"
+        "from asperity.solve.other import y\n"
+        "if TYPE_CHECKING:\n    from asperity.study import z\n",
+        encoding="utf-8",
+    )
+    assert wrong_imports(tmp_path) == []
+
+
+def test_modules_are_small() -> None:
+    long = {
+        str(module.relative_to(PACKAGE)): lines
+        for module in PACKAGE.rglob("*.py")
+        if (lines := len(module.read_text(encoding="utf-8").splitlines())) > MOST_LINES
+    }
+    assert long == {}
+
+
+def test_no_file_names_a_registry_or_a_machine() -> None:
+    files = repository_files()
+    assert ROOT / "pyproject.toml" in files
+    assert ROOT / "requirements" / "run.txt" in files
+    found = [
+        f"{f.relative_to(ROOT)}: {match[0]}"
+        for f in files
+        if (match := _FORBIDDEN.search(f.read_text(encoding="utf-8")))
+    ]
+    assert found == []
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "https://" + "pypi" + ".org/simple",
+        "see /" + "root/venv/bin",
+        'path = "/' + 'work/main"',
+        "file:///" + "home/someone/x",
+        "--extra-index" + "-url x",
+    ],
+)
+def test_planted_machine_details_are_caught(text: str) -> None:
+    assert _FORBIDDEN.search(text)
+
+
+def test_ordinary_paths_are_not_taken_for_machine_details() -> None:
+    assert not _FORBIDDEN.search("src/work/main.py, $HOME/work/ and ./root/x")
+
+
+def test_every_locked_requirement_is_hashed() -> None:
+    for lock in sorted((ROOT / "requirements").glob("*.txt")):
+        text = lock.read_text(encoding="utf-8").replace("\\\n", " ")
+        pins = [line for line in text.splitlines() if line and not line.lstrip().startswith("#")]
+        assert pins, lock.name
+        assert [p for p in pins if "--hash=sha256:" not in p or "==" not in p] == [], lock.name
