@@ -7,7 +7,9 @@ and the periodic solution found by Newton's method on the end point.
 """
 
 import dataclasses
+import itertools
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -107,7 +109,7 @@ def one_period(p: Printed, start: np.ndarray, epsilon: float) -> np.ndarray:
     times = np.linspace(0, 1 / p.frequency, SAMPLES + 1)
     states = [start]
     # Restarted at every sample: dense output is of lower order than the method.
-    for begin, end in zip(times, times[1:], strict=False):
+    for begin, end in itertools.pairwise(times):
         run = solve_ivp(
             p.rates,
             (begin, end),
@@ -152,15 +154,14 @@ def expansion(p: Printed, epsilon: float = 1e-3) -> np.ndarray:
     return (4 * scaled(epsilon / 2) - scaled(epsilon)) / 3
 
 
-@dataclasses.dataclass(frozen=True)
-class Reference:
+class Reference(NamedTuple):
     """What tests use of this file."""
 
-    Printed: type[Printed] = Printed
-    expansion: Callable[..., np.ndarray] = staticmethod(expansion)
-    periodic_response: Callable[..., np.ndarray] = staticmethod(periodic_response)
+    Printed: type[Printed]
+    expansion: Callable[..., np.ndarray]
+    periodic_response: Callable[..., np.ndarray]
 
 
 @pytest.fixture(scope="session")
 def reference() -> Reference:
-    return Reference()
+    return Reference(Printed, expansion, periodic_response)

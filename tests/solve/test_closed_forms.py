@@ -1,4 +1,4 @@
-"""The formulas of section III, printed and derived, against an integration and against each other."""
+"""The formulas of section III, printed and derived, against an integration and each other."""
 
 import numpy as np
 import pytest
@@ -127,6 +127,18 @@ def test_numbers_of_the_paper():
     np.testing.assert_allclose(cf.critical_pulsation(p), 25.0, rtol=1e-12)
     np.testing.assert_allclose(cf.inertial_pulsation(p), 353.553, rtol=1e-5)
     np.testing.assert_allclose(cf.velocity_modulation(p, 1.0), 38.4615, rtol=1e-5)
+
+
+def test_inertia_is_negligible_where_the_text_says_so():
+    """|Delta| = omega^2 A W0/V within 2 % at 10 um/s; at 100 um/s, also used, off by half."""
+    p = central(V=np.array([1e-5, 1e-4]), M=1.6)
+    ratio = p.omega**2 * p.A * p.W0 / p.V / np.abs(cf.determinant(p))
+    # The correction M omega V/(A W0) is in quadrature; terms of V/(omega D0) remain.
+    inertia = p.M * p.omega * p.V / (p.A * p.W0)
+    np.testing.assert_allclose(inertia, [0.1326, 1.326], rtol=1e-3)
+    np.testing.assert_allclose(ratio[0], 1 / np.hypot(1, inertia[0]), rtol=0.01)
+    assert abs(ratio[0] - 1) < 0.02
+    assert abs(ratio[1] - 1) > 0.4
 
 
 def test_age_to_velocity_ratio():

@@ -108,12 +108,39 @@ def test_sliding_loses_stability_at_the_critical_stiffness(name):
     response = perturb(QuasiStatic(Slider(law, spring=stiffness, load=W0), 1e-6, 1.0))
     assert response.stable.tolist()[::2] == [False, True]
     scale = critical_pulsation(p)
-    assert abs(response.eigenvalues[0, 1].real) < 1e-12 * scale
+    assert abs(response.eigenvalues[1, 0].real) < 1e-12 * scale
     # Multipliers are those of one period of 2 pi s.
-    np.testing.assert_allclose(np.abs(response.multipliers[0, 1]), 1.0, rtol=1e-10)
+    np.testing.assert_allclose(np.abs(response.multipliers[1, 0]), 1.0, rtol=1e-10)
     if name == "rice-ruina":
         np.testing.assert_allclose(critical, critical_stiffness(p), rtol=1e-14)
-        np.testing.assert_allclose(abs(response.eigenvalues[0, 1].imag), scale, rtol=1e-7)
+        np.testing.assert_allclose(abs(response.eigenvalues[1, 0].imag), scale, rtol=1e-7)
+
+
+class TwoAges(RiceRuina):
+    """Rice-Ruina friction with its age counted twice, each copy with half of B."""
+
+    state_names = ("first", "second")
+
+    def log_age(self, state, w):
+        return (state[0] + state[1]) / 2
+
+    def state_rate(self, v, v_plastic, state, w):
+        return tuple(self.V0 / self.D0 * jnp.exp(-s) - v / self.D0 for s in state)
+
+    def steady_state(self, v):
+        return 2 * super().steady_state(v)
+
+
+def test_a_law_with_more_states_than_two():
+    point = {"velocity": np.array([1e-6, 1e-5]), "frequency": 7.0}
+    two = perturbation_response(Slider(TwoAges(**BASE), spring=K, load=W0), **point)
+    one = perturbation_response(Slider(RiceRuina(**BASE), spring=K, load=W0), **point)
+    np.testing.assert_allclose(coefficients(two), coefficients(one), rtol=1e-10)
+    # The difference of the copies relaxes at the rate V/D0 on its own.
+    relaxation = -point["velocity"] / BASE["D0"]
+    assert two.eigenvalues.shape == (2, 3)
+    np.testing.assert_allclose(two.eigenvalues[:, 2], relaxation, rtol=1e-10)
+    np.testing.assert_allclose(two.eigenvalues[:, :2], one.eigenvalues, rtol=1e-10)
 
 
 def test_amontons_follows_the_load():
@@ -124,19 +151,21 @@ def test_amontons_follows_the_load():
     np.testing.assert_array_equal(at.mu1, [0.05, 0.05])
     for silent in (at.delta_mu, at.mu2, at.phase1):
         np.testing.assert_array_equal(silent, [0.0, 0.0])
-    assert response.eigenvalues.shape == (0, 2)
+    assert response.eigenvalues.shape == (2, 0)
     assert response.stable.tolist() == [True, True]
 
 
 def test_amplitudes_and_phases_at_an_epsilon():
     slider = Slider(LAWS["rice-ruina"][0], spring="0.2 N/um", load="7 N")
     response = perturbation_response(slider, velocity="1 um/s", frequency="120 Hz")
-    at = response.at(np.array([1e-3, 2e-3]))
-    np.testing.assert_allclose(at.mu1 * np.exp(1j * at.phase1), [1e-3, 2e-3] * response.transfer)
+    at = response.at([1e-3, 2e-3])
     np.testing.assert_allclose(
-        at.mu2 * np.exp(1j * at.phase2), [1e-6, 4e-6] * response.second_harmonic
+        at.mu1 * np.exp(1j * at.phase1), np.array([1e-3, 2e-3]) * response.transfer
     )
-    np.testing.assert_allclose(at.delta_mu, [1e-6, 4e-6] * response.mean_curvature)
+    np.testing.assert_allclose(
+        at.mu2 * np.exp(1j * at.phase2), np.array([1e-6, 4e-6]) * response.second_harmonic
+    )
+    np.testing.assert_allclose(at.delta_mu, np.array([1e-6, 4e-6]) * response.mean_curvature)
 
 
 def test_arrays_broadcast_to_single_points():
@@ -147,13 +176,13 @@ def test_arrays_broadcast_to_single_points():
         Slider(law, spring=spring, load=W0), velocity=velocity, frequency=9
     )
     assert grid.transfer.shape == grid.omega.shape == (2, 3)
-    assert grid.eigenvalues.shape == grid.multipliers.shape == (2, 2, 3)
+    assert grid.eigenvalues.shape == grid.multipliers.shape == (2, 3, 2)
     point = perturbation_response(
         Slider(law, spring=spring[2], load=W0), velocity=velocity[1, 0], frequency=9
     )
     assert point.transfer.shape == ()
     np.testing.assert_allclose(grid.second_harmonic[1, 2], point.second_harmonic, rtol=1e-12)
-    np.testing.assert_allclose(grid.eigenvalues[:, 1, 2], point.eigenvalues, rtol=1e-12)
+    np.testing.assert_allclose(grid.eigenvalues[1, 2], point.eigenvalues, rtol=1e-12)
 
 
 def test_derivative_with_respect_to_a_parameter():
@@ -177,6 +206,7 @@ def test_derivative_with_respect_to_a_parameter():
         ({"frequency": "-3 Hz"}, "frequency must be positive, got -3 Hz"),
         ({"frequency": "3 rad/s"}, "frequency"),
         ({"velocity": "3 N"}, "velocity"),
+        ({"velocity": [1e-6] * 2, "frequency": [1.0] * 3}, r"got \(2,\), \(3,\)"),
     ],
 )
 def test_bad_input_is_named(bad, message):

@@ -1,7 +1,7 @@
 """The elasto-plastic extension ("EXT"): the rate term feels only the plastic velocity.
 
-Bureau et al. (2000), section III.C, Eqs. (26)-(29). Asperities of shear stiffness W / lambda carry the
-interface force F_i; sliding at dx/dt strains them elastically and the joint plastically::
+Bureau et al. (2000), section III.C, Eqs. (26)-(29). Asperities of shear stiffness W / lambda carry
+the interface force F_i; sliding at dx/dt strains them elastically and the joint plastically::
 
     v_plastic = d/dt (x - F_i lambda / W)
     F_i / W   = mu0 + A ln(v_plastic / V0) + B ln(V0 Phi / D0)

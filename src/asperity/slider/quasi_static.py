@@ -48,7 +48,7 @@ class QuasiStatic(eqx.Module):
 
     @property
     def compliance_ratio(self) -> Array:
-        """l = lambda K / W0: stiffness of the spring over that of the asperities."""
+        """L = lambda K / W0: stiffness of the spring over that of the asperities."""
         return self.slider.law.elastic_length * self.slider.K / self.slider.W0
 
     @property

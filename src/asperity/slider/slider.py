@@ -30,7 +30,12 @@ class Slider(eqx.Module):
     M: ArrayLike
 
     def __init__(
-        self, law: Law, *, spring: ArrayLike | str, load: ArrayLike | str, mass: ArrayLike | str = 0.0
+        self,
+        law: Law,
+        *,
+        spring: ArrayLike | str,
+        load: ArrayLike | str,
+        mass: ArrayLike | str = 0.0,
     ) -> None:
         """Build a slider from SI numbers or texts with units.
 

@@ -83,7 +83,9 @@ def averaged_states(system, w: Array, weights: Array, steps: int = 10) -> Array:
         slip = 1 - mean[0] / system.kappa
         mean[0] = -system.kappa * slip * jnp.log(slip)
         change = solve_points(jacobian, -jnp.stack(mean))
-        change = jnp.stack([change[0], *(jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:])])
+        change = jnp.stack(
+            [change[0], *(jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:])]
+        )
         return centre + change
 
     return jax.lax.fori_loop(0, steps, step, laplace_estimate(system, w))

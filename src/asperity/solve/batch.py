@@ -1,15 +1,13 @@
 """Running a compiled function over many operating points in chunks of a fixed shape.
 
-One shape means one compilation, and bounded memory whatever the number of points. Chunks run on as
-many threads as there are cores: XLA releases the interpreter while it computes, and its own
-threading of small element-wise programs gains nothing.
+One shape means one compilation, and bounded memory whatever the number of points. Chunks run one
+after the other: programs of XLA's CPU backend that are called from several threads at once can
+wait for each other for ever. More cores are used by more processes, see `asperity.solve.parallel`.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import jax
@@ -17,13 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Indices = NDArray[np.intp]
-
-
-def available_cores() -> int:
-    """Cores this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def take(tree: Any, index: Indices) -> Any:
@@ -59,7 +50,7 @@ def run_chunks(
     Yields
     ------
     indices, outputs
-        In any order as they come, as NumPy arrays without the filling.
+        As NumPy arrays without the filling.
     """
 
     def work(part: Indices) -> tuple[Indices, Any]:
@@ -67,20 +58,5 @@ def run_chunks(
         outputs = function(take(inputs, filled))
         return part, jax.tree.map(lambda a: np.asarray(a)[..., : len(part)], outputs)
 
-    parts = [index[i : i + chunk] for i in range(0, len(index), chunk)]
-    if len(parts) < 2:
-        yield from map(work, parts)
-        return
-    with ThreadPoolExecutor(available_cores()) as pool:
-        pending = []
-        try:
-            # A bounded queue: results of a million points must not pile up before they are read.
-            for part in parts:
-                pending.append(pool.submit(work, part))
-                if len(pending) > 2 * available_cores():
-                    yield pending.pop(0).result()
-            while pending:
-                yield pending.pop(0).result()
-        finally:
-            for job in pending:
-                job.cancel()
+    for start in range(0, len(index), chunk):
+        yield work(index[start : start + chunk])

@@ -13,21 +13,28 @@ Linker-Dieterich ageing and elastic asperities as well, are in `asperity.solve.a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from typing import Literal, TypeAlias
+from functools import partial
+from typing import Any, Literal, TypeAlias
 
+import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError
+from asperity.laws.parameter import checked
 
 Form: TypeAlias = Literal["derived", "as_printed"]
 
 
-@dataclass(frozen=True)
-class SmallModulation:
+def _quantity(name: str, kind: str, rule: str = "positive", **options: Any) -> Any:
+    """A field that takes SI numbers or texts with units, and refuses what breaks its rule."""
+    converter = partial(checked, name=f"SmallModulation.{name}", kind=kind, rule=rule)
+    return eqx.field(converter=converter, **options)
+
+
+class SmallModulation(eqx.Module):
     """Steady sliding at V, of which the formulas describe a small modulation.
 
     Parameters
@@ -54,21 +61,17 @@ class SmallModulation:
         Shear elastic length of the asperities (m); 0 for rigid ones.
     """
 
-    mu: ArrayLike
-    A: ArrayLike
-    B: ArrayLike
-    D0: ArrayLike
-    K: ArrayLike
-    W0: ArrayLike
-    V: ArrayLike
-    omega: ArrayLike
-    M: ArrayLike = 0.0
-    alpha: ArrayLike = 0.0
-    lambda_: ArrayLike = 0.0
-
-    def __post_init__(self) -> None:
-        for field in fields(self):
-            object.__setattr__(self, field.name, jnp.asarray(getattr(self, field.name), float))
+    mu: Array = _quantity("mu", "dimensionless")
+    A: Array = _quantity("A", "dimensionless")
+    B: Array = _quantity("B", "dimensionless", "not negative")
+    D0: Array = _quantity("D0", "length")
+    K: Array = _quantity("K", "stiffness")
+    W0: Array = _quantity("W0", "force")
+    V: Array = _quantity("V", "velocity")
+    omega: Array = _quantity("omega", "angular_frequency")
+    M: Array = _quantity("M", "mass", "not negative", default=0.0)
+    alpha: Array = _quantity("alpha", "dimensionless", "finite", default=0.0)
+    lambda_: Array = _quantity("lambda", "length", "not negative", default=0.0)
 
     @property
     def kappa(self) -> Array:
@@ -88,8 +91,8 @@ def steady_position(p: SmallModulation, t: ArrayLike, form: Form = "derived") ->
 def determinant(p: SmallModulation, form: Form = "derived") -> Array:
     """Delta (kg/s^3), Eq. (17): the determinant of the linear system (13)-(14).
 
-    Derived: (K - M omega^2 + i omega A W0/V)(V/D0 + i omega) - i omega B W0/D0. The printed form has
-    K/Kc where factoring this out gives Kc/K, and, like omega_c, needs B > A.
+    Derived: (K - M omega^2 + i omega A W0/V)(V/D0 + i omega) - i omega B W0/D0. The printed form
+    has K/Kc where factoring this out gives Kc/K, and, like omega_c, needs B > A.
     """
     _check_form(form)
     if form == "derived":
@@ -147,7 +150,7 @@ def inertial_pulsation(p: SmallModulation) -> Array:
 
 
 def first_harmonic(p: SmallModulation, epsilon: ArrayLike) -> Array:
-    """mu1 at high frequency, Eq. (20), and with alpha Eq. (25): eps |mu - alpha| V K/(A omega W0)."""
+    """mu1 at high frequency: eps |mu - alpha| V K/(A omega W0), Eqs. (20) and (25)."""
     return epsilon * jnp.abs(p.mu - p.alpha) / p.A * p.kappa
 
 
@@ -247,6 +250,6 @@ def _check_form(form: str) -> None:
         )
 
 
-def _by_form(form: str, *, derived: ArrayLike, as_printed: ArrayLike) -> ArrayLike:
+def _by_form(form: str, *, derived: Array, as_printed: Array | float) -> Array | float:
     _check_form(form)
     return derived if form == "derived" else as_printed

@@ -190,8 +190,7 @@ def collocation_response(system, load, orbit: Orbit, *, harmonics: int) -> Collo
     )
     theta = orbit.stage_phases
     phasors = [
-        2 * (weights * rest * jnp.exp(-1j * k * theta)).sum((0, 1))
-        for k in range(1, harmonics + 1)
+        2 * (weights * rest * jnp.exp(-1j * k * theta)).sum((0, 1)) for k in range(1, harmonics + 1)
     ]
     mean = constant.reshape(-1) + (weights * rest).sum((0, 1))
     response, _ = _condense(local, orbit)

@@ -58,9 +58,7 @@ def _log_pair(monodromy: Float, log_scale: Float, log_determinant: Float) -> Com
         np.log(np.abs(larger)) + log_scale + 1j * np.where(sign < 0, np.pi, 0.0),
         0.5 * log_determinant + 1j * np.arctan2(np.sqrt(np.where(real, 0.0, -square)), half_trace),
     )
-    second = np.where(
-        real, log_determinant - first.real + 1j * first.imag, np.conj(first)
-    )
+    second = np.where(real, log_determinant - first.real + 1j * first.imag, np.conj(first))
     return np.stack([first, second])
 
 

@@ -33,7 +33,6 @@ from jax import Array
 from asperity.solve.averaged import averaged_states
 from asperity.solve.linear import expm_points, jacobian_columns, solve_points
 
-
 #: A change this small is round-off of the slip exponent: it no longer shrinks, and need not.
 _ROUND_OFF = 1e-12
 

@@ -25,6 +25,9 @@ from asperity.solve.mesh import Orbit, evaluate, split
 _LARGEST_CHANGE = 2.0
 _NEWTON_TOLERANCE = 1e-8
 
+#: A Newton change below this counts as converged: the one before it was about its square root.
+ACCEPTED = 1e-6
+
 
 class Problem(NamedTuple):
     """Equations and load of many operating points, parameters along the last axis."""
@@ -123,10 +126,18 @@ def follow_orbit(
 def refine_orbit(
     problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, harmonics: int, phases: int
 ) -> tuple[Orbit, Reading, Array]:
-    """The orbit on an equidistributed mesh of `intervals`, its reading and last Newton change."""
+    """The orbit on an equidistributed mesh of `intervals`, its reading and last Newton change.
+
+    Where Newton's method failed, the orbit is the guess on the new mesh: a better start for a finer
+    one than what the failure left.
+    """
     problem, guess = problem_and_orbit
-    result = _newton(problem, refined(*problem, guess, intervals), 15)
-    return result.orbit, _read(problem, result.orbit, harmonics, phases), result.error
+    guess = refined(*problem, guess, intervals)
+    result = _newton(problem, guess, 15)
+    orbit = jax.tree.map(
+        lambda new, old: jnp.where(result.error < ACCEPTED, new, old), result.orbit, guess
+    )
+    return orbit, _read(problem, orbit, harmonics, phases), result.error
 
 
 @partial(jax.jit, static_argnames=("parts",))

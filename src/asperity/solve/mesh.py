@@ -52,6 +52,16 @@ class Orbit(NamedTuple):
     nodes: Array
     slopes: Array
 
+    @classmethod
+    def empty(cls, size: int, intervals: int, points: int) -> Orbit:
+        """NumPy arrays to be filled in."""
+        return cls(
+            np.zeros((intervals + 1, points)),
+            np.zeros((size, points)),
+            np.zeros((size, intervals, points)),
+            np.zeros((size, STAGES, intervals, points)),
+        )
+
     @property
     def widths(self) -> Array:
         """Interval widths, shape (intervals, points)."""

@@ -12,10 +12,11 @@ from jax.typing import ArrayLike
 from asperity.errors import InputError
 from asperity.loads import Harmonic
 from asperity.slider import QuasiStatic, Slider
+from asperity.solve.found import Found
 from asperity.solve.kernels import Problem
-from asperity.solve.response import PeriodicResponse
-from asperity.solve.search import Found, find_orbits
 from asperity.solve.outcome import Outcome
+from asperity.solve.response import PeriodicResponse
+from asperity.solve.search import find_orbits
 from asperity.units import to_si
 
 
@@ -66,7 +67,7 @@ def periodic_response(
 
     Notes
     -----
-    Bureau et al. (2000), Eqs. (1), (2), (7), (10) and (33), quasi-static. Where converged,
+    Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (29), quasi-static. Where converged,
     mean, mu1, mu2 and multipliers are good to 1e-8 relative (multipliers of modulus below 1e-12:
     to 1e-20 absolute).
     """

@@ -28,6 +28,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity.errors import InputError
 from asperity.laws.parameter import checked
 from asperity.slider import QuasiStatic, Slider
 from asperity.solve.linear import jacobian_columns, solve_points
@@ -57,7 +58,7 @@ class PerturbedHarmonics(NamedTuple):
 
 
 class PerturbationResponse(eqx.Module):
-    """Coefficients of the expansion in eps; the trailing axes are the operating points.
+    """Coefficients of the expansion in eps, one per operating point.
 
     Attributes
     ----------
@@ -82,25 +83,26 @@ class PerturbationResponse(eqx.Module):
 
     @property
     def eigenvalues_per_radian(self) -> Array:
-        """Growth rates per radian of the modulation, shape (size, ...)."""
-        return self.eigenvalues / self.omega
+        """Growth rates per radian of the modulation, shape (..., states)."""
+        return self.eigenvalues / self.omega[..., None]
 
     @property
     def multipliers(self) -> Array:
-        """Floquet multipliers in the limit eps -> 0, shape (size, ...)."""
+        """Floquet multipliers in the limit eps -> 0, shape (..., states)."""
         return jnp.exp(2 * jnp.pi * self.eigenvalues_per_radian)
 
     @property
     def stable(self) -> Array:
         """Whether unmodulated sliding is stable, shape (...)."""
-        return jnp.all(self.eigenvalues.real < 0, axis=0)
+        return jnp.all(self.eigenvalues.real < 0, axis=-1)
 
     def at(self, epsilon: ArrayLike) -> PerturbedHarmonics:
         """Leading-order response at the amplitude `epsilon` (broadcasts with the points)."""
-        c1 = epsilon * self.transfer
-        c2 = jnp.square(epsilon) * self.second_harmonic
+        first = jnp.asarray(epsilon)
+        second = first**2
+        c1, c2 = first * self.transfer, second * self.second_harmonic
         return PerturbedHarmonics(
-            delta_mu=jnp.square(epsilon) * self.mean_curvature,
+            delta_mu=second * self.mean_curvature,
             mu1=jnp.abs(c1),
             mu2=jnp.abs(c2),
             phase1=jnp.angle(c1),
@@ -148,14 +150,27 @@ def perturb(system: QuasiStatic) -> PerturbationResponse:
     Returns
     -------
     PerturbationResponse
-        With the broadcast shape of the leaves as its trailing axes.
+        One operating point for each element of the broadcast leaves.
+
+    Raises
+    ------
+    InputError
+        If the shapes of the leaves do not broadcast.
     """
-    shape = jnp.broadcast_shapes(*(jnp.shape(leaf) for leaf in jax.tree.leaves(system)))
+    shapes = [jnp.shape(leaf) for leaf in jax.tree.leaves(system)]
+    try:
+        shape = jnp.broadcast_shapes(*shapes)
+    except ValueError:
+        given = ", ".join(sorted({str(s) for s in shapes if s}))
+        raise InputError(
+            f"parameters must have shapes that broadcast, got {given}; "
+            "give arrays of one shape, or add axes of length 1"
+        ) from None
     # One axis of points: what the linear solver takes, and one compiled shape less to know about.
     points = jax.tree.map(lambda x: jnp.broadcast_to(jnp.asarray(x, float), shape).ravel(), system)
     expand = _rate_independent if not system.slider.law.rate_dependent else _expand
     response = expand(points)
-    return jax.tree.map(lambda leaf: leaf.reshape(leaf.shape[:-1] + shape), response)
+    return jax.tree.map(lambda leaf: leaf.reshape(shape + leaf.shape[1:]), response)
 
 
 @eqx.filter_jit
@@ -185,7 +200,7 @@ def _expand(system: QuasiStatic) -> PerturbationResponse:
         transfer=_first(force, steady, u)[0],
         mean_curvature=mean_force[0] + (force_gradient * Y20).sum(0),
         second_harmonic=double_force[0] + (force_gradient * Y22).sum(0),
-        eigenvalues=_eigenvalues(jacobian) * system.omega,
+        eigenvalues=_eigenvalues(jacobian) * jnp.asarray(system.omega)[:, None],
         omega=jnp.asarray(system.omega),
     )
 
@@ -198,7 +213,7 @@ def _rate_independent(system: QuasiStatic) -> PerturbationResponse:
         transfer=mu + 0j,
         mean_curvature=jnp.zeros_like(mu),
         second_harmonic=jnp.zeros_like(mu) + 0j,
-        eigenvalues=jnp.zeros((0, *omega.shape)) + 0j,
+        eigenvalues=jnp.zeros((*omega.shape, 0)) + 0j,
         omega=omega,
     )
 
@@ -228,11 +243,11 @@ def _quadratic(function: Callable[[Point], Array], at: Point, u: Point) -> tuple
 
 def _parts(u: Point) -> tuple[Point, Point]:
     """Real and imaginary parts of a complex direction."""
-    return tuple(part.real for part in u), tuple(part.imag for part in u)  # type: ignore[return-value]
+    return tuple(part.real for part in u), tuple(part.imag for part in u)
 
 
 def _eigenvalues(jacobian: Array) -> Array:
-    """Eigenvalues at every point, shape (size, points), by decreasing real part."""
+    """Eigenvalues at every point, shape (points, size), by decreasing real part."""
     values = jnp.linalg.eigvals(jnp.moveaxis(jacobian, -1, 0))
     order = jnp.argsort(-values.real, axis=-1)
-    return jnp.take_along_axis(values, order, axis=-1).T
+    return jnp.take_along_axis(values, order, axis=-1)

@@ -148,7 +148,7 @@ class PeriodicResponse:
 
     @property
     def result(self) -> NDArray[np.object_]:
-        """"converged", or the reason why not, for each point."""
+        """ "converged", or the reason why not, for each point."""
         return sentences(np.asarray(self.outcome), np.asarray(self.detail))
 
     @property

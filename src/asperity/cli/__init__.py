@@ -1,0 +1,5 @@
+"""The command line: a thin shell without physics and without defaults of its own.
+
+Data go to stdout, talk to stderr. Exit code 0: done; 1: done, but some points failed and say why;
+2: bad input; 130: interrupted.
+"""

@@ -1,0 +1,52 @@
+"""The command ``asperity``.
+
+Only click is loaded here; each command is imported when it is called, and loads what it needs when
+it runs, so that ``asperity --version`` costs nothing.
+"""
+
+from __future__ import annotations
+
+import click
+
+from asperity._version import __version__
+from asperity.cli.shell import Shell
+
+_EPILOG = """\b
+Examples:
+  asperity reproduce --out report
+  asperity response --law elasto-plastic --material bureau2000 \\
+      -V "1 um/s" -e 0.24 -f "120 Hz" --json
+  asperity response --table points.csv --out responses.csv --material bureau2000
+  asperity air --material bureau2000 -f "120 Hz" -f "200 Hz"
+  asperity materials bureau2000
+"""
+
+
+@click.group(
+    cls=Shell,
+    commands={
+        "air": "asperity.cli.air",
+        "materials": "asperity.cli.materials",
+        "reproduce": "asperity.cli.reproduce",
+        "response": "asperity.cli.response",
+    },
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
+    epilog=_EPILOG,
+)
+@click.version_option(__version__, prog_name="asperity")
+@click.pass_context
+def main(context: click.Context) -> None:
+    """Friction of a slider under a modulated normal load.
+
+    Laws, periodic responses with their stability, the squeezed air layer, and the paper they come
+    from (Bureau, Baumberger and Caroli, Phys. Rev. E 62, 6810, 2000).
+
+    A quantity is written with its unit ("1 um/s", "120 Hz", "0.2 N/um"); tables hold SI numbers.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+if __name__ == "__main__":
+    main(prog_name="asperity")

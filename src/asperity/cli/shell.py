@@ -1,0 +1,74 @@
+"""A group of commands that are imported when called, and whose mistakes are told in a sentence."""
+
+from __future__ import annotations
+
+import importlib
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any, NoReturn
+
+import click
+
+from asperity.cli.interrupt import INTERRUPTED, MESSAGE, leaving_at_once
+from asperity.errors import InputError, closest
+
+_BAD_INPUT = 2
+
+
+class Shell(click.Group):
+    """Commands by the module that defines each, under its own name.
+
+    A command returns its exit code, None for 0. `InputError` and click's own complaints become one
+    line on stderr and exit code 2, Ctrl-C one line and 130.
+
+    Parameters
+    ----------
+    commands : mapping of str to str
+        Module of every command.
+    """
+
+    def __init__(self, *args: Any, commands: Mapping[str, str], **options: Any) -> None:
+        super().__init__(*args, **options)
+        self.modules = dict(commands)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names of the commands."""
+        return sorted(self.modules)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        """Import a command; an unknown name is answered with the nearest one."""
+        if cmd_name not in self.modules:
+            raise InputError(
+                f"command must be a known one, got '{cmd_name}'; {closest(cmd_name, self.modules)}"
+            )
+        command: click.Command = getattr(importlib.import_module(self.modules[cmd_name]), cmd_name)
+        return command
+
+    def main(
+        self,
+        args: Sequence[str] | None = None,
+        prog_name: str | None = None,
+        complete_var: str | None = None,
+        standalone_mode: bool = False,
+        **extra: Any,
+    ) -> NoReturn:
+        """Run, and leave with the exit code.
+
+        Click's own standalone mode is not used: its messages take several lines.
+        """
+        try:
+            with leaving_at_once():
+                code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
+        except InputError as error:
+            code = _say(str(error), _BAD_INPUT)
+        except click.Abort as abort:
+            code = _say(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
+        except click.ClickException as error:
+            code = _say(error.format_message(), _BAD_INPUT)
+        sys.exit(code)
+
+
+def _say(message: str, code: int) -> int:
+    """One line, whatever the user's text in the message holds."""
+    click.echo("asperity: " + " ".join(message.split()), err=True)
+    return code

@@ -1,0 +1,1 @@
+"""Figures: numbers to CSV, then to a picture. Nothing is solved here."""

@@ -1,0 +1,40 @@
+"""What a colour and a line mean, the same in every figure.
+
+The colour is the law (Okabe and Ito's palette, told apart by all common kinds of colour vision),
+the dashes are the velocity as in the paper's captions, and ochre is what the text states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import as_file, files
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+RICE_RUINA = "#0072B2"
+LINKER_DIETERICH = "#D55E00"
+LINKER_DIETERICH_LOW = "#B0528F"
+ELASTO_PLASTIC = "#00805B"
+STATED = "#8A5A00"
+STATED_FILL = "#E9C46A"
+GREY = "#767676"
+
+SLOW, FAST = "solid", "dashed"
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """The project's style, for making and for saving figures; the user's own is left as it was."""
+    with as_file(files("asperity.figures") / "asperity.mplstyle") as path:
+        settings = mpl.rc_params_from_file(path, use_default_template=True)
+    # The template holds the backend and would switch it; files are written by the figure itself.
+    kept = {name: value for name, value in settings.items() if not name.startswith("backend")}
+    with mpl.rc_context(kept):
+        yield
+
+
+def new_figure(width: float = 5.0, height: float = 3.5) -> Figure:
+    """An empty figure (inches) that no window or global state knows of."""
+    return Figure(figsize=(width, height))

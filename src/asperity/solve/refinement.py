@@ -1,0 +1,195 @@
+"""Trust in an orbit: it is solved on finer and finer meshes until two of them agree."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.solve.batch import Indices, put, run_chunks, take
+from asperity.solve.floquet import from_logs
+from asperity.solve.found import Found, Options, logs_of, store
+from asperity.solve.kernels import ACCEPTED, Problem, Reading, refine_orbit, split_reading
+from asperity.solve.mesh import Orbit
+from asperity.solve.outcome import Outcome
+
+#: Agreement between two meshes, relative, at which the finer one is trusted to 1e-8: its own error
+#: is smaller by at least the factor 2^5 of a stiff orbit, by 2^8 otherwise.
+AGREEMENT = 5e-9
+
+#: Orbits are followed on the first of these meshes, and refined up to the last.
+MESHES = (48, 96, 192, 384, 768)
+_SPLITS = (4, 16)
+
+#: Interval-points in a chunk: keeps the working set of collocation within a core's cache.
+_CHUNK_INTERVALS = 3072
+
+#: Multipliers below this modulus are compared absolutely: no experiment sees them.
+_VANISHING = 1e-12
+
+#: Where the largest eigenvalue of the Jacobian integrates to less than the first or more than the
+#: second, the multipliers vanish or overflow whatever the transfer maps of a stiff method
+#: say of them, by a margin of many orders of magnitude.
+_DEAD, _EXPLODING = -200.0, 900.0
+
+
+def chunk_size(intervals: int) -> int:
+    """Points per chunk on a mesh of `intervals`."""
+    return max(4, _CHUNK_INTERVALS // intervals)
+
+
+class _State(NamedTuple):
+    """What two meshes are compared by."""
+
+    mean: float
+    harmonics: NDArray[np.complex128]
+    logs: NDArray[np.complex128]
+
+
+def refine(
+    problem: Problem,
+    found: Found,
+    block: Indices,
+    orbit: Orbit,
+    index: Indices,
+    options: Options,
+) -> None:
+    """Refine the orbits of the points `index` and write what settles into `found`.
+
+    Parameters
+    ----------
+    problem : Problem
+        The points of a block.
+    found : Found
+        Results of all points.
+    block : array of int
+        Where the points of the block stand in `found`.
+    orbit : Orbit
+        Orbits of the block on the first mesh.
+    index : array of int
+        Points of the block that have an orbit.
+    options : Options
+    """
+    previous: dict[int, _State] = {}
+    for intervals in MESHES:
+        finer = Orbit.empty(problem.system.size, intervals, len(block))
+        solve = partial(
+            refine_orbit,
+            intervals=intervals,
+            harmonics=options.harmonics,
+            phases=options.phases,
+        )
+        settled = np.zeros(len(block), dtype=bool)
+        for part, (fine, reading, error) in run_chunks(
+            solve, (problem, orbit), index, chunk_size(intervals)
+        ):
+            put(finer, part, fine)
+            found.iterations[block[part]] = intervals
+            settled[part] = _compare(found, block[part], part, previous, reading, error)
+        options.progress(int(settled[index].sum()))
+        orbit, index = finer, index[~settled[index]]
+        if not len(index):
+            return
+    stiff = index[found.outcome[block[index]] == Outcome.MULTIPLIERS_NOT_RESOLVED]
+    _split(problem, found, block, orbit, stiff)
+    options.progress(len(index))
+
+
+def _compare(
+    found: Found,
+    rows: Indices,
+    part: Indices,
+    previous: dict[int, _State],
+    reading: Reading,
+    error: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """Hold each point against its previous mesh; returns which of them are settled."""
+    settled = np.zeros(len(part), dtype=bool)
+    logs = logs_of(reading)
+    for k, point in enumerate(part):
+        if error[k] > ACCEPTED:
+            found.outcome[rows[k]], found.detail[rows[k]] = Outcome.NOT_RESOLVED, np.inf
+            continue
+        state = _State(reading.mean_friction[k], reading.harmonics[:2, k], logs[:, k])
+        before, previous[point] = previous.get(point), state
+        orbit_gap, multiplier_gap = _gaps(before, state)
+        if orbit_gap <= AGREEMENT and _beyond_doubles(reading.growth[k]):
+            logs[:, k] = _frozen_logs(reading, k)
+            multiplier_gap = 0.0
+        if orbit_gap > AGREEMENT:
+            found.outcome[rows[k]], found.detail[rows[k]] = Outcome.NOT_RESOLVED, orbit_gap
+        elif multiplier_gap > AGREEMENT:
+            found.outcome[rows[k]] = Outcome.MULTIPLIERS_NOT_RESOLVED
+            found.detail[rows[k]] = multiplier_gap
+        else:
+            settled[k] = True
+    kept = np.flatnonzero(settled)
+    store(found, rows[kept], take(reading, kept), logs[:, kept])
+    # Kept until the multipliers settle, so that only they are computed again.
+    resolved = np.flatnonzero(found.outcome[rows] == Outcome.MULTIPLIERS_NOT_RESOLVED)
+    outcome = found.outcome[rows[resolved]]
+    store(found, rows[resolved], take(reading, resolved), logs[:, resolved])
+    found.outcome[rows[resolved]] = outcome
+    return settled
+
+
+def _split(problem: Problem, found: Found, block: Indices, orbit: Orbit, index: Indices) -> None:
+    """Settle the multipliers of resolved orbits on ever finer transfer maps."""
+    for parts in _SPLITS:
+        solve = partial(split_reading, parts=parts)
+        chunk = max(1, chunk_size(MESHES[-1] * parts))
+        for part, reading in run_chunks(solve, (problem, orbit), index, chunk):
+            logs, rows = logs_of(reading), block[part]
+            gap = np.array(
+                [
+                    _multiplier_gap(found.log_multipliers[:, r], logs[:, k])
+                    for k, r in enumerate(rows)
+                ]
+            )
+            found.log_multipliers[:, rows] = logs
+            found.detail[rows] = gap
+            found.outcome[rows[gap <= AGREEMENT]] = Outcome.CONVERGED
+        index = index[found.outcome[block[index]] != Outcome.CONVERGED]
+        if not len(index):
+            return
+    found.discard(block[index])
+
+
+def _beyond_doubles(growth: float) -> bool:
+    return not _DEAD < growth < _EXPLODING
+
+
+def _frozen_logs(reading: Reading, k: int) -> NDArray[np.complex128]:
+    """Logarithms from the eigenvalues of the Jacobian along the orbit, each followed on its own.
+
+    Good to a few units, which is enough for multipliers that are 0 or infinite as doubles.
+    """
+    growth, determinant = reading.growth[k], reading.log_determinant[k]
+    size = reading.monodromy.shape[0]
+    rest = (determinant - growth) / max(size - 1, 1)
+    return np.array([growth] + [min(growth, rest)] * (size - 1), dtype=complex)
+
+
+def _gaps(before: _State | None, now: _State) -> tuple[float, float]:
+    """Relative change of mean and harmonics, and of multipliers, between two meshes."""
+    if before is None or not all(np.all(np.isfinite(a)) for a in now[:2]):
+        return np.inf, np.inf
+    mean = abs(now.mean - before.mean) / abs(now.mean)
+    # Round-off of the mean bounds what a vanishing second harmonic can mean.
+    floor = 1e-15 * abs(now.mean) / AGREEMENT
+    harmonics = np.abs(now.harmonics - before.harmonics) / (np.abs(now.harmonics) + floor)
+    return float(max(mean, harmonics.max())), _multiplier_gap(before.logs, now.logs)
+
+
+def _multiplier_gap(before: NDArray[np.complex128], now: NDArray[np.complex128]) -> float:
+    if not (np.all(np.isfinite(before)) and np.all(np.isfinite(now))):
+        return np.inf
+    old, new = from_logs(before), from_logs(now)
+    # Beyond doubles the logarithms are compared, the moduli elsewhere.
+    huge = now.real > 700
+    with np.errstate(invalid="ignore", over="ignore"):
+        gaps = np.abs(old - new) / np.maximum(np.abs(new), _VANISHING)
+        gaps = np.where(huge, np.abs(before - now) / np.abs(now), gaps)
+    return float(np.max(gaps, initial=0.0))

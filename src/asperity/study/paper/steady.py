@@ -1,0 +1,40 @@
+"""Stability of unmodulated steady sliding, in closed form.
+
+Linearised about steady sliding at V, with l = lambda K/W0 and perturbations growing as e^{s t}, the
+quasi-static equations of section III give, the age law being on the slider's velocity::
+
+    (1 + l) A W0/V s^2 + [K - (B - (1 + l) A) W0/D0] s + K V/D0 = 0.
+
+For l = 0 the bracket changes sign at the paper's Kc = (B - A) W0/D0. Load rates are absent, hence
+Linker-Dieterich ageing has the stability of Rice-Ruina's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.slider import Slider
+from asperity.study.paper.machine import Float
+
+
+def growth_rate(slider: Slider, V: ArrayLike) -> Float:
+    """Largest real part of s (1/s); positive where steady sliding is unstable."""
+    law, K, W0 = slider.law, float(slider.K), float(slider.W0)
+    V = np.asarray(V, dtype=float)
+    A = float(law.A) * (1 + float(law.elastic_length) * K / W0)
+    quadratic, constant = A * W0 / V, K * V / float(law.D0)
+    linear = K - (float(law.B) - A) * W0 / float(law.D0)
+    root = np.sqrt(linear**2 - 4 * quadratic * constant + 0j)
+    return np.asarray(((root - linear) / (2 * quadratic)).real)
+
+
+def floquet_max(slider: Slider, V: ArrayLike, frequency: float) -> Float:
+    """Growth of a perturbation of steady sliding over one period 1/frequency (Hz)."""
+    return np.exp(growth_rate(slider, V) / frequency)
+
+
+def stiffness_ratio(slider: Slider) -> float:
+    """K/Kc with the paper's Kc = (B - A) W0/D0: sliding on rigid asperities is stable above 1."""
+    law = slider.law
+    return float(slider.K * law.D0 / ((law.B - law.A) * slider.W0))

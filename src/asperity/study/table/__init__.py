@@ -1,0 +1,13 @@
+"""Tables of operating points: one point a row in, the same rows with their responses out.
+
+Input columns are SI numbers without units, named ``law, A, B, D0, mu0, V0, K, M, W0, alpha,
+lambda, V, epsilon, frequency`` and whatever else a registered law declares. They are written back
+as they were read, in their order, followed by `RESULTS`. A row that cannot be solved says why in
+``result`` and costs no other row. Rows are read, solved and written in blocks, so that memory does
+not grow with the table.
+"""
+
+from asperity.study.table.columns import RESULTS
+from asperity.study.table.run import TableInterrupted, TableSummary, run_table
+
+__all__ = ["RESULTS", "TableInterrupted", "TableSummary", "run_table"]

@@ -1,0 +1,207 @@
+"""Reading a table: checked as a whole first, then block by block."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import math
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import islice
+from pathlib import Path
+from typing import TextIO
+
+from asperity.errors import InputError
+from asperity.laws import get_law
+from asperity.study.operating_point import all_quantities, required
+from asperity.study.table.cells import Row
+from asperity.study.table.columns import check_header
+
+_DELIMITERS = (",", ";", "\t")
+
+
+@dataclass(frozen=True)
+class Source:
+    """A table that can be solved.
+
+    Attributes
+    ----------
+    path : Path
+    delimiter : str
+    header : list of str
+        As read.
+    columns : mapping of str to int
+        Position of every known column.
+    rows : int
+        Rows of data; blank lines are none.
+    digest : str
+        SHA-256 of the file.
+    """
+
+    path: Path
+    delimiter: str
+    header: Row
+    columns: Mapping[str, int]
+    rows: int
+    digest: str
+
+    def blocks(self, size: int, skip: int = 0) -> Iterator[list[Row]]:
+        """Rows of data in lists of at most `size`, without the first `skip`."""
+        with _opened(self.path) as stream:
+            rows = islice(_rows(stream, self.delimiter), 1 + skip, None)
+            while block := list(islice(rows, size)):
+                yield block
+
+
+@dataclass
+class _Survey:
+    """What a first reading of all rows finds."""
+
+    rows: int = 0
+    laws: set[str] = field(default_factory=set)
+    numeric: set[str] = field(default_factory=set)
+    first_text: dict[str, tuple[str, int]] = field(default_factory=dict)
+
+
+def open_source(path: Path, law: str | None, filled: Mapping[str, object]) -> Source:
+    """Read a table once and check what concerns it as a whole.
+
+    Parameters
+    ----------
+    path : Path
+    law : str or None
+        Law of the rows that name none.
+    filled : mapping
+        Names of the numbers that need no column.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read, has no rows, or has a column that is missing or
+        unusable in every row.
+    """
+    with _opened(path) as stream:
+        delimiter = _delimiter(stream.readline())
+        stream.seek(0)
+        rows = _rows(stream, delimiter)
+        header = next(rows, [])
+        if not any(name.strip() for name in header):
+            raise InputError(
+                f"{path} must have a line of column names and rows, got an empty file; "
+                "give one operating point a row"
+            )
+        columns = check_header(header, str(path))
+        survey = _survey(rows, columns, law)
+    if not survey.rows:
+        raise InputError(
+            f"{path} must have rows of data, got only column names; give one operating point a row"
+        )
+    _check_columns(path, columns, survey, filled)
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+    return Source(path, delimiter, header, columns, survey.rows, digest)
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[TextIO]:
+    """The table as text; whatever keeps it from being read becomes one sentence."""
+    try:
+        # utf-8-sig: spreadsheets put a byte-order mark in front.
+        with path.open(encoding="utf-8-sig", newline="") as stream:
+            yield stream
+    except FileNotFoundError:
+        raise InputError(
+            f"table must be a file, got '{path}'; there is none, correct the path"
+        ) from None
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path} must be UTF-8 text, got the byte 0x{error.object[error.start]:02x}; "
+            "save the table as CSV in UTF-8"
+        ) from None
+    except csv.Error as error:
+        raise InputError(
+            f"{path} must be valid CSV, got a fault ({error}); check the quotation marks"
+        ) from None
+    except OSError as error:
+        raise InputError(
+            f"table must be a readable file, got '{path}' ({error.strerror or error}); "
+            "give a CSV file"
+        ) from None
+
+
+def _rows(stream: TextIO, delimiter: str) -> Iterator[Row]:
+    # Strict: a forgotten quotation mark must not swallow the rows behind it in silence.
+    return (row for row in csv.reader(stream, delimiter=delimiter, strict=True) if row)
+
+
+def _delimiter(line: str) -> str:
+    """The delimiter that makes the most known columns of the first line, a comma if in doubt."""
+    known = {"law", *all_quantities()}
+
+    def count(delimiter: str) -> int:
+        names = next(csv.reader([line], delimiter=delimiter), [])
+        return sum(name.strip() in known for name in names)
+
+    return max(_DELIMITERS, key=count)
+
+
+def _survey(rows: Iterator[Row], columns: Mapping[str, int], law: str | None) -> _Survey:
+    survey = _Survey()
+    unsettled = {name: place for name, place in columns.items() if name != "law"}
+    law_place = columns.get("law", -1)
+    for row in rows:
+        survey.rows += 1
+        own = row[law_place].strip() if 0 <= law_place < len(row) else ""
+        survey.laws.add(own or law or "")
+        # A column leaves the loop with its first number: a long table is read at full speed.
+        for name in [n for n, place in unsettled.items() if place < len(row)]:
+            text = row[unsettled[name]].strip()
+            if _is_number(text):
+                survey.numeric.add(name)
+                del unsettled[name]
+            elif text:
+                survey.first_text.setdefault(name, (text, survey.rows))
+    return survey
+
+
+def _is_number(text: str) -> bool:
+    try:
+        return math.isfinite(float(text))
+    except ValueError:
+        return False
+
+
+def _check_columns(
+    path: Path, columns: Mapping[str, int], survey: _Survey, filled: Mapping[str, object]
+) -> None:
+    """Refuse a table in which no row can be solved, for want of one and the same column."""
+    if survey.laws == {""}:
+        raise InputError(
+            f"{path} must say the law of its rows, got no column 'law'; add it or give --law"
+        )
+    needs = [set(required(get_law(name))) for name in survey.laws if _known_law(name)]
+    if not needs:
+        get_law(min(survey.laws - {""}))
+    everywhere = set.intersection(*needs)
+    for name in columns:
+        if name in everywhere and name not in survey.numeric and name in survey.first_text:
+            text, row = survey.first_text[name]
+            raise InputError(
+                f"{path} must have finite numbers in column '{name}', got '{text}' in row {row} "
+                "and none in any other; write SI numbers without units"
+            )
+    missing = [n for n in all_quantities() if n in everywhere - survey.numeric and n not in filled]
+    if missing:
+        raise InputError(
+            f"{path} must have the columns that its laws need, got none for {', '.join(missing)}; "
+            "add them or name a material that has them"
+        )
+
+
+def _known_law(name: str) -> bool:
+    try:
+        get_law(name)
+    except InputError:
+        return False
+    return True

@@ -1,0 +1,182 @@
+"""Bad input to any command: one sentence on stderr, exit code 2, nothing left behind."""
+
+from pathlib import Path
+
+import pytest
+
+OF = ("response", "--material", "bureau2000")
+POINT = {"--law": "rice-ruina", "-V": "1 um/s", "-e": "0.24", "-f": "120 Hz"}
+HEADER = "law,V,epsilon,frequency"
+ROW = "rice-ruina,1e-6,0.2,120"
+
+
+def refused(result, *parts: str) -> None:
+    """Exactly one line that says these things, and exit code 2."""
+    assert result.exit_code == 2, result.output
+    assert result.stdout == ""
+    assert result.stderr.startswith("asperity: ")
+    assert result.stderr.count("\n") == 1
+    assert result.stderr.endswith("\n")
+    for part in parts:
+        assert part in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "parts"),
+    [
+        ("-V", "1", ["velocity must carry a unit, got '1'", "1 um/s"]),
+        ("-V", "1 um", ["velocity must be a velocity (m/s), got '1 um'"]),
+        ("-V", "0 um/s", ["velocity must be positive, got 0 m/s"]),
+        ("-V", "-1 um/s", ["velocity must be positive, got -1e-06 m/s"]),
+        ("-V", "fast", ["velocity must be a finite number with a unit, got 'fast'"]),
+        ("-V", "nan um/s", ["velocity must be a finite number with a unit, got 'nan um/s'"]),
+        ("-f", "754 rad/s", ["frequency must be a frequency (Hz)", "angular", "120 Hz"]),
+        ("-f", "120", ["frequency must carry a unit, got '120'"]),
+        ("-f", "120 1/s", ["frequency must be a frequency (Hz), got '120 1/s'"]),
+        ("-f", "7200 rpm", ["frequency must be a frequency (Hz), got '7200 rpm'"]),
+        ("-f", "-3 Hz", ["frequency must be positive, got -3 Hz"]),
+        ("-e", "1", ["epsilon must be at least 0 and below 1", "got 1;"]),
+        ("-e", "1.5", ["epsilon must be at least 0 and below 1", "got 1.5;"]),
+        ("-e", "-0.1", ["epsilon must be at least 0 and below 1", "got -0.1;"]),
+        ("-e", "0.2 N", ["epsilon must be a pure number, got '0.2 N'"]),
+        ("--law", "elasto-plastc", ["got 'elasto-plastc'; did you mean 'elasto-plastic'?"]),
+        ("--material", "bureau200", ["got 'bureau200'; did you mean 'bureau2000'?"]),
+        ("--material", "none.toml", ["material.file must be a readable TOML file"]),
+        ("--set", "A=0", ["law.A must be positive, got 0;"]),
+        ("--set", "A=-0.01", ["law.A must be positive, got -0.01;"]),
+        ("--set", "D0=0 um", ["law.D0 must be positive, got 0 m;"]),
+        ("--set", "D0=0.4", ["law.D0 must carry a unit, got '0.4'"]),
+        ("--set", "D0=0.4 s", ["law.D0 must be a length (m), got '0.4 s'"]),
+        ("--set", "K=-1 N/um", ["slider.K must be positive, got -1e+06 N/m;"]),
+        ("--set", "K=0.2", ["slider.K must carry a unit, got '0.2'"]),
+        ("--set", "W0=0 N", ["slider.W0 must be positive, got 0 N;"]),
+        ("--set", "W0=7 kg", ["slider.W0 must be a force (N), got '7 kg'"]),
+        ("--set", "M=-1 kg", ["slider.M must be not negative, got -1 kg;"]),
+        ("--set", "B=-0.1", ["law.B must be not negative, got -0.1;"]),
+        ("--set", "A=0.01 m", ["law.A must be a pure number, got '0.01 m'"]),
+        ("--set", "alpa=0.2", ["parameter must be a known name, got 'alpa'", "'alpha'"]),
+        ("--set", "alpha=0.2", ["rice-ruina must be given its own", "'alpha'", "linker-dieterich"]),
+        ("--set", "lambda=1 um", ["rice-ruina must be given its own", "elasto-plastic"]),
+        ("--set", "A", ["--set must be NAME=VALUE, got 'A'"]),
+        ("--set", "=1", ["--set must be NAME=VALUE, got '=1'"]),
+        ("--set", "V=2 um/s", ["V must be given once, got '2 um/s' and '1 um/s'"]),
+        ("--out", "x.csv", ["--out and --resume must go with --table"]),
+        ("--colour", "red", ["No such option"]),
+    ],
+)
+def test_a_bad_option(asperity, option: str, value: str, parts: list[str]) -> None:
+    options = POINT | {option: value}
+    refused(asperity(*OF, *(text for pair in options.items() for text in pair)), *parts)
+
+
+def test_a_missing_option(asperity) -> None:
+    refused(asperity("response"), "--law must be given", "rice-ruina")
+    refused(asperity(*OF, "--law", "rice-ruina"), "got none for V, epsilon;", "V=1 um/s")
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        ("", ["got an empty file"]),
+        ("\n\n", ["got an empty file"]),
+        (f"{HEADER}\n", ["must have rows of data, got only column names"]),
+        (f"{HEADER},V\n{ROW},1\n", ["must have each column once, got 'V' 2 times"]),
+        (f"{HEADER},lamda\n{ROW},1\n", ["got 'lamda'; did you mean 'lambda'?"]),
+        ("law,V,epsilon,freq\n" + ROW, ["got 'freq'; did you mean 'frequency'?"]),
+        ("law,V (m/s),epsilon,frequency\n" + ROW, ["got 'V (m/s)'; did you mean 'V'?"]),
+        ("law,v,epsilon,frequency\n" + ROW, ["got 'v'; did you mean 'V'?"]),
+        (f"{HEADER},Dc\n{ROW},1\n", ["got 'Dc'; did you mean 'D0'?"]),
+        (f"{HEADER},result\n{ROW},1\n", ["named like a result, got 'result'"]),
+        ("law,epsilon,frequency\nrice-ruina,0.2,120\n", ["got none for V;"]),
+        ("V,epsilon,frequency\n1e-6,0.2,120\n", ["got no column 'law'; add it or give --law"]),
+        (f"{HEADER}\nrice-runia,1e-6,0.2,120\n", ["did you mean 'rice-ruina'?"]),
+        (f"{HEADER}\nrice-ruina,quick,0.2,120\n", ["in column 'V', got 'quick' in row 1"]),
+        (f"{HEADER}\nrice-ruina,nan,0.2,120\n", ["in column 'V', got 'nan' in row 1"]),
+        (f"{HEADER}\nrice-ruina,,0.2,120\n", ["got none for V;"]),
+        (f'{HEADER}\nrice-ruina,"1e-6,0.2,120\n', ["must be valid CSV"]),
+        ("no table at all", ["must have rows of data, got only column names"]),
+        ("no table\nat all\n", ["got no column 'law'"]),
+    ],
+)
+def test_a_bad_table(asperity, tmp_path: Path, text: str, parts: list[str]) -> None:
+    table = tmp_path / "in.csv"
+    table.write_text(text, encoding="utf-8")
+    refused(asperity(*OF, "--table", table, "--out", tmp_path / "out.csv"), *parts)
+    assert list(tmp_path.iterdir()) == [table]
+
+
+def test_a_table_that_is_no_text(asperity, tmp_path: Path) -> None:
+    table = tmp_path / "in.csv"
+    table.write_bytes(f"{HEADER},Reibflächen\n{ROW},1\n".encode("latin-1"))
+    refused(asperity(*OF, "--table", table, "--out", tmp_path / "o.csv"), "UTF-8", "0xe4")
+    table.write_bytes(f"{HEADER}\n{ROW}\n".encode("utf-16"))
+    refused(asperity(*OF, "--table", table, "--out", tmp_path / "o.csv"), "UTF-8")
+    assert list(tmp_path.iterdir()) == [table]
+
+
+def test_a_table_that_is_not_there(asperity, tmp_path: Path) -> None:
+    out = ("--out", tmp_path / "out.csv")
+    refused(asperity(*OF, "--table", tmp_path / "in.csv", *out), "there is none")
+    refused(asperity(*OF, "--table", tmp_path, *out), "must be a readable file", "directory")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_output_that_cannot_be_written(asperity, tmp_path: Path) -> None:
+    table = tmp_path / "in.csv"
+    table.write_text(f"{HEADER}\n{ROW}\n", encoding="utf-8")
+    call = (*OF, "--table", table)
+    refused(asperity(*call), "--out must be given with --table")
+    refused(asperity(*call, "--out", tmp_path), "must be the name of a file")
+    refused(asperity(*call, "--out", "/dev/null"), "must be the name of a file")
+    refused(asperity(*call, "--out", table), "must be another file than the table")
+    refused(asperity(*call, "--out", tmp_path / "no" / "o.csv"), "must be a file that can be")
+    refused(asperity(*call, "--out", table / "o.csv"), "must be a file that can be")
+    assert list(tmp_path.iterdir()) == [table]
+
+
+def test_bad_options_beside_a_table(asperity, tmp_path: Path) -> None:
+    table = tmp_path / "in.csv"
+    table.write_text(f"{HEADER}\n{ROW}\n", encoding="utf-8")
+    call = (*OF, "--table", table, "--out", tmp_path / "o.csv")
+    refused(asperity(*call, "--set", "A=-1"), "law.A must be positive, got -1;")
+    refused(asperity(*call, "--set", "lamda=1 um"), "'lambda'")
+    refused(asperity(*call, "--law", "rice"), "rice-ruina")
+    refused(asperity(*call, "-f", "10 rad/s"), "Hz")
+    assert list(tmp_path.iterdir()) == [table]
+
+
+AIR = ("air", "--material", "bureau2000", "-f", "120 Hz")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (("air", "--material", "bureau2000"), ["Missing option", "--frequency"]),
+        (("air", "-f", "120 Hz"), ["got none for R, h0, P0, eta, W0, M, lambda_z;"]),
+        (("air", "-f", "120 Hz", "--vacuum"), ["got none for W0, M, lambda_z;"]),
+        ((*AIR, "-f", "10 rad/s"), ["frequency must be a frequency (Hz)"]),
+        ((*AIR, "--set", "h0=-1 um"), ["AirLayer.h0 must be finite and positive"]),
+        ((*AIR, "--set", "h=1 um"), ["got 'h'"]),
+        ((*AIR, "--set", "P0=1000"), ["air.P0 must carry a unit"]),
+        ((*AIR, "--set", "R=1 cm", "--vacuum"), ["R must not be given with --vacuum"]),
+        ((*AIR, "--inverse", "0.48"), ["--inverse and --for must be given together"]),
+        ((*AIR, "--for", "gap"), ["--inverse and --for must be given together"]),
+        ((*AIR, "--inverse", "0.48", "--for", "mass"), ["--for must be radius or gap"]),
+        ((*AIR, "--inverse", "0 %", "--for", "gap"), ["inverse.ratio must be finite and positive"]),
+        ((*AIR, "--inverse", "0.4", "--for", "gap", "--vacuum"), ["must have an air layer"]),
+        ((*AIR, "-f", "2 Hz", "--inverse", "0.4", "--for", "gap"), ["must have one frequency"]),
+        (("materials", "bureau"), ["did you mean 'bureau2000'?"]),
+        (("materials", "no.toml", "--cite"), ["must be a readable TOML file"]),
+        (("reproduce",), ["Missing option '--out'"]),
+    ],
+)
+def test_the_other_commands(asperity, arguments: tuple[str, ...], parts: list[str]) -> None:
+    refused(asperity(*arguments), *parts)
+
+
+def test_a_report_folder_that_cannot_be_written(asperity, tmp_path: Path) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("", encoding="utf-8")
+    refused(asperity("reproduce", "--out", blocked), "must be a folder that can be written")
+    refused(asperity("reproduce", "--out", blocked / "below"), "must be a folder that can be")
+    assert list(tmp_path.iterdir()) == [blocked]

@@ -1,0 +1,131 @@
+"""`asperity air`, `materials` and `reproduce`."""
+
+import json
+import sys
+import types
+from pathlib import Path
+
+import pytest
+
+from asperity import air, materials
+
+MATERIAL = ("--material", "bureau2000")
+
+
+def test_air_gives_the_fraction_of_the_library(asperity) -> None:
+    shown = asperity("air", *MATERIAL, "-f", "120 Hz", "-f", "200 Hz", "--json")
+    assert shown.exit_code == 0
+    record = json.loads(shown.stdout)
+    pmma = materials.load("bureau2000")
+    layer = air.AirLayer(P0=pmma.P0, h0=pmma.h0, eta=pmma.eta_air, R=pmma.R)
+    machine = {"W0": pmma.W0, "M": pmma.M, "lambda_z": pmma.lambda_z}
+    for point, f in zip(record["points"], (120.0, 200.0), strict=True):
+        assert point["frequency"] == f
+        assert point["ratio"] == air.effective_modulation(f, layer=layer, **machine)
+        assert point["phase"] == air.modulation_phase(f, layer=layer, **machine)
+    assert record["air_stiffness"] == layer.stiffness
+
+
+def test_air_text_and_vacuum(asperity) -> None:
+    shown = asperity("air", *MATERIAL, "-f", "200 Hz", "--vacuum")
+    assert shown.exit_code == 0
+    assert "eps_eff/eps" in shown.stdout
+    assert "1.16874" in shown.stdout
+    assert "gamma" not in shown.stdout
+    assert "gamma" in asperity("air", *MATERIAL, "-f", "200 Hz").stdout
+
+
+def test_air_set_replaces_the_material(asperity) -> None:
+    shown = asperity("air", *MATERIAL, "-f", "120 Hz", "--set", "R=2.5 cm", "--json")
+    record = json.loads(shown.stdout)
+    assert record["parameters"]["R"] == 0.025
+    assert record["points"][0]["ratio"] == pytest.approx(0.48, abs=0.005)
+
+
+@pytest.mark.parametrize(("sought", "name"), [("radius", "R"), ("gap", "h0")])
+def test_air_inverse_gives_the_fraction_back(asperity, sought: str, name: str) -> None:
+    shown = asperity(
+        "air", *MATERIAL, "-f", "120 Hz", "--inverse", "48 %", "--for", sought, "--json"
+    )
+    (length,) = json.loads(shown.stdout)["solutions"]
+    back = asperity("air", *MATERIAL, "-f", "120 Hz", "--set", f"{name}={length!r} m", "--json")
+    assert json.loads(back.stdout)["points"][0]["ratio"] == pytest.approx(0.48, rel=1e-9)
+    text = asperity("air", *MATERIAL, "-f", "120 Hz", "--inverse", "0.48", "--for", sought)
+    assert text.stdout.startswith(f"{name} = ")
+
+
+def test_air_inverse_without_solution_says_what_can_be_reached(asperity) -> None:
+    shown = asperity("air", *MATERIAL, "-f", "120 Hz", "--inverse", "48", "--for", "gap")
+    assert (shown.exit_code, shown.stdout) == (1, "")
+    assert "there it ranges from" in shown.stderr
+    assert shown.stderr.count("\n") == 1
+
+
+def test_materials_are_listed(asperity) -> None:
+    assert asperity("materials").stdout.startswith("bureau2000  PMMA on PMMA")
+    assert set(json.loads(asperity("materials", "--json").stdout)) == set(materials.available())
+
+
+def test_a_material_shows_every_number_with_its_source(asperity) -> None:
+    pmma = materials.load("bureau2000")
+    text = asperity("materials", "bureau2000").stdout
+    record = json.loads(asperity("materials", "bureau2000", "--json").stdout)
+    assert set(record["numbers"]) == set(pmma.numbers)
+    for name, number in pmma.numbers.items():
+        assert f"\n{name} " in text
+        assert str(number) in text
+        assert record["numbers"][name]["place"] == number.place
+    told = record["numbers"]["D0"]
+    assert (told["value"], told["uncertainty"], told["unit"]) == (0.4, 0.04, "um")
+    assert (told["kind"], told["si"]["value"], told["si"]["unit"]) == ("published", 4e-7, "m")
+
+
+def test_sources_are_cited(asperity) -> None:
+    assert asperity("materials", "bureau2000", "--cite").stdout.startswith("@article{bureau2000,")
+    everything = asperity("materials", "--cite").stdout
+    assert everything.count("@article{") == len(materials.available_citations())
+
+
+class Summary:
+    """What a reproduction hands back."""
+
+    def __init__(self, failed: int) -> None:
+        self.failed = failed
+
+    def lines(self) -> list[str]:
+        return ["claims 46", f"failed {self.failed}"]
+
+
+@pytest.mark.parametrize(("failed", "code"), [(0, 0), (2, 1)])
+def test_reproduce_prints_the_summary(
+    asperity, tmp_path: Path, monkeypatch, failed: int, code: int
+) -> None:
+    def reproduce(out: Path, progress) -> Summary:
+        progress("figures", 1, 2)
+        progress("claims", 2, 2)
+        (out / "index.html").write_text("", encoding="utf-8")
+        return Summary(failed)
+
+    paper = types.ModuleType("asperity.study.paper")
+    paper.reproduce = reproduce  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "asperity.study.paper", paper)
+    out = tmp_path / "new" / "report"
+    shown = asperity("reproduce", "--out", out)
+    assert shown.exit_code == code
+    assert shown.stdout == f"claims 46\nfailed {failed}\n\nReport: {out / 'index.html'}\n"
+    assert (out / "index.html").is_file()
+    assert [f.name for f in out.iterdir()] == ["index.html"]
+
+
+def test_an_interrupted_reproduction_says_that_it_is_not_complete(
+    asperity, tmp_path: Path, monkeypatch
+) -> None:
+    def reproduce(out: Path, progress) -> Summary:
+        raise KeyboardInterrupt
+
+    paper = types.ModuleType("asperity.study.paper")
+    paper.reproduce = reproduce  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "asperity.study.paper", paper)
+    shown = asperity("reproduce", "--out", tmp_path)
+    assert shown.exit_code == 130
+    assert "is not complete, repeat the command" in shown.stderr

@@ -1,0 +1,121 @@
+"""The command itself: what it costs, how it helps, how it leaves."""
+
+import os
+import signal
+import subprocess
+import sys
+import types
+
+import pytest
+
+import asperity.cli.response
+from asperity import __version__
+from asperity.cli.shell import Shell
+
+HEAVY = ("jax", "numpy", "pint", "pydantic", "scipy", "pandas", "matplotlib", "tqdm")
+
+
+def python(*arguments: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, *arguments], capture_output=True, text=True, env=os.environ, check=False
+    )
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["response", "--help"]])
+def test_version_and_help_load_nothing_heavy(arguments: list[str]) -> None:
+    script = (
+        "import sys\nfrom asperity.cli.main import main\n"
+        f"try:\n    main({arguments!r}, prog_name='asperity')\n"
+        "except SystemExit as left:\n    assert left.code == 0\n"
+        f"print('heavy:', [m for m in {HEAVY!r} if m in sys.modules])"
+    )
+    done = python("-c", script)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.endswith("heavy: []\n")
+
+
+@pytest.mark.parametrize("module", ["asperity", "asperity.cli.main"])
+def test_it_runs_as_a_module(module: str) -> None:
+    done = python("-m", module, "--version")
+    assert (done.returncode, done.stdout) == (0, f"asperity, version {__version__}\n")
+    assert done.stderr == ""
+
+
+def test_a_mistake_in_a_real_process_is_one_line_and_exit_2() -> None:
+    done = python("-m", "asperity", "response", "--law", "elasto-plastc")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == (
+        "asperity: law must be a registered law, got 'elasto-plastc'; "
+        "did you mean 'elasto-plastic'?\n"
+    )
+
+
+def test_help_lists_the_commands_with_examples(asperity) -> None:
+    for arguments in ([], ["--help"]):
+        shown = asperity(*arguments)
+        assert shown.exit_code == 0
+        for command in ("air", "materials", "reproduce", "response"):
+            assert f"\n  {command} " in shown.stdout
+        assert "Examples:" in shown.stdout
+
+
+@pytest.mark.parametrize("command", ["air", "materials", "reproduce", "response"])
+def test_every_command_has_help_with_an_example(asperity, command: str) -> None:
+    shown = asperity(command, "--help")
+    assert shown.exit_code == 0
+    assert f"asperity {command}" in shown.stdout.split("Example")[-1]
+
+
+def test_an_unknown_command_names_the_nearest(asperity) -> None:
+    shown = asperity("materals")
+    assert shown.exit_code == 2
+    assert shown.stderr == (
+        "asperity: command must be a known one, got 'materals'; did you mean 'materials'?\n"
+    )
+
+
+def test_an_interrupt_is_one_sentence_and_130(asperity, monkeypatch) -> None:
+    def stop(*arguments: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(asperity_response(), "_point", stop)
+    shown = asperity("response")
+    assert shown.exit_code == 130
+    assert shown.stderr.strip() == "asperity: interrupted; nothing was written"
+
+
+def asperity_response() -> types.ModuleType:
+    # The package's attribute of that name is the module; the command inside it has the same name.
+    return sys.modules[asperity.cli.response.__name__]
+
+
+LATE = """
+import os, signal, sys
+from asperity.cli.main import main
+import asperity.cli.materials as module
+module.materials.callback = lambda **_: os.kill(os.getpid(), signal.SIGINT)
+main(["materials"])
+"""
+
+
+def test_ctrl_c_leaves_at_once_without_a_traceback() -> None:
+    done = python("-c", LATE)
+    assert done.returncode == 130
+    assert done.stderr == "\nasperity: interrupted; nothing was written\n"
+
+
+def test_the_handler_of_the_caller_is_given_back(asperity) -> None:
+    before = signal.getsignal(signal.SIGINT)
+    asperity("--version")
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_message_with_line_breaks_stays_one_line(asperity) -> None:
+    shown = asperity("response", "--law", "two\nlines")
+    assert shown.exit_code == 2
+    assert shown.stderr.count("\n") == 1
+
+
+def test_the_commands_are_a_group_of_modules() -> None:
+    group = Shell(name="x", commands={"air": "asperity.cli.air"})
+    assert group.list_commands(None) == ["air"]  # type: ignore[arg-type]
