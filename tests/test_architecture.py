@@ -33,8 +33,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "inference": _EQUATIONS | {"materials", "slider", "solve", "instrument"},
     "study": _RESULTS,
     "figures": _BASE | {"study"},  # turns numbers into pictures, solves nothing
-    "cli": _RESULTS | {"study", "figures"},
-    "app": _RESULTS | {"study", "figures"},
+    "report": _BASE | {"materials", "study", "figures"},  # writes a folder, solves nothing
+    "cli": _RESULTS | {"study", "figures", "report"},
+    "app": _RESULTS | {"study", "figures", "report"},
     "__main__": {"cli"},
     # The package itself names its rooms as text, and imports them when they are asked for.
     "__init__": {"_version"},

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """Input that cannot be used; the message names the field, the rule, the value and the way out."""
+    """Input that cannot be used; the message names field, rule, value and the way out."""
 
 
 def closest(name: str, known: Iterable[str]) -> str:

@@ -1,6 +1,7 @@
 """Tables of operating points: same rows out, a reason for each that fails, nothing lost."""
 
 import csv
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -16,11 +17,17 @@ from asperity.study.operating_point import all_quantities, quantities, required
 from asperity.study.table import RESULTS, TableInterrupted, run_table
 
 NUMBERS = RESULTS[:7]
-COLUMNS = "law,A,B,D0,mu0,V0,K,M,W0,alpha,lambda,V,epsilon,frequency".split(",")
-POINT = {
-    **{"A": 0.013, "B": 0.026, "D0": 4e-7, "mu0": 0.5, "V0": 1e-6, "K": 2e5, "M": 1.6, "W0": 7.0},
-    **{"alpha": 0.02, "lambda": 7e-7, "V": 1e-6, "epsilon": 0.24, "frequency": 120.0},
-}
+COLUMNS = [
+    *("law", "A", "B", "D0", "mu0", "V0", "K", "M", "W0"),
+    *("alpha", "lambda", "V", "epsilon", "frequency"),
+]
+POINT = dict(
+    zip(
+        COLUMNS[1:],
+        (0.013, 0.026, 4e-7, 0.5, 1e-6, 2e5, 1.6, 7.0, 0.02, 7e-7, 1e-6, 0.24, 120.0),
+        strict=True,
+    )
+)
 
 
 def write(path: Path, rows: list[dict], columns: list[str] = COLUMNS, delimiter: str = ",") -> Path:
@@ -52,8 +59,7 @@ def points(count: int, **changed: object) -> list[dict]:
 def direct(row: dict) -> asp.solve.PeriodicResponse:
     """The response of one row, asked of the library without any table."""
     law = get_law(row["law"])
-    names = {"lambda_": "lambda"}
-    fields = {f: row[names.get(f, f)] for f in law.__dataclass_fields__}
+    fields = {f.name: row[f.name.rstrip("_")] for f in dataclasses.fields(law)}
     slider = Slider(law(**fields), spring=row["K"], load=row["W0"], mass=row["M"])
     return asp.periodic_response(
         slider, velocity=row["V"], epsilon=row["epsilon"], frequency=row["frequency"]
@@ -232,7 +238,7 @@ def test_columns_of_the_users_own_are_kept(here, name: str) -> None:
     [
         *(("freq", "frequency"), ("Frequency", "frequency"), ("frequency (Hz)", "frequency")),
         *(("lamda", "lambda"), ("lambda_", "lambda"), ("eps", "epsilon"), ("velocity", "V")),
-        *(("mu", "mu0"), ("d0", "D0"), ("D_c", "D0"), ("alfa", "alpha"), ("k", "K"), ("W", "W0")),
+        *(("mu", "mu0"), ("d0", "D0"), ("D_c", "D0"), ("alhpa", "alpha"), ("k", "K"), ("W", "W0")),
     ],
 )
 def test_a_misspelt_column_is_refused(tmp_path: Path, name: str, meant: str) -> None:
@@ -256,7 +262,7 @@ class Stop:
 
 def test_progress_reaches_every_row(here) -> None:
     watch = Stop()
-    here(points(7) + [POINT | {"law": "rice-ruina", "A": -1}], block=3, progress=watch)
+    here([*points(7), POINT | {"law": "rice-ruina", "A": -1}], block=3, progress=watch)
     done = [d for d, _ in watch.seen]
     assert done == sorted(done)
     assert watch.seen[0] == (0, 8)
@@ -265,11 +271,11 @@ def test_progress_reaches_every_row(here) -> None:
 
 @pytest.mark.parametrize("rubbish", [b"", b"half a li"])
 def test_an_interrupted_table_is_resumed_to_the_same_output(tmp_path: Path, rubbish: bytes) -> None:
-    rows = points(8) + [POINT | {"law": "rice-ruina", "A": -1}] + points(3)
+    rows = [*points(8), POINT | {"law": "rice-ruina", "A": -1}, *points(3)]
     source = write(tmp_path / "in.csv", rows)
     whole = run_table(source, tmp_path / "whole.csv", block=4)
     out = tmp_path / "out.csv"
-    with pytest.raises(TableInterrupted, match="with 8 of 12 rows finished; .* --resume"):
+    with pytest.raises(TableInterrupted, match=r"with 8 of 12 rows finished; .* --resume"):
         run_table(source, out, block=4, progress=Stop(9))
     partial = tmp_path / "out.csv.partial"
     assert not out.exists()

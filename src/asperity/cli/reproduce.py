@@ -22,7 +22,7 @@ def reproduce(out: Path) -> int:
     """
     _check_writable(out)
     from asperity.cli.progress import bar
-    from asperity.study.paper import reproduce as reproduce_paper
+    from asperity.report import reproduce as reproduce_paper
 
     try:
         with bar("step") as update:

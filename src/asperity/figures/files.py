@@ -28,8 +28,10 @@ def save_picture(figure: Figure, stem: Path) -> tuple[Path, Path]:
     """
     png, pdf = stem.with_suffix(".png"), stem.with_suffix(".pdf")
     # Lay the figure out once, and not again for each format.
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")
+    layout = figure.get_layout_engine()
+    if layout is not None:
+        layout.execute(figure)
+        figure.set_layout_engine("none")
     figure.savefig(png, metadata={"Software": None})
     # The date, and the versions of what wrote the file, would make equal figures differ.
     figure.savefig(pdf, metadata={"CreationDate": None, "Creator": None, "Producer": None})

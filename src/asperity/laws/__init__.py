@@ -1,9 +1,5 @@
 """Friction laws, one a file, and the registry that the command line and tables look them up in."""
 
-from asperity._jax import configure
-
-configure()
-
 from asperity.laws.amontons import Amontons
 from asperity.laws.elasto_plastic import ElastoPlastic
 from asperity.laws.elasto_plastic_age import ElastoPlasticAge

@@ -17,6 +17,10 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity._jax import configure
+
+configure()  # double precision, before any law makes an array
+
 State: TypeAlias = tuple[Array, ...]
 
 
@@ -79,7 +83,7 @@ class Law(eqx.Module):
         return 0.0
 
     def log_velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
-        """ln(v in m/s) at which the law carries the force `friction` = F_i/W: inverse of `friction`.
+        """ln(v in m/s) at which the law carries the force `friction` = F_i/W: its inverse.
 
         A law with a closed form overrides this; the default solves it by Newton's method on
         ln v, in which every rate-and-state law is close to linear.

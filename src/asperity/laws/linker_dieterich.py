@@ -30,13 +30,14 @@ class LinkerDieterich(RiceRuina):
         Linker-Dieterich coefficient (dimensionless): a load step changes F/W by
         -alpha ln(W_after / W_before) at constant velocity.
     mu0, A, B, D0, V0 : float
-        As in `RiceRuina`. B must not be zero.
+        As in `RiceRuina`, but B > 0.
     """
 
     name: ClassVar[str] = "linker-dieterich"
     source: ClassVar[str] = "bureau2000, linker1992"
     state_names: ClassVar[tuple[str, ...]] = ("log_age_plus_load",)
 
+    B: ArrayLike = parameter("law.B", "dimensionless")  # alpha / B: zero has no limit
     alpha: ArrayLike = parameter("law.alpha", "dimensionless", "finite")
 
     def log_age(self, state: State, w: ArrayLike) -> Array:

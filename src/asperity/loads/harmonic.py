@@ -14,8 +14,8 @@ class Harmonic(eqx.Module):
     Parameters
     ----------
     epsilon : array
-        Relative amplitude, 0 <= eps < 1 (contact is never lost). Where an air layer
-        bears part of the modulation this is the effective amplitude, the part that the contacts carry.
+        Relative amplitude, 0 <= eps < 1 (contact is never lost). Where an air
+        layer bears part of the modulation this is the part that the contacts carry.
     """
 
     epsilon: ArrayLike

@@ -19,7 +19,12 @@ from jax import Array
 
 from asperity.solve.averaged import averaged_states
 from asperity.solve.cyclic import solve_cyclic
-from asperity.solve.linear import jacobian_columns
+from asperity.solve.linear import (
+    jacobian_columns,
+    product,
+    solve_columns,
+    spectral_abscissa,
+)
 from asperity.solve.mesh import (
     GAUSS_A,
     GAUSS_B,
@@ -73,17 +78,38 @@ def _condense(local: _Local, orbit: Orbit) -> tuple[Array, Array]:
     Returns the matrix (n, STAGES, n, intervals, points) and the constant part
     (n, STAGES, intervals, points) of the change of the slopes.
     """
-    n, stages, intervals, points = local.rates.shape
-    m = n * stages
-    per_stage = jnp.transpose(local.jacobian, (0, 2, 1, 3, 4))  # (row, stage, column, ...)
-    coupling = per_stage[:, :, :, None] * GAUSS_A[None, :, None, :, None, None]
-    matrix = jnp.eye(m).reshape(n, stages, n, stages)[..., None, None] - orbit.widths * coupling
-    right = jnp.concatenate([per_stage, (local.rates - orbit.slopes)[:, :, None]], axis=2)
-    matrix = matrix.reshape(m, m, intervals, points).transpose(2, 3, 0, 1)
-    right = right.reshape(m, n + 1, intervals, points).transpose(2, 3, 0, 1)
-    solution = jnp.linalg.solve(matrix, right).transpose(2, 3, 0, 1)
-    solution = solution.reshape(n, stages, n + 1, intervals, points)
+    n = local.rates.shape[0]
+    per_stage = jnp.transpose(local.jacobian, (2, 0, 1, 3, 4))  # (stage, row, column, ...)
+    constant = jnp.swapaxes(local.rates - orbit.slopes, 0, 1)[:, :, None]
+    # Row blocks (I - h a_jk J_j | J_j, F_j - K_j), one per stage j, columns (k, state).
+    coupling = per_stage[:, :, None] * (orbit.widths * GAUSS_A[:, None, :, None, None, None])
+    identity = jnp.eye(STAGES)[:, None, :, None] * jnp.eye(n)[:, None, :]
+    left = (identity[..., None, None] - coupling).reshape(STAGES, n, -1, *orbit.widths.shape)
+    solution = _eliminate_stages(jnp.concatenate([left, per_stage, constant], axis=2))
+    solution = jnp.swapaxes(solution, 0, 1)
     return solution[:, :, :n], solution[:, :, n]
+
+
+def _eliminate_stages(rows: Array) -> Array:
+    """Block elimination of (stages, n, stages * n + right sides, ...), one stage after the other.
+
+    Returns (stages, n, right sides, ...). Pivots are the n x n blocks of the stages; one
+    is singular only where the mesh is far too coarse for a growing mode.
+    """
+    stages, n = rows.shape[:2]
+    solved = []
+    for j in range(stages):
+        pivot, rest = rows[0, :, :n], rows[0, :, n:]
+        own = solve_columns(pivot, rest)
+        below, rows = rows[1:, :, :n], rows[1:, :, n:]
+        rows = rows - (below[:, :, :, None] * own[None, None]).sum(2)
+        solved.append(own)
+    for j in reversed(range(stages - 1)):
+        for later in range(stages - 1, j, -1):
+            at = (later - j - 1) * n
+            known = product(solved[j][:, at : at + n], solved[later])
+            solved[j] = jnp.concatenate([solved[j][:, :at], solved[j][:, at + n :] - known], axis=1)
+    return jnp.stack(solved)
 
 
 def _transfer_maps(response: Array, widths: Array) -> Array:
@@ -100,6 +126,12 @@ def _newton_step(system, load, orbit: Orbit) -> tuple[_Local, Array, Array]:
     nodes = solve_cyclic(maps, rise - gap)
     slopes = jnp.einsum("nkcmb,cmb->nkmb", response, nodes) + constant
     return local, nodes, slopes
+
+
+def newton_update(system, load, orbit: Orbit) -> Orbit:
+    """One undamped Newton step: at a converged orbit an identity with the orbit's derivative."""
+    _, nodes, slopes = _newton_step(system, load, orbit)
+    return orbit._replace(nodes=orbit.nodes + nodes, slopes=orbit.slopes + slopes)
 
 
 class NewtonResult(NamedTuple):
@@ -143,8 +175,10 @@ def newton_orbit(
         nodes = nodes - nodes[:, :1]
         moved = Orbit(orbit.mesh, centre, nodes, orbit.slopes + damping * slopes)
         swing = jnp.abs(moved.nodes[0]).max(0)
-        relative = jnp.abs(stages[0] - stages[0, :1, :1]).max((0, 1)) / (swing + 1e-300)
-        error = jnp.maximum(change, jnp.where(swing > 0, relative, 0.0))
+        # Against round-off where there is hardly any swing: of z, see the rate of z.
+        swing = swing + 1e-4 * jnp.minimum(system.kappa, 1.0)
+        relative = jnp.abs(stages[0] - stages[0, :1, :1]).max((0, 1)) / swing
+        error = jnp.maximum(change, relative)
         return moved, jnp.where(jnp.isfinite(error), error, jnp.inf), steps + 1
 
     def unfinished(carry) -> Array:
@@ -202,7 +236,7 @@ def collocation_response(system, load, orbit: Orbit, *, harmonics: int) -> Collo
         monodromy,
         log_scale,
         2 * jnp.pi * (weights * trace).sum((0, 1)),
-        2 * jnp.pi * (weights * _largest_growth(local.jacobian)).sum((0, 1)),
+        2 * jnp.pi * (weights * spectral_abscissa(local.jacobian)).sum((0, 1)),
     )
 
 
@@ -220,15 +254,3 @@ def _scaled_product(maps: Array) -> tuple[Array, Array]:
     identity = jnp.broadcast_to(jnp.eye(n)[:, :, None], (n, n, points))
     start = (identity, jnp.zeros(points))
     return jax.lax.scan(multiply, start, jnp.moveaxis(maps, 2, 0))[0]
-
-
-def _largest_growth(jacobian: Array) -> Array:
-    """Largest real part of the eigenvalues of (n, n, ...) Jacobians."""
-    if jacobian.shape[0] == 1:
-        return jacobian[0, 0]
-    if jacobian.shape[0] == 2:
-        (a, b), (c, d) = jacobian
-        square = 0.25 * (a - d) ** 2 + b * c
-        return 0.5 * (a + d) + jnp.sqrt(jnp.maximum(square, 0.0))
-    eigenvalues = jnp.linalg.eigvals(jnp.moveaxis(jacobian, (0, 1), (-2, -1)))
-    return eigenvalues.real.max(-1)

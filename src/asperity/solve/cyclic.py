@@ -14,21 +14,24 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from asperity.solve.linear import reflect
+
 
 def _triangularise(rows: Array, columns: int) -> Array:
     """Householder reflections that zero the first `columns` columns below the diagonal.
 
     `rows` has shape (rows, all columns, points).
     """
+    done, rest = [], rows
     for k in range(columns):
-        x = rows[k:, k]
-        norm = jnp.sqrt((x * x).sum(0))
-        v = x.at[0].add(jnp.where(x[0] >= 0, norm, -norm))
-        square = (v * v).sum(0)
-        factor = 2 / jnp.where(square == 0, 1.0, square)
-        along = (v[:, None] * rows[k:]).sum(0)
-        rows = rows.at[k:].add(-factor * v[:, None] * along[None])
-    return rows
+        pivot, rest = reflect(rest)
+        zeros = jnp.zeros((k, *pivot.shape))
+        done.append(jnp.concatenate([zeros, pivot[None], rest[0]]))
+        rest = rest[1:]
+    if not rest.shape[0]:
+        return jnp.stack(done)
+    padding = jnp.zeros((rest.shape[0], columns, *rest.shape[2:]))
+    return jnp.concatenate([jnp.stack(done), jnp.concatenate([padding, rest], axis=1)])
 
 
 def _back_substitute(triangle: Array, rhs: Array) -> Array:

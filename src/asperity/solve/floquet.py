@@ -9,6 +9,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+#: Logarithm from which a multiplier overflows a double. Its argument, a small difference of large
+#: phases, is then not known either.
+LARGEST_LOG = 709.0
+
 Complex = NDArray[np.complex128]
 Float = NDArray[np.float64]
 
@@ -66,7 +70,13 @@ def from_logs(logs: Complex) -> Complex:
     """Multipliers from their logarithms; a modulus beyond the range of doubles is inf or 0."""
     with np.errstate(over="ignore", under="ignore", invalid="ignore"):
         modulus = np.exp(logs.real)
-        on_axis = (logs.imag == 0) | (np.abs(logs.imag) == np.pi)
+        angle = np.where(np.isnan(logs.imag) & ~np.isnan(logs.real), 0.0, logs.imag)
+        on_axis = (angle == 0) | (np.abs(angle) == np.pi)
         # Not inf * 0: a real multiplier has no imaginary part however large it is.
-        imaginary = np.where(on_axis, 0.0, modulus * np.sin(logs.imag))
-        return modulus * np.cos(logs.imag) + 1j * imaginary
+        imaginary = np.where(on_axis, 0.0, modulus * np.sin(angle))
+        return modulus * np.cos(angle) + 1j * imaginary
+
+
+def without_lost_arguments(logs: Complex) -> Complex:
+    """The same with NaN for the argument of a multiplier that overflows."""
+    return np.where(logs.real > LARGEST_LOG, logs.real + 1j * np.nan, logs)

@@ -41,7 +41,7 @@ _FLOQUET_TOLERANCE = 1e-10
 
 
 class FourierOrbit(NamedTuple):
-    """A periodic orbit on the half grid; `even` and `odd` in theta, each (size, nodes/2, points)."""
+    """A periodic orbit on the half grid; `even` and `odd` parts are (size, nodes/2, points)."""
 
     mean: Array
     even: Array
@@ -143,11 +143,17 @@ def _step(system, cycle: _Cycle, mean: Array, even: Array, odd: Array) -> tuple:
     return mean + change, jnp.stack(new_even), jnp.stack(new_odd), jnp.abs(change).max(0)
 
 
-def _relative_change(new_even: Array, new_odd: Array, even: Array, odd: Array) -> Array:
-    """Largest change of the zero-mean parts: the first relative to itself, log states absolutely."""
+def _relative_change(
+    new_even: Array, new_odd: Array, even: Array, odd: Array, kappa: Array
+) -> Array:
+    """Largest change of the zero-mean parts: z relative to its size, log states absolutely.
+
+    The rate of z is kappa times a number with the round-off of 1, which bounds what a vanishing
+    z can mean.
+    """
     moved = jnp.maximum(jnp.abs(new_even - even), jnp.abs(new_odd - odd)).max(1)
     size = jnp.maximum(jnp.abs(new_even), jnp.abs(new_odd)).max(1)
-    return jnp.maximum(moved[0] / (size[0] + 1e-300), moved[1:].max(0, initial=0.0))
+    return jnp.maximum(moved[0] / (size[0] + 1e-3 * kappa), moved[1:].max(0, initial=0.0))
 
 
 def fourier_orbit(
@@ -189,7 +195,9 @@ def fourier_orbit(
     def body(carry) -> tuple:
         mean, even, odd, change, _, steps = carry
         mean, new_even, new_odd, moved = _step(system, cycle, mean, even, odd)
-        new_change = jnp.maximum(moved, _relative_change(new_even, new_odd, even, odd))
+        new_change = jnp.maximum(
+            moved, _relative_change(new_even, new_odd, even, odd, system.kappa)
+        )
         # A contraction by r leaves r / (1 - r) of the last change; none is assumed at first.
         contraction = jnp.where(jnp.isinf(change), 0.5, new_change / change)
         error = jnp.where(contraction < 1, new_change * contraction / (1 - contraction), jnp.inf)
@@ -250,7 +258,7 @@ def fourier_waveform(system, load, orbit: FourierOrbit, *, grading: float, phase
     half = orbit.even.shape[1]
     theta = 2 * np.pi * np.arange(phases) / phases
     tau = theta.copy()
-    for _ in range(60):  # Kepler's equation theta = tau + g sin(tau), contraction by g
+    for _ in range(60):  # Newton's method for Kepler's equation
         tau = tau - (tau + grading * np.sin(tau) - theta) / (1 + grading * np.cos(tau))
     nodes, k = _half_grid(2 * half)[0], np.arange(1, half)[:, None]
     even = (2 / half) * np.cos(k * tau).T @ np.cos(k * nodes)

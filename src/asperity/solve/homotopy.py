@@ -23,6 +23,7 @@ Path = Callable[[Problem, Float], Problem]
 _GROWTH, _SHRINKAGE = 1.6, 0.35
 _SMALLEST_STEP = 1e-4
 _MOST_STEPS = 250
+_CHUNK = 16
 #: A step is accepted when Newton's method has converged to this; the end point is solved again.
 _ACCEPTED = 1e-5
 
@@ -49,7 +50,6 @@ def follow(
     orbit: Orbit,
     index: Indices,
     *,
-    chunk: int,
     first_step: float,
 ) -> Float:
     """Follow the orbits of the points `index` along `path` from t = 0 to t = 1.
@@ -64,7 +64,6 @@ def follow(
         Orbits at t = 0, NumPy arrays; overwritten with the orbits at the t reached.
     index : array of int
         Points to work on.
-    chunk : int
     first_step : float
 
     Returns
@@ -85,7 +84,7 @@ def follow(
             break
         trial = np.minimum(1.0, t + step)
         inputs = (path(problem, trial), orbit)
-        for part, (moved, error) in run_chunks(advance, inputs, active, chunk):
+        for part, (moved, error) in run_chunks(advance, inputs, active, _CHUNK):
             # Also the re-meshed orbit must be finite: it is the next guess.
             good = (error < _ACCEPTED) & np.isfinite(moved.slopes).all((0, 1, 2))
             put(orbit, part[good], take(moved, np.flatnonzero(good)))

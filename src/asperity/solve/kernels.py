@@ -17,7 +17,7 @@ from asperity.solve.collocation import (
     refined,
 )
 from asperity.solve.fourier import fourier_orbit, fourier_response, fourier_waveform
-from asperity.solve.linear import jacobian_columns
+from asperity.solve.linear import jacobian_columns, spectral_radius
 from asperity.solve.mesh import Orbit, evaluate, split
 
 #: Bounds on an exponent's change per Newton step: bold from a rough guess, since the change of
@@ -59,8 +59,7 @@ def stiffness_of_steady_sliding(problem: Problem) -> Array:
     steady = jnp.broadcast_to(system.steady(), (system.size, _points(problem)))
     one, flat = jnp.ones(steady.shape[1:]), jnp.zeros(steady.shape[1:])
     _, columns = jacobian_columns(lambda Y: system.rates(Y, one, flat), steady)
-    matrix = jnp.moveaxis(jnp.stack(columns, axis=1), -1, 0)
-    return jnp.abs(jnp.linalg.eigvals(matrix)).max(-1)
+    return spectral_radius(jnp.stack(columns, axis=1))
 
 
 @partial(jax.jit, static_argnames=("nodes", "grading", "harmonics", "phases"))

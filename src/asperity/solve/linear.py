@@ -1,4 +1,9 @@
-"""Small dense systems, one per operating point, with the points along the last axis."""
+"""Small dense systems, one per operating point, with the points along the last axes.
+
+Written in element-wise operations on purpose. They vectorise over the points, which calls of LAPACK
+do not, and two LAPACK calls that XLA's CPU backend runs side by side can wait for each other for
+ever (seen with jaxlib 0.10.2 on two cores).
+"""
 
 from __future__ import annotations
 
@@ -14,22 +19,68 @@ def solve_points(matrix: Array, rhs: Array) -> Array:
 
     Parameters
     ----------
-    matrix : array, shape (n, n, points)
-    rhs : array, shape (n, points)
+    matrix : array, shape (n, n, ...)
+    rhs : array, shape (n, ...)
 
     Returns
     -------
-    array, shape (n, points)
+    array, shape (n, ...)
         Not finite where a matrix is singular.
+    """
+    return solve_columns(matrix, rhs[:, None])[:, 0]
+
+
+def solve_columns(matrix: Array, rhs: Array) -> Array:
+    """Solve ``matrix X = rhs`` with several right-hand sides.
+
+    By Cramer's rule up to two states, by Householder reflections for more.
+
+    Parameters
+    ----------
+    matrix : array, shape (n, n, ...), real or complex
+    rhs : array, shape (n, columns, ...)
+
+    Returns
+    -------
+    array, shape (n, columns, ...)
     """
     n = matrix.shape[0]
     if n == 1:
-        return rhs / matrix[0]
-    if n == 2:  # Cramer: vectorises over the points, which LAPACK calls do not
+        return rhs / matrix
+    if n == 2:
         (a, b), (c, d) = matrix
         return jnp.stack([d * rhs[0] - b * rhs[1], a * rhs[1] - c * rhs[0]]) / (a * d - b * c)
-    x = jnp.linalg.solve(jnp.moveaxis(matrix, -1, 0), jnp.moveaxis(rhs, -1, 0)[..., None])
-    return jnp.moveaxis(x[..., 0], 0, -1)
+    rest = jnp.concatenate([matrix, rhs], axis=1)
+    diagonal, rows = [], []
+    for _ in range(n):
+        pivot, rest = reflect(rest)
+        diagonal.append(pivot)
+        rows.append(rest[0])
+        rest = rest[1:]
+    solution: list[Array] = []  # last unknown first
+    for k in reversed(range(n)):
+        known = n - 1 - k
+        right = rows[k][known:]
+        for j in range(known):
+            right = right - rows[k][j] * solution[known - 1 - j]
+        solution.append(right / diagonal[k])
+    return jnp.stack(solution[::-1])
+
+
+def reflect(rows: Array) -> tuple[Array, Array]:
+    """One Householder reflection of `rows`, shape (rows, columns, ...).
+
+    Returns the first entry of the first column after it, the others being zero, and the
+    remaining columns.
+    """
+    x = rows[:, 0]
+    norm = jnp.sqrt((x * x.conj()).real.sum(0))
+    first = jnp.abs(x[0])
+    signed = norm * jnp.where(first == 0, 1.0, x[0] / jnp.where(first == 0, 1.0, first))
+    v = x.at[0].add(signed)
+    scale = norm * (norm + first)
+    along = (v.conj()[:, None] * rows[:, 1:]).sum(0) / jnp.where(scale == 0, 1.0, scale)
+    return -signed, rows[:, 1:] - v[:, None] * along
 
 
 def jacobian_columns(function: Callable[[Array], Array], Y: Array) -> tuple[Array, list[Array]]:
@@ -76,4 +127,57 @@ def expm_points(matrix: Array) -> Array:
         traceless = jnp.stack([jnp.stack([a - half, b]), jnp.stack([c, d - half])])
         identity = jnp.eye(2)[:, :, None]
         return jnp.exp(half) * (cosh * identity + sinhc * traceless)
-    return jnp.moveaxis(jax.scipy.linalg.expm(jnp.moveaxis(matrix, -1, 0)), 0, -1)
+    norm = jnp.abs(matrix).sum(1).max(0)
+    halvings = jnp.maximum(jnp.ceil(jnp.log2(norm + 1e-300)) + 4, 0.0)
+    small = matrix / 2.0**halvings
+    total = term = jnp.broadcast_to(jnp.eye(matrix.shape[0])[:, :, None], matrix.shape)
+    for k in range(1, 14):  # Taylor at norm 1/16: 1e-17
+        term = product(small, term) / k
+        total = total + term
+    return jax.lax.fori_loop(
+        0,
+        jnp.max(halvings).astype(int),
+        lambda i, m: jnp.where(i < halvings, product(m, m), m),
+        total,
+    )
+
+
+def product(a: Array, b: Array) -> Array:
+    """Matrix product for every operating point, (n, n, ...) each."""
+    return (a[:, :, None] * b[None]).sum(1)
+
+
+def spectral_radius(matrix: Array) -> Array:
+    """Largest modulus of the eigenvalues, to a per mille, by repeated squaring."""
+    return jnp.exp(_log_growth(matrix))
+
+
+def spectral_abscissa(matrix: Array) -> Array:
+    """Largest real part of the eigenvalues of (n, n, ...) matrices.
+
+    Exact for two states; to a per mille of the norm for more, from the growth of the exponential.
+    """
+    if matrix.shape[0] == 1:
+        return matrix[0, 0]
+    if matrix.shape[0] == 2:
+        (a, b), (c, d) = matrix
+        square = 0.25 * (a - d) ** 2 + b * c
+        return 0.5 * (a + d) + jnp.sqrt(jnp.maximum(square, 0.0))
+    size = jnp.abs(matrix).max((0, 1)) + 1e-300
+    n = matrix.shape[0]
+    scaled = matrix / (8 * n * size)
+    identity = jnp.eye(n).reshape((n, n) + (1,) * (matrix.ndim - 2))
+    square = product(scaled, scaled)
+    exponential = identity + scaled + square / 2 + product(square, scaled) / 6
+    return _log_growth(exponential) * 8 * n * size
+
+
+def _log_growth(matrix: Array) -> Array:
+    """Limit of ln |matrix^k| / k."""
+    log_scale = jnp.zeros(matrix.shape[2:])
+    for k in range(12):
+        size = jnp.abs(matrix).max((0, 1)) + 1e-300
+        log_scale = log_scale + jnp.log(size) / 2**k
+        matrix = matrix / size
+        matrix = product(matrix, matrix)
+    return log_scale + jnp.log(jnp.abs(matrix).max((0, 1)) + 1e-300) / 2**12

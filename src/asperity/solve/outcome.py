@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import IntEnum
 
 import numpy as np
@@ -21,21 +22,30 @@ _SENTENCES = {
     Outcome.CONVERGED: "converged",
     Outcome.NO_ORBIT: (
         "no periodic orbit found: followed from steady sliding the branch stops at "
-        "epsilon = {detail:.4g}, short of the amplitude asked for; lower epsilon, or stiffen the spring"
+        "epsilon = {detail:.4g}, short of the amplitude asked for; "
+        "lower epsilon or stiffen the spring"
     ),
     Outcome.NOT_RESOLVED: (
         "an orbit was found but not resolved: refining the mesh still changes it by {detail:.1e} "
         "relative, above 1e-8"
     ),
     Outcome.MULTIPLIERS_NOT_RESOLVED: (
-        "the orbit is resolved but its Floquet multipliers are not: refining the mesh still changes "
-        "them by {detail:.1e} relative, above 1e-8"
+        "the orbit is resolved but its Floquet multipliers are not: refining the mesh "
+        "still changes them by {detail:.1e} relative, above 1e-8"
     ),
 }
 
 
+_LOST = (
+    "an orbit was found on a coarse mesh but lost on every finer one, so it may not exist; "
+    "lower epsilon or stiffen the spring"
+)
+
+
 def sentence(outcome: int, detail: float) -> str:
     """The sentence that a user reads."""
+    if outcome == Outcome.NOT_RESOLVED and not math.isfinite(detail):
+        return _LOST
     return _SENTENCES[Outcome(outcome)].format(detail=detail)
 
 

@@ -71,13 +71,13 @@ def periodic_response(
     mean, mu1, mu2 and multipliers are good to 1e-8 relative (multipliers of modulus below 1e-12:
     to 1e-20 absolute).
     """
-    V = _checked(velocity, "velocity", "velocity")
-    f = _checked(frequency, "frequency", "frequency")
+    V = checked_positive(velocity, "velocity", "velocity")
+    f = checked_positive(frequency, "frequency", "frequency")
     eps = checked_epsilon(epsilon)
     if harmonics < 2:
         raise InputError(f"harmonics must be at least 2, got {harmonics}; ask for 2 or more")
     problem = Problem(QuasiStatic(slider, V, 2 * np.pi * f), Harmonic(eps))
-    flat, shape = _flatten(problem)
+    flat, shape = flatten(problem)
     points = int(np.prod(shape, dtype=int))
     report = progress or (lambda _: None)
     if slider.law.rate_dependent:
@@ -91,7 +91,14 @@ def periodic_response(
     return PeriodicResponse.from_search(found, shape, mu_ss, slider, V, eps, f)
 
 
-def _checked(value: Any, kind: str, name: str) -> np.ndarray:
+def checked_positive(value: Any, kind: str, name: str) -> np.ndarray:
+    """An array of velocities or frequencies in SI, all positive.
+
+    Raises
+    ------
+    InputError
+        Otherwise.
+    """
     array = np.asarray(to_si(value, kind, name), dtype=float)
     bad = array[~(array > 0)]
     if bad.size:
@@ -120,7 +127,7 @@ def checked_epsilon(value: Any) -> np.ndarray:
     return array
 
 
-def _flatten(problem: Problem) -> tuple[Problem, tuple[int, ...]]:
+def flatten(problem: Problem) -> tuple[Problem, tuple[int, ...]]:
     """Broadcast all parameters against each other and lay the points out along one axis."""
     leaves = jax.tree.leaves(problem)
     try:

@@ -9,22 +9,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.solve.batch import Indices, put, run_chunks, take
-from asperity.solve.floquet import from_logs
+from asperity.solve.floquet import LARGEST_LOG, from_logs
 from asperity.solve.found import Found, Options, logs_of, store
 from asperity.solve.kernels import ACCEPTED, Problem, Reading, refine_orbit, split_reading
 from asperity.solve.mesh import Orbit
 from asperity.solve.outcome import Outcome
 
-#: Agreement between two meshes, relative, at which the finer one is trusted to 1e-8: its own error
-#: is smaller by at least the factor 2^5 of a stiff orbit, by 2^8 otherwise.
-AGREEMENT = 5e-9
+#: Agreement between two meshes, relative, at which the finer one is trusted to 1e-8: with three times
+#: the intervals its own error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
+AGREEMENT = 2e-7
 
 #: Orbits are followed on the first of these meshes, and refined up to the last.
-MESHES = (48, 96, 192, 384, 768)
-_SPLITS = (4, 16)
+MESHES = (48, 144, 432, 1296)
+_SPLITS = (3, 9)
 
 #: Interval-points in a chunk: keeps the working set of collocation within a core's cache.
-_CHUNK_INTERVALS = 3072
+_CHUNK_INTERVALS = 1536
 
 #: Multipliers below this modulus are compared absolutely: no experiment sees them.
 _VANISHING = 1e-12
@@ -177,8 +177,8 @@ def _gaps(before: _State | None, now: _State) -> tuple[float, float]:
     if before is None or not all(np.all(np.isfinite(a)) for a in now[:2]):
         return np.inf, np.inf
     mean = abs(now.mean - before.mean) / abs(now.mean)
-    # Round-off of the mean bounds what a vanishing second harmonic can mean.
-    floor = 1e-15 * abs(now.mean) / AGREEMENT
+    # Round-off bounds what a harmonic that vanishes beside the first, or beside the mean, can mean.
+    floor = (1e-14 * abs(now.harmonics[0]) + 1e-17 * abs(now.mean)) / AGREEMENT
     harmonics = np.abs(now.harmonics - before.harmonics) / (np.abs(now.harmonics) + floor)
     return float(max(mean, harmonics.max())), _multiplier_gap(before.logs, now.logs)
 
@@ -187,9 +187,9 @@ def _multiplier_gap(before: NDArray[np.complex128], now: NDArray[np.complex128])
     if not (np.all(np.isfinite(before)) and np.all(np.isfinite(now))):
         return np.inf
     old, new = from_logs(before), from_logs(now)
-    # Beyond doubles the logarithms are compared, the moduli elsewhere.
-    huge = now.real > 700
+    # Beyond doubles the logarithms of the moduli are compared, the multipliers elsewhere.
+    huge = now.real > LARGEST_LOG
     with np.errstate(invalid="ignore", over="ignore"):
         gaps = np.abs(old - new) / np.maximum(np.abs(new), _VANISHING)
-        gaps = np.where(huge, np.abs(before - now) / np.abs(now), gaps)
+        gaps = np.where(huge, np.abs(before.real - now.real) / np.abs(now.real), gaps)
     return float(np.max(gaps, initial=0.0))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.slider import Slider
-from asperity.solve.floquet import from_logs
+from asperity.solve.floquet import from_logs, without_lost_arguments
 from asperity.solve.outcome import Outcome, sentences
 
 Float = NDArray[np.float64]
@@ -36,7 +36,7 @@ class PeriodicResponse:
     multipliers : complex array, shape (..., states)
         Floquet multipliers, by falling modulus.
     log_multipliers : complex array, shape (..., states)
-        ln|m| + i arg m, finite where a multiplier overflows.
+        ln|m| + i arg m. Where a multiplier overflows ln|m| does not; arg m is then NaN.
     stable : bool array, shape (...)
         All multipliers inside the unit circle; False where not converged.
     converged : bool array, shape (...)
@@ -86,7 +86,7 @@ class PeriodicResponse:
             mean_friction=shaped(found.mean_friction),
             mu_ss=mu_ss,
             harmonics=shaped(found.harmonics),
-            log_multipliers=shaped(found.log_multipliers),
+            log_multipliers=without_lost_arguments(shaped(found.log_multipliers)),
             waveform=np.stack([shaped(found.waveform[0]), shaped(found.waveform[1])]),
             iterations=shaped(found.iterations),
             outcome=shaped(found.outcome),
@@ -148,7 +148,7 @@ class PeriodicResponse:
 
     @property
     def result(self) -> NDArray[np.object_]:
-        """ "converged", or the reason why not, for each point."""
+        """Of each point: converged, or the reason why not."""
         return sentences(np.asarray(self.outcome), np.asarray(self.detail))
 
     @property

@@ -12,24 +12,18 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 
-import jax
 import numpy as np
-from numpy.typing import NDArray
 
-from asperity.solve.batch import Indices, put, run_chunks, take
+from asperity.solve.batch import Indices, run_chunks, take
 from asperity.solve.found import Found, Options, logs_of, store
-from asperity.solve.homotopy import along_amplitude, along_frequency, follow
 from asperity.solve.kernels import (
     Problem,
     fast_solve,
-    first_orbit,
     stiffness_of_steady_sliding,
 )
-from asperity.solve.mesh import Orbit
 from asperity.solve.outcome import Outcome
-from asperity.solve.refinement import MESHES, chunk_size, refine
-
-Float = NDArray[np.float64]
+from asperity.solve.refinement import refine
+from asperity.solve.starts import starting_orbits
 
 #: (nodes, grading, points a chunk) of the Fourier stages, and the error they must reach.
 _FOURIER = ((32, 0.3, 512), (128, 0.5, 128))
@@ -37,7 +31,6 @@ _FOURIER_ERROR = 1e-9
 #: Rate per radian above which Fourier collocation cannot contract, from experience.
 _FOURIER_STIFFNESS = 1.0
 
-_FOLLOWED = MESHES[0]
 #: Points whose orbits are kept in memory at a time.
 _BLOCK = 2048
 
@@ -103,62 +96,9 @@ def _fourier_stages(problem: Problem, found: Found, index: Indices, options: Opt
 
 
 def _collocate(problem: Problem, found: Found, block: Indices, options: Options) -> None:
-    """Stages 2 to 4 for a block of points."""
+    """Collocation, however far the start has to be fetched, and refinement for a block of points."""
     part = take(problem, block)
-    points = len(block)
-    everything = np.arange(points)
-    orbit = Orbit.empty(problem.system.size, _FOLLOWED, points)
-
-    solved = _from_averaged(part, orbit, everything)
-    reached = solved.astype(float)
-    lost = np.flatnonzero(~solved)
-    if len(lost):
-        reached[lost] = _from_steady(part, orbit, lost)[lost]
-        solved = reached >= 1
-    found.detail[block] = reached * np.asarray(part.load.epsilon)
-    lost = np.flatnonzero(~solved)
-    if len(lost):
-        solved[lost] = _from_high_frequency(part, orbit, lost)[lost]
-    options.progress(int((~solved).sum()))
-    refine(part, found, block, orbit, np.flatnonzero(solved), options)
-
-
-def _from_averaged(problem: Problem, orbit: Orbit, index: Indices) -> NDArray[np.bool_]:
-    solved = np.zeros(orbit.centre.shape[-1], dtype=bool)
-    solve = partial(first_orbit, intervals=_FOLLOWED)
-    for part, (first, error) in run_chunks(solve, problem, index, chunk_size(_FOLLOWED)):
-        good = error < 1e-6
-        put(orbit, part[good], take(first, np.flatnonzero(good)))
-        solved[part] = good
-    return solved
-
-
-def _from_steady(problem: Problem, orbit: Orbit, index: Indices) -> Float:
-    """Amplitude path from epsilon = 0; returns the share of epsilon reached."""
-    steady = np.asarray(jax.jit(lambda s: s.steady())(problem.system))
-    orbit.mesh[:, index] = np.linspace(0, 2 * np.pi, _FOLLOWED + 1)[:, None]
-    orbit.centre[:, index] = np.broadcast_to(steady, orbit.centre.shape)[:, index]
-    orbit.nodes[..., index] = 0.0
-    orbit.slopes[..., index] = 0.0
-    return follow(
-        problem, along_amplitude, orbit, index, chunk=chunk_size(_FOLLOWED), first_step=0.05
-    )
-
-
-def _from_high_frequency(problem: Problem, orbit: Orbit, index: Indices) -> NDArray[np.bool_]:
-    """Frequency path from where the averaged limit holds; returns whether the end was reached."""
-    stiffness = np.zeros(orbit.centre.shape[-1])
-    for part, value in run_chunks(stiffness_of_steady_sliding, problem, index, 4096):
-        stiffness[part] = value
-    omega = np.asarray(problem.system.omega)
-    path = along_frequency(omega * np.maximum(stiffness / 0.02, 1.0))
-    started = _from_averaged(path(problem, np.zeros_like(omega)), orbit, index)
-    reached = follow(
-        problem,
-        path,
-        orbit,
-        index[started[index]],
-        chunk=chunk_size(_FOLLOWED),
-        first_step=0.02,
-    )
-    return reached >= 1
+    start = starting_orbits(part, len(block))
+    found.detail[block] = start.reached * np.asarray(part.load.epsilon)
+    options.progress(int((~start.found).sum()))
+    refine(part, found, block, start.orbit, np.flatnonzero(start.found), options)

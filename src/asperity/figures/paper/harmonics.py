@@ -45,7 +45,7 @@ def draw_4(numbers: FigureNumbers) -> Figure:
     seen = stated()
     for name, dashes in _SPEEDS:
         rows = numbers.curve(name)
-        line = {"color": ELASTO_PLASTIC, "linestyle": dashes}
+        line: dict[str, Any] = {"color": ELASTO_PLASTIC, "linestyle": dashes}
         for axis, (_, column) in zip(axes, _HARMONICS, strict=False):
             draw_curve(axis, rows, APPLIED, column, _SMALL, **line)
         some = rows[rows[APPLIED] > 0]

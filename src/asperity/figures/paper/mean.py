@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.figure import Figure
 
 from asperity.figures.paper.parts import (
@@ -42,7 +44,7 @@ def draw_2(numbers: FigureNumbers) -> Figure:
         draw_curve(axis, rows, APPLIED, "delta_mu", color=ELASTO_PLASTIC, linestyle=dashes)
     layer = numbers.curve("air layer")
     draw_curve(axis, layer, APPLIED, "delta_mu", color=GREY, linestyle="dotted")
-    axis.set(xlim=(0, 0.53), ylim=(-0.12, 0.004), xlabel=AMPLITUDE, ylabel=DROP)
+    axis.set(xlim=(0, 0.53), ylim=(-0.124, 0.004), xlabel=AMPLITUDE, ylabel=DROP)
     mark_statement(axis, seen.epsilon, seen.drop)
     say(axis, "within the noise", (seen.onset / 2, -0.116), ha="center", va="bottom", rotation=90)
     say(axis, "a drop of 20 %", (0.505, -0.1035), ha="right", va="top")
@@ -112,7 +114,7 @@ def draw_5(numbers: FigureNumbers) -> Figure:
     )
     draw_curve(axis, vacuum, APPLIED, "delta_mu", color=ELASTO_PLASTIC)
     draw_curve(axis, air, APPLIED, "delta_mu", color=ELASTO_PLASTIC, linestyle=FAST)
-    thin = {"color": GREY, "linewidth": 1.2}
+    thin: dict[str, Any] = {"color": GREY, "linewidth": 1.2}
     layer = numbers.curve("1 mbar, air layer"), numbers.curve("1 atm, air layer")
     draw_curve(axis, layer[0], APPLIED, "delta_mu", **thin)
     draw_curve(axis, layer[1], APPLIED, "delta_mu", linestyle=FAST, **thin)
@@ -143,7 +145,7 @@ def draw_6(numbers: FigureNumbers) -> Figure:
     for name, dashes in _SPEEDS:
         rows = numbers.curve(name)
         draw_curve(axis, rows, APPLIED, "delta_mu", color=RICE_RUINA, linestyle=dashes)
-    axis.set(xlim=(0, 0.53), ylim=(-0.25, 0.008), xlabel=AMPLITUDE, ylabel=DROP)
+    axis.set(xlim=(0, 0.53), ylim=(-0.257, 0.008), xlabel=AMPLITUDE, ylabel=DROP)
     mark_statement(axis, seen.epsilon, seen.drop)
     say(axis, "a drop of 20 %", (0.515, -0.091), ha="right", va="bottom")
     axis.legend(
@@ -164,7 +166,7 @@ def draw_7(numbers: FigureNumbers) -> Figure:
     draw_curve(axis, numbers.curve("1 um/s"), APPLIED, "delta_mu", color=RICE_RUINA)
     axis.set(
         xlim=(0, 0.53),
-        ylim=(-0.25, 0.008),
+        ylim=(-0.257, 0.008),
         xlabel=r"$\epsilon$  or  $\epsilon_{\mathrm{eff}}$",
         ylabel=DROP,
     )
@@ -178,7 +180,7 @@ def draw_7(numbers: FigureNumbers) -> Figure:
         arrowprops={"arrowstyle": "-|>", "color": STATED, "linewidth": 1.2},
     )
     say(axis, r"$\epsilon \to \epsilon/2.1$", (0.369, middle + 0.005), ha="center", va="bottom")
-    say(axis, "a drop of 20 %", (0.515, -0.091), ha="right", va="bottom")
+    say(axis, "a drop of 20 %", (0.515, -0.103), ha="right", va="top")
     axis.legend(
         handles=[key("Rice–Ruina, 1 µm/s", color=RICE_RUINA), statement_key()], loc="lower left"
     )

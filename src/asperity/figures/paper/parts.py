@@ -20,7 +20,7 @@ DROP = r"$\Delta\bar{\mu}$"
 
 #: Half the width of the bar that stands for a statement at one amplitude, over that of the axis.
 _HALF_WIDTH = 0.032
-_STATEMENT = {
+_STATEMENT: dict[str, Any] = {
     "facecolor": STATED_FILL,
     "edgecolor": STATED,
     "linewidth": 0.8,
@@ -66,13 +66,13 @@ def mark_statement(
     low, high = sorted(scale * end for end in ends)
     left, right = axis.get_xlim()
     half = _HALF_WIDTH * (right - left)
-    bar = Rectangle((epsilon - half, low), 2 * half, high - low, **_STATEMENT, zorder=1.5)
-    axis.add_patch(bar)
+    axis.add_patch(Rectangle((epsilon - half, low), 2 * half, high - low, **_STATEMENT, zorder=1.5))
 
 
 def say(axis: Axes, text: str, at: tuple[float, float], **options: Any) -> None:
     """A remark on what the text states."""
-    axis.text(*at, text, **({"color": STATED, "style": "italic", "fontsize": 9.5} | options))
+    look: dict[str, Any] = {"color": STATED, "style": "italic", "fontsize": 9.5} | options
+    axis.text(*at, text, **look)
 
 
 def shade_noise(axis: Axes, seen: Stated) -> None:

@@ -41,7 +41,7 @@ def _modest_modulation() -> Claim:
         rules.above(rules.WEAK, "relative drop of the mean at eps = 0.5"),
         {"1 um/s": drop[0], "10 um/s": drop[1]},
         id="abstract-substantial-drop",
-        place="Abstract (i)",
+        place="Abstract (i); Section III.D",
         statement="Even a modest modulation of the load lowers the mean friction substantially.",
         stated="substantial",
         computed=f"{percent(drop[0])} and {percent(drop[1])} at 1 and 10 um/s",
@@ -76,10 +76,12 @@ def _excellent_agreement() -> Claim:
         stated="excellent quantitative agreement",
         computed=f"quasi-static, as in the paper: {met(quasi_static)} of the measured features; "
         f"with inertia: {met(inertial)}",
-        how="Seven features that the text states at eps = 0.5, 120 Hz, 1 and 10 um/s; the points of "
+        how="Seven features that the text states at eps = 0.5, 120 Hz, 1 and 10 um/s; the points "
+        "of "
         "the figures are not available.",
-        why="The agreement is that of the model without inertia, with eps_eff/eps and lambda fitted "
-        "on it.",
+        why="The agreement is that of the model without inertia, with eps_eff/eps and lambda "
+        "fitted "
+        "on it; see the claim on inertia in Eq. (29).",
     )
 
 
@@ -104,12 +106,13 @@ def _rice_ruina_mean() -> Claim:
         rules.about(paper().relative_drop, "relative drop of the mean"),
         {"1 um/s": drop[0], "10 um/s": drop[1]},
         id="rice-ruina-mean",
-        place="Section I (i); Section III.A, Figs. 6, 7",
+        place="Section I (i); Section III.A.3, Figs. 6, 7",
         statement="Rice-Ruina predicts the mean force quantitatively.",
         stated=str(paper()["relative_drop"]),
         computed=f"{100 * drop[0]:.1f} % and {100 * drop[1]:.1f} % at 1 and 10 um/s",
         how="Rice-Ruina law, periodic orbits at eps = 0.5, eps_eff = 0.48 eps.",
-        why="eps_eff/eps was fitted to make it so; the 0.4 measured at 200 Hz gives a drop a fifth smaller.",
+        why="eps_eff/eps was fitted to make it so; the 0.4 measured at 200 Hz gives a drop a fifth "
+        "smaller.",
     )
 
 

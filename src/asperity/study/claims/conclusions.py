@@ -26,7 +26,6 @@ from asperity.study.claims.features import met, missed, outputs
 def claims() -> list[Claim]:
     """All claims of section III.D."""
     return [
-        _significant_lowering(),
         _as_soon_as_applied(),
         _harmonics_essential(),
         _velocity_controls(),
@@ -34,21 +33,6 @@ def claims() -> list[Claim]:
         _smaller_alpha(),
         _not_a_good_tool(),
     ]
-
-
-def _significant_lowering() -> Claim:
-    drop = outputs(EXT).relative_drop
-    return judged(
-        rules.above(rules.WEAK, "relative drop at eps = 0.5"),
-        {"1 um/s": drop[0], "10 um/s": drop[1]},
-        id="significant-lowering",
-        place="Section III.D",
-        statement="Modulating the load lowers the dynamic friction coefficient significantly.",
-        stated="significantly",
-        computed=f"{100 * drop[0]:.1f} % and {100 * drop[1]:.1f} % at 1 and 10 um/s",
-        how="Elasto-plastic law, periodic orbits at eps = 0.5.",
-        why="As in the abstract.",
-    )
 
 
 def _as_soon_as_applied() -> Claim:
@@ -61,7 +45,8 @@ def _as_soon_as_applied() -> Claim:
         place="Section III.D",
         statement="The lowering occurs as soon as the modulation is applied.",
         stated="no threshold",
-        computed=f"{smallest[0]:.1e} at eps = 0.005, {at(r.delta_mu, p.epsilon_onset)[0]:.1e} at 0.05",
+        computed=f"{smallest[0]:.1e} at eps = 0.005, {at(r.delta_mu, p.epsilon_onset)[0]:.1e} at "
+        "0.05",
         how="Elasto-plastic law, periodic orbits.",
         why="There is no threshold; below eps of about 0.02 the drop is quadratic, too small to be "
         "seen.",
@@ -114,21 +99,19 @@ def _plastic_rate() -> Claim:
 
 
 def _smaller_alpha() -> Claim:
-    measured = paper().relative_drop
-    misfit = {
-        "alpha = 0.2": abs(outputs(LD).relative_drop[0] / measured - 1),
-        "alpha = 0.02": abs(outputs(LD, alpha=paper().alpha_low).relative_drop[0] / measured - 1),
-    }
+    measured, low = paper().relative_drop, outputs(LD, alpha=paper().alpha_low)
+    misfit = [1 - d / measured for d in outputs(LD).relative_drop]
     return judged(
-        rules.above(rules.MUCH / 2, "misfit of the drop at alpha = 0.2 over that at 0.02"),
-        {"1 um/s": misfit["alpha = 0.2"] / misfit["alpha = 0.02"]},
+        rules.above(rules.QUASI, "shortfall of the drop at alpha = 0.2"),
+        {"1 um/s": misfit[0], "10 um/s": misfit[1]},
         id="smaller-alpha",
         place="Section III.D",
         statement="The effect of the load on the age is much smaller than Linker and Dieterich's.",
-        stated="much smaller",
-        computed="; ".join(f"{k}: {v:.0%} off" for k, v in misfit.items()),
-        how="Linker-Dieterich law at 1 um/s, eps = 0.5, eps_eff = 0.48 eps, measured drop 20 %.",
-        why="Given the measured eps_eff/eps, see the claim on the upper limit of alpha.",
+        stated="certainly much smaller",
+        computed=f"the drop falls short by {misfit[0]:.0%} at alpha = 0.2, by "
+        f"{1 - low.relative_drop[0] / measured:.0%} at 0.02 (1 um/s)",
+        how="Linker-Dieterich law, eps = 0.5, eps_eff = 0.48 eps, measured drop 20 %.",
+        why="Given the measured eps_eff/eps; see the claim on the upper limit of alpha.",
     )
 
 
@@ -147,7 +130,8 @@ def _not_a_good_tool() -> Claim:
         "stick-slip frequency, are.",
         stated="not a good tool",
         computed="; ".join(f"{k}: x {v:.0f}" for k, v in ratios.items()),
-        how="Exact linear response of elastic asperities (lambda = 0.7 um) with alpha = 0.02 and 0, "
+        how="Exact linear response of elastic asperities (lambda = 0.7 um) with alpha = 0.02 and "
+        "0, "
         "at w = wc and at 120 Hz: modulus of the difference.",
         why="The spring turns velocities into forces in proportion to 1/w, and near wc sliding is "
         "close to its instability.",

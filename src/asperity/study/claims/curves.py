@@ -118,9 +118,9 @@ def experiment(V: float, **overrides: float) -> Experiment:
     return Experiment(**{k: v for k, v in numbers.items() if k != "omega"}, frequency=frequency())
 
 
-def _numbers(V: float, **overrides: float) -> dict[str, float]:
+def _numbers(V: float, **overrides: float) -> dict[str, Any]:
     p = paper()
-    own = {"A": p.A, "B": p.B, "D0": p.D0, "K": p.K, "W0": p.W0}
+    own: dict[str, Any] = {"A": p.A, "B": p.B, "D0": p.D0, "K": p.K, "W0": p.W0}
     own |= {"V": V, "omega": 2 * np.pi * p.frequency}
     own |= overrides
     own.setdefault("mu", p.mu0 - (own["B"] - own["A"]) * float(np.log(V / p.V0)))

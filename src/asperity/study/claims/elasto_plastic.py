@@ -7,20 +7,19 @@ import numpy as np
 from asperity.study.claims import rules
 from asperity.study.claims.claim import Claim, judged
 from asperity.study.claims.curves import (
-    APPLIED,
     EXT,
     RR,
+    STRONGEST,
     amplitude_slopes,
     at,
     curve,
     experiment,
     paper,
-    percent,
     slider,
     velocities,
     velocity_exponent,
 )
-from asperity.study.claims.features import inertial_outputs, met, missed, outputs
+from asperity.study.claims.features import inertial_outputs, outputs
 from asperity.study.claims.integration import periodic_orbit
 
 _EXT = "Elasto-plastic law, periodic orbits at 1 and 10 um/s, 120 Hz"
@@ -40,7 +39,6 @@ def claims() -> list[Claim]:
         _weaker("mu2", "Fig. 11c"),
         _no_saturation("mu1", "Fig. 11b"),
         _no_saturation("mu2", "Fig. 11c"),
-        _global_agreement(),
     ]
 
 
@@ -55,7 +53,7 @@ def _elastic_length_order() -> Claim:
         stated=str(p["lambda_order"]),
         computed=f"{p['lambda_quasi_static']} (quasi-static), {p['lambda']} (fitted)",
         how="Values given below in the section.",
-        why="Consistent.",
+        why="Both lengths are of the order of the size of the asperities.",
     )
 
 
@@ -80,7 +78,7 @@ def _stationary() -> Claim:
 def _equation() -> Claim:
     """The fast solver against Eq. (29), written out and integrated in time."""
     p, r = paper(), outputs(EXT)
-    gaps = {}
+    gaps: dict[str, float] = {}
     for i, V in enumerate(velocities()):
         orbit = periodic_orbit(experiment(V, lambda_=p.lambda_), _strongest(), r.delta_mu[i])
         found = {"drop": orbit.delta_mu, "mu1": abs(orbit.c1), "mu2": abs(orbit.c2)}
@@ -95,7 +93,8 @@ def _equation() -> Claim:
         statement="The extended model is Eq. (29) with the age law (2).",
         stated="Eqs. (29), (2)",
         computed=f"mean, mu1 and mu2 agree to {worst:.0e}",
-        how="Periodic orbits of the law of the package against Eq. (29) written out and integrated by "
+        how="Periodic orbits of the law of the package against Eq. (29) written out and integrated "
+        "by "
         "DOP853, eps = 0.5, 1 and 10 um/s.",
         why="What the package solves is the printed equation.",
     )
@@ -103,7 +102,17 @@ def _equation() -> Claim:
 
 def _strongest() -> float:
     """eps_eff at eps = 0.5."""
-    return paper().transmission * 0.5
+    return paper().transmission * STRONGEST
+
+
+def _inertial_transmission() -> float:
+    """eps_eff/eps that makes the drop 20 % at eps = 0.5 and 1 um/s, with inertia."""
+    p, V = paper(), velocities()[0]
+    measured, largest = p.relative_drop, _strongest()
+    smaller = p.transmission_air_over_vacuum * STRONGEST
+    orbit = periodic_orbit(experiment(V, M=p.M, lambda_=p.lambda_), smaller, -measured * p.mu0)
+    drops = [-orbit.delta_mu / orbit.mu, inertial_outputs().relative_drop[0]]
+    return float(np.interp(measured, drops, [smaller, largest])) / STRONGEST
 
 
 def _inertia() -> Claim:
@@ -120,11 +129,13 @@ def _inertia() -> Claim:
         place="Section III.C, Eq. (29)",
         statement="In the experimental conditions inertia can be neglected in the extended model.",
         stated="can be neglected",
-        computed="; ".join(f"{k}: {v:+.0%}" for k, v in changes.items()),
+        computed="; ".join(f"{k}: {v:+.0%}" for k, v in changes.items())
+        + f"; a drop of 20 % then needs eps_eff/eps = {_inertial_transmission():.2f}",
         how="Elasto-plastic law with M = 1.6 kg and without, integrated in time at eps = 0.5.",
         why="The argument of section III.A is linear and for rigid asperities. On elastic ones the "
         "slider resonates near 400 Hz, close to the third harmonic, and the pulses of slip "
-        "excite it.",
+        "excite it. The fitted 0.48 stands in part for the missing inertia: with it, the fit comes "
+        "near the 0.4 measured against the vacuum.",
     )
 
 
@@ -141,7 +152,7 @@ def _within_uncertainty() -> Claim:
         stated=str(p["lambda_quasi_static"]),
         computed=f"{distance / uncertainty:.2f} of the uncertainty away",
         how="(0.7 - 0.62)/0.15.",
-        why="Consistent.",
+        why="Half an uncertainty: fit and measurement agree.",
     )
 
 
@@ -204,9 +215,8 @@ def _weaker(name: str, figure: str) -> Claim:
 
 
 def _no_saturation(name: str, figure: str) -> Claim:
-    r, limit = curve(EXT), paper().no_saturation_below
+    r = curve(EXT)
     slopes = amplitude_slopes({"mu1": r.mu1, "mu2": r.mu2}[name]).min(1)
-    assert abs(APPLIED[-1] * paper().transmission - limit) < 1e-12
     return judged(
         rules.above(rules.UNSATURATED, f"smallest d ln({name})/d ln(eps) up to eps_eff = 0.3"),
         {"1 um/s": slopes[0], "10 um/s": slopes[1]},
@@ -217,21 +227,4 @@ def _no_saturation(name: str, figure: str) -> Claim:
         computed=f"smallest logarithmic slope {slopes[0]:.2f} and {slopes[1]:.2f} at 1 and 10 um/s",
         how=f"{_EXT}, eps_eff from 0.0024 to 0.3.",
         why="The elastic exchange grows with eps without limit.",
-    )
-
-
-def _global_agreement() -> Claim:
-    quasi_static, inertial = outputs(EXT), inertial_outputs()
-    return judged(
-        rules.below(0.5, "measured features that the model misses"),
-        {"as in the paper": len(missed(quasi_static))},
-        id="global-agreement",
-        place="Section III.C, Fig. 11",
-        statement="The global agreement of the extended model is excellent.",
-        stated="excellent",
-        computed=f"as in the paper, without inertia: {met(quasi_static)}; with inertia: "
-        f"{met(inertial)}, relative drop {percent(inertial.relative_drop[0])} at 1 um/s",
-        how="Seven features that the text states at eps = 0.5.",
-        why="All of them without inertia. With it the drop is larger, which a smaller eps_eff/eps "
-        "would undo: the fitted 0.48 stands in part for the missing inertia.",
     )

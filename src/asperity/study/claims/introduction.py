@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from asperity.laws import LinkerDieterich
@@ -191,7 +193,8 @@ def _product_response() -> Claim:
         + " from keeping it, at 10 um/s",
         how="Laws strength-area and rice-ruina, periodic orbits at eps = 0.5; at V = V0 they agree "
         "to five digits.",
-        why="True of the response. Stability feels it more: the term changes the weakening slope, on "
+        why="True of the response. Stability feels it more: the term changes the weakening slope, "
+        "on "
         "which the threshold of stick-slip hangs.",
     )
 
@@ -220,7 +223,8 @@ def _amontons_harmonic() -> Claim:
         {"mu1/(mu eps) - 1": abs(mu1 - 1), "mu2/mu1": mu2},
         id="amontons-harmonic",
         place="Section I",
-        statement="With Amontons-Coulomb friction the force is modulated harmonically, as the load.",
+        statement="With Amontons-Coulomb friction the force is modulated harmonically, as the "
+        "load.",
         stated="mu1 = mu eps, no overtones",
         computed=f"mu1/(mu eps) = {mu1:.12g}, mu2/mu1 = {mu2:.1g}",
         how="Law amontons, eps_eff = 0.24.",
@@ -244,8 +248,7 @@ def _anharmonic() -> Claim:
 
 
 def _age_jump() -> Claim:
-    law = slider(LD).law
-    assert isinstance(law, LinkerDieterich)
+    law = cast(LinkerDieterich, slider(LD).law)
     step, state = 1.1, law.steady_state(paper().V0)
     jump = float(np.exp(law.log_age(state, step) - law.log_age(state, 1.0)))
     expected = step ** (-paper().alpha / paper().B)
@@ -273,5 +276,5 @@ def _no_loss_of_contact() -> Claim:
         stated="eps from 0.005 to 0.5",
         computed=f"smallest W/W0 = {1 - largest:g}",
         how="W/W0 = 1 + eps cos(wt).",
-        why="The applied load stays positive; what the contacts bear stays further from zero in air.",
+        why="In air the contacts bear less; in vacuo at 200 Hz up to 0.58, still below 1.",
     )

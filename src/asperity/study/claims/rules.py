@@ -9,11 +9,17 @@ the paper writes              accepted
 a number with its digits      what rounds to it: half a unit of the last digit stated
 "about", "approximately"      within 5 %
 "of order", "k orders"        within half a decade: the nearest power of ten is the same
-"much smaller / larger"       by a factor of 10 or more
+"much smaller", ">>"          by a factor of 10 or more
 "negligible", "very weakly"   a change of less than 5 %
+"very close", "excellent"     a difference of less than 5 %
 "independent", "weakly"       a change of less than 10 %
+"satisfactory"                a difference of less than 10 %
 "quasi-independent"           a change of less than 20 %
-"quasi-linear"                an exponent within 0.1 of 1
+"substantial", "relevant"     10 % or more
+"significant", "sizeable"     20 % or more; so is a distance from something, "away"
+"strongly", "crucially"       a factor of 1.5 or more, or an exponent above 1/2
+"quasi-linear" in V           an exponent within 0.1 of 1; "much weaker": below 1/2
+"quasi-linear" curve          within 5 % of a line, relative to its highest point
 "saturates"                   a logarithmic slope below 1/4; "does not": above 1/2
 ============================  ===========================================================
 """
@@ -32,6 +38,8 @@ WEAK = 0.10
 QUASI = 0.20
 NEARLY_ONE = 0.1
 SATURATED, UNSATURATED = 0.25, 0.5
+#: A tie counts as inside, whatever its last bit: 0.485 rounds to 0.48 or 0.49.
+_TIE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -56,19 +64,17 @@ class Rule:
 def rounds_to(stated: float, last_digit: float, what: str = "the value") -> Rule:
     """Half a unit of the last digit stated, `last_digit` being one unit of it."""
     half = last_digit / 2
-    # A tie counts: 0.485 rounds to 0.48 or 0.49.
-    slack = 1e-9 * abs(stated)
     return Rule(
         f"{what} within {half:g} of {stated:g}, half a unit of the last digit stated",
-        lambda value: abs(value - stated) <= half + slack,
+        lambda value: abs(value - stated) <= half + _TIE * abs(stated),
     )
 
 
 def about(stated: float, what: str = "the value") -> Rule:
     """Within 5 %."""
     return Rule(
-        f"{what} within {ABOUT:.0%} of {stated:g}",
-        lambda value: abs(value / stated - 1) <= ABOUT,
+        f"{what} within {100 * ABOUT:g} % of {stated:g}",
+        lambda value: abs(value / stated - 1) <= ABOUT + _TIE,
     )
 
 
@@ -97,7 +103,7 @@ def between(low: float, high: float, what: str) -> Rule:
 
 def change_below(limit: float, what: str) -> Rule:
     """A relative change, of either sign, of less than `limit`."""
-    return Rule(f"{what} changes by less than {limit:.0%}", lambda value: abs(value) < limit)
+    return Rule(f"{what} changes by less than {100 * limit:g} %", lambda value: abs(value) < limit)
 
 
 def agrees(reference: float, tolerance: float, what: str) -> Rule:

@@ -45,7 +45,8 @@ def _most_compliant() -> Claim:
         place="Section II.A",
         statement="The leaf spring is the most compliant part of the system.",
         stated="more compliant",
-        computed=f"asperities {ratio:.0f} times stiffer at 3 N, {p.W0 / p.lambda_ / p.K:.0f} at 7 N",
+        computed=f"asperities {ratio:.0f} times stiffer at 3 N, {p.W0 / p.lambda_ / p.K:.0f} at 7 "
+        "N",
         how="kappa_asp = W0/lambda with lambda = 0.7 um, K = 0.2 N/um.",
         why="Even so the asperities dominate mu1: their stiffness is modulated.",
     )
@@ -63,7 +64,7 @@ def _dead_weight() -> Claim:
         stated=str(p["slider_weight"]),
         computed=f"{weight:.1f} N",
         how="M g with M = 1.6 kg, g = 9.80665 m/s^2.",
-        why="Consistent.",
+        why="The mass is the weight over g, rounded.",
     )
 
 
@@ -89,7 +90,8 @@ def _away_from_resonance() -> Claim:
         stated="away",
         computed=listed,
         how="sqrt(K/M), sqrt(W0/(lambda M)), sqrt(W0/(lambda_z M)) over 2 pi.",
-        why="True of the excitation, not of its overtones: 3 x 120 Hz and 2 x 200 Hz lie within 10 % "
+        why="True of the excitation, not of its overtones: 3 x 120 Hz and 2 x 200 Hz lie within 10 "
+        "% "
         "and 1 % of the tangential contact resonance.",
     )
 

@@ -91,7 +91,7 @@ def _solve(curve: Curve) -> pd.DataFrame:
             "curve": curve.name,
             "law": curve.law,
             "alpha": getattr(chosen.law, "alpha", np.nan),
-            "lambda": float(chosen.law.elastic_length),
+            "lambda": float(np.asarray(chosen.law.elastic_length)),
             "V": V,
             "frequency": f,
             "epsilon_applied": applied,

@@ -63,7 +63,7 @@ def thresholds(variant: str, V: Float, bracket: tuple[Float, Float]) -> Float:
     Returns
     -------
     array, shape (n,)
-        NaN where the iteration did not settle.
+        NaN where the multiplier does not cross 1 between them.
     """
     old, new = bracket
     at_old, at_new = log_multiplier(variant, V, old), log_multiplier(variant, V, new)
@@ -74,9 +74,11 @@ def thresholds(variant: str, V: Float, bracket: tuple[Float, Float]) -> Float:
         old, at_old = new, at_new
         new = np.clip(new - step, bracket[0], bracket[1])
         if np.abs(new - old).max() < _TOLERANCE:
-            return new
+            break
         at_new = log_multiplier(variant, V, new)
-    return np.where(np.abs(new - old) < _TOLERANCE, new, np.nan)
+    # At an end of the bracket the iterates agree as well, without a crossing.
+    crossed = (np.abs(new - old) < _TOLERANCE) & (np.abs(at_old) < _TOLERANCE)
+    return np.where(crossed, new, np.nan)
 
 
 def curve_name(variant: str, V: float) -> str:
@@ -92,7 +94,7 @@ def floquet_figure() -> FigureNumbers:
         for variant, (law, overrides) in variants().items()
         for speed in V
     )
-    found = FigureNumbers("figure-12", "Our own", "Modulation stabilises sliding", data)
+    found = FigureNumbers("figure-12", "A figure of our own", "Modulation stabilises sliding", data)
     scalars = {"K_over_Kc": stiffness_ratio(slider(RR))}
     scalars |= {f"steady {s:.0e}": float(floquet_max(slider(RR), s, paper().frequency)) for s in V}
     for variant in variants():
@@ -118,8 +120,8 @@ def _caption(scalars: dict[str, float], V: Float) -> str:
     slow, fast = (scalars[f"threshold {curve_name('RR', speed)}"] for speed in V)
     elastic = scalars[f"threshold {curve_name('EXT', V[0])}"]
     return (
-        f"Largest modulus of the Floquet multipliers of one period. The paper's central values give "
-        f"K/K_c = {scalars['K_over_Kc']:.2f}, so unmodulated sliding is unstable (dots at "
+        f"Largest modulus of the Floquet multipliers of one period. The paper's central values "
+        f"give K/K_c = {scalars['K_over_Kc']:.2f}, so unmodulated sliding is unstable (dots at "
         "ε = 0, closed form) although the text has K/K_c ≳ 1; modulation stabilises it where the "
         f"curve crosses 1: for Rice–Ruina at ε_eff = {slow:.4f} (1 µm/s) and {fast:.4f} "
         f"(10 µm/s), for the elasto-plastic law at {elastic:.4f} (1 µm/s). Cochard, Bureau and "

@@ -11,6 +11,8 @@ Linker-Dieterich ageing has the stability of Rice-Ruina's.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -20,11 +22,11 @@ from asperity.study.paper.machine import Float
 
 def growth_rate(slider: Slider, V: ArrayLike) -> Float:
     """Largest real part of s (1/s); positive where steady sliding is unstable."""
-    law, K, W0 = slider.law, float(slider.K), float(slider.W0)
     V = np.asarray(V, dtype=float)
-    A = float(law.A) * (1 + float(law.elastic_length) * K / W0)
-    quadratic, constant = A * W0 / V, K * V / float(law.D0)
-    linear = K - (float(law.B) - A) * W0 / float(law.D0)
+    A, B, D0, length, K, W0 = _numbers(slider)
+    A = A * (1 + length * K / W0)
+    quadratic, constant = A * W0 / V, K * V / D0
+    linear = K - (B - A) * W0 / D0
     root = np.sqrt(linear**2 - 4 * quadratic * constant + 0j)
     return np.asarray(((root - linear) / (2 * quadratic)).real)
 
@@ -36,5 +38,12 @@ def floquet_max(slider: Slider, V: ArrayLike, frequency: float) -> Float:
 
 def stiffness_ratio(slider: Slider) -> float:
     """K/Kc with the paper's Kc = (B - A) W0/D0: sliding on rigid asperities is stable above 1."""
-    law = slider.law
-    return float(slider.K * law.D0 / ((law.B - law.A) * slider.W0))
+    A, B, D0, _, K, W0 = _numbers(slider)
+    return K * D0 / ((B - A) * W0)
+
+
+def _numbers(slider: Slider) -> tuple[float, ...]:
+    """A, B, D0, lambda, K and W0 of a slider with one of the paper's laws."""
+    law: Any = slider.law
+    values = (law.A, law.B, law.D0, law.elastic_length, slider.K, slider.W0)
+    return tuple(float(np.asarray(value)) for value in values)
