@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from asperity._version import __version__
 
 if TYPE_CHECKING:
-    from asperity import air, figures, laws, materials, solve, study, units
+    from asperity import air, figures, laws, materials, report, solve, study, units
     from asperity.errors import InputError
     from asperity.slider import Slider
     from asperity.solve import (
@@ -30,7 +30,7 @@ _HOMES = {
     "perturbation_response": "asperity.solve",
     "sensitivities": "asperity.solve",
 }
-_MODULES = ("air", "figures", "laws", "materials", "solve", "study", "units")
+_MODULES = ("air", "figures", "laws", "materials", "report", "solve", "study", "units")
 
 __all__ = [
     "InputError",
@@ -43,6 +43,7 @@ __all__ = [
     "materials",
     "periodic_response",
     "perturbation_response",
+    "report",
     "sensitivities",
     "solve",
     "study",

@@ -16,13 +16,14 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from asperity.slider import QuasiStatic
 from asperity.solve.linear import jacobian_columns, solve_points
 
 #: Largest change of a logarithmic state in one step; the mean of e^(-state) is what is solved for.
 _STATE_STEP = 2.0
 
 
-def laplace_estimate(system, w: Array) -> Array:
+def laplace_estimate(system: QuasiStatic, w: Array) -> Array:
     """States at which the pulse of slip at the weakest contact carries the mean velocity.
 
     Parameters
@@ -53,7 +54,7 @@ def laplace_estimate(system, w: Array) -> Array:
     return start.at[0].set(jnp.minimum(start[0], weakest + width * gain))
 
 
-def averaged_states(system, w: Array, weights: Array, steps: int = 10) -> Array:
+def averaged_states(system: QuasiStatic, w: Array, weights: Array, steps: int = 10) -> Array:
     """States that make the mean rates vanish, by Newton's method from `laplace_estimate`.
 
     Parameters

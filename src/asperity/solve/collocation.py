@@ -17,6 +17,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from asperity.loads import Harmonic
+from asperity.slider import QuasiStatic
 from asperity.solve.averaged import averaged_states
 from asperity.solve.cyclic import solve_cyclic
 from asperity.solve.linear import (
@@ -36,7 +38,9 @@ from asperity.solve.mesh import (
 )
 
 
-def averaged_orbit(system, load, points: int, *, intervals: int, grading: float) -> Orbit:
+def averaged_orbit(
+    system: QuasiStatic, load: Harmonic, points: int, *, intervals: int, grading: float
+) -> Orbit:
     """The averaged limit as a first guess."""
     orbit = steady_orbit(system, points, intervals=intervals, grading=grading)
     w = load.load(orbit.stage_phases).reshape(-1, points)
@@ -44,7 +48,7 @@ def averaged_orbit(system, load, points: int, *, intervals: int, grading: float)
     return orbit._replace(centre=averaged_states(system, w, weights / (2 * jnp.pi)))
 
 
-def steady_orbit(system, points: int, *, intervals: int, grading: float) -> Orbit:
+def steady_orbit(system: QuasiStatic, points: int, *, intervals: int, grading: float) -> Orbit:
     """Steady sliding under constant load: the orbit at epsilon = 0."""
     n = system.size
     return Orbit(
@@ -64,7 +68,7 @@ class _Local(NamedTuple):
     jacobian: Array  # (row, column, STAGES, intervals, points)
 
 
-def _localise(system, load, orbit: Orbit) -> _Local:
+def _localise(system: QuasiStatic, load: Harmonic, orbit: Orbit) -> _Local:
     theta = orbit.stage_phases
     w, w_slope = load.load(theta), load.slope(theta)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
@@ -98,7 +102,7 @@ def _eliminate_stages(rows: Array) -> Array:
     """
     stages, n = rows.shape[:2]
     solved = []
-    for j in range(stages):
+    for _ in range(stages):
         pivot, rest = rows[0, :, :n], rows[0, :, n:]
         own = solve_columns(pivot, rest)
         below, rows = rows[1:, :, :n], rows[1:, :, n:]
@@ -117,7 +121,7 @@ def _transfer_maps(response: Array, widths: Array) -> Array:
     return identity + widths * jnp.einsum("k,nkcmb->ncmb", GAUSS_B, response)
 
 
-def _newton_step(system, load, orbit: Orbit) -> tuple[_Local, Array, Array]:
+def _newton_step(system: QuasiStatic, load: Harmonic, orbit: Orbit) -> tuple[_Local, Array, Array]:
     local = _localise(system, load, orbit)
     response, constant = _condense(local, orbit)
     maps = _transfer_maps(response, orbit.widths)
@@ -128,7 +132,7 @@ def _newton_step(system, load, orbit: Orbit) -> tuple[_Local, Array, Array]:
     return local, nodes, slopes
 
 
-def newton_update(system, load, orbit: Orbit) -> Orbit:
+def newton_update(system: QuasiStatic, load: Harmonic, orbit: Orbit) -> Orbit:
     """One undamped Newton step: at a converged orbit an identity with the orbit's derivative."""
     _, nodes, slopes = _newton_step(system, load, orbit)
     return orbit._replace(nodes=orbit.nodes + nodes, slopes=orbit.slopes + slopes)
@@ -143,7 +147,13 @@ class NewtonResult(NamedTuple):
 
 
 def newton_orbit(
-    system, load, orbit: Orbit, *, tolerance: float, max_steps: int, largest_change: float
+    system: QuasiStatic,
+    load: Harmonic,
+    orbit: Orbit,
+    *,
+    tolerance: float,
+    max_steps: int,
+    largest_change: float,
 ) -> NewtonResult:
     """Newton's method from the guess `orbit`.
 
@@ -161,7 +171,7 @@ def newton_orbit(
         Bound on the change of an exponent or logarithmic state in one step.
     """
 
-    def body(carry) -> tuple:
+    def body(carry: tuple) -> tuple:
         orbit, _, steps = carry
         local, nodes, slopes = _newton_step(system, load, orbit)
         stages = nodes[:, None] + orbit.widths * stage_sums(slopes)
@@ -181,14 +191,14 @@ def newton_orbit(
         error = jnp.maximum(change, relative)
         return moved, jnp.where(jnp.isfinite(error), error, jnp.inf), steps + 1
 
-    def unfinished(carry) -> Array:
+    def unfinished(carry: tuple) -> Array:
         return (carry[2] < max_steps) & jnp.any(carry[1] > tolerance)
 
     start = (orbit, jnp.full(orbit.mesh.shape[1], jnp.inf), 0)
     return NewtonResult(*jax.lax.while_loop(unfinished, body, start))
 
 
-def refined(system, load, orbit: Orbit, intervals: int) -> Orbit:
+def refined(system: QuasiStatic, load: Harmonic, orbit: Orbit, intervals: int) -> Orbit:
     """The orbit on an equidistributed mesh of `intervals` intervals."""
     w = load.load(orbit.stage_phases)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
@@ -215,7 +225,9 @@ class CollocationResponse(NamedTuple):
     growth: Array
 
 
-def collocation_response(system, load, orbit: Orbit, *, harmonics: int) -> CollocationResponse:
+def collocation_response(
+    system: QuasiStatic, load: Harmonic, orbit: Orbit, *, harmonics: int
+) -> CollocationResponse:
     """Mean, harmonics and monodromy of a converged orbit."""
     local = _localise(system, load, orbit)
     weights = jnp.asarray(GAUSS_B)[:, None, None] * orbit.widths / (2 * jnp.pi)
@@ -244,7 +256,7 @@ def _scaled_product(maps: Array) -> tuple[Array, Array]:
     """Product of the maps around the cycle, kept near unit size, and the log of its scale."""
     n, _, _, points = maps.shape
 
-    def multiply(carry, T: Array) -> tuple:
+    def multiply(carry: tuple, T: Array) -> tuple:
         product, log_scale = carry
         product = jnp.einsum("ijb,jkb->ikb", T, product)
         size = jnp.abs(product).max((0, 1))

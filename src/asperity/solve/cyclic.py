@@ -61,7 +61,7 @@ def solve_cyclic(maps: Array, rhs: Array) -> Array:
     identity = jnp.broadcast_to(jnp.eye(n)[:, :, None], (n, n, points))
     maps, rhs = jnp.moveaxis(maps, 2, 0), jnp.moveaxis(rhs, 1, 0)
 
-    def forward(relation, interval) -> tuple:
+    def forward(relation: tuple, interval: tuple) -> tuple:
         first, last, right = relation  # first d_0 + last d_i = right
         T, r = interval
         zero = jnp.zeros_like(T)
@@ -71,6 +71,7 @@ def solve_cyclic(maps: Array, rhs: Array) -> Array:
         rest = rows[n:]
         return (rest[:, n : 2 * n], rest[:, 2 * n : 3 * n], rest[:, -1]), rows[:n]
 
+    eliminated: Array
     (first, last, right), eliminated = jax.lax.scan(
         forward, (-maps[0], identity, rhs[0]), (maps[1:], rhs[1:])
     )

@@ -14,10 +14,6 @@ their relative accuracy however small they are.
 Grid: theta = tau + g sin(tau) puts the nodes where the load is lightest and the slip pulse narrow.
 The nodes are half-shifted and symmetric about theta = 0, so w is even, integration maps even
 functions to odd ones, and the matrices halve.
-
-Floquet: the fundamental matrix is Q(tau) exp(L tau) with Q periodic of mean 1, which obeys
-dQ/dtau = J Q - Q L and is found by the same iteration; the multipliers are
-exp(2 pi eig L).
 """
 
 from __future__ import annotations
@@ -30,14 +26,13 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity.loads import Harmonic
+from asperity.slider import QuasiStatic
 from asperity.solve.averaged import averaged_states
-from asperity.solve.linear import expm_points, jacobian_columns, solve_points
+from asperity.solve.linear import jacobian_columns, solve_points
 
 #: A change this small is round-off of the slip exponent: it no longer shrinks, and need not.
 _ROUND_OFF = 1e-12
-
-#: On the change of L: multipliers are exp(2 pi eig L), and the last change overstates the error.
-_FLOQUET_TOLERANCE = 1e-10
 
 
 class FourierOrbit(NamedTuple):
@@ -51,7 +46,7 @@ class FourierOrbit(NamedTuple):
 
 
 @lru_cache
-def _half_grid(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def half_grid(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Nodes in (0, pi) and the matrices that integrate even and odd functions of tau."""
     half = nodes // 2
     tau = 2 * np.pi * (np.arange(half) + 0.5) / nodes
@@ -62,7 +57,7 @@ def _half_grid(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return tau, even_to_odd, odd_to_even
 
 
-class _Cycle(NamedTuple):
+class Cycle(NamedTuple):
     """The load cycle on the half grid."""
 
     theta: Array
@@ -79,12 +74,13 @@ class _Cycle(NamedTuple):
         return new_even, new_odd
 
 
-def _cycle(load, nodes: int, grading: float) -> _Cycle:
-    tau, even_to_odd, odd_to_even = _half_grid(nodes)
+def load_cycle(load: Harmonic, nodes: int, grading: float) -> Cycle:
+    """The load cycle on a grid of `nodes` per period, shape (nodes/2, points)."""
+    tau, even_to_odd, odd_to_even = half_grid(nodes)
     tau = tau[:, None]
     theta = jnp.asarray(tau + grading * np.sin(tau))
     stretch = jnp.asarray(1 + grading * np.cos(tau))
-    return _Cycle(
+    return Cycle(
         theta,
         stretch,
         load.load(theta),
@@ -94,7 +90,7 @@ def _cycle(load, nodes: int, grading: float) -> _Cycle:
     )
 
 
-class _Linearised(NamedTuple):
+class Linearised(NamedTuple):
     """Rates per tau and their derivatives, in even and odd parts: rates[i], jacobian[j][i]."""
 
     even: list[Array]
@@ -103,7 +99,11 @@ class _Linearised(NamedTuple):
     columns_odd: list[list[Array]]
 
 
-def _linearise(system, cycle: _Cycle, mean: Array, even: Array, odd: Array) -> _Linearised:
+def linearise(
+    system: QuasiStatic, cycle: Cycle, mean: Array, even: Array, odd: Array
+) -> Linearised:
+    """Rates per tau at mean + even + odd, and their derivatives with respect to the states."""
+
     def side(sign: float) -> tuple[Array, list[Array]]:
         Y = jnp.stack([m + (e + sign * o) for m, e, o in zip(mean, even, odd, strict=True)])
         return jacobian_columns(
@@ -121,15 +121,15 @@ def _linearise(system, cycle: _Cycle, mean: Array, even: Array, odd: Array) -> _
 
     rate_even, rate_odd = parts(right, left)
     columns = [parts(a, b) for a, b in zip(right_columns, left_columns, strict=True)]
-    return _Linearised(rate_even, rate_odd, [c[0] for c in columns], [c[1] for c in columns])
+    return Linearised(rate_even, rate_odd, [c[0] for c in columns], [c[1] for c in columns])
 
 
 def _matrix_of_means(columns: list[list[Array]]) -> Array:
     return jnp.stack([jnp.stack([c.mean(0) for c in column]) for column in columns], axis=1)
 
 
-def _step(system, cycle: _Cycle, mean: Array, even: Array, odd: Array) -> tuple:
-    lin = _linearise(system, cycle, mean, even, odd)
+def _step(system: QuasiStatic, cycle: Cycle, mean: Array, even: Array, odd: Array) -> tuple:
+    lin = linearise(system, cycle, mean, even, odd)
     n = len(mean)
     residual = jnp.stack([r.mean(0) for r in lin.even])
     change = solve_points(_matrix_of_means(lin.columns_even), -residual)
@@ -157,7 +157,14 @@ def _relative_change(
 
 
 def fourier_orbit(
-    system, load, points: int, *, nodes: int, grading: float, tolerance: float, max_steps: int
+    system: QuasiStatic,
+    load: Harmonic,
+    points: int,
+    *,
+    nodes: int,
+    grading: float,
+    tolerance: float,
+    max_steps: int,
 ) -> FourierOrbit:
     """Iterate to the periodic orbit of every operating point.
 
@@ -182,17 +189,17 @@ def fourier_orbit(
     FourierOrbit
         `error` holds the estimate; inf where the iteration does not contract.
     """
-    cycle = _cycle(load, nodes, grading)
+    cycle = load_cycle(load, nodes, grading)
     weights = cycle.stretch * (2 / nodes) * jnp.ones(points)
     mean = averaged_states(system, cycle.w, weights)
     zero = jnp.zeros((system.size, nodes // 2, points))
     far = jnp.full(points, jnp.inf)
 
-    def unfinished(carry) -> Array:
+    def unfinished(carry: tuple) -> Array:
         *_, change, error, steps = carry
         return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
 
-    def body(carry) -> tuple:
+    def body(carry: tuple) -> tuple:
         mean, even, odd, change, _, steps = carry
         mean, new_even, new_odd, moved = _step(system, cycle, mean, even, odd)
         new_change = jnp.maximum(
@@ -208,132 +215,3 @@ def fourier_orbit(
         unfinished, body, (mean, zero, zero, far, far, 0)
     )
     return FourierOrbit(mean, even, odd, jnp.where(jnp.isnan(change), jnp.inf, error), steps)
-
-
-class FourierResponse(NamedTuple):
-    """What is read off an orbit; F/W0 = mean + sum Re(c_n e^{i n theta})."""
-
-    mean_friction: Array
-    harmonics: Array  # complex, (count, points)
-    monodromy: Array  # (size, size, points)
-    log_determinant: Array  # of the monodromy matrix, by Liouville's formula
-    error: Array  # of the orbit, of the Floquet iteration and of the truncation, the largest
-
-
-def fourier_response(
-    system, load, orbit: FourierOrbit, *, grading: float, harmonics: int, max_steps: int
-) -> FourierResponse:
-    """Mean, harmonics and monodromy matrix of a converged orbit.
-
-    Parameters
-    ----------
-    system, load, grading
-        As given to `fourier_orbit`.
-    orbit : FourierOrbit
-    harmonics : int
-        Number of harmonics.
-    max_steps : int
-        Bound on the steps of the Floquet iteration.
-    """
-    half = orbit.even.shape[1]
-    cycle = _cycle(load, 2 * half, grading)
-    right = system.force_split(orbit.mean, orbit.even + orbit.odd, cycle.w)
-    left = system.force_split(orbit.mean, orbit.even - orbit.odd, cycle.w)
-    even = 0.5 * (right[1] + left[1]) * cycle.stretch
-    odd = 0.5 * (right[1] - left[1]) * cycle.stretch
-    angle = jnp.arange(1, harmonics + 1)[:, None] * cycle.theta[:, 0]
-    phasors = (jnp.cos(angle) @ even - 1j * (jnp.sin(angle) @ odd)) * (2 / half)
-    lin = _linearise(system, cycle, *orbit[:3])
-    trace = sum(lin.columns_even[i][i].mean(0) for i in range(len(orbit.mean)))
-    monodromy, floquet_error = _monodromy(cycle, lin, orbit, max_steps)
-    error = jnp.maximum(jnp.maximum(orbit.error, floquet_error), _truncation(orbit))
-    mean = right[0] + even.mean(0)
-    return FourierResponse(mean, phasors, monodromy, 2 * jnp.pi * trace, error)
-
-
-def fourier_waveform(system, load, orbit: FourierOrbit, *, grading: float, phases: int) -> Array:
-    """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points)."""
-    if phases == 0:
-        return jnp.zeros((2, 0, orbit.mean.shape[-1]))
-    half = orbit.even.shape[1]
-    theta = 2 * np.pi * np.arange(phases) / phases
-    tau = theta.copy()
-    for _ in range(60):  # Newton's method for Kepler's equation
-        tau = tau - (tau + grading * np.sin(tau) - theta) / (1 + grading * np.cos(tau))
-    nodes, k = _half_grid(2 * half)[0], np.arange(1, half)[:, None]
-    even = (2 / half) * np.cos(k * tau).T @ np.cos(k * nodes)
-    odd = (2 / half) * np.sin(k * tau).T @ np.sin(k * nodes)
-    Y = jnp.stack(
-        [m + even @ e + odd @ o for m, e, o in zip(orbit.mean, orbit.even, orbit.odd, strict=True)]
-    )
-    w = load.load(jnp.asarray(theta)[:, None])
-    return jnp.stack([system.force(Y, w), system.log_slip(Y, w)])
-
-
-def _truncation(orbit: FourierOrbit) -> Array:
-    """Estimate of the aliasing error of the harmonics from the end of the spectrum in tau.
-
-    A coefficient of order nodes - n aliases into order n. The spectra fall off at least
-    geometrically, so that coefficient is about the square of the one at nodes / 2.
-    """
-    half = orbit.even.shape[1]
-    tau = np.pi * (np.arange(half) + 0.5) / half
-    last = np.arange(half - 4, half)[:, None]
-    spectrum = jnp.hypot(
-        jnp.cos(last * tau) @ orbit.even[0], jnp.sin(last * tau) @ orbit.odd[0]
-    ).max(0)
-    first = jnp.hypot(np.cos(tau) @ orbit.even[0], np.sin(tau) @ orbit.odd[0])
-    second = jnp.hypot(np.cos(2 * tau) @ orbit.even[0], np.sin(2 * tau) @ orbit.odd[0])
-    return spectrum**2 / (first * jnp.minimum(first, second) + 1e-300)
-
-
-def _monodromy(
-    cycle: _Cycle, lin: _Linearised, orbit: FourierOrbit, max_steps: int
-) -> tuple[Array, Array]:
-    """Monodromy matrix exp(2 pi L), and 0 where L settled, else inf."""
-    n = orbit.mean.shape[0]
-
-    def times(even: list[Array], odd: list[Array]) -> tuple[list[Array], list[Array]]:
-        """J times a vector with the given parts."""
-        ce, co = lin.columns_even, lin.columns_odd
-        return (
-            [sum(ce[j][i] * even[j] + co[j][i] * odd[j] for j in range(n)) for i in range(n)],
-            [sum(ce[j][i] * odd[j] + co[j][i] * even[j] for j in range(n)) for i in range(n)],
-        )
-
-    def body(carry) -> tuple:
-        even, odd, exponent, _, steps = carry  # even, odd: Q - 1 as [column][row]
-        products = [
-            times([even[c][i] + float(i == c) for i in range(n)], list(odd[c])) for c in range(n)
-        ]
-        new_exponent = jnp.stack(
-            [jnp.stack([products[c][0][i].mean(0) for c in range(n)]) for i in range(n)]
-        )
-        new_even, new_odd = [], []
-        for c in range(n):
-            q_even = [
-                products[c][0][i]
-                - new_exponent[i, c]
-                - sum(even[k][i] * new_exponent[k, c] for k in range(n))
-                for i in range(n)
-            ]
-            q_odd = [
-                products[c][1][i] - sum(odd[k][i] * new_exponent[k, c] for k in range(n))
-                for i in range(n)
-            ]
-            e, o = cycle.integrate(q_even, q_odd)
-            new_even.append(jnp.stack(e))
-            new_odd.append(jnp.stack(o))
-        change = jnp.abs(new_exponent - exponent).max((0, 1))
-        return jnp.stack(new_even), jnp.stack(new_odd), new_exponent, change, steps + 1
-
-    def unfinished(carry) -> Array:
-        change, steps = carry[-2:]
-        return (steps < max_steps) & jnp.any((change > _FLOQUET_TOLERANCE) & (change < 1e3))
-
-    points = orbit.mean.shape[-1]
-    zero = jnp.zeros((n, *orbit.even.shape))
-    start = (zero, zero, jnp.zeros((n, n, points)), jnp.full(points, 1e2), 0)
-    _, _, exponent, change, _ = jax.lax.while_loop(unfinished, body, start)
-    change = jnp.where(change < _FLOQUET_TOLERANCE, 0.0, jnp.inf)
-    return expm_points(2 * jnp.pi * exponent), change

@@ -11,12 +11,14 @@ import numpy as np
 from jax import Array
 
 from asperity.solve.collocation import (
+    NewtonResult,
     averaged_orbit,
     collocation_response,
     newton_orbit,
     refined,
 )
-from asperity.solve.fourier import fourier_orbit, fourier_response, fourier_waveform
+from asperity.solve.fourier import fourier_orbit
+from asperity.solve.fourier_reading import fourier_response, fourier_waveform
 from asperity.solve.linear import jacobian_columns, spectral_radius
 from asperity.solve.mesh import Orbit, evaluate, split
 
@@ -146,7 +148,7 @@ def split_reading(problem_and_orbit: tuple[Problem, Orbit], *, parts: int) -> Re
     return _read(problem, split(orbit, parts), 1, 0)
 
 
-def _newton(problem: Problem, guess: Orbit, max_steps: int):
+def _newton(problem: Problem, guess: Orbit, max_steps: int) -> NewtonResult:
     return newton_orbit(
         *problem,
         guess,

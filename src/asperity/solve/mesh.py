@@ -92,8 +92,11 @@ def graded_mesh(intervals: int, points: int, grading: float) -> Array:
 def evaluate(orbit: Orbit, theta: Array) -> tuple[Array, Array]:
     """States less `centre`, and slopes, at the phases `theta` of shape (count, points)."""
     intervals = orbit.mesh.shape[0] - 1
-    find = jax.vmap(lambda mesh, at: jnp.searchsorted(mesh, at, side="right"), (1, 1), 1)
-    index = jnp.clip(find(orbit.mesh, theta) - 1, 0, intervals - 1)
+
+    def find(mesh: Array, at: Array) -> Array:
+        return jnp.searchsorted(mesh, at, side="right") - 1
+
+    index = jnp.clip(jax.vmap(find, (1, 1), 1)(orbit.mesh, theta), 0, intervals - 1)
 
     def pick(a: Array) -> Array:
         return jnp.take_along_axis(a, index, 0)

@@ -15,8 +15,8 @@ from asperity.solve.kernels import ACCEPTED, Problem, Reading, refine_orbit, spl
 from asperity.solve.mesh import Orbit
 from asperity.solve.outcome import Outcome
 
-#: Agreement between two meshes, relative, at which the finer one is trusted to 1e-8: with three times
-#: the intervals its own error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
+#: Agreement between two meshes, relative, at which the finer one is trusted to 1e-8: with three
+#: times the intervals its own error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
 AGREEMENT = 2e-7
 
 #: Orbits are followed on the first of these meshes, and refined up to the last.

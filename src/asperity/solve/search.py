@@ -96,7 +96,7 @@ def _fourier_stages(problem: Problem, found: Found, index: Indices, options: Opt
 
 
 def _collocate(problem: Problem, found: Found, block: Indices, options: Options) -> None:
-    """Collocation, however far the start has to be fetched, and refinement for a block of points."""
+    """Collocation, however far the start has to be fetched, and refinement of a block."""
     part = take(problem, block)
     start = starting_orbits(part, len(block))
     found.detail[block] = start.reached * np.asarray(part.load.epsilon)

@@ -4,8 +4,8 @@ By the implicit function theorem: with R(Y, p) = 0 the equations of the orbit, o
 
     N(Y, p) = Y - R_Y^-1 R(Y, p)
 
-from a converged orbit Y* has the derivative dN/dp = -R_Y^-1 R_p = dY*/dp. So the step and everything
-read off its result are differentiated, and no derivative of an iteration is taken.
+from a converged orbit Y* has the derivative dN/dp = -R_Y^-1 R_p = dY*/dp. So the step and
+everything read off its result are differentiated, and no derivative of an iteration is taken.
 """
 
 from __future__ import annotations
@@ -48,7 +48,8 @@ class Sensitivities:
     Attributes
     ----------
     parameters : tuple of str
-        Names, in the order of the last axis: those of the law, then K, W0, M, V, frequency, epsilon.
+        Names, in the order of the last axis: those of the law, then K, W0, M, V, frequency and
+        epsilon.
     converged : bool array, shape (...)
         False where no orbit was found; the derivatives there are NaN.
     mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
