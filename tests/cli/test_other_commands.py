@@ -103,12 +103,13 @@ def test_reproduce_prints_the_summary(
     def reproduce(out: Path, progress) -> Summary:
         progress("figures", 1, 2)
         progress("claims", 2, 2)
+        out.mkdir(parents=True)
         (out / "index.html").write_text("", encoding="utf-8")
         return Summary(failed)
 
-    paper = types.ModuleType("asperity.study.paper")
+    paper = types.ModuleType("asperity.report")
     paper.reproduce = reproduce  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "asperity.study.paper", paper)
+    monkeypatch.setitem(sys.modules, "asperity.report", paper)
     out = tmp_path / "new" / "report"
     shown = asperity("reproduce", "--out", out)
     assert shown.exit_code == code
@@ -117,15 +118,15 @@ def test_reproduce_prints_the_summary(
     assert [f.name for f in out.iterdir()] == ["index.html"]
 
 
-def test_an_interrupted_reproduction_says_that_it_is_not_complete(
+def test_an_interrupted_reproduction_says_how_to_go_on(
     asperity, tmp_path: Path, monkeypatch
 ) -> None:
     def reproduce(out: Path, progress) -> Summary:
         raise KeyboardInterrupt
 
-    paper = types.ModuleType("asperity.study.paper")
+    paper = types.ModuleType("asperity.report")
     paper.reproduce = reproduce  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "asperity.study.paper", paper)
+    monkeypatch.setitem(sys.modules, "asperity.report", paper)
     shown = asperity("reproduce", "--out", tmp_path)
     assert shown.exit_code == 130
-    assert "is not complete, repeat the command" in shown.stderr
+    assert "is as it was, repeat the command" in shown.stderr

@@ -30,9 +30,10 @@ def parameter(name: str, kind: str, rule: str = "positive") -> Any:
     Returns
     -------
     dataclass field
-        Its values are float64 arrays.
+        Its values are float64 arrays; its metadata hold the SI unit.
     """
-    return eqx.field(converter=partial(checked, name=name, kind=kind, rule=rule))
+    converter = partial(checked, name=name, kind=kind, rule=rule)
+    return eqx.field(converter=converter, metadata={"unit": KINDS[kind].si})
 
 
 def checked(value: Any, *, name: str, kind: str, rule: str) -> Any:

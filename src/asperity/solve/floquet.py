@@ -79,4 +79,6 @@ def from_logs(logs: Complex) -> Complex:
 
 def without_lost_arguments(logs: Complex) -> Complex:
     """The same with NaN for the argument of a multiplier that overflows."""
-    return np.where(logs.real > LARGEST_LOG, logs.real + 1j * np.nan, logs)
+    kept = logs.copy()
+    kept.imag[logs.real > LARGEST_LOG] = np.nan
+    return kept

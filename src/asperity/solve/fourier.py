@@ -111,25 +111,35 @@ def linearise(
         )
 
     (right, right_columns), (left, left_columns) = side(1.0), side(-1.0)
-    n = len(mean)
-
-    def parts(a: Array, b: Array) -> tuple[list[Array], list[Array]]:
-        return (
-            [0.5 * (a[i] + b[i]) for i in range(n)],
-            [0.5 * (a[i] - b[i]) for i in range(n)],
-        )
-
-    rate_even, rate_odd = parts(right, left)
-    columns = [parts(a, b) for a, b in zip(right_columns, left_columns, strict=True)]
+    rate_even, rate_odd = _parity_parts(right, left)
+    columns = [_parity_parts(a, b) for a, b in zip(right_columns, left_columns, strict=True)]
     return Linearised(rate_even, rate_odd, [c[0] for c in columns], [c[1] for c in columns])
+
+
+def rate_parts(
+    system: QuasiStatic, cycle: Cycle, mean: Array, even: Array, odd: Array
+) -> tuple[list[Array], list[Array]]:
+    """Even and odd parts of the rates per tau alone."""
+
+    def side(sign: float) -> Array:
+        Y = mean[:, None] + even + sign * odd
+        return cycle.stretch * system.rates(Y, cycle.w, sign * cycle.w_slope)
+
+    return _parity_parts(side(1.0), side(-1.0))
+
+
+def _parity_parts(right: Array, left: Array) -> tuple[list[Array], list[Array]]:
+    """Even and odd parts of functions known at theta and -theta."""
+    pairs = list(zip(right, left, strict=True))
+    return [0.5 * (a + b) for a, b in pairs], [0.5 * (a - b) for a, b in pairs]
 
 
 def _matrix_of_means(columns: list[list[Array]]) -> Array:
     return jnp.stack([jnp.stack([c.mean(0) for c in column]) for column in columns], axis=1)
 
 
-def _step(system: QuasiStatic, cycle: Cycle, mean: Array, even: Array, odd: Array) -> tuple:
-    lin = linearise(system, cycle, mean, even, odd)
+def advance(cycle: Cycle, mean: Array, lin: Linearised) -> tuple[Array, Array, Array, Array]:
+    """One step of the iteration: new mean, even and odd parts, and the largest change of a mean."""
     n = len(mean)
     residual = jnp.stack([r.mean(0) for r in lin.even])
     change = solve_points(_matrix_of_means(lin.columns_even), -residual)
@@ -201,7 +211,8 @@ def fourier_orbit(
 
     def body(carry: tuple) -> tuple:
         mean, even, odd, change, _, steps = carry
-        mean, new_even, new_odd, moved = _step(system, cycle, mean, even, odd)
+        lin = linearise(system, cycle, mean, even, odd)
+        mean, new_even, new_odd, moved = advance(cycle, mean, lin)
         new_change = jnp.maximum(
             moved, _relative_change(new_even, new_odd, even, odd, system.kappa)
         )

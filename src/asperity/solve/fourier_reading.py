@@ -61,20 +61,26 @@ def fourier_response(
     max_steps : int
         Bound on the steps of the Floquet iteration.
     """
-    half = orbit.even.shape[1]
-    cycle = load_cycle(load, 2 * half, grading)
-    right = system.force_split(orbit.mean, orbit.even + orbit.odd, cycle.w)
-    left = system.force_split(orbit.mean, orbit.even - orbit.odd, cycle.w)
-    even = 0.5 * (right[1] + left[1]) * cycle.stretch
-    odd = 0.5 * (right[1] - left[1]) * cycle.stretch
-    angle = jnp.arange(1, harmonics + 1)[:, None] * cycle.theta[:, 0]
-    phasors = (jnp.cos(angle) @ even - 1j * (jnp.sin(angle) @ odd)) * (2 / half)
+    cycle = load_cycle(load, 2 * orbit.even.shape[1], grading)
+    mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.even, orbit.odd, harmonics)
     lin = linearise(system, cycle, *orbit[:3])
     trace = sum(lin.columns_even[i][i].mean(0) for i in range(len(orbit.mean)))
     monodromy, floquet_error = _monodromy(cycle, lin, orbit, max_steps)
     error = jnp.maximum(jnp.maximum(orbit.error, floquet_error), _truncation(orbit))
-    mean = right[0] + even.mean(0)
     return FourierResponse(mean, phasors, monodromy, 2 * jnp.pi * trace, error)
+
+
+def force_spectrum(
+    system: QuasiStatic, cycle: Cycle, mean: Array, even: Array, odd: Array, harmonics: int
+) -> tuple[Array, Array]:
+    """Mean of F/W0 and its complex harmonics, shape (harmonics, points)."""
+    constant, right = system.force_split(mean, even + odd, cycle.w)
+    _, left = system.force_split(mean, even - odd, cycle.w)
+    force_even = 0.5 * (right + left) * cycle.stretch
+    force_odd = 0.5 * (right - left) * cycle.stretch
+    angle = jnp.arange(1, harmonics + 1)[:, None] * cycle.theta[:, 0]
+    phasors = jnp.cos(angle) @ force_even - 1j * (jnp.sin(angle) @ force_odd)
+    return constant + force_even.mean(0), phasors * (2 / cycle.theta.shape[0])
 
 
 def fourier_waveform(

@@ -15,6 +15,7 @@ from asperity.slider import QuasiStatic, Slider
 from asperity.solve.found import Found
 from asperity.solve.kernels import Problem
 from asperity.solve.outcome import Outcome
+from asperity.solve.parallel import WORTHWHILE, available_cores, find_orbits_on_cores
 from asperity.solve.response import PeriodicResponse
 from asperity.solve.search import find_orbits
 from asperity.units import to_si
@@ -30,6 +31,7 @@ def periodic_response(
     waveform: int = 0,
     progress: Callable[[int], None] | None = None,
     methods: tuple[str, ...] = ("fourier", "collocation"),
+    workers: int | None = None,
 ) -> PeriodicResponse:
     """Periodic response to W = W0 (1 + eps cos wt), stable or not, without inertia.
 
@@ -54,6 +56,8 @@ def periodic_response(
     methods : tuple of str
         Subset of ("fourier", "collocation"): the fast and the robust method. Both, unless they are
         to be checked against each other.
+    workers : int, optional
+        Processes to use; by default one per core for 200,000 points or more, else this one alone.
 
     Returns
     -------
@@ -81,9 +85,13 @@ def periodic_response(
     points = int(np.prod(shape, dtype=int))
     report = progress or (lambda _: None)
     if slider.law.rate_dependent:
-        found = find_orbits(
-            flat, points, harmonics=harmonics, phases=waveform, progress=report, methods=methods
-        )
+        options = {"harmonics": harmonics, "phases": waveform, "methods": methods}
+        if workers is None:
+            workers = available_cores() if points >= WORTHWHILE else 1
+        if workers > 1:
+            found = find_orbits_on_cores(flat, points, workers, progress=report, **options)
+        else:
+            found = find_orbits(flat, points, progress=report, **options)
     else:
         found = _proportional(flat, points, harmonics, waveform)
         report(points)

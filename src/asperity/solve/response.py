@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from asperity._version import __version__
 from asperity.slider import Slider
 from asperity.solve.floquet import from_logs, without_lost_arguments
 from asperity.solve.outcome import Outcome, sentences
+
+if TYPE_CHECKING:
+    import xarray
 
 Float = NDArray[np.float64]
 
@@ -157,6 +161,57 @@ class PeriodicResponse:
         samples = self.waveform.shape[-1]
         return 2 * np.pi * np.arange(samples) / max(samples, 1)
 
+    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
+        """The response as a labelled dataset, ready for NetCDF.
+
+        Parameters
+        ----------
+        dims : tuple of str, optional
+            Names of the axes; ``axis_0``, ... by default.
+
+        Returns
+        -------
+        xarray.Dataset
+            Every variable has `units` and `long_name`; real and imaginary parts of complex ones
+            are variables of their own; attributes hold the provenance.
+        """
+        import xarray
+
+        shape = self.mean_friction.shape
+        dims = dims or tuple(f"axis_{i}" for i in range(len(shape)))
+
+        def variable(values: Any, units: str, name: str, *extra: str) -> tuple:
+            return (*dims, *extra), values, {"units": units, "long_name": name}
+
+        def asked(values: Any, units: str, name: str) -> tuple:
+            return variable(np.broadcast_to(values, shape), units, name)
+
+        data = {
+            "mean_friction": variable(self.mean_friction, "1", "mean of F/W0"),
+            "delta_mu": variable(self.delta_mu, "1", "change of the mean by the modulation"),
+            "mu1": variable(self.mu1, "1", "first harmonic of F/W0, peak"),
+            "mu2": variable(self.mu2, "1", "second harmonic of F/W0, peak"),
+            "phase1": variable(self.phase1, "rad", "phase of the first harmonic"),
+            "phase2": variable(self.phase2, "rad", "phase of the second harmonic"),
+            "floquet_max": variable(self.floquet_max, "1", "largest modulus of the multipliers"),
+            "stable": variable(self.stable, "1", "all multipliers inside the unit circle"),
+            "converged": variable(self.converged, "1", "whether the point was solved"),
+            "result": variable(self.result.astype(str), "1", "converged, or why not"),
+        }
+        for name, values, axis in (
+            ("harmonics", self.harmonics, "harmonic"),
+            ("log_multipliers", self.log_multipliers, "multiplier"),
+        ):
+            for part in ("real", "imag"):
+                label = f"{part} part of {name}"
+                data[f"{name}_{part}"] = variable(getattr(values, part), "1", label, axis)
+        coords = {
+            "velocity": asked(self.velocity, "m/s", "pulling velocity"),
+            "epsilon": asked(self.epsilon, "1", "relative load amplitude"),
+            "frequency": asked(self.frequency, "Hz", "modulation frequency"),
+        }
+        return xarray.Dataset(data, coords=coords, attrs=self.provenance)
+
     @property
     def provenance(self) -> dict[str, Any]:
         """Version, law, conventions, tolerance and source of the numbers."""
@@ -166,6 +221,25 @@ class PeriodicResponse:
             "law": law.name,
             "source": law.source,
             "equation_of_motion": "quasi-static",
+            "parameters": self._parameters(),
             "relative_tolerance": 1e-8,
             "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), w(t) = 1 + eps cos(w t)",
         }
+
+    def _parameters(self) -> str:
+        """All parameters with their units; a range where they are arrays."""
+        law = self.slider.law
+        values = {
+            field.name.rstrip("_"): (getattr(law, field.name), field.metadata.get("unit", ""))
+            for field in dataclasses.fields(law)
+        }
+        values |= {"K": (self.slider.K, "N/m"), "W0": (self.slider.W0, "N")}
+        values |= {"V": (self.velocity, "m/s"), "epsilon": (self.epsilon, "")}
+        values["frequency"] = (self.frequency, "Hz")
+        return "; ".join(f"{name} = {_shown(*value)}" for name, value in values.items())
+
+
+def _shown(value: Any, unit: str) -> str:
+    low, high = float(np.min(value)), float(np.max(value))
+    text = f"{low!r}" if low == high else f"{low!r} to {high!r}"
+    return f"{text} {unit}".rstrip()

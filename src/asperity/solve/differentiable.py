@@ -1,0 +1,112 @@
+"""The fast solve as a function that JAX can differentiate, map and compile into larger programs.
+
+By the implicit function theorem: the orbit is a fixed point Y = T(Y, p) of the iteration of
+`asperity.solve.fourier`, so a cotangent c of Y is carried to the parameters by the solution of
+
+    l = c + T_Y^T l,
+
+found by the same contraction, transposed. The Jacobian of the rates inside T may be held constant
+there: it multiplies a residual that is zero.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from asperity.loads import Harmonic
+from asperity.slider import QuasiStatic
+from asperity.solve.fourier import advance, fourier_orbit, linearise, load_cycle, rate_parts
+from asperity.solve.fourier_reading import force_spectrum
+
+_Parts = tuple[Array, Array, Array]
+_Parameters = tuple[QuasiStatic, Harmonic]
+
+
+class _Options(NamedTuple):
+    nodes: int
+    grading: float
+    tolerance: float
+    max_steps: int
+
+
+def harmonic_response(
+    system: QuasiStatic,
+    load: Harmonic,
+    *,
+    harmonics: int = 2,
+    nodes: int = 32,
+    grading: float = 0.3,
+    tolerance: float = 1e-10,
+    max_steps: int = 40,
+) -> tuple[Array, Array]:
+    """Mean and harmonics of F/W0, differentiable in reverse mode with respect to every parameter.
+
+    For modulation that is fast beside the interface, where Fourier collocation contracts and
+    `nodes` resolve the slip pulse; nothing is checked here. `asperity.periodic_response` finds
+    out whether that holds, and `asperity.sensitivities` has no such restriction.
+
+    Parameters
+    ----------
+    system : QuasiStatic
+        Parameters of shape (points,).
+    load : Harmonic
+        Amplitudes of shape (points,).
+    harmonics : int
+    nodes, grading, tolerance, max_steps
+        As `asperity.solve.fourier.fourier_orbit`.
+
+    Returns
+    -------
+    mean : array, shape (points,)
+    harmonics : complex array, shape (harmonics, points)
+        F/W0 = mean + sum Re(c_n e^{i n theta}).
+    """
+    orbit = _orbit(_Options(nodes, grading, tolerance, max_steps), (system, load))
+    return force_spectrum(system, load_cycle(load, nodes, grading), *orbit, harmonics)
+
+
+@partial(jax.custom_vjp, nondiff_argnums=(0,))
+def _orbit(options: _Options, parameters: _Parameters) -> _Parts:
+    points = parameters[1].epsilon.shape[-1]
+    return fourier_orbit(*parameters, points, **options._asdict())[:3]
+
+
+def _forward(options: _Options, parameters: _Parameters) -> tuple[_Parts, tuple]:
+    orbit = _orbit(options, parameters)
+    return orbit, (parameters, orbit)
+
+
+def _backward(options: _Options, kept: tuple, cotangent: _Parts) -> tuple[_Parameters]:
+    parameters, orbit = kept
+    system, load = parameters
+    cycle = load_cycle(load, options.nodes, options.grading)
+    frozen = linearise(system, cycle, *orbit)
+
+    def iterate(parts: _Parts, parameters: _Parameters) -> _Parts:
+        system, load = parameters
+        cycle = load_cycle(load, options.nodes, options.grading)
+        even, odd = rate_parts(system, cycle, *parts)
+        return advance(cycle, parts[0], frozen._replace(even=even, odd=odd))[:3]
+
+    _, pull = jax.vjp(iterate, orbit, parameters)
+
+    def body(carry: tuple) -> tuple:
+        total, _, steps = carry
+        new = jax.tree.map(jnp.add, cotangent, pull(total)[0])
+        size = sum(jnp.abs(a).sum() for a in new)
+        change = sum(jnp.abs(a - b).sum() for a, b in zip(new, total, strict=True))
+        return new, change / (size + 1e-300), steps + 1
+
+    def unfinished(carry: tuple) -> Array:
+        return (carry[2] < options.max_steps) & (carry[1] > options.tolerance)
+
+    total, _, _ = jax.lax.while_loop(unfinished, body, (cotangent, jnp.inf, 0))
+    return (pull(total)[1],)
+
+
+_orbit.defvjp(_forward, _backward)
