@@ -72,7 +72,7 @@ def harmonic_response(
 
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def _orbit(options: _Options, parameters: _Parameters) -> _Parts:
-    points = parameters[1].epsilon.shape[-1]
+    points = jnp.shape(parameters[1].epsilon)[-1]
     return fourier_orbit(*parameters, points, **options._asdict())[:3]
 
 
