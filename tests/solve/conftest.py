@@ -3,7 +3,8 @@
 The equations are written in physical units as the paper prints them. States: the extension d of
 the spring (m, counted from steady sliding) and the age Phi (s); with inertia, also the velocity v
 (m/s) and the elastic displacement of the asperities (m). One period is integrated by SciPy's DOP853
-and the periodic solution found by Newton's method on the end point.
+and the periodic solution found by Newton's method on the end point; `multiple_shooting` does so for
+many operating points, stable or not, and gives the Floquet multipliers too.
 """
 
 import dataclasses
@@ -57,6 +58,15 @@ class Printed:
             strength = friction / (self.mu0 * (1 + self.B / self.mu0 * log_age))
             return self.V0 * np.exp((strength - 1) * self.mu0 / self.A)
         return self.V0 * np.exp((friction - self.mu0 - self.B * log_age) / self.A)
+
+    def age(self, friction: float, velocity: float) -> float:
+        """The friction law solved for the age."""
+        rate = self.A * np.log(velocity / self.V0)
+        if self.product:
+            log_age = (friction / (self.mu0 + rate) - 1) * self.mu0 / self.B
+        else:
+            log_age = (friction - self.mu0 - rate) / self.B
+        return self.D0 / self.V0 * np.exp(log_age)
 
     @property
     def scale(self) -> np.ndarray:
@@ -154,14 +164,128 @@ def expansion(p: Printed, epsilon: float = 1e-3) -> np.ndarray:
     return (4 * scaled(epsilon / 2) - scaled(epsilon)) / 3
 
 
+class Shot(NamedTuple):
+    """Periodic solutions of many operating points: the first axis of every array."""
+
+    mean: np.ndarray
+    harmonics: np.ndarray  # c1, c2 of F/W0
+    multipliers: np.ndarray  # by falling modulus
+    force: np.ndarray  # F/W0 at the start of each segment
+
+
+def multiple_shooting(
+    p: Printed, epsilon: np.ndarray, force: np.ndarray, log_slip: np.ndarray
+) -> Shot:
+    """Newton's method on the ends of the segments of a period, with variational equations.
+
+    Parameters of `p` that vary and `epsilon` have shape (points, 1); `force` and `log_slip`, F/W0
+    and ln(v_pl/V) at equally spaced phases, (points, segments), are where it starts. The age, which
+    varies by many orders of magnitude, is carried by its logarithm.
+    """
+    segments = force.shape[1]
+    W = 1 + epsilon * np.cos(2 * np.pi * np.arange(segments) / segments)
+    age = p.age(force / W, p.V * np.exp(log_slip))
+    start = np.stack([(force - p.mu) * p.W0 / p.K, np.log(age)])
+    swing = np.ptp(start[0], axis=1, keepdims=True)
+    scale = np.stack([swing, np.ones_like(swing)])
+    for _ in range(8):
+        ends, maps, integrals = _segments(p, epsilon, start, scale)
+        gap = (ends - np.roll(start, -1, axis=2)) / scale
+        step = _around_the_period(maps, gap)
+        start = start + step * scale
+        if np.abs(step).max() < 1e-8:  # quadratic: the next one is round-off
+            break
+    else:
+        raise AssertionError("the reference integration found no periodic solution")
+    origin = start[0, :, :1]
+    spectrum = integrals[:3].sum(-1) * p.K / p.W0
+    mean = (p.mu + origin * p.K / p.W0)[:, 0] + spectrum[0].real
+    multipliers = _eigenvalues(maps, integrals[3].real.sum(-1))
+    return Shot(mean, 2 * spectrum[1:].T, multipliers, p.mu + start[0] * p.K / p.W0)
+
+
+def _segments(p: Printed, epsilon, start, scale) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """States at the ends, transfer maps over `scale`, and integrals over each segment.
+
+    The integrals are the means over the period of d - d(0) times 1, e^-iwt and e^-2iwt, and
+    the integral of the trace of the Jacobian.
+    """
+    shape = start.shape[1:]
+    length = np.broadcast_to(1 / (p.frequency * shape[1]), (shape[0], 1))
+    begin = np.arange(shape[1]) * length
+    count = 2 + 4 + 4
+    step = 1e-30
+
+    def rates(s: float, packed: np.ndarray) -> np.ndarray:
+        y = packed.view(complex).reshape(count, *shape)
+        state, maps, t = start + y[:2].real, y[2:6].real.reshape(2, 2, *shape), begin + s * length
+        columns = []
+        for k in range(2):
+            moved = state.astype(complex)
+            moved[k] += 1j * step * scale[k]
+            extension, age = moved[0], np.exp(moved[1])
+            rate = p.rates(t, np.stack([extension, age]), epsilon)
+            columns.append(np.stack([rate[0], rate[1] / age]))
+        jacobian = np.stack([c.imag / step / scale for c in columns], axis=1)
+        turn = np.exp(-1j * p.omega * t)
+        away = (state[0] - start[0, :, :1]) * p.frequency
+        return length * np.concatenate(
+            [
+                columns[0].real,
+                np.einsum("ij...,jk...->ik...", jacobian, maps).reshape(4, *shape),
+                np.stack([away, away * turn, away * turn**2, np.trace(jacobian)]),
+            ]
+        )
+
+    def flat(s: float, packed: np.ndarray) -> np.ndarray:
+        return rates(s, packed).astype(complex).ravel().view(float)
+
+    first = np.zeros((count, *shape), dtype=complex)
+    first[2], first[5] = 1, 1
+    size = np.ones((count, *shape))
+    size[:2] = scale
+    size[6:9] = scale[0]
+    bound = np.repeat(1e-12 * size.ravel(), 2)
+    run = solve_ivp(flat, (0, 1), first.ravel().view(float), "DOP853", rtol=1e-11, atol=bound)
+    last = run.y[:, -1].copy().view(complex).reshape(count, *shape)
+    return start + last[:2].real, last[2:6].real.reshape(2, 2, *shape), last[6:]
+
+
+def _around_the_period(maps: np.ndarray, gap: np.ndarray) -> np.ndarray:
+    """Solve d_next - map d = gap around the cycle for every point."""
+    points, segments = gap.shape[1:]
+    matrix = np.zeros((points, segments, 2, segments, 2))
+    for i in range(segments):
+        matrix[:, i, :, (i + 1) % segments] += np.eye(2)
+        matrix[:, i, :, i] -= np.moveaxis(maps[..., i], -1, 0)
+    matrix = matrix.reshape(points, 2 * segments, 2 * segments)
+    right = np.moveaxis(gap, 0, 2).reshape(points, 2 * segments, 1)
+    return np.moveaxis(np.linalg.solve(matrix, right).reshape(points, segments, 2), 2, 0)
+
+
+def _eigenvalues(maps: np.ndarray, log_determinant: np.ndarray) -> np.ndarray:
+    """Multipliers; the smaller of a real pair from the determinant, which loses no digits."""
+    found = []
+    for point, log in zip(np.moveaxis(maps, 2, 0), log_determinant, strict=True):
+        total = np.eye(2)
+        for i in range(point.shape[2]):
+            total = point[..., i] @ total
+        values = np.linalg.eigvals(total).astype(complex)
+        larger = values[np.argmax(np.abs(values))]
+        pair = [larger, np.exp(log) / larger if larger.imag == 0 else larger.conj()]
+        found.append(pair)
+    return np.array(found)
+
+
 class Reference(NamedTuple):
     """What tests use of this file."""
 
     Printed: type[Printed]
     expansion: Callable[..., np.ndarray]
     periodic_response: Callable[..., np.ndarray]
+    multiple_shooting: Callable[..., Shot]
 
 
 @pytest.fixture(scope="session")
 def reference() -> Reference:
-    return Reference(Printed, expansion, periodic_response)
+    return Reference(Printed, expansion, periodic_response, multiple_shooting)

@@ -1,0 +1,165 @@
+"""Nothing that a user can name is missing from the documentation, and its parts fit together."""
+
+import dataclasses
+import importlib
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+import asperity
+from asperity import materials
+from asperity.cli.main import main
+from asperity.laws import law_parameters, registered
+from asperity.solve import PeriodicResponse
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+PAGES = {p.relative_to(DOCS).as_posix(): p.read_text(encoding="utf-8") for p in DOCS.rglob("*.md")}
+PAGES = {name: text for name, text in PAGES.items() if not name.startswith("_build")}
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+API = "\n".join(text for name, text in PAGES.items() if name.startswith("api/"))
+#: Laws of the package; a test of another module may have registered one of its own.
+LAWS = sorted(n for n, law in registered().items() if law.__module__.startswith("asperity."))
+
+
+def code(text: str) -> set[str]:
+    """Everything that stands in code."""
+    return {
+        word for part in re.findall(r"`([^`\n]+)`", text) for word in re.findall(r"[\w-]+", part)
+    }
+
+
+def options(name: str) -> list[str]:
+    module = importlib.import_module(main.modules[name])
+    return [option for p in getattr(module, name).params for option in p.opts if option[0] == "-"]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_every_law_is_named(law) -> None:
+    for text in (README, *(PAGES[p] for p in ("getting_started.md", "command_line.md"))):
+        assert law in code(text)
+    assert f"`{law}`" in PAGES["theory/equations.md"]
+    assert f"asperity.laws.{registered()[law].__name__}" in API
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_the_nomenclature_has_every_parameter_of_a_law(law) -> None:
+    assert set(law_parameters(registered()[law])) <= code(PAGES["nomenclature.md"])
+
+
+def test_the_nomenclature_has_the_response_and_the_machine() -> None:
+    told = code(PAGES["nomenclature.md"])
+    results = {"mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", "multipliers"}
+    assert results | {"K", "M", "W0", "V", "epsilon", "frequency", "omega"} <= told
+
+
+@pytest.mark.parametrize("command", sorted(main.modules))
+def test_every_command_and_option_has_its_place(command) -> None:
+    page = PAGES["command_line.md"]
+    assert f"## asperity {command}" in page
+    own = [part for part in re.split(r"^## ", page, flags=re.M) if f"asperity {command}" in part]
+    told = set(re.findall(r"(?<![\w-])--?[\w-]+", "\n".join(own)))
+    assert set(options(command)) <= told
+    assert f"asperity {command}" in README
+
+
+@pytest.mark.parametrize(
+    "name", sorted(n for n in asperity.__all__ if callable(getattr(asperity, n)))
+)
+def test_every_public_name_is_in_the_reference(name) -> None:
+    assert re.search(rf":: asperity\.{name}\b", API)
+
+
+@pytest.mark.parametrize("room", ["air", "laws", "materials", "solve", "units"])
+def test_every_public_name_of_a_room_is_in_the_reference(room) -> None:
+    module = importlib.import_module(f"asperity.{room}")
+    told = set(re.findall(rf":: asperity\.(?:{room}\.)?(\w+)", API))
+    # A type alias has no page of its own.
+    assert set(module.__all__) - {"State"} <= told | {"KINDS"}
+
+
+@pytest.mark.parametrize(
+    "field",
+    sorted(
+        {f.name for f in dataclasses.fields(PeriodicResponse)} - {"detail"}
+        | {n for n, v in vars(PeriodicResponse).items() if isinstance(v, property)}
+    ),
+)
+def test_every_attribute_of_a_response_is_described(field) -> None:
+    assert field in code(PAGES["results.md"])
+
+
+def test_every_material_is_named() -> None:
+    for name in materials.available():
+        assert name in PAGES["command_line.md"]
+
+
+def test_every_page_is_in_the_contents() -> None:
+    listed = re.findall(r"^([\w/]+)$", PAGES["index.md"], re.M)
+    assert sorted(f"{name}.md" for name in listed) == sorted(set(PAGES) - {"index.md"})
+
+
+def test_links_of_the_readme_lead_somewhere() -> None:
+    targets = re.findall(r"\]\(([^)#]+)\)", README) + re.findall(r'src="([^"]+)"', README)
+    local = [t for t in targets if "://" not in t]
+    assert len(local) > 8
+    assert [t for t in local if not (ROOT / t).exists()] == []
+
+
+def test_the_picture_of_the_readme_is_small() -> None:
+    for picture in (DOCS / "images").glob("*.png"):
+        assert picture.name in README
+        assert picture.stat().st_size < 150_000
+
+
+def test_the_version_is_the_same_everywhere() -> None:
+    version = asperity.__version__
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"## [{version}]" in (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+
+
+def test_the_ten_lines_of_the_vision_are_ten() -> None:
+    text = (ROOT / "VISION.md").read_text(encoding="utf-8")
+    assert re.findall(r"^(\d+)\.", text, re.M) == [str(n) for n in range(1, 11)]
+
+
+@pytest.fixture
+def extension(monkeypatch):
+    """A module of docs/_ext, where what it needs is installed."""
+
+    def load(name: str):
+        pytest.importorskip("sphinx")
+        monkeypatch.syspath_prepend(str(DOCS / "_ext"))
+        monkeypatch.delitem(sys.modules, name, raising=False)
+        return importlib.import_module(name)
+
+    return load
+
+
+def test_a_planted_asset_from_elsewhere_is_seen(extension) -> None:
+    foreign = extension("offline").foreign_assets
+    assert foreign('<script src="https://example.org/x.js"></script>')
+    assert foreign('<link rel="stylesheet" href="//example.org/x.css">')
+    assert foreign("@font-face{src:url(https://example.org/x.woff2)}")
+    assert not foreign('<a href="https://example.org">a link</a><script src="_static/x.js">')
+    assert not foreign('<link rel="canonical" href="https://example.org/"><img src="x.png">')
+
+
+def test_docstrings_are_made_safe(extension) -> None:
+    escaped = extension("docstrings").escaped
+    assert escaped(["mu = |c_1|, lambda_ of `lambda_`"]) == [r"mu = \|c_1\|, lambda\_ of `lambda_`"]
+    assert escaped(["lambda_ : |x|"]) == [r"lambda_ : \|x\|"]
+    literal = ["Eq.::", "", "    F = |x|", "", "after |x|"]
+    assert escaped(literal) == [*literal[:-1], r"after \|x\|"]
+
+
+def test_formulas_become_mathml_and_unknown_commands_are_told(extension, caplog) -> None:
+    pytest.importorskip("latex2mathml")
+    module = extension("mathml")
+    assert module.to_mathml(r"\arg c_n", display=False).startswith("<math")
+    told = []
+    module._log = type("Log", (), {"warning": lambda self, *a, **k: told.append(a)})()
+    module.to_mathml(r"\nosuchcommand x", display=True)
+    assert told

@@ -1,0 +1,195 @@
+"""Every runnable part of the README and of the pages runs, and prints what the page says."""
+
+import csv
+import importlib.util
+import json
+import re
+import runpy
+import sys
+from pathlib import Path
+
+import matplotlib as mpl
+import pytest
+from click.testing import CliRunner
+
+from asperity.cli.main import main
+from asperity.laws import registry
+
+_spec = importlib.util.spec_from_file_location("snippets", Path(__file__).with_name("snippets.py"))
+pages = importlib.util.module_from_spec(_spec)
+sys.modules["snippets"] = pages
+_spec.loader.exec_module(pages)
+
+ROOT = pages.ROOT
+RUNNABLE = [page for page in pages.PAGES if pages.snippets(page)]
+#: Pages whose code takes more than about ten seconds.
+SLOW = {"docs/claims.md", "docs/theory/numerical_method.md", "docs/findings.md"}
+
+
+def named(page: Path) -> str:
+    return page.relative_to(ROOT).as_posix()
+
+
+def invoke(*arguments: str):
+    result = CliRunner().invoke(main, list(arguments), prog_name="asperity")
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+@pytest.fixture
+def workplace(tmp_path, monkeypatch):
+    """An empty folder, a registry of laws of its own, and no window for figures."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
+    mpl.use("agg")
+    return tmp_path
+
+
+def run_python(snippet, namespace, capsys, where) -> None:
+    capsys.readouterr()
+    exec(compile(snippet.text, where, "exec"), namespace)
+    printed = capsys.readouterr().out
+    assert pages.difference(snippet.prints or "", printed) == "", f"{where}\n{printed}"
+
+
+def run_console(snippet, where, capsys) -> None:
+    for command in pages.commands(snippet.text):
+        program, *arguments = command.arguments
+        if program == "asperity" and arguments[0] == "reproduce":
+            # Half a minute of work that tests/report does; here its options are parsed.
+            import asperity.cli.reproduce as module
+
+            module.reproduce.make_context("reproduce", arguments[1:])
+        elif program == "asperity":
+            result = invoke(*arguments)
+            assert result.exit_code == command.exit_code, f"{where}: {result.output}"
+            assert pages.difference(command.prints, result.output) == "", (
+                f"{where}\n{result.output}"
+            )
+        elif program == "make":
+            makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+            for target in arguments:
+                assert re.search(rf"^{target}:", makefile, re.M), f"{where}: no make {target}"
+        elif program == "python":
+            capsys.readouterr()
+            runpy.run_path(str(ROOT / arguments[0]), run_name="__main__")
+            printed = capsys.readouterr().out
+            assert pages.difference(command.prints, printed) == "", f"{where}\n{printed}"
+        else:
+            pytest.fail(f"{where}: nobody knows how to try '{program}'")
+
+
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(p, id=named(p), marks=pytest.mark.slow if named(p) in SLOW else ())
+        for p in RUNNABLE
+    ],
+)
+def test_page_runs_as_it_says(page, workplace, capsys) -> None:
+    namespace = {"__name__": "page"}
+    for snippet in pages.snippets(page):
+        where = f"{named(page)}:{snippet.line}"
+        if snippet.kind == "python":
+            run_python(snippet, namespace, capsys, where)
+        elif snippet.kind == "console":
+            run_console(snippet, where, capsys)
+        elif snippet.kind == "file":
+            (workplace / snippet.name).write_text(snippet.text, encoding="utf-8")
+        elif snippet.name.endswith(".py"):
+            included = runpy.run_path(str((page.parent / snippet.name).resolve()))
+            namespace |= {k: v for k, v in included.items() if not k.startswith("__")}
+
+
+def documented(page: str, head: str) -> set[str]:
+    """Names in the first column of the table that follows `head`."""
+    text = (ROOT / page).read_text(encoding="utf-8").partition(head)[2]
+    table = re.search(r"(?:^\|.*\n)+", text, re.M)[0].splitlines()[2:]
+    return {name for row in table for name in re.findall(r"`([^`]+)`", row.split("|")[1])}
+
+
+POINT = ("--law", "rice-ruina", "--material", "bureau2000", "-V", "1 um/s", "-e", "0.24")
+
+
+def test_json_keys_of_a_response_are_those_of_the_page() -> None:
+    record = json.loads(invoke("response", *POINT, "-f", "120 Hz", "--json").stdout)
+    assert documented("docs/command_line.md", "Keys of the JSON") == set(record)
+
+
+def test_json_keys_of_the_air_are_those_of_the_page() -> None:
+    record = json.loads(invoke("air", "--material", "bureau2000", "-f", "120 Hz", "--json").stdout)
+    text = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"`(\w+)`", text.partition("JSON keys\nare")[2].partition("\n\n")[0]))
+    assert told == set(record) | set(record["points"][0])
+
+
+def test_result_columns_of_a_table_are_those_of_the_page(workplace) -> None:
+    Path("in.csv").write_text("law,V,epsilon,frequency\nrice-ruina,1e-6,0.24,120\n")
+    invoke("response", "--table", "in.csv", "--out", "out.csv", "--material", "bureau2000")
+    with Path("out.csv").open(encoding="utf-8") as file:
+        columns = next(csv.reader(file))
+    told = documented("docs/command_line.md", "The output has the columns of the input")
+    assert told - {"converged"} == set(columns[4:]) - {"converged"}
+    assert "converged" in columns
+
+
+@pytest.mark.slow
+def test_counts_of_the_readme_are_those_of_the_ledger() -> None:
+    from asperity.study.claims import VERDICTS, ledger
+
+    claims = ledger()
+    counts = [len(claims), *(sum(c.verdict == v for c in claims) for v in VERDICTS)]
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    told = re.search(
+        r"(\d+) statements of the paper .*?: (\d+) are reproduced, (\d+) are misprints, "
+        r"(\d+) differ",
+        text,
+    )
+    assert [int(n) for n in told.groups()] == counts
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed"),
+    [
+        ("a 1.000", "a 1.001"),
+        ("a 1.2e-09 b", "a 1.3e-09 b"),
+        ("...\nend 2", "x\ny\nend 2"),
+        ("x ...\nend", "x 12 y\nend"),
+        ("a   b", "a b\n\n"),
+        ("-23%", "-23%"),
+    ],
+)
+def test_equal_outputs_are_equal(shown, printed) -> None:
+    assert pages.difference(shown, printed) == ""
+
+
+@pytest.mark.parametrize(
+    ("shown", "printed"),
+    [
+        ("a 1.000", "a 1.002"),
+        ("a 1.2e-09", "a 1.4e-09"),
+        ("a 1.2e-09", "a 1.2e-08"),
+        ("a", "b"),
+        ("a", "a\nb"),
+        ("a\nb", "a"),
+        ("", "a"),
+        ("...\nend 2", "x\nend 3"),
+        ("-23%", "-28%"),
+        ("True", "False"),
+    ],
+)
+def test_planted_differences_are_seen(shown, printed) -> None:
+    assert pages.difference(shown, printed)
+
+
+def test_a_planted_snippet_is_found(tmp_path) -> None:
+    page = tmp_path / "page.md"
+    page.write_text(
+        "x\n\n```python\nprint(1)\n```\n\n```text\n2\n```\n\n"
+        "```console\n$ asperity --version  # exit 2\nno\n```\n",
+        encoding="utf-8",
+    )
+    first, second = pages.snippets(page)
+    assert (first.kind, first.prints, first.line) == ("python", "2\n", 3)
+    (command,) = pages.commands(second.text)
+    assert command == pages.Command(["asperity", "--version"], "no\n", 2)
