@@ -46,15 +46,17 @@ def to_mathml(latex: str, *, display: bool, where: Any = None) -> str:
 
 
 def _mark_signs(row: ElementTree.Element) -> None:
-    """A minus behind an opening bracket or a relation is a sign, and no difference."""
+    """A minus behind a bracket, a relation or a blank is a sign, and no difference."""
     for before, minus in pairwise(row):
-        if minus.tag.endswith("}mo") and minus.text == "−" and (before.text or "x") in "([=,→≈":
+        opens = before.tag.endswith("}mspace") or (before.text or "x") in "([=,→≈"
+        if minus.tag.endswith("}mo") and minus.text == "−" and opens:
             minus.set("form", "prefix")
 
 
 def _pair_bars(root: ElementTree.Element) -> None:
     """Bars of a modulus belong to what they enclose; alone they would be spaced like a sign."""
-    bars = [mo for mo in root.iter(f"{{{_SPACE}}}mo") if mo.text == "|" and not mo.attrib]
+    single = [mo for mo in root.iter(f"{{{_SPACE}}}mo") if mo.text == "|"]
+    bars = [mo for mo in single if not {"fence", "minsize"} & set(mo.attrib)]
     if len(bars) % 2:
         return
     for i, bar in enumerate(bars):

@@ -19,7 +19,7 @@ from asperity.laws import (
 PROMISED = 1e-8
 #: Below this modulus multipliers are promised to 1e-20 absolute.
 VANISHING = 1e-12
-#: Relative to the swing of F. A Fourier series whose harmonics have an error of 1e-9 ends with terms
+#: Relative to the swing of F. A Fourier series whose harmonics are good to 1e-9 ends with terms
 #: of about the square root of that.
 WAVEFORM = 3e-5
 #: The same arithmetic in other units: round-off times the condition of the orbit.
@@ -28,7 +28,7 @@ OTHER_UNITS = 1e-10
 BASE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
 LENGTH = 7e-7
 K, W0 = 2e5, 7.0
-SAMPLES, SEGMENTS = 512, 32
+SAMPLES, SEGMENTS = 4096, 32
 
 #: Law, and the variant of the reference's equations that it stands for.
 LAWS = {

@@ -1,0 +1,75 @@
+"""Peer: marching in time with diffrax's Tsit5 in log variables, all points at once.
+
+From the averaged limit, for the reason given in `scipy_marching`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from benchmarks.cases import Batch
+from benchmarks.equations import Answer, averaged_limit, force_rest, read
+
+_SAMPLES = 32
+_SETTLED = 1e-9
+_MOST_PERIODS = 5000
+
+
+class Marching:
+    """The compiled map over one period."""
+
+    def __init__(self) -> None:
+        import jax
+
+        self.period = jax.jit(jax.vmap(_period))
+
+    def solve(self, batch: Batch) -> Answer:
+        """March until the last point repeats itself."""
+        numbers = {k: np.array(v) for k, v in batch.numbers().items()}
+        z0, chi = averaged_limit(numbers)
+        state = np.stack([np.zeros_like(chi), chi], axis=-1)
+        last = np.full(len(batch), np.inf)
+        for _ in range(_MOST_PERIODS):
+            path = np.asarray(self.period(state, numbers, z0))
+            moved = np.abs(path[:, -1] - state) * np.stack([numbers["kappa"], 0 * chi + 1], -1)
+            state, change = path[:, -1], moved.max(1)
+            with np.errstate(invalid="ignore", divide="ignore"):
+                settled = (change < last) & (change / (1 - change / last) < _SETTLED)
+            if settled.all():
+                break
+            last = change
+        theta = 2 * np.pi * np.arange(_SAMPLES)[:, None] / _SAMPLES
+        w = 1 + numbers["epsilon"] * np.cos(theta)
+        rest = force_rest(numbers, z0, path[:, :-1, 0].T, w)
+        return read(z0 / (1 + numbers["ratio"]), rest, None)
+
+
+def _period(state, numbers: dict, z0):
+    """Samples of the states over one period, shape (samples + 1, 2)."""
+    import diffrax
+    import jax.numpy as jnp
+
+    def rates(theta, state, _):
+        n = numbers
+        w = 1 + n["epsilon"] * jnp.cos(theta)
+        f = (z0 + n["kappa"] * state[0]) * w / (w + n["ratio"])
+        phi = state[1] + n["ageing"] / n["kappa"] * f
+        slip = jnp.exp((f / w - n["mu"] - n["B"] * phi) / n["A"])
+        return jnp.stack([1 - slip, n["ageing"] * (jnp.exp(-phi) - 1)])
+
+    theta = jnp.linspace(0, 2 * np.pi, _SAMPLES + 1)
+    solution = diffrax.diffeqsolve(
+        diffrax.ODETerm(rates),
+        diffrax.Tsit5(),
+        0.0,
+        2 * np.pi,
+        None,
+        state,
+        # Dense output is of lower order than the steps: stop at the samples instead.
+        saveat=diffrax.SaveAt(ts=theta),
+        stepsize_controller=diffrax.ClipStepSizeController(
+            diffrax.PIDController(rtol=1e-10, atol=1e-12), step_ts=theta[1:-1]
+        ),
+        max_steps=100_000,
+    )
+    return solution.ys

@@ -1,0 +1,64 @@
+"""Peer: marching in time with SciPy's LSODA until the response repeats.
+
+From the averaged limit: at full amplitude, a start from steady sliding runs away, because steady
+sliding is unstable with the paper's parameters and no inertia holds the slider back.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from benchmarks.cases import Batch
+from benchmarks.equations import Answer, averaged_limit, force_rest, read
+
+_SAMPLES = 32
+#: Change of the states over a period, relative to the distance still to go, that ends the march.
+_SETTLED = 1e-9
+_MOST_PERIODS = 5000
+
+
+def solve(batch: Batch) -> Answer:
+    """March each point to its steady state."""
+    numbers = batch.numbers()
+    z0, chi0 = averaged_limit(numbers)
+    answers = [
+        _march({k: v[i] for k, v in numbers.items()}, z0[i], chi0[i]) for i in range(len(batch))
+    ]
+    return Answer(*(np.concatenate(values, axis=-1) for values in zip(*answers, strict=True)))
+
+
+def _march(numbers: dict, z0: float, chi0: float) -> Answer:
+    state = np.array([0.0, chi0])
+    theta = np.linspace(0, 2 * np.pi, _SAMPLES + 1)
+    last = np.inf
+    for _ in range(_MOST_PERIODS):
+        run = solve_ivp(
+            _rates,
+            (0.0, 2 * np.pi),
+            state,
+            "LSODA",
+            t_eval=theta,
+            args=(numbers, z0),
+            rtol=1e-10,
+            atol=1e-12,
+        )
+        moved = np.abs(run.y[:, -1] - state) * [numbers["kappa"], 1.0]
+        state = run.y[:, -1]
+        change = moved.max()
+        # A decay by r per period leaves r / (1 - r) of the last change.
+        if change < last and change / (1 - change / last) < _SETTLED:
+            break
+        last = change
+    w = 1 + numbers["epsilon"] * np.cos(theta[:-1, None])
+    rest = force_rest(numbers, z0, run.y[0, :-1, None], w)
+    return read(np.array([z0 / (1 + numbers["ratio"])]), rest, None)
+
+
+def _rates(theta: float, state: np.ndarray, numbers: dict, z0: float) -> list[float]:
+    n = numbers
+    w = 1 + n["epsilon"] * np.cos(theta)
+    f = (z0 + n["kappa"] * state[0]) * w / (w + n["ratio"])
+    phi = state[1] + n["ageing"] / n["kappa"] * f
+    slip = np.exp((f / w - n["mu"] - n["B"] * phi) / n["A"])
+    return [1 - slip, n["ageing"] * (np.exp(-phi) - 1)]
