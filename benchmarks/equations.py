@@ -81,9 +81,7 @@ def read(mean: np.ndarray, rest: np.ndarray, monodromy: np.ndarray | None) -> An
         multipliers = np.full((2, rest.shape[1]), np.nan)
     else:
         multipliers = multipliers_of(monodromy)
-    return Answer(
-        mean + spectrum[0].real, 2 * abs(spectrum[1]), 2 * abs(spectrum[2]), multipliers
-    )
+    return Answer(mean + spectrum[0].real, 2 * abs(spectrum[1]), 2 * abs(spectrum[2]), multipliers)
 
 
 def force_rest(numbers: dict, z0: np.ndarray, y: np.ndarray, w: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Peer: heyoka, Taylor integration in SIMD batches with variational equations, and shooting.
 
 As fast as we could make it: the equations in a form with few products (see `equations`), compiled
-once, compact mode off, one point a SIMD lane, points of like epsilon in a batch, a first Newton step
-at a loose tolerance, harmonics from the dense output of the last period.
+once, compact mode off, one point a SIMD lane, points of like epsilon in a batch, a first Newton
+step at a loose tolerance, harmonics from the dense output of the last period.
 """
 
 from __future__ import annotations
@@ -100,5 +100,3 @@ def _newton(start: np.ndarray, state: np.ndarray) -> np.ndarray:
     a, b, c, d = state[2:] - np.eye(2).reshape(4, 1)
     determinant = a * d - b * c
     return np.array([b * gap[1] - d * gap[0], c * gap[0] - a * gap[1]]) / determinant
-
-

@@ -277,6 +277,21 @@ def _eigenvalues(maps: np.ndarray, log_determinant: np.ndarray) -> np.ndarray:
     return np.array(found)
 
 
+#: Below this modulus multipliers are promised to 1e-20 absolute.
+VANISHING = 1e-12
+
+
+def disagreement(response, shot: Shot) -> np.ndarray:
+    """Relative errors (points, 3) of mean, harmonics 1 and 2, and multipliers; the larger ones."""
+    size = np.maximum(np.abs(shot.multipliers), VANISHING)
+    errors = [
+        np.abs(response.mean_friction / shot.mean - 1),
+        np.abs(response.harmonics[..., :2] / shot.harmonics - 1).max(-1),
+        (np.abs(response.multipliers - shot.multipliers) / size).max(-1),
+    ]
+    return np.stack(errors, axis=-1)
+
+
 class Reference(NamedTuple):
     """What tests use of this file."""
 
@@ -284,8 +299,9 @@ class Reference(NamedTuple):
     expansion: Callable[..., np.ndarray]
     periodic_response: Callable[..., np.ndarray]
     multiple_shooting: Callable[..., Shot]
+    disagreement: Callable[..., np.ndarray]
 
 
 @pytest.fixture(scope="session")
 def reference() -> Reference:
-    return Reference(Printed, expansion, periodic_response, multiple_shooting)
+    return Reference(Printed, expansion, periodic_response, multiple_shooting, disagreement)

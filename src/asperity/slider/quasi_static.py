@@ -79,7 +79,7 @@ class QuasiStatic(eqx.Module):
 
     def log_slip(self, Y: Array, w: ArrayLike) -> Array:
         """ln(v_pl / V), the exponent that makes the equations stiff."""
-        f_over_w = Y[0] / (w + self.compliance_ratio)
+        f_over_w = Y[0] * (1 / (w + self.compliance_ratio))
         return self.slider.law.log_velocity(f_over_w, tuple(Y[1:]), w) - jnp.log(self.V)
 
     def rates(self, Y: Array, w: ArrayLike, w_slope: ArrayLike) -> Array:
@@ -91,10 +91,12 @@ class QuasiStatic(eqx.Module):
         w, w_slope : arrays
             W/W0 and its derivative with respect to theta.
         """
-        law, kappa, ratio = self.slider.law, self.kappa, self.compliance_ratio
+        law, ratio = self.slider.law, self.compliance_ratio
+        # Of the load alone: loops over the states divide once, before they start.
+        per_stiffness = 1 / (w + ratio)
+        load_rate = ratio / self.kappa * w_slope * per_stiffness**2
         slip = jnp.exp(self.log_slip(Y, w))
-        z_rate = kappa * (1 - slip)
-        f_rate = (z_rate * w + Y[0] * ratio * w_slope / (w + ratio)) / (w + ratio)
-        v = self.V * (1 - f_rate / kappa)
+        z_rate = self.kappa * (1 - slip)
+        v = self.V * (1 - (1 - slip) * (w * per_stiffness) - Y[0] * load_rate)
         state_rates = law.state_rate(v, self.V * slip, tuple(Y[1:]), w)
         return jnp.stack([z_rate, *(r / self.omega for r in state_rates)])

@@ -12,15 +12,45 @@ estimate, and Newton's method works on the logarithm of the mean slip rate, whic
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 from jax import Array
 
 from asperity.slider import QuasiStatic
-from asperity.solve.linear import jacobian_columns, solve_points
+from asperity.solve.linear import Matrix, inverse_points
 
 #: Largest change of a logarithmic state in one step; the mean of e^(-state) is what is solved for.
 _STATE_STEP = 2.0
+
+
+class Pulse(NamedTuple):
+    """Slip concentrated where the contact is weakest, for states of steady sliding."""
+
+    weakest: Array  # spring force at which the weakest contact carries V
+    width: Array  # of the exponent of the slip rate, in units of that force
+    swing: Array  # of that force over the cycle, half its range
+
+    @property
+    def sharpness(self) -> Array:
+        """Half the range of the exponent of the slip rate over the cycle."""
+        return self.swing / self.width
+
+
+def slip_pulse(system: QuasiStatic, w: Array) -> Pulse:
+    """The pulse over the samples `w` of the load cycle, shape (nodes, points)."""
+    law = system.slider.law
+    state = tuple(system.steady()[1:])
+
+    def friction(log_v: Array) -> Array:
+        return law.friction(jnp.exp(log_v), state, w)
+
+    log_v = jnp.log(system.V)
+    strength, direct_effect = jax.jvp(friction, (log_v,), (jnp.ones_like(log_v),))
+    carried = strength * (w + system.compliance_ratio)
+    weakest = carried.min(0)
+    return Pulse(weakest, (direct_effect * w).min(0), 0.5 * (carried.max(0) - weakest))
 
 
 def laplace_estimate(system: QuasiStatic, w: Array) -> Array:
@@ -37,24 +67,27 @@ def laplace_estimate(system: QuasiStatic, w: Array) -> Array:
     array, shape (size, points)
     """
     start = jnp.broadcast_to(system.steady(), (system.size, w.shape[1]))
-    law = system.slider.law
-    state = tuple(start[1:])
-
-    def friction(log_v: Array) -> Array:
-        return law.friction(jnp.exp(log_v), state, w)
-
-    log_v = jnp.log(system.V) * jnp.ones_like(w)
-    strength, direct_effect = jax.jvp(friction, (log_v,), (jnp.ones_like(w),))
-    carried = strength * (w + system.compliance_ratio)
-    weakest = carried.min(0)
-    width = (direct_effect * w).min(0)
+    pulse = slip_pulse(system, w)
     # Second derivative of the strength at its minimum, as if its whole swing were one cosine.
-    swing = 0.5 * (carried.max(0) - weakest)
-    gain = 0.5 * jnp.log(jnp.maximum(2 * jnp.pi * swing / width, 1.0))
-    return start.at[0].set(jnp.minimum(start[0], weakest + width * gain))
+    gain = 0.5 * jnp.log(jnp.maximum(2 * jnp.pi * pulse.sharpness, 1.0))
+    return start.at[0].set(jnp.minimum(start[0], pulse.weakest + pulse.width * gain))
 
 
-def averaged_states(system: QuasiStatic, w: Array, weights: Array, steps: int = 10) -> Array:
+class Averaged(NamedTuple):
+    """The averaged limit, as tuples of arrays (points,) over the states."""
+
+    centre: tuple[Array, ...]
+    matrix: Matrix  # [i][j]: derivative of the mean rate of state i to state j
+
+
+def averaged_limit(
+    system: QuasiStatic,
+    w: Array,
+    weights: Array,
+    *,
+    tolerance: float = 1e-12,
+    max_steps: int = 12,
+) -> Averaged:
     """States that make the mean rates vanish, by Newton's method from `laplace_estimate`.
 
     Parameters
@@ -62,31 +95,52 @@ def averaged_states(system: QuasiStatic, w: Array, weights: Array, steps: int = 
     system : QuasiStatic
     w : array, shape (nodes, points)
         Samples of the load cycle.
-    weights : array, shape (nodes, points)
+    weights : array, shape (nodes,)
         Their share of the period; sums to 1.
-    steps : int
-        Newton steps.
+    tolerance : float
+        On the last change of the exponent of the slip rate and of the logarithmic states.
+    max_steps : int
+        Newton steps at most.
 
     Returns
     -------
-    array, shape (size, points)
+    Averaged
         Not finite where it failed.
     """
+    points = w.shape[1]
+    n = system.size
+
+    def unfinished(carry: tuple) -> Array:
+        *_, change, steps = carry
+        return (steps < max_steps) & jnp.any(change > tolerance)
+
+    def body(carry: tuple) -> tuple:
+        centre, _, _, steps = carry
+        return (*_newton_step(system, centre, w, weights), steps + 1)
+
+    none = [[jnp.zeros(points)] * n] * n
+    start = (tuple(laplace_estimate(system, w)), none, jnp.full(points, jnp.inf), 0)
+    centre, matrix, _, _ = jax.lax.while_loop(unfinished, body, start)
+    return Averaged(centre, matrix)
+
+
+def _newton_step(system: QuasiStatic, centre: tuple[Array, ...], w: Array, weights: Array) -> tuple:
+    """The new means, the matrix used, and the largest logarithmic change."""
     flat = jnp.zeros_like(w)  # constant states: terms in dw/dtheta have zero mean
 
-    def step(_: int, centre: Array) -> Array:
-        Y = jnp.stack([c + flat for c in centre])
-        rates, columns = jacobian_columns(lambda Y: system.rates(Y, w, flat), Y)
-        mean = [(weights * r).sum(0) for r in rates]
-        jacobian = jnp.stack(
-            [jnp.stack([(weights * r).sum(0) for r in column]) for column in columns], axis=1
-        )
-        slip = 1 - mean[0] / system.kappa
-        mean[0] = -system.kappa * slip * jnp.log(slip)
-        change = solve_points(jacobian, -jnp.stack(mean))
-        change = jnp.stack(
-            [change[0], *(jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:])]
-        )
-        return centre + change
+    def rates(*Y: Array) -> tuple[Array, ...]:
+        return tuple(system.rates(jnp.stack(Y), w, flat))
 
-    return jax.lax.fori_loop(0, steps, step, laplace_estimate(system, w))
+    value, push = jax.linearize(rates, *(c + flat for c in centre))
+    one = jnp.ones_like(w)
+    n = len(centre)
+    columns = [push(*(one if i == j else flat for j in range(n))) for i in range(n)]
+    matrix = [[weights @ column[i] for column in columns] for i in range(n)]
+    mean = [weights @ rate for rate in value]
+    slip = 1 - mean[0] / system.kappa
+    mean[0] = -system.kappa * slip * jnp.log(slip)
+    inverse = inverse_points(matrix)
+    change = [-sum(a * m for a, m in zip(row, mean, strict=True)) for row in inverse]
+    change[1:] = [jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:]]
+    moved = jnp.stack([jnp.log(slip), *change[1:]])
+    return tuple(c + d for c, d in zip(centre, change, strict=True)), matrix, jnp.abs(moved).max(0)

@@ -19,7 +19,7 @@ from jax import Array
 
 from asperity.loads import Harmonic
 from asperity.slider import QuasiStatic
-from asperity.solve.averaged import averaged_states
+from asperity.solve.averaged import averaged_limit
 from asperity.solve.cyclic import solve_cyclic
 from asperity.solve.linear import (
     jacobian_columns,
@@ -45,7 +45,8 @@ def averaged_orbit(
     orbit = steady_orbit(system, points, intervals=intervals, grading=grading)
     w = load.load(orbit.stage_phases).reshape(-1, points)
     weights = (jnp.asarray(GAUSS_B)[:, None, None] * orbit.widths).reshape(-1, points)
-    return orbit._replace(centre=averaged_states(system, w, weights / (2 * jnp.pi)))
+    averaged = averaged_limit(system, w, weights[:, 0] / (2 * jnp.pi))
+    return orbit._replace(centre=jnp.stack(averaged.centre))
 
 
 def steady_orbit(system: QuasiStatic, points: int, *, intervals: int, grading: float) -> Orbit:

@@ -5,8 +5,8 @@ By the implicit function theorem: the orbit is a fixed point Y = T(Y, p) of the 
 
     l = c + T_Y^T l,
 
-found by the same contraction, transposed. The Jacobian of the rates inside T may be held constant
-there: it multiplies a residual that is zero.
+found by the same contraction, transposed. The derivatives of the rates inside T may be held
+constant there: they multiply a residual that is zero.
 """
 
 from __future__ import annotations
@@ -20,10 +20,19 @@ from jax import Array
 
 from asperity.loads import Harmonic
 from asperity.slider import QuasiStatic
-from asperity.solve.fourier import advance, fourier_orbit, linearise, load_cycle, rate_parts
+from asperity.solve.fourier import (
+    States,
+    advance,
+    fourier_orbit,
+    jacobian,
+    load_cycle,
+    rates_on,
+    together,
+)
 from asperity.solve.fourier_reading import force_spectrum
+from asperity.solve.linear import inverse_points
 
-_Parts = tuple[Array, Array, Array]
+_Parts = tuple[States, States]
 _Parameters = tuple[QuasiStatic, Harmonic]
 
 
@@ -73,7 +82,7 @@ def harmonic_response(
 @partial(jax.custom_vjp, nondiff_argnums=(0,))
 def _orbit(options: _Options, parameters: _Parameters) -> _Parts:
     points = jnp.shape(parameters[1].epsilon)[-1]
-    return fourier_orbit(*parameters, points, **options._asdict())[:3]
+    return fourier_orbit(*parameters, points, **options._asdict())[:2]
 
 
 def _forward(options: _Options, parameters: _Parameters) -> tuple[_Parts, tuple]:
@@ -85,28 +94,39 @@ def _backward(options: _Options, kept: tuple, cotangent: _Parts) -> tuple[_Param
     parameters, orbit = kept
     system, load = parameters
     cycle = load_cycle(load, options.nodes, options.grading)
-    frozen = linearise(system, cycle, *orbit)
+    states = together(*orbit)
+    J = jacobian(jax.linearize(rates_on(system, cycle), *states)[1], states)
+    inverse = inverse_points([[cycle.share @ entry for entry in row] for row in J])
 
-    def iterate(parts: _Parts, parameters: _Parameters) -> _Parts:
+    def push(*change: Array) -> States:
+        return tuple(sum(a * c for a, c in zip(row, change, strict=True)) for row in J)
+
+    def linear(parts: _Parts) -> _Parts:
+        return advance(cycle, inverse, parts[0], push(*together(*parts)), push)[:2]
+
+    def iterate(parameters: _Parameters) -> _Parts:
         system, load = parameters
         cycle = load_cycle(load, options.nodes, options.grading)
-        even, odd = rate_parts(system, cycle, *parts)
-        return advance(cycle, parts[0], frozen._replace(even=even, odd=odd))[:3]
+        return advance(cycle, inverse, orbit[0], rates_on(system, cycle)(*states), push)[:2]
 
-    _, pull = jax.vjp(iterate, orbit, parameters)
+    transposed = jax.linear_transpose(linear, orbit)
 
     def body(carry: tuple) -> tuple:
         total, _, steps = carry
-        new = jax.tree.map(jnp.add, cotangent, pull(total)[0])
-        size = sum(jnp.abs(a).sum() for a in new)
-        change = sum(jnp.abs(a - b).sum() for a, b in zip(new, total, strict=True))
+        new = jax.tree.map(jnp.add, cotangent, transposed(total)[0])
+        size = _sum(jax.tree.map(jnp.abs, new))
+        change = _sum(jax.tree.map(lambda a, b: jnp.abs(a - b), new, total))
         return new, change / (size + 1e-300), steps + 1
 
     def unfinished(carry: tuple) -> Array:
         return (carry[2] < options.max_steps) & (carry[1] > options.tolerance)
 
     total, _, _ = jax.lax.while_loop(unfinished, body, (cotangent, jnp.inf, 0))
-    return (pull(total)[1],)
+    return jax.vjp(iterate, parameters)[1](total)
 
 
 _orbit.defvjp(_forward, _backward)
+
+
+def _sum(parts: _Parts) -> Array:
+    return jnp.stack([a.sum() for a in jax.tree.leaves(parts)]).sum()

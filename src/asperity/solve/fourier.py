@@ -2,22 +2,25 @@
 
 The states are split into means and zero-mean parts. One step of the iteration
 
-1. evaluates the rates and their derivatives on a uniform grid in tau,
-2. moves the means by Newton's method, so that the mean rates vanish,
+1. evaluates the rates on a uniform grid in tau,
+2. moves the means by a Newton step, so that the mean rates vanish,
 3. integrates the zero-mean rest spectrally, which gives the new zero-mean part.
 
 It is a linear iteration that contracts by about the change of the slip exponent in a period, a few
 hundredths in the regime of Bureau et al.; where it does not contract, the orbit is left to
-`asperity.solve.collocation`. The zero-mean part is carried on its own, so the harmonics keep
-their relative accuracy however small they are.
+`asperity.solve.collocation`. The means need to contract no faster than the rest, so their Newton
+matrix stays that of the averaged limit. The zero-mean part is carried on its own, so the harmonics
+keep their relative accuracy however small they are.
 
 Grid: theta = tau + g sin(tau) puts the nodes where the load is lightest and the slip pulse narrow.
-The nodes are half-shifted and symmetric about theta = 0, so w is even, integration maps even
-functions to odd ones, and the matrices halve.
+
+States and rates are tuples with an array for each state, not stacks: a stack is written to memory
+before it is read, and memory is what these programs wait for.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -28,142 +31,117 @@ from jax import Array
 
 from asperity.loads import Harmonic
 from asperity.slider import QuasiStatic
-from asperity.solve.averaged import averaged_states
-from asperity.solve.linear import jacobian_columns, solve_points
+from asperity.solve.averaged import averaged_limit
+from asperity.solve.linear import Matrix, inverse_points
+
+States = tuple[Array, ...]
 
 #: A change this small is round-off of the slip exponent: it no longer shrinks, and need not.
 _ROUND_OFF = 1e-12
 
+#: The averaged limit is itself no closer to the orbit than this.
+_AVERAGED_TOLERANCE = 1e-2
+
+#: Convergence is looked for at every third node: the changes are smooth.
+_LOOKED_AT = slice(1, None, 3)
+
 
 class FourierOrbit(NamedTuple):
-    """A periodic orbit on the half grid; `even` and `odd` parts are (size, nodes/2, points)."""
+    """A periodic orbit on the grid, one array for each state."""
 
-    mean: Array
-    even: Array
-    odd: Array
+    mean: States  # (points,)
+    rest: States  # (nodes, points), of zero mean in tau
     error: Array
     steps: Array
 
 
-@lru_cache
-def half_grid(nodes: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes in (0, pi) and the matrices that integrate even and odd functions of tau."""
-    half = nodes // 2
-    tau = 2 * np.pi * (np.arange(half) + 0.5) / nodes
-    k = np.arange(1, half)[:, None]
-    cosine, sine = np.cos(k * tau), np.sin(k * tau)
-    even_to_odd = (sine / k).T @ cosine * (4 / nodes)
-    odd_to_even = -(cosine / k).T @ sine * (4 / nodes)
-    return tau, even_to_odd, odd_to_even
-
-
 class Cycle(NamedTuple):
-    """The load cycle on the half grid."""
+    """The load cycle on the grid."""
 
-    theta: Array
-    stretch: Array  # dtheta/dtau
-    w: Array
+    theta: np.ndarray  # (nodes,)
+    stretch: np.ndarray  # (nodes,), dtheta/dtau
+    integral: np.ndarray  # (nodes, nodes), zero-mean antiderivative in tau
+    w: Array  # (nodes, points)
     w_slope: Array
-    even_to_odd: Array
-    odd_to_even: Array
 
-    def integrate(self, even: list[Array], odd: list[Array]) -> tuple[list[Array], list[Array]]:
-        """Zero-mean antiderivative in tau of even + odd."""
-        new_odd = [self.even_to_odd @ e for e in even]
-        new_even = [self.odd_to_even @ o for o in odd]
-        return new_even, new_odd
+    @property
+    def share(self) -> np.ndarray:
+        """Weight of each node in a mean over theta, shape (nodes,)."""
+        return self.stretch / len(self.stretch)
+
+
+@lru_cache
+def grid(nodes: int) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes tau, the positive ones before their mirror images, and the integrating matrix."""
+    positive = 2 * np.pi * (np.arange(nodes // 2) + 0.5) / nodes
+    tau = np.concatenate([positive, -positive])
+    k = np.arange(1, nodes // 2)[:, None, None]
+    return tau, (2 / nodes) * (np.sin(k * (tau[:, None] - tau)) / k).sum(0)
 
 
 def load_cycle(load: Harmonic, nodes: int, grading: float) -> Cycle:
-    """The load cycle on a grid of `nodes` per period, shape (nodes/2, points)."""
-    tau, even_to_odd, odd_to_even = half_grid(nodes)
-    tau = tau[:, None]
-    theta = jnp.asarray(tau + grading * np.sin(tau))
-    stretch = jnp.asarray(1 + grading * np.cos(tau))
-    return Cycle(
-        theta,
-        stretch,
-        load.load(theta),
-        load.slope(theta),
-        jnp.asarray(even_to_odd),
-        jnp.asarray(odd_to_even),
-    )
+    """The load cycle on a grid of `nodes` per period."""
+    tau, integral = grid(nodes)
+    theta = tau + grading * np.sin(tau)
+    column = jnp.asarray(theta)[:, None]
+    return Cycle(theta, 1 + grading * np.cos(tau), integral, load.load(column), load.slope(column))
 
 
-class Linearised(NamedTuple):
-    """Rates per tau and their derivatives, in even and odd parts: rates[i], jacobian[j][i]."""
+def rates_on(system: QuasiStatic, cycle: Cycle) -> Callable[..., States]:
+    """The rates per radian on the grid, as a function of the states one by one."""
 
-    even: list[Array]
-    odd: list[Array]
-    columns_even: list[list[Array]]
-    columns_odd: list[list[Array]]
+    def rates(*states: Array) -> States:
+        return tuple(system.rates(jnp.stack(states), cycle.w, cycle.w_slope))
 
-
-def linearise(
-    system: QuasiStatic, cycle: Cycle, mean: Array, even: Array, odd: Array
-) -> Linearised:
-    """Rates per tau at mean + even + odd, and their derivatives with respect to the states."""
-
-    def side(sign: float) -> tuple[Array, list[Array]]:
-        Y = jnp.stack([m + (e + sign * o) for m, e, o in zip(mean, even, odd, strict=True)])
-        return jacobian_columns(
-            lambda Y: cycle.stretch * system.rates(Y, cycle.w, sign * cycle.w_slope), Y
-        )
-
-    (right, right_columns), (left, left_columns) = side(1.0), side(-1.0)
-    rate_even, rate_odd = _parity_parts(right, left)
-    columns = [_parity_parts(a, b) for a, b in zip(right_columns, left_columns, strict=True)]
-    return Linearised(rate_even, rate_odd, [c[0] for c in columns], [c[1] for c in columns])
+    return rates
 
 
-def rate_parts(
-    system: QuasiStatic, cycle: Cycle, mean: Array, even: Array, odd: Array
-) -> tuple[list[Array], list[Array]]:
-    """Even and odd parts of the rates per tau alone."""
-
-    def side(sign: float) -> Array:
-        Y = mean[:, None] + even + sign * odd
-        return cycle.stretch * system.rates(Y, cycle.w, sign * cycle.w_slope)
-
-    return _parity_parts(side(1.0), side(-1.0))
+def together(mean: States, rest: States) -> States:
+    """The states on the grid."""
+    return tuple(m + y for m, y in zip(mean, rest, strict=True))
 
 
-def _parity_parts(right: Array, left: Array) -> tuple[list[Array], list[Array]]:
-    """Even and odd parts of functions known at theta and -theta."""
-    pairs = list(zip(right, left, strict=True))
-    return [0.5 * (a + b) for a, b in pairs], [0.5 * (a - b) for a, b in pairs]
+def jacobian(push: Callable[..., States], states: States) -> Matrix:
+    """Derivatives [i][j] of rate i to state j, from the linear map of their changes."""
+    one, zero = jnp.ones_like(states[0]), jnp.zeros_like(states[0])
+    n = range(len(states))
+    columns = [push(*(one if i == j else zero for j in n)) for i in n]
+    return [[columns[j][i] for j in n] for i in n]
 
 
-def _matrix_of_means(columns: list[list[Array]]) -> Array:
-    return jnp.stack([jnp.stack([c.mean(0) for c in column]) for column in columns], axis=1)
+def advance(
+    cycle: Cycle, inverse: Matrix, mean: States, rates: States, push: Callable[..., States]
+) -> tuple[States, States, States]:
+    """One step of the iteration: the new means and zero-mean parts, and the change of the means.
+
+    Parameters
+    ----------
+    inverse : Matrix
+        Of the derivatives of the mean rates to the means, roughly.
+    rates : States
+        At the present states.
+    push : callable
+        Change of the rates with the states, to first order.
+    """
+    half = len(cycle.theta) // 2
+    # Mirror images first: what is odd in theta then cancels exactly, however large it is.
+    residual = [cycle.share[:half] @ (r[:half] + r[half:]) for r in rates]
+    change = tuple(-sum(a * r for a, r in zip(row, residual, strict=True)) for row in inverse)
+    follow = push(*(c + jnp.zeros_like(r) for c, r in zip(change, rates, strict=True)))
+    integral = cycle.integral * cycle.stretch
+    rest = tuple(integral @ (r + f) for r, f in zip(rates, follow, strict=True))
+    return together(mean, change), rest, change
 
 
-def advance(cycle: Cycle, mean: Array, lin: Linearised) -> tuple[Array, Array, Array, Array]:
-    """One step of the iteration: new mean, even and odd parts, and the largest change of a mean."""
-    n = len(mean)
-    residual = jnp.stack([r.mean(0) for r in lin.even])
-    change = solve_points(_matrix_of_means(lin.columns_even), -residual)
-    rate_even = [
-        lin.even[i] + sum(change[j] * lin.columns_even[j][i] for j in range(n)) for i in range(n)
-    ]
-    rate_odd = [
-        lin.odd[i] + sum(change[j] * lin.columns_odd[j][i] for j in range(n)) for i in range(n)
-    ]
-    new_even, new_odd = cycle.integrate(rate_even, rate_odd)
-    return mean + change, jnp.stack(new_even), jnp.stack(new_odd), jnp.abs(change).max(0)
-
-
-def _relative_change(
-    new_even: Array, new_odd: Array, even: Array, odd: Array, kappa: Array
-) -> Array:
-    """Largest change of the zero-mean parts: z relative to its size, log states absolutely.
+def _largest_change(change: States, new: States, old: States, kappa: Array) -> Array:
+    """Largest change of means and zero-mean parts: z relative to its size, log states absolutely.
 
     The rate of z is kappa times a number with the round-off of 1, which bounds what a vanishing
     z can mean.
     """
-    moved = jnp.maximum(jnp.abs(new_even - even), jnp.abs(new_odd - odd)).max(1)
-    size = jnp.maximum(jnp.abs(new_even), jnp.abs(new_odd)).max(1)
-    return jnp.maximum(moved[0] / (size[0] + 1e-3 * kappa), moved[1:].max(0, initial=0.0))
+    moved = [jnp.abs(a - b)[_LOOKED_AT].max(0) for a, b in zip(new, old, strict=True)]
+    size = jnp.abs(new[0])[_LOOKED_AT].max(0) + 1e-3 * kappa
+    return jnp.stack([moved[0] / size, *moved[1:], *map(jnp.abs, change)]).max(0)
 
 
 def fourier_orbit(
@@ -200,9 +178,13 @@ def fourier_orbit(
         `error` holds the estimate; inf where the iteration does not contract.
     """
     cycle = load_cycle(load, nodes, grading)
-    weights = cycle.stretch * (2 / nodes) * jnp.ones(points)
-    mean = averaged_states(system, cycle.w, weights)
-    zero = jnp.zeros((system.size, nodes // 2, points))
+    half = nodes // 2  # of a symmetric grid: the averaged limit needs no more
+    averaged = averaged_limit(
+        system, cycle.w[:half], 2 * cycle.share[:half], tolerance=_AVERAGED_TOLERANCE
+    )
+    inverse = inverse_points(averaged.matrix)
+    rates_of = rates_on(system, cycle)
+    zero = (jnp.zeros((nodes, points)),) * system.size
     far = jnp.full(points, jnp.inf)
 
     def unfinished(carry: tuple) -> Array:
@@ -210,19 +192,19 @@ def fourier_orbit(
         return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
 
     def body(carry: tuple) -> tuple:
-        mean, even, odd, change, _, steps = carry
-        lin = linearise(system, cycle, mean, even, odd)
-        mean, new_even, new_odd, moved = advance(cycle, mean, lin)
-        new_change = jnp.maximum(
-            moved, _relative_change(new_even, new_odd, even, odd, system.kappa)
-        )
+        mean, rest, last, reached, steps = carry
+        rates, push = jax.linearize(rates_of, *together(mean, rest))
+        mean, new, moved = advance(cycle, inverse, mean, rates, push)
+        change = _largest_change(moved, new, rest, system.kappa)
         # A contraction by r leaves r / (1 - r) of the last change; none is assumed at first.
-        contraction = jnp.where(jnp.isinf(change), 0.5, new_change / change)
-        error = jnp.where(contraction < 1, new_change * contraction / (1 - contraction), jnp.inf)
-        error = jnp.where(new_change < _ROUND_OFF, new_change, error)
-        return mean, new_even, new_odd, new_change, error, steps + 1
+        contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
+        error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
+        error = jnp.where(change < _ROUND_OFF, change, error)
+        # Settled points stay so while others need more steps: their changes are round-off.
+        error = jnp.where(reached <= tolerance, reached, error)
+        return mean, new, change, error, steps + 1
 
-    mean, even, odd, change, error, steps = jax.lax.while_loop(
-        unfinished, body, (mean, zero, zero, far, far, 0)
+    mean, rest, change, error, steps = jax.lax.while_loop(
+        unfinished, body, (averaged.centre, zero, far, far, 0)
     )
-    return FourierOrbit(mean, even, odd, jnp.where(jnp.isnan(change), jnp.inf, error), steps)
+    return FourierOrbit(mean, rest, jnp.where(jnp.isnan(change), jnp.inf, error), steps)

@@ -19,15 +19,17 @@ from asperity.slider import QuasiStatic
 from asperity.solve.fourier import (
     Cycle,
     FourierOrbit,
-    Linearised,
-    half_grid,
-    linearise,
+    States,
+    grid,
+    jacobian,
     load_cycle,
+    rates_on,
+    together,
 )
-from asperity.solve.linear import expm_points
+from asperity.solve.linear import Matrix, expm_points, inverse_points
 
-#: On the change of L: multipliers are exp(2 pi eig L), and the last change overstates the error.
-_FLOQUET_TOLERANCE = 1e-10
+#: On the estimated error of L.
+_FLOQUET_TOLERANCE = 1e-12
 
 
 class FourierResponse(NamedTuple):
@@ -61,26 +63,34 @@ def fourier_response(
     max_steps : int
         Bound on the steps of the Floquet iteration.
     """
-    cycle = load_cycle(load, 2 * orbit.even.shape[1], grading)
-    mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.even, orbit.odd, harmonics)
-    lin = linearise(system, cycle, *orbit[:3])
-    trace = sum(lin.columns_even[i][i].mean(0) for i in range(len(orbit.mean)))
-    monodromy, floquet_error = _monodromy(cycle, lin, orbit, max_steps)
-    error = jnp.maximum(jnp.maximum(orbit.error, floquet_error), _truncation(orbit))
-    return FourierResponse(mean, phasors, monodromy, 2 * jnp.pi * trace, error)
+    cycle = load_cycle(load, len(orbit.rest[0]), grading)
+    mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.rest, harmonics)
+    states = together(orbit.mean, orbit.rest)
+    _, push = jax.linearize(rates_on(system, cycle), *states)
+    stretch = cycle.stretch[:, None]
+    J = [[stretch * entry for entry in row] for row in jacobian(push, states)]
+    trace = sum(row[i].mean(0) for i, row in enumerate(J))
+    exponent, floquet_error = _floquet_exponent(cycle, J, max_steps)
+    error = jnp.maximum(orbit.error, _truncation(orbit, harmonics))
+    return FourierResponse(
+        mean,
+        phasors,
+        expm_points(2 * jnp.pi * exponent),
+        2 * jnp.pi * trace,
+        jnp.maximum(error, floquet_error),
+    )
 
 
 def force_spectrum(
-    system: QuasiStatic, cycle: Cycle, mean: Array, even: Array, odd: Array, harmonics: int
+    system: QuasiStatic, cycle: Cycle, mean: States, rest: States, harmonics: int
 ) -> tuple[Array, Array]:
     """Mean of F/W0 and its complex harmonics, shape (harmonics, points)."""
-    constant, right = system.force_split(mean, even + odd, cycle.w)
-    _, left = system.force_split(mean, even - odd, cycle.w)
-    force_even = 0.5 * (right + left) * cycle.stretch
-    force_odd = 0.5 * (right - left) * cycle.stretch
-    angle = jnp.arange(1, harmonics + 1)[:, None] * cycle.theta[:, 0]
-    phasors = jnp.cos(angle) @ force_even - 1j * (jnp.sin(angle) @ force_odd)
-    return constant + force_even.mean(0), phasors * (2 / cycle.theta.shape[0])
+    constant, force = system.force_split(jnp.stack(mean), jnp.stack(rest), cycle.w)
+    angle = np.arange(harmonics + 1)[:, None] * cycle.theta
+    # One product for all: a mean, cosines and sines.
+    spectrum = (np.concatenate([np.cos(angle), -np.sin(angle[1:])]) * cycle.share) @ force
+    cosine, sine = spectrum[1 : harmonics + 1], spectrum[harmonics + 1 :]
+    return constant + spectrum[0], 2 * jax.lax.complex(cosine, sine)
 
 
 def fourier_waveform(
@@ -88,86 +98,78 @@ def fourier_waveform(
 ) -> Array:
     """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points)."""
     if phases == 0:
-        return jnp.zeros((2, 0, orbit.mean.shape[-1]))
-    half = orbit.even.shape[1]
+        return jnp.zeros((2, 0, orbit.mean[0].shape[-1]))
+    nodes = len(orbit.rest[0])
     theta = 2 * np.pi * np.arange(phases) / phases
     tau = theta.copy()
     for _ in range(60):  # Newton's method for Kepler's equation
         tau = tau - (tau + grading * np.sin(tau) - theta) / (1 + grading * np.cos(tau))
-    nodes, k = half_grid(2 * half)[0], np.arange(1, half)[:, None]
-    even = (2 / half) * np.cos(k * tau).T @ np.cos(k * nodes)
-    odd = (2 / half) * np.sin(k * tau).T @ np.sin(k * nodes)
-    Y = jnp.stack(
-        [m + even @ e + odd @ o for m, e, o in zip(orbit.mean, orbit.even, orbit.odd, strict=True)]
-    )
+    k = np.arange(1, nodes // 2)[:, None, None]
+    interpolate = (2 / nodes) * np.cos(k * (tau[:, None] - grid(nodes)[0])).sum(0)
+    Y = jnp.stack([m + interpolate @ y for m, y in zip(orbit.mean, orbit.rest, strict=True)])
     w = load.load(jnp.asarray(theta)[:, None])
     return jnp.stack([system.force(Y, w), system.log_slip(Y, w)])
 
 
-def _truncation(orbit: FourierOrbit) -> Array:
+def _truncation(orbit: FourierOrbit, harmonics: int) -> Array:
     """Estimate of the aliasing error of the harmonics from the end of the spectrum in tau.
 
     A coefficient of order nodes - n aliases into order n. The spectra fall off at least
-    geometrically, so that coefficient is about the square of the one at nodes / 2.
+    geometrically, so that coefficient is about the square of the one at (nodes - n) / 2.
     """
-    half = orbit.even.shape[1]
-    tau = np.pi * (np.arange(half) + 0.5) / half
-    last = np.arange(half - 4, half)[:, None]
-    spectrum = jnp.hypot(
-        jnp.cos(last * tau) @ orbit.even[0], jnp.sin(last * tau) @ orbit.odd[0]
-    ).max(0)
-    first = jnp.hypot(np.cos(tau) @ orbit.even[0], np.sin(tau) @ orbit.odd[0])
-    second = jnp.hypot(np.cos(2 * tau) @ orbit.even[0], np.sin(2 * tau) @ orbit.odd[0])
-    return spectrum**2 / (first * jnp.minimum(first, second) + 1e-300)
+    z = orbit.rest[0]
+    nodes = len(z)
+    orders = np.array([1, 2, *range((nodes - harmonics) // 2, nodes // 2)])[:, None]
+    angle = orders * grid(nodes)[0]
+    power = (np.cos(angle) @ z) ** 2 + (np.sin(angle) @ z) ** 2
+    scale = jnp.sqrt(power[0]) * jnp.sqrt(jnp.minimum(power[0], power[1]))
+    return power[2:].max(0) / (scale + 1e-300)
 
 
-def _monodromy(
-    cycle: Cycle, lin: Linearised, orbit: FourierOrbit, max_steps: int
-) -> tuple[Array, Array]:
-    """Monodromy matrix exp(2 pi L), and 0 where L settled, else inf."""
-    n = orbit.mean.shape[0]
+def _floquet_exponent(cycle: Cycle, J: Matrix, max_steps: int) -> tuple[Array, Array]:
+    """L, shape (size, size, points), and 0 where it settled, else inf.
 
-    def times(even: list[Array], odd: list[Array]) -> tuple[list[Array], list[Array]]:
-        """J times a vector with the given parts."""
-        ce, co = lin.columns_even, lin.columns_odd
-        return (
-            [sum(ce[j][i] * even[j] + co[j][i] * odd[j] for j in range(n)) for i in range(n)],
-            [sum(ce[j][i] * odd[j] + co[j][i] * even[j] for j in range(n)) for i in range(n)],
-        )
+    The iteration for Q gains an order of smallness a step. In the states y = Q z of an
+    approximate Q,
+
+        dz/dtau = R z,      R = Q^-1 (J Q - dQ/dtau),
+
+    and R is constant but for the error of Q: by averaging, its mean is L to twice the order.
+    """
+    n = range(len(J))
+
+    def product(q: Matrix) -> Matrix:
+        """J (1 + q)."""
+        return [[J[i][c] + sum(J[i][j] * q[j][c] for j in n) for c in n] for i in n]
 
     def body(carry: tuple) -> tuple:
-        even, odd, exponent, _, steps = carry  # even, odd: Q - 1 as [column][row]
-        products = [
-            times([even[c][i] + float(i == c) for i in range(n)], list(odd[c])) for c in range(n)
-        ]
-        new_exponent = jnp.stack(
-            [jnp.stack([products[c][0][i].mean(0) for c in range(n)]) for i in range(n)]
-        )
-        new_even, new_odd = [], []
-        for c in range(n):
-            q_even = [
-                products[c][0][i]
-                - new_exponent[i, c]
-                - sum(even[k][i] * new_exponent[k, c] for k in range(n))
-                for i in range(n)
-            ]
-            q_odd = [
-                products[c][1][i] - sum(odd[k][i] * new_exponent[k, c] for k in range(n))
-                for i in range(n)
-            ]
-            e, o = cycle.integrate(q_even, q_odd)
-            new_even.append(jnp.stack(e))
-            new_odd.append(jnp.stack(o))
-        change = jnp.abs(new_exponent - exponent).max((0, 1))
-        return jnp.stack(new_even), jnp.stack(new_odd), new_exponent, change, steps + 1
+        q, _, last, change, _, steps = carry
+        P = product(q)
+        L = _means(P)
+        slope = [[P[i][c] - L[i][c] - sum(q[i][k] * L[k][c] for k in n) for c in n] for i in n]
+        q = [[cycle.integral @ entry for entry in row] for row in slope]
+        moved = jnp.stack([jnp.abs(L[i][c] - last[i][c]) for i in n for c in n]).max(0)
+        # The next change would be smaller by the contraction; averaging leaves its square.
+        error = jnp.minimum(moved, moved**2 / (change + 1e-300)) ** 2
+        return q, slope, L, moved, error, steps + 1
 
     def unfinished(carry: tuple) -> Array:
-        change, steps = carry[-2:]
-        return (steps < max_steps) & jnp.any((change > _FLOQUET_TOLERANCE) & (change < 1e3))
+        *_, change, error, steps = carry
+        return (steps < max_steps) & jnp.any((error > _FLOQUET_TOLERANCE) & (change < 1e3))
 
-    points = orbit.mean.shape[-1]
-    zero = jnp.zeros((n, *orbit.even.shape))
-    start = (zero, zero, jnp.zeros((n, n, points)), jnp.full(points, 1e2), 0)
-    _, _, exponent, change, _ = jax.lax.while_loop(unfinished, body, start)
-    change = jnp.where(change < _FLOQUET_TOLERANCE, 0.0, jnp.inf)
-    return expm_points(2 * jnp.pi * exponent), change
+    zero = [[jnp.zeros_like(entry) for entry in row] for row in J]
+    none = jnp.zeros(J[0][0].shape[1])
+    start = (zero, zero, [[none for _ in n] for _ in n], none, none + jnp.inf, 0)
+    q, slope, _, _, error, _ = jax.lax.while_loop(unfinished, body, start)
+    P = product(q)
+    rest = [[P[i][c] - slope[i][c] for c in n] for i in n]
+    inverse = inverse_points([[q[i][c] + float(i == c) for c in n] for i in n])
+    R = [[sum(inverse[i][k] * rest[k][c] for k in n) for c in n] for i in n]
+    exponent = jnp.stack([jnp.stack(row) for row in _means(R)])
+    return exponent, jnp.where(error < _FLOQUET_TOLERANCE, 0.0, jnp.inf)
+
+
+def _means(entries: Matrix) -> Matrix:
+    """Means over tau, as products with a vector: XLA's reductions would be slower."""
+    share = np.full(len(entries[0][0]), 1 / len(entries[0][0]))
+    return [[share @ entry for entry in row] for row in entries]

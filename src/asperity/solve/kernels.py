@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity.solve.averaged import slip_pulse
 from asperity.solve.collocation import (
     NewtonResult,
     averaged_orbit,
@@ -26,6 +27,9 @@ from asperity.solve.mesh import Orbit, evaluate, split
 #: the slip rate is e to that.
 _LARGEST_CHANGE = 2.0
 _NEWTON_TOLERANCE = 1e-8
+
+#: Points in a block of the fast method; no power of two, at which arrays share cache lines.
+FAST_BLOCK = 240
 
 #: A Newton change below this counts as converged: the one before it was about its square root.
 ACCEPTED = 1e-6
@@ -64,11 +68,35 @@ def stiffness_of_steady_sliding(problem: Problem) -> Array:
     return spectral_radius(jnp.stack(columns, axis=1))
 
 
+@jax.jit
+def sharpness_of_slip(problem: Problem) -> Array:
+    """Half the range of the exponent of the slip rate over the cycle."""
+    system, load = problem
+    extremes = load.load(jnp.array([[0.0], [jnp.pi]])) * jnp.ones(_points(problem))
+    return slip_pulse(system, extremes).sharpness
+
+
 @partial(jax.jit, static_argnames=("nodes", "grading", "harmonics", "phases"))
 def fast_solve(
     problem: Problem, *, nodes: int, grading: float, harmonics: int, phases: int
 ) -> tuple[Reading, Array, Array]:
-    """Fourier collocation: the reading, its error estimate and the number of steps."""
+    """Fourier collocation: the reading, its error estimate and the number of steps.
+
+    Works on blocks of points that fit into a core's cache, each until its slowest point is done.
+    """
+    points = _points(problem)
+
+    def solve(block: Problem) -> tuple[Reading, Array, Array]:
+        return _fast_block(block, nodes, grading, harmonics, phases)
+
+    blocks = jax.tree.map(lambda a: a.reshape(-1, FAST_BLOCK), problem)
+    results = jax.lax.map(solve, blocks)
+    return jax.tree.map(lambda a: jnp.moveaxis(a, 0, -2).reshape(*a.shape[1:-1], points), results)
+
+
+def _fast_block(
+    problem: Problem, nodes: int, grading: float, harmonics: int, phases: int
+) -> tuple[Reading, Array, Array]:
     system, load = problem
     points = _points(problem)
     orbit = fourier_orbit(

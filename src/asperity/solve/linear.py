@@ -13,6 +13,27 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+#: Entries [row][column] of a small matrix, each an array over the operating points.
+Matrix = list[list[Array]]
+
+
+def inverse_points(matrix: Matrix) -> Matrix:
+    """Inverse of a small matrix for every operating point; not finite where it is singular.
+
+    Entries come and go one by one, so that XLA does not write a stack to memory in between.
+    """
+    n = len(matrix)
+    if n == 1:
+        return [[1 / matrix[0][0]]]
+    if n == 2:
+        (a, b), (c, d) = matrix
+        scale = 1 / (a * d - b * c)
+        return [[d * scale, -b * scale], [-c * scale, a * scale]]
+    entries = jnp.stack([jnp.stack(row) for row in matrix])
+    identity = jnp.eye(n).reshape((n, n) + (1,) * (entries.ndim - 2))
+    inverse = solve_columns(entries, jnp.broadcast_to(identity, entries.shape))
+    return [list(row) for row in inverse]
+
 
 def solve_points(matrix: Array, rhs: Array) -> Array:
     """Solve ``matrix x = rhs`` for every operating point.
@@ -148,7 +169,18 @@ def product(a: Array, b: Array) -> Array:
 
 
 def spectral_radius(matrix: Array) -> Array:
-    """Largest modulus of the eigenvalues, to a per mille, by repeated squaring."""
+    """Largest modulus of the eigenvalues of (n, n, ...) matrices.
+
+    Exact up to two states; to a per mille for more, by repeated squaring.
+    """
+    if matrix.shape[0] == 1:
+        return jnp.abs(matrix[0, 0])
+    if matrix.shape[0] == 2:
+        (a, b), (c, d) = matrix
+        half, determinant = 0.5 * jnp.abs(a + d), a * d - b * c
+        square = 0.25 * (a - d) ** 2 + b * c
+        real = half + jnp.sqrt(jnp.maximum(square, 0.0))
+        return jnp.where(square >= 0, real, jnp.sqrt(jnp.abs(determinant)))
     return jnp.exp(_log_growth(matrix))
 
 

@@ -1,6 +1,7 @@
 """The search for periodic orbits: from the fast method to the robust one, each where it is needed.
 
-1. Fourier collocation on two grids, for points whose orbit moves little within a period.
+1. Fourier collocation, on a grid as fine as the slip pulse needs, for points whose orbit moves
+   little within a period.
 2. Collocation with Newton's method from the averaged limit.
 3. Collocation along a path in amplitude, then in frequency.
 4. Whatever stages 2 and 3 found is solved on finer and finer meshes, until mean, first and second
@@ -11,22 +12,28 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
 import numpy as np
 
 from asperity.solve.batch import Indices, run_chunks, take
-from asperity.solve.found import Found, Options, logs_of, store
+from asperity.solve.found import Float, Found, Options, logs_of, store
 from asperity.solve.kernels import (
+    FAST_BLOCK,
     Problem,
     fast_solve,
+    sharpness_of_slip,
     stiffness_of_steady_sliding,
 )
 from asperity.solve.outcome import Outcome
 from asperity.solve.refinement import refine
 from asperity.solve.starts import starting_orbits
 
-#: (nodes, grading, points a chunk) of the Fourier stages, and the error they must reach.
-_FOURIER = ((32, 0.3, 512), (128, 0.5, 128))
+#: Fourier grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for.
+_GRIDS = ((5.0, 24, 0.3), (9.5, 28, 0.3), (18.0, 32, 0.3), (np.inf, 128, 0.5))
+#: Points in a call: enough for the time that a call costs, few enough for a single point.
+_FOURIER_CHUNK = 4 * FAST_BLOCK
+#: Error that the fast method must reach.
 _FOURIER_ERROR = 1e-9
 #: Rate per radian above which Fourier collocation cannot contract, from experience.
 _FOURIER_STIFFNESS = 1.0
@@ -71,13 +78,12 @@ def find_orbits(
 
 def _fourier_stages(problem: Problem, found: Found, index: Indices, options: Options) -> Indices:
     """Run the Fourier stages; returns the points they leave."""
-    stiffness = np.full(found.outcome.shape, np.inf)
-    for part, value in run_chunks(stiffness_of_steady_sliding, problem, index, 4096):
-        stiffness[part] = value
+    stiffness = _measured(stiffness_of_steady_sliding, problem, index)
+    sharpness = _measured(sharpness_of_slip, problem, index)
     candidates = index[stiffness[index] < _FOURIER_STIFFNESS]
-    # Chunks run until their slowest point is done: points of like difficulty belong together.
+    # Blocks run until their slowest point is done: points of like difficulty belong together.
     candidates = candidates[np.argsort(stiffness[candidates], kind="stable")]
-    for nodes, grading, chunk in _FOURIER:
+    for sharpest, nodes, grading in _GRIDS:
         solve = partial(
             fast_solve,
             nodes=nodes,
@@ -85,7 +91,8 @@ def _fourier_stages(problem: Problem, found: Found, index: Indices, options: Opt
             harmonics=options.harmonics,
             phases=options.phases,
         )
-        for part, (reading, error, steps) in run_chunks(solve, problem, candidates, chunk):
+        chosen = candidates[sharpness[candidates] <= sharpest]
+        for part, (reading, error, steps) in run_chunks(solve, problem, chosen, _FOURIER_CHUNK):
             good = error < _FOURIER_ERROR
             kept = take(reading, np.flatnonzero(good))
             store(found, part[good], kept, logs_of(kept))
@@ -93,6 +100,14 @@ def _fourier_stages(problem: Problem, found: Found, index: Indices, options: Opt
             options.progress(int(good.sum()))
         candidates = candidates[found.outcome[candidates] != Outcome.CONVERGED]
     return index[found.outcome[index] != Outcome.CONVERGED]
+
+
+def _measured(measure: Callable[[Problem], Any], problem: Problem, index: Indices) -> Float:
+    """One number for each of the points `index`, inf for the others."""
+    values = np.full(problem.system.V.shape, np.inf)
+    for part, value in run_chunks(measure, problem, index, 4096):
+        values[part] = value
+    return values
 
 
 def _collocate(problem: Problem, found: Found, block: Indices, options: Options) -> None:

@@ -1,0 +1,42 @@
+"""The benchmark runs from end to end; no time is asserted, the errors are."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+#: Largest error of each method on the benchmark's points, with a margin over what it reaches.
+WORST = {
+    "asperity": 1e-8,
+    "asperity, collocation only": 1e-8,
+    "heyoka shooting": 1e-8,
+    "SciPy shooting": 1e-7,
+    "SciPy LSODA marching": 1e-5,
+    "diffrax marching": 1e-7,
+}
+
+
+@pytest.mark.slow
+def test_eight_points(tmp_path):
+    out = tmp_path / "rows.json"
+    options = ["--points", "8", "--repeats", "1", "--million", "16", "--out", str(out)]
+    done = subprocess.run(
+        [sys.executable, "-m", "benchmarks", *options],
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    rows = json.loads(out.read_text())
+    assert done.stdout.count("\n|") == len(rows) + 1
+    for row in rows:
+        assert row["seconds"] > 0
+        method = row["what"].rpartition(", ")[0]
+        errors = [row[name] for name in ("mean", "mu1", "mu2", "multipliers")]
+        for error in errors:
+            assert error is None or error < WORST[method], row
+    assert all(row["mean"] is not None for row in rows if row["what"] == "asperity, rice-ruina")

@@ -1,0 +1,263 @@
+"""Collocation: order of convergence, the linear algebra under it, and its meshes."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from asperity.laws import RiceRuina
+from asperity.loads import Harmonic
+from asperity.slider import QuasiStatic, Slider
+from asperity.solve.collocation import averaged_orbit, collocation_response, newton_orbit
+from asperity.solve.cyclic import solve_cyclic
+from asperity.solve.linear import (
+    expm_points,
+    product,
+    solve_columns,
+    solve_points,
+    spectral_abscissa,
+    spectral_radius,
+)
+from asperity.solve.mesh import (
+    GAUSS_C,
+    STAGES,
+    Orbit,
+    equidistributed,
+    evaluate,
+    graded_mesh,
+    split,
+)
+
+#: Round-off times the condition of a random small matrix.
+EXACT = 1e-11
+
+
+def normal(*shape, seed=7):
+    return np.random.default_rng(seed).normal(size=shape)
+
+
+def matrices(n, points=50, complex_=False, seed=7):
+    real = normal(n, n, points, seed=seed)
+    return real + 1j * normal(n, n, points, seed=seed + 1) if complex_ else real
+
+
+def each(a):
+    """Points first, as NumPy's linear algebra has it."""
+    return np.moveaxis(np.asarray(a), -1, 0)
+
+
+@pytest.mark.parametrize("complex_", [False, True])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_solve_columns(n, complex_):
+    matrix, right = matrices(n, complex_=complex_), normal(n, 4, 50, seed=9)
+    found = each(solve_columns(jnp.asarray(matrix), jnp.asarray(right)))
+    np.testing.assert_allclose(found, np.linalg.solve(each(matrix), each(right)), rtol=1e-9)
+    one = each(solve_points(jnp.asarray(matrix), jnp.asarray(right[:, 0])))
+    np.testing.assert_allclose(one, found[:, :, 0], rtol=EXACT)
+
+
+def test_solve_columns_with_a_zero_pivot():
+    matrix = np.array([[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 3.0]])[..., None]
+    found = solve_columns(jnp.asarray(matrix), jnp.eye(3)[..., None])
+    np.testing.assert_allclose(found[..., 0], np.linalg.inv(matrix[..., 0]), atol=EXACT)
+
+
+def test_a_singular_matrix_is_not_solved_silently():
+    matrix = jnp.asarray([[1.0, 2.0], [2.0, 4.0]])[..., None]
+    assert not np.isfinite(solve_points(matrix, jnp.ones((2, 1)))).any()
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 20.0])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_matrix_exponential(n, size):
+    matrix = size * matrices(n)
+    found = each(expm_points(jnp.asarray(matrix)))
+    for one, expected in zip(found, map(expm, each(matrix)), strict=True):
+        np.testing.assert_allclose(one, expected, rtol=0, atol=EXACT * np.abs(expected).max())
+
+
+def test_matrix_exponential_of_a_defective_matrix():
+    matrix = jnp.asarray([[0.3, 1.0], [0.0, 0.3]])[..., None]
+    expected = np.exp(0.3) * np.array([[1.0, 1.0], [0.0, 1.0]])
+    np.testing.assert_allclose(expm_points(matrix)[..., 0], expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_product(n):
+    a, b = matrices(n), matrices(n, seed=8)
+    np.testing.assert_allclose(each(product(a, b)), each(a) @ each(b), atol=EXACT)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_spectral_radius_and_abscissa(n):
+    matrix = matrices(n)
+    values = np.linalg.eigvals(each(matrix))
+    radius = spectral_radius(jnp.asarray(matrix))
+    np.testing.assert_allclose(radius, np.abs(values).max(1), rtol=3e-3)
+    # Of three states: the growth of an exponential series, to a per mille of the norm or so.
+    norm = np.abs(matrix).max((0, 1))
+    error = np.abs(spectral_abscissa(jnp.asarray(matrix)) - values.real.max(1))
+    assert (error < (1e-14 if n < 3 else 3e-2) * np.maximum(norm, 1)).all()
+
+
+def dense_cyclic(maps, right):
+    """The periodic recurrence d_{i+1} - T_i d_i = r_i as one matrix."""
+    n, _, count, points = maps.shape
+    found = np.zeros_like(right)
+    for p in range(points):
+        matrix = np.zeros((count, n, count, n))
+        for i in range(count):
+            matrix[i, :, (i + 1) % count] += np.eye(n)
+            matrix[i, :, i] -= maps[:, :, i, p]
+        flat = matrix.reshape(count * n, -1)
+        found[..., p] = np.linalg.solve(flat, right[..., p].T.ravel()).reshape(count, n).T
+    return found
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 2, 17])
+def test_solve_cyclic(n, count):
+    maps = normal(n, n, count, 6) + np.eye(n)[:, :, None, None]
+    right = normal(n, count, 6, seed=8)
+    found = solve_cyclic(jnp.asarray(maps), jnp.asarray(right))
+    np.testing.assert_allclose(found, dense_cyclic(maps, right), rtol=1e-8, atol=1e-10)
+
+
+def test_solve_cyclic_where_one_direction_grows_and_another_decays():
+    # 1e3 and 1e-3 an interval: the product of the maps is 1e120 and 1e-120, far beyond doubles.
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)[:, None] + np.array([0.0, 1.0])
+    c, s = np.cos(turn), np.sin(turn)
+    basis = np.array([[c, -s], [s, c]])
+    stretch = np.diag([1e3, 1e-3])
+    after = np.roll(basis, -1, axis=2)
+    maps = np.einsum("ijmp,jk,lkmp->ilmp", after, stretch, basis)
+    right = normal(2, 40, 2)
+    found = np.asarray(solve_cyclic(jnp.asarray(maps), jnp.asarray(right)))
+    np.testing.assert_allclose(found, dense_cyclic(maps, right), rtol=1e-9, atol=1e-12)
+    assert np.abs(found).max() < 100
+
+
+#: Irregular on purpose. On a mesh that is a smooth map of an even one, quadratures of periodic
+#: functions, hence mean, harmonics and multipliers, converge faster than any power.
+COARSE = np.cumsum([0.0, 0.9, 1.4, 0.6, 1.1, 1.3, 0.7]) / 6.0 * 2 * np.pi
+
+
+@partial(jax.jit, static_argnames="parts")
+def on_split_mesh(problem, *, parts):
+    """Mean, c1, c2, trace of the monodromy matrix and log of its determinant."""
+    corners = np.arange((len(COARSE) - 1) * parts + 1) / parts
+    mesh = np.interp(corners, np.arange(len(COARSE)), COARSE)[:, None] * np.ones(2)
+    orbit = averaged_orbit(*problem, 2, intervals=len(mesh) - 1, grading=0.0)
+    orbit = orbit._replace(mesh=jnp.asarray(mesh))
+    result = newton_orbit(*problem, orbit, tolerance=1e-12, max_steps=12, largest_change=2.0)
+    read = collocation_response(*problem, result.orbit, harmonics=2)
+    trace = jnp.trace(read.monodromy) * jnp.exp(read.log_scale)
+    return jnp.stack([read.mean_friction, *read.harmonics, trace, read.log_determinant])
+
+
+def test_order_of_convergence():
+    # Gauss-Legendre collocation with s stages is of order 2s at the nodes, and so are quadratures.
+    law = RiceRuina(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6)
+    pair = np.ones(2)
+    slider = jax.tree.map(lambda a: a * pair, Slider(law, spring=2e5, load=7.0))
+    system = QuasiStatic(slider, np.array([1e-5, 2e-5]), 2 * np.pi * 120.0 * pair)
+    problem = (system, Harmonic(0.1 * pair))
+    exact = on_split_mesh(problem, parts=24)
+    coarse, fine = (np.abs(on_split_mesh(problem, parts=parts) - exact) for parts in (4, 8))
+    # Next terms of the error: (h/radius of convergence)^2 of the leading one.
+    np.testing.assert_allclose(np.log2(coarse / fine), 2 * STAGES, atol=0.5)
+
+
+def polynomial_orbit(mesh, power):
+    """Orbit whose two states are theta^power and 2 - theta, not periodic."""
+    bare = Orbit(mesh, jnp.zeros((2, mesh.shape[1])), None, None)
+    theta = bare.stage_phases
+    nodes = jnp.stack([mesh[:-1] ** power, -mesh[:-1]])
+    slopes = jnp.stack([power * theta ** (power - 1), -jnp.ones_like(theta)])
+    return bare._replace(nodes=nodes, slopes=slopes)
+
+
+THETA = np.sort(np.random.default_rng(7).uniform(0, 2 * np.pi, (40, 3)), axis=0)
+
+
+def values(orbit):
+    states, slopes = evaluate(orbit, jnp.asarray(THETA))
+    return np.asarray(states), np.asarray(slopes)
+
+
+@pytest.mark.parametrize("power", [1, 2, 4])
+def test_evaluate_reproduces_polynomials_up_to_the_number_of_stages(power):
+    mesh = graded_mesh(9, 3, 0.5)
+    states, slopes = values(polynomial_orbit(mesh, power))
+    np.testing.assert_allclose(states[0], THETA**power, rtol=EXACT, atol=EXACT)
+    np.testing.assert_allclose(states[1], -THETA, atol=EXACT)
+    np.testing.assert_allclose(slopes[0], power * THETA ** (power - 1), rtol=EXACT)
+
+
+def test_one_power_more_is_no_longer_exact():
+    mesh = graded_mesh(9, 3, 0.5)
+    states, _ = values(polynomial_orbit(mesh, STAGES + 1))
+    assert np.abs(states[0] - THETA ** (STAGES + 1)).max() > 1e-6
+
+
+def test_stage_deviations_are_the_states_at_the_stages():
+    orbit = polynomial_orbit(graded_mesh(9, 3, 0.5), 4)
+    np.testing.assert_allclose(
+        orbit.stage_deviations[0], orbit.stage_phases**4, rtol=EXACT, atol=EXACT
+    )
+    assert orbit.stage_phases.shape == (STAGES, 9, 3)
+    np.testing.assert_allclose(orbit.stage_phases[:, 0, 0], GAUSS_C * orbit.widths[0, 0])
+
+
+def test_split_cuts_every_interval_and_keeps_the_orbit():
+    orbit = polynomial_orbit(graded_mesh(9, 3, 0.5), 4)
+    finer = split(orbit, 3)
+    assert finer.widths.shape == (27, 3)
+    np.testing.assert_allclose(finer.widths, np.repeat(orbit.widths, 3, axis=0) / 3, rtol=EXACT)
+    for before, after in zip(values(orbit), values(finer), strict=True):
+        np.testing.assert_allclose(after, before, rtol=EXACT, atol=EXACT)
+
+
+def peaked_orbit(intervals):
+    """A state that rises within 0.1 rad of theta = 4."""
+    mesh = graded_mesh(intervals, 3, 0.0)
+    bare = Orbit(mesh, jnp.zeros((1, 3)), None, None)
+    nodes = jnp.arctan((mesh[:-1] - 4) / 0.1)[None]
+    slopes = (0.1 / ((bare.stage_phases - 4) ** 2 + 0.01))[None]
+    return bare._replace(nodes=nodes, slopes=slopes)
+
+
+def test_equidistributed_keeps_a_polynomial_orbit():
+    orbit = polynomial_orbit(graded_mesh(9, 3, 0.5), 4)
+    for intervals in (9, 20):
+        moved = equidistributed(orbit, jnp.ones((2, 9, 3)), intervals)
+        np.testing.assert_array_equal(moved.mesh[0], 0.0)
+        np.testing.assert_array_equal(moved.mesh[-1], 2 * np.pi)
+        assert (np.asarray(moved.widths) > 0).all()
+        for before, after in zip(values(orbit), values(moved), strict=True):
+            np.testing.assert_allclose(after, before, rtol=EXACT, atol=EXACT)
+
+
+def test_equidistributed_puts_intervals_where_the_orbit_is_steep():
+    orbit = peaked_orbit(200)
+    mesh = np.asarray(equidistributed(orbit, jnp.ones((1, 200, 3)), 60).mesh)[:, 0]
+    inside = np.histogram(mesh, bins=[3.5, 4.5])[0][0]
+    # Spread evenly there would be 60 / (2 pi), ten.
+    assert inside > 20
+    narrow = np.diff(mesh)[np.searchsorted(mesh, 4.0)]
+    assert narrow < 0.2 * np.diff(mesh).max()
+
+
+def test_scales_choose_the_state_that_matters():
+    orbit = peaked_orbit(200)
+    slopes = jnp.concatenate([orbit.slopes, orbit.slopes[:, ::-1, ::-1]])
+    nodes = jnp.zeros((2, 200, 3))  # only slopes are looked at
+    both = Orbit(orbit.mesh, jnp.zeros((2, 3)), nodes, slopes)
+    for weights, at in (([1.0, 0.0], 4.0), ([0.0, 1.0], 2 * np.pi - 4.0)):
+        scales = jnp.asarray(weights)[:, None, None] * jnp.ones((2, 200, 3))
+        mesh = np.asarray(equidistributed(both, scales, 60).mesh)[:, 0]
+        finest = mesh[np.argmin(np.diff(mesh))]
+        assert finest == pytest.approx(at, abs=0.15)

@@ -1,0 +1,166 @@
+"""Floquet multipliers: from matrices, from Liouville's formula, and the threshold of stability."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from asperity import Slider, periodic_response
+from asperity.laws import ElastoPlastic, RiceRuina
+from asperity.solve.floquet import (
+    LARGEST_LOG,
+    from_logs,
+    log_multipliers,
+    without_lost_arguments,
+)
+
+#: Round-off of logarithms.
+EXACT = 1e-13
+#: Integral of the trace from samples of a waveform that is good to 3e-5 of its swing, and whose
+#: mean slip rate, on which the trace depends, is good to 1e-6 (see test_residual).
+LIOUVILLE = 1e-6
+
+BASE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
+K, W0, LAMBDA = 2e5, 7.0, 7e-7
+SAMPLES = 4096
+
+
+def logs(matrix, log_determinant, log_scale=0.0):
+    """Of one matrix; the determinant is that of the matrix times exp(log_scale)."""
+    stacked = np.asarray(matrix, dtype=float)[..., None]
+    return log_multipliers(stacked, np.array([log_scale]), np.array([log_determinant]))[:, 0]
+
+
+def similar(triangle):
+    """A full matrix with the eigenvalues of `triangle`."""
+    basis = np.array([[1.0, 0.4], [-0.7, 1.2]])
+    return basis @ triangle @ np.linalg.inv(basis)
+
+
+@pytest.mark.parametrize(
+    ("triangle", "expected"),
+    [
+        ([[0.9, 1.0], [0.0, 0.2]], [0.9, 0.2]),
+        ([[-0.3, 0.0], [0.0, -2.5]], [-2.5, -0.3]),
+        ([[0.5, 0.8], [-0.8, 0.5]], [0.5 + 0.8j, 0.5 - 0.8j]),
+        ([[-0.5, 0.8], [-0.8, -0.5]], [-0.5 + 0.8j, -0.5 - 0.8j]),
+        ([[0.6, 0.0], [0.0, 0.6]], [0.6, 0.6]),
+    ],
+)
+def test_pairs(triangle, expected):
+    triangle = np.array(triangle)
+    found = logs(similar(triangle), np.log(np.linalg.det(triangle)))
+    # The root of a small difference: a double eigenvalue is known to half the digits.
+    np.testing.assert_allclose(found, np.log(np.array(expected, dtype=complex)), atol=1e-7)
+    np.testing.assert_allclose(from_logs(found), expected, atol=1e-7)
+
+
+def test_a_pair_separated_by_more_than_round_off():
+    # 1e5 and 1e-30: the matrix does not know the second any more, its determinant does.
+    matrix = similar(np.diag([1e5, 1e-30]))
+    found = logs(matrix, np.log(1e5) + np.log(1e-30))
+    np.testing.assert_allclose(found.real, [np.log(1e5), np.log(1e-30)], rtol=EXACT)
+    negative = logs(-matrix, np.log(1e5) + np.log(1e-30))
+    np.testing.assert_allclose(from_logs(negative), [-1e5, -1e-30], rtol=1e-11)
+
+
+def test_the_scale_of_the_matrix():
+    matrix, scale = similar(np.diag([0.8, 0.1])), 50.0
+    found = logs(matrix, np.log(0.08) + 2 * scale, log_scale=scale)
+    np.testing.assert_allclose(found.real, np.log([0.8, 0.1]) + scale, rtol=EXACT)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_overflow_keeps_the_modulus_and_gives_up_the_argument(sign):
+    scale = 800.0
+    found = logs(sign * similar(np.diag([0.8, 0.1])), np.log(0.08) + 2 * scale, log_scale=scale)
+    kept = without_lost_arguments(found)
+    np.testing.assert_allclose(kept.real, np.log([0.8, 0.1]) + scale, rtol=EXACT)
+    assert np.isnan(kept.imag).all()
+    assert np.isinf(from_logs(kept)).all()
+
+
+def test_only_the_multiplier_that_overflows_loses_its_argument():
+    pair = np.array([LARGEST_LOG + 1 + np.pi * 1j, -2.0 + np.pi * 1j])
+    kept = without_lost_arguments(pair)
+    assert np.isnan(kept[0].imag)
+    assert kept[1] == pair[1]
+    assert from_logs(kept)[1] == pytest.approx(-np.exp(-2.0))
+    assert not np.isnan(pair.imag).any()  # not in place
+
+
+def test_a_vanishing_multiplier_is_zero():
+    assert from_logs(np.array([-800.0 + 0j])) == 0
+
+
+def test_one_state_is_its_determinant():
+    np.testing.assert_allclose(logs([[0.5]], -3.0), [-3.0])
+
+
+def test_three_states():
+    basis = np.array([[1.0, 0.2, 0.3], [0.0, 1.0, -0.5], [0.4, 0.1, 1.0]])
+    block = np.array([[0.3, 0.4, 0.0], [-0.4, 0.3, 0.0], [0.0, 0.0, -0.9]])
+    found = from_logs(logs(basis @ block @ np.linalg.inv(basis), 0.0, log_scale=2.0))
+    expected = np.array([-0.9, 0.3 + 0.4j, 0.3 - 0.4j]) * np.exp(2.0)
+    np.testing.assert_allclose(found[0], expected[0], rtol=1e-12)
+    np.testing.assert_allclose(sorted(found[1:], key=np.imag), sorted(expected[1:], key=np.imag))
+
+
+def trace_integral(response, V, epsilon, frequency, elastic):
+    """Integral over a period of the trace of the Jacobian of (F/W0, ln Phi), written by hand."""
+    A, B, D0 = BASE["A"], BASE["B"], BASE["D0"]
+    theta = response.theta
+    w, dw = 1 + epsilon * np.cos(theta), -epsilon * np.sin(theta)
+    omega = 2 * np.pi * frequency
+    friction, log_slip = response.waveform
+    plastic = V * np.exp(log_slip)
+    rate = A * (log_slip + np.log(V / BASE["V0"]))
+    phi = (friction / w - BASE["mu0"] - rate) / B  # ln(V0 Phi/D0)
+    # dF/dtheta (1/K + lambda/W) = (V - v_pl)/omega + lambda F W'/W^2, all over W0
+    soft = W0 / K + elastic / w
+    by_force = (-plastic / (A * w * omega) + elastic * dw / w**2) / soft
+    by_age = plastic * B / (A * omega) / soft
+    # dln(Phi)/dtheta = (1/Phi - v/D0)/omega, v = V - omega dF/dtheta / K
+    ageing = -BASE["V0"] / (D0 * omega) * np.exp(-phi) + W0 / K / D0 * by_age
+    return 2 * np.pi * (by_force + ageing).mean()
+
+
+@pytest.mark.parametrize(
+    ("V", "epsilon", "frequency"),
+    [(1e-6, 0.24, 120.0), (1e-5, 0.5, 120.0), (1e-4, 0.24, 120.0), (1e-6, 0.5, 1.0)],
+)
+@pytest.mark.parametrize(
+    ("law", "elastic"),
+    [(RiceRuina(**BASE), 0.0), (ElastoPlastic(**BASE, lambda_=LAMBDA), LAMBDA)],
+)
+def test_liouville(law, elastic, V, epsilon, frequency):
+    response = periodic_response(
+        Slider(law, spring=K, load=W0),
+        velocity=V,
+        epsilon=epsilon,
+        frequency=frequency,
+        waveform=SAMPLES,
+    )
+    expected = trace_integral(response, V, epsilon, frequency, elastic)
+    assert response.log_multipliers.real.sum() == pytest.approx(expected, rel=LIOUVILLE)
+
+
+def test_threshold_of_stability(reference):
+    # PHYSICS: modulation stabilises sliding at K/Kc = 0.88; the crossing is near eps = 0.1329.
+    slider = Slider(RiceRuina(**BASE), spring=K, load=W0)
+
+    def respond(epsilon):
+        return periodic_response(
+            slider, velocity=1e-6, epsilon=epsilon, frequency=120.0, waveform=SAMPLES
+        )
+
+    threshold = brentq(lambda e: float(respond(e).floquet_max) - 1, 0.1, 0.15, xtol=1e-10)
+    assert threshold == pytest.approx(0.1329, abs=5e-5)
+    sides = respond(threshold + np.array([-1e-4, 0.0, 1e-4]))
+    assert list(sides.stable[[0, 2]]) == [False, True]
+    shot = reference.multiple_shooting(
+        reference.Printed(),
+        sides.epsilon[:, None],
+        *sides.waveform[..., :: SAMPLES // 16],
+    )
+    assert np.abs(shot.multipliers[1, 0]) == pytest.approx(1, abs=1e-10)
+    assert np.abs(shot.multipliers[0, 0]) > 1 > np.abs(shot.multipliers[2, 0])
