@@ -89,8 +89,10 @@ def asperity_response() -> types.ModuleType:
     return sys.modules[asperity.cli.response.__name__]
 
 
+# A shell hands SIGINT on as ignored to what it runs in the background: not what is tested here.
 LATE = """
 import os, signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
 from asperity.cli.main import main
 import asperity.cli.materials as module
 module.materials.callback = lambda **_: os.kill(os.getpid(), signal.SIGINT)

@@ -169,8 +169,12 @@ class Shot(NamedTuple):
 
     mean: np.ndarray
     harmonics: np.ndarray  # c1, c2 of F/W0
-    multipliers: np.ndarray  # by falling modulus
+    log_multipliers: np.ndarray  # by falling real part
     force: np.ndarray  # F/W0 at the start of each segment
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        return np.exp(self.log_multipliers)
 
 
 def multiple_shooting(
@@ -200,8 +204,8 @@ def multiple_shooting(
     origin = start[0, :, :1]
     spectrum = integrals[:3].sum(-1) * p.K / p.W0
     mean = (p.mu + origin * p.K / p.W0)[:, 0] + spectrum[0].real
-    multipliers = _eigenvalues(maps, integrals[3].real.sum(-1))
-    return Shot(mean, 2 * spectrum[1:].T, multipliers, p.mu + start[0] * p.K / p.W0)
+    logs = _log_multipliers(maps, integrals[3].real.sum(-1))
+    return Shot(mean, 2 * spectrum[1:].T, logs, p.mu + start[0] * p.K / p.W0)
 
 
 def _segments(p: Printed, epsilon, start, scale) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -263,17 +267,21 @@ def _around_the_period(maps: np.ndarray, gap: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.linalg.solve(matrix, right).reshape(points, segments, 2), 2, 0)
 
 
-def _eigenvalues(maps: np.ndarray, log_determinant: np.ndarray) -> np.ndarray:
-    """Multipliers; the smaller of a real pair from the determinant, which loses no digits."""
+def _log_multipliers(maps: np.ndarray, log_determinant: np.ndarray) -> np.ndarray:
+    """Logarithms; the smaller of a real pair from the determinant, which loses no digits."""
     found = []
-    for point, log in zip(np.moveaxis(maps, 2, 0), log_determinant, strict=True):
-        total = np.eye(2)
+    for point, determinant in zip(np.moveaxis(maps, 2, 0), log_determinant, strict=True):
+        total, log_scale = np.eye(2), 0.0
         for i in range(point.shape[2]):
             total = point[..., i] @ total
+            log_scale += np.log(np.abs(total).max())
+            total = total / np.abs(total).max()
         values = np.linalg.eigvals(total).astype(complex)
-        larger = values[np.argmax(np.abs(values))]
-        pair = [larger, np.exp(log) / larger if larger.imag == 0 else larger.conj()]
-        found.append(pair)
+        log = np.log(values[np.argmax(np.abs(values))])
+        if log.imag in (0, np.pi):
+            found.append([log + log_scale, determinant - log.real - log_scale + 1j * log.imag])
+        else:
+            found.append(determinant / 2 + 1j * abs(log.imag) * np.array([1, -1]))
     return np.array(found)
 
 
