@@ -144,6 +144,33 @@ def test_liouville(law, elastic, V, epsilon, frequency):
     assert response.log_multipliers.real.sum() == pytest.approx(expected, rel=LIOUVILLE)
 
 
+def test_multipliers_beyond_what_a_coarse_mesh_resolves(reference):
+    # Unstable sliding, K < Kc, modulated so slowly that perturbations turn and grow many times
+    # within an interval of the mesh; the orbit itself is smooth.
+    points = [(1.7e5, 0.1, 0.02), (1e5, 0.2, 0.01), (2e4, 0.5, 0.01), (1e5, 0.02, 0.03)]
+    stiffness, epsilon, frequency = np.transpose([*points, (2e4, 0.2, 0.03)])
+    response = periodic_response(
+        Slider(RiceRuina(**BASE), spring=stiffness, load=W0),
+        velocity=1e-5,
+        epsilon=epsilon,
+        frequency=frequency,
+        waveform=SAMPLES,
+    )
+    assert response.converged[-1]
+    done = response.converged
+    shot = reference.multiple_shooting(
+        reference.Printed(K=stiffness[done, None], V=1e-5, frequency=frequency[done, None]),
+        epsilon[done, None],
+        *response.waveform[:, done, :: SAMPLES // 256],
+    )
+    found = response.log_multipliers[done]
+    # 1e3 radians and e-foldings a period: of their logarithms round-off leaves 1e-9 or so.
+    np.testing.assert_allclose(found.real, shot.log_multipliers.real, rtol=1e-7)
+    argument = np.abs(np.exp(1j * (found.imag - shot.log_multipliers.imag)) - 1)
+    known = found.real < LARGEST_LOG
+    assert argument[known].max() < 1e-7
+
+
 def test_threshold_of_stability(reference):
     # PHYSICS: modulation stabilises sliding at K/Kc = 0.88; the crossing is near eps = 0.1329.
     slider = Slider(RiceRuina(**BASE), spring=K, load=W0)

@@ -168,6 +168,32 @@ def test_the_two_methods_agree(name):
     assert multiplier_error(fast.multipliers, robust.multipliers)[both].max() < PROMISED
 
 
+def test_pulses_too_narrow_for_the_fast_method(reference):
+    # The force is resolved by its grid, and the slip rate, hence the multipliers, is not quite.
+    names = ("mu0", "A", "B", "D0", "K", "W0", "V", "epsilon", "frequency")
+    points = [
+        (0.57, 0.0051883, 0.0127723, 1.39147e-7, 562420, 9.803, 7.21473e-5, 0.888433, 1e4),
+        (0.681, 0.0039304, 0.0064719, 2.93931e-7, 567613, 9.766, 6.63044e-5, 0.825056, 1e4),
+        (0.4835, 0.0020921, 0.0050157, 1.56597e-6, 69748, 4.804, 4.04143e-4, 0.754019, 1e4),
+        (0.797, 0.0033894, 0.0047345, 1.50703e-6, 316191, 5.605, 8.17341e-8, 0.780402, 17.483),
+    ]
+    n = dict(zip(names, np.transpose(points), strict=True))
+    law = RiceRuina(**{k: n[k] for k in ("mu0", "A", "B", "D0")}, V0=1e-6)
+    response = periodic_response(
+        Slider(law, spring=n["K"], load=n["W0"]),
+        velocity=n["V"],
+        epsilon=n["epsilon"],
+        frequency=n["frequency"],
+        waveform=SAMPLES,
+    )
+    assert response.converged.all()
+    columns = {k: a[:, None] for k, a in n.items()}
+    epsilon = columns.pop("epsilon")
+    start = response.waveform[..., :: SAMPLES // SEGMENTS]
+    shot = reference.multiple_shooting(reference.Printed(**columns), epsilon, *start)
+    assert reference.disagreement(response, shot).max() < PROMISED
+
+
 class TestShapes:
     def test_arrays_of_one_shape_are_as_many_points(self, solved):
         V, epsilon, frequency = np.transpose(FAST[:4])

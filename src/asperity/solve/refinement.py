@@ -94,6 +94,7 @@ def refine(
             return
     stiff = index[found.outcome[block[index]] == Outcome.MULTIPLIERS_NOT_RESOLVED]
     _split(problem, found, block, orbit, stiff)
+    found.discard(block[index[found.outcome[block[index]] != Outcome.CONVERGED]])
     options.progress(len(index))
 
 
@@ -154,7 +155,6 @@ def _split(problem: Problem, found: Found, block: Indices, orbit: Orbit, index: 
         index = index[found.outcome[block[index]] != Outcome.CONVERGED]
         if not len(index):
             return
-    found.discard(block[index])
 
 
 def _beyond_doubles(growth: float) -> bool:
