@@ -5,13 +5,15 @@ From the averaged limit, for the reason given in `scipy_marching`.
 
 from __future__ import annotations
 
+from collections import deque
+
 import numpy as np
 
 from benchmarks.cases import Batch
 from benchmarks.equations import Answer, averaged_limit, force_rest, read
+from benchmarks.scipy_marching import LAST, SETTLED
 
 _SAMPLES = 32
-_SETTLED = 1e-9
 _MOST_PERIODS = 5000
 
 
@@ -28,16 +30,14 @@ class Marching:
         numbers = {k: np.array(v) for k, v in batch.numbers().items()}
         z0, chi = averaged_limit(numbers)
         state = np.stack([np.zeros_like(chi), chi], axis=-1)
-        last = np.full(len(batch), np.inf)
+        changes = deque([np.inf], LAST)
         for _ in range(_MOST_PERIODS):
             path = np.asarray(self.period(state, numbers, z0))
-            moved = np.abs(path[:, -1] - state) * np.stack([numbers["kappa"], 0 * chi + 1], -1)
-            state, change = path[:, -1], moved.max(1)
-            with np.errstate(invalid="ignore", divide="ignore"):
-                settled = (change < last) & (change / (1 - change / last) < _SETTLED)
-            if settled.all():
+            scale = np.stack([numbers["kappa"], np.ones_like(chi)], axis=-1)
+            changes.append(np.max(np.abs(path[:, -1] - state) * scale))
+            state = path[:, -1]
+            if max(changes) < SETTLED:
                 break
-            last = change
         theta = 2 * np.pi * np.arange(_SAMPLES)[:, None] / _SAMPLES
         w = 1 + numbers["epsilon"] * np.cos(theta)
         rest = force_rest(numbers, z0, path[:, :-1, 0].T, w)

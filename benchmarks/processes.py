@@ -54,9 +54,9 @@ def whole_batch_rows(law: str, points: int, repeats: int, cores: set[int]) -> li
     used = measured["cores"]
     peak = measured["bytes"] + used * measured["worker"]
     note = f"peak memory below {peak / 1e9:.2f} GB in all processes"
-    rows = [Row(f"asperity, {law}, first call", points, first, used, note=note)]
+    rows = [Row(f"asperity on all cores, first call, {law}", points, first, used, note=note)]
     if warm:
-        rows.append(Row(f"asperity, {law}", points, statistics.median(warm), used))
+        rows.append(Row(f"asperity on all cores, {law}", points, statistics.median(warm), used))
     return rows
 
 

@@ -15,7 +15,7 @@ WORST = {
     "asperity, collocation only": 1e-8,
     "heyoka shooting": 1e-8,
     "SciPy shooting": 1e-7,
-    "SciPy LSODA marching": 1e-5,
+    "SciPy LSODA marching": 1e-7,
     "diffrax marching": 1e-7,
 }
 

@@ -201,8 +201,9 @@ def multiple_shooting(
             break
     else:
         raise AssertionError("the reference integration found no periodic solution")
+    _, maps, integrals = _segments(p, epsilon, start, scale)
     origin = start[0, :, :1]
-    spectrum = integrals[:3].sum(-1) * p.K / p.W0
+    spectrum = (integrals[:3] * p.K / p.W0).sum(-1)
     mean = (p.mu + origin * p.K / p.W0)[:, 0] + spectrum[0].real
     logs = _log_multipliers(maps, integrals[3].real.sum(-1))
     return Shot(mean, 2 * spectrum[1:].T, logs, p.mu + start[0] * p.K / p.W0)

@@ -165,10 +165,16 @@ def test_multipliers_beyond_what_a_coarse_mesh_resolves(reference):
     )
     found = response.log_multipliers[done]
     # 1e3 radians and e-foldings a period: of their logarithms round-off leaves 1e-9 or so.
-    np.testing.assert_allclose(found.real, shot.log_multipliers.real, rtol=1e-7)
-    argument = np.abs(np.exp(1j * (found.imag - shot.log_multipliers.imag)) - 1)
+    expected = shot.log_multipliers
+    resolved = np.isfinite(found.real).all(axis=-1)
+    assert resolved.sum() >= 4
+    np.testing.assert_allclose(found[resolved].real, expected[resolved].real, rtol=1e-7)
+    argument = np.abs(np.exp(1j * (found.imag - expected.imag)) - 1)
     known = found.real < LARGEST_LOG
-    assert argument[known].max() < 1e-7
+    assert argument[known & resolved[:, None]].max() < 1e-7
+    # Where no mesh resolves them, the first is a lower bound that overflows all the same.
+    bound = found[~resolved, 0].real
+    assert np.all((bound > LARGEST_LOG) & (bound <= expected[~resolved, 0].real))
 
 
 def test_threshold_of_stability(reference):

@@ -63,7 +63,9 @@ def _log_pair(monodromy: Float, log_scale: Float, log_determinant: Float) -> Com
         0.5 * log_determinant + 1j * np.arctan2(np.sqrt(np.where(real, 0.0, -square)), half_trace),
     )
     second = np.where(real, log_determinant - first.real + 1j * first.imag, np.conj(first))
-    return np.stack([first, second])
+    # A matrix with entries up to 1 has no larger determinant: the transfer maps missed the growth.
+    missed = determinant > 4
+    return np.where(missed, np.nan, np.stack([first, second]))
 
 
 def from_logs(logs: Complex) -> Complex:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,10 +29,13 @@ _CHUNK_INTERVALS = 1536
 #: Multipliers below this modulus are compared absolutely: no experiment sees them.
 _VANISHING = 1e-12
 
-#: Where the largest eigenvalue of the Jacobian integrates to less than the first or more than the
-#: second, the multipliers vanish or overflow whatever the transfer maps of a stiff method
-#: say of them, by a margin of many orders of magnitude.
-_DEAD, _EXPLODING = -200.0, 900.0
+#: Where the largest eigenvalue of the Jacobian integrates to less than this, all multipliers
+#: vanish, by many orders of magnitude, whatever the transfer maps of a stiff method say of them.
+_DEAD = -200.0
+
+#: Mean logarithm of the multipliers, exact by Liouville's formula, above which the largest
+#: overflows a double for certain, and above which no mesh of ours resolves more than that.
+_OVERFLOW, _HOPELESS = 750.0, 5000.0
 
 
 def chunk_size(intervals: int) -> int:
@@ -116,9 +119,13 @@ def _compare(
         state = _State(reading.mean_friction[k], reading.harmonics[:2, k], logs[:, k])
         before, previous[point] = previous.get(point), state
         orbit_gap, multiplier_gap = _gaps(before, state)
-        if orbit_gap <= AGREEMENT and _beyond_doubles(reading.growth[k]):
-            logs[:, k] = _frozen_logs(reading, k)
-            multiplier_gap = 0.0
+        if orbit_gap <= AGREEMENT and reading.growth[k] < _DEAD:
+            logs[:, k], multiplier_gap = _frozen_logs(reading, k), 0.0
+        elif orbit_gap <= AGREEMENT and reading.log_determinant[k] > _HOPELESS * len(logs):
+            logs[:, k], multiplier_gap = (
+                _overflowing_logs(len(logs), reading.log_determinant[k]),
+                0.0,
+            )
         if orbit_gap > AGREEMENT:
             found.outcome[rows[k]], found.detail[rows[k]] = Outcome.NOT_RESOLVED, orbit_gap
         elif multiplier_gap > AGREEMENT:
@@ -152,19 +159,30 @@ def _split(problem: Problem, found: Found, block: Indices, orbit: Orbit, index: 
             found.log_multipliers[:, rows] = logs
             found.detail[rows] = gap
             found.outcome[rows[gap <= AGREEMENT]] = Outcome.CONVERGED
+            over = np.flatnonzero(
+                (gap > AGREEMENT) & (reading.log_determinant > _OVERFLOW * len(logs))
+            )
+            if parts == _SPLITS[-1] and len(over):
+                found.log_multipliers[:, rows[over]] = _overflowing_logs(
+                    len(logs), reading.log_determinant[over]
+                )
+                found.outcome[rows[over]] = Outcome.CONVERGED
         index = index[found.outcome[block[index]] != Outcome.CONVERGED]
         if not len(index):
             return
 
 
-def _beyond_doubles(growth: float) -> bool:
-    return not _DEAD < growth < _EXPLODING
+def _overflowing_logs(size: int, log_determinant: Any) -> NDArray[np.complex128]:
+    """A lower bound for the largest multiplier, infinite as a double; the others are not known."""
+    logs = np.full((size, *np.shape(log_determinant)), complex(np.nan, np.nan))
+    logs.real[0] = log_determinant / size
+    return logs
 
 
 def _frozen_logs(reading: Reading, k: int) -> NDArray[np.complex128]:
     """Logarithms from the eigenvalues of the Jacobian along the orbit, each followed on its own.
 
-    Good to a few units, which is enough for multipliers that are 0 or infinite as doubles.
+    A rough estimate, which is enough for multipliers that are 0 as doubles.
     """
     growth, determinant = reading.growth[k], reading.log_determinant[k]
     size = reading.monodromy.shape[0]
@@ -187,9 +205,11 @@ def _multiplier_gap(before: NDArray[np.complex128], now: NDArray[np.complex128])
     if not (np.all(np.isfinite(before)) and np.all(np.isfinite(now))):
         return np.inf
     old, new = from_logs(before), from_logs(now)
-    # Beyond doubles the logarithms of the moduli are compared, the multipliers elsewhere.
+    # Beyond doubles the logarithms are compared, the multipliers elsewhere.
     huge = now.real > LARGEST_LOG
     with np.errstate(invalid="ignore", over="ignore"):
         gaps = np.abs(old - new) / np.maximum(np.abs(new), _VANISHING)
-        gaps = np.where(huge, np.abs(before.real - now.real) / np.abs(now.real), gaps)
+        turned = np.abs(np.exp(1j * (before.imag - now.imag)) - 1)
+        apart = np.abs(before.real - now.real) / np.abs(now.real)
+        gaps = np.where(huge, np.maximum(apart, turned), gaps)
     return float(np.max(gaps, initial=0.0))

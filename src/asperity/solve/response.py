@@ -40,7 +40,9 @@ class PeriodicResponse:
     multipliers : complex array, shape (..., states)
         Floquet multipliers, by falling modulus.
     log_multipliers : complex array, shape (..., states)
-        ln|m| + i arg m. Where a multiplier overflows ln|m| does not; arg m is then NaN.
+        ln|m| + i arg m. Where a multiplier overflows ln|m| does not; arg m is then NaN. Of
+        orbits so unstable that no mesh resolves them the first is a lower bound and the others are
+        NaN; of multipliers that are 0 as doubles ln|m| is an estimate.
     stable : bool array, shape (...)
         All multipliers inside the unit circle; False where not converged.
     converged : bool array, shape (...)
