@@ -92,6 +92,13 @@ def test_a_vanishing_multiplier_is_zero():
     assert from_logs(np.array([-800.0 + 0j])) == 0
 
 
+def test_a_determinant_that_the_matrix_cannot_have_gives_no_multipliers():
+    matrix = similar(np.diag([0.8, 0.1]))
+    assert np.isnan(logs(matrix, np.log(0.08) + 300.0)).all()
+    # Large entries may well have a large determinant.
+    np.testing.assert_allclose(logs(50 * matrix, np.log(0.08 * 2500)).real, np.log([40.0, 5.0]))
+
+
 def test_one_state_is_its_determinant():
     np.testing.assert_allclose(logs([[0.5]], -3.0), [-3.0])
 
@@ -142,6 +149,27 @@ def test_liouville(law, elastic, V, epsilon, frequency):
     )
     expected = trace_integral(response, V, epsilon, frequency, elastic)
     assert response.log_multipliers.real.sum() == pytest.approx(expected, rel=LIOUVILLE)
+
+
+@pytest.mark.parametrize("method", ["fourier", "collocation"])
+def test_growth_within_a_fast_period(method):
+    # K = Kc/10 and V/(w D0) = 0.1: steady sliding grows fivefold a period.
+    A, B, D0, V = BASE["A"], 4 * BASE["A"], BASE["D0"], 1e-5
+    stiffness, nu = 0.1 * (B - A), 0.1
+    response = periodic_response(
+        Slider(RiceRuina(**BASE | {"B": B}), spring=stiffness * W0 / D0, load=W0),
+        velocity=V,
+        epsilon=[0.0, 1e-4],
+        frequency=V / (2 * np.pi * nu * D0),
+        waveform=SAMPLES,
+        methods=(method,),
+    )
+    assert response.converged.all()
+    rates = np.array([[-stiffness / A, stiffness * B / A], [-1 / A, B / A - 1]])
+    expected = np.sort(2 * np.pi * nu * np.linalg.eigvals(rates))[::-1]
+    # eps = 1e-4 changes them by about (eps mu/A)^2.
+    np.testing.assert_allclose(response.log_multipliers[0], expected, rtol=1e-10)
+    np.testing.assert_allclose(response.log_multipliers[1], expected, rtol=1e-4)
 
 
 def test_multipliers_beyond_what_a_coarse_mesh_resolves(reference):

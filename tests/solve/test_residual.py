@@ -157,6 +157,15 @@ def test_the_mean_is_that_of_the_waveform(batch):
     assert (error <= HARMONICS * np.ptp(waveform[0], axis=1) + 1e-14).all()
 
 
+def test_numbers_of_a_point_that_converged_are_given(batch):
+    rows = batch.response.converged
+    logs = batch.response.log_multipliers[rows].real
+    assert np.isfinite(batch.response.harmonics[rows]).all()
+    assert np.isfinite(logs[:, 0]).all()
+    # Of orbits so unstable that the largest overflows, the other one may not be known.
+    assert (np.isfinite(logs[:, 1]) | (logs[:, 0] > 709)).all()
+
+
 def test_numbers_of_a_point_that_failed_are_not_given(batch):
     failed = ~batch.response.converged
     assert np.isnan(batch.response.mean_friction[failed]).all()

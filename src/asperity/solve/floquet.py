@@ -63,8 +63,8 @@ def _log_pair(monodromy: Float, log_scale: Float, log_determinant: Float) -> Com
         0.5 * log_determinant + 1j * np.arctan2(np.sqrt(np.where(real, 0.0, -square)), half_trace),
     )
     second = np.where(real, log_determinant - first.real + 1j * first.imag, np.conj(first))
-    # A matrix with entries up to 1 has no larger determinant: the transfer maps missed the growth.
-    missed = determinant > 4
+    # Hadamard: entries of this size allow no larger determinant; the transfer maps missed growth.
+    missed = determinant > 4 * np.abs(monodromy).max((0, 1)) ** 2
     return np.where(missed, np.nan, np.stack([first, second]))
 
 

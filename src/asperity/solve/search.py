@@ -29,8 +29,9 @@ from asperity.solve.outcome import Outcome
 from asperity.solve.refinement import refine
 from asperity.solve.starts import starting_orbits
 
-#: Fourier grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for.
-_GRIDS = ((5.0, 24, 0.3), (9.5, 28, 0.3), (18.0, 32, 0.3), (np.inf, 128, 0.5))
+#: Fourier grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for:
+#: the nodes that a pulse needs grow with the root of it. Sharper ones are left to collocation.
+_GRIDS = ((5.0, 24, 0.3), (9.5, 28, 0.3), (18.0, 32, 0.3), (300.0, 128, 0.5))
 #: Points in a call: enough for the time that a call costs, few enough for a single point.
 _FOURIER_CHUNK = 4 * FAST_BLOCK
 #: Error that the fast method must reach.
