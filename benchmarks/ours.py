@@ -69,7 +69,7 @@ def rates_row(law: str, points: int, repeats: int) -> Row:
         system, load = block
         # Different at every node, or exponentials would be taken once for all.
         states = system.steady()[:, None] + 1e-3 * jnp.cos(theta)
-        values = system.rates(states, load.load(theta), load.slope(theta))
+        values = system.rates(states, load.at(theta))
         # Only means leave the cache: writing all values to memory would cost three times as much.
         return jnp.stack([share @ rate for rate in values])
 

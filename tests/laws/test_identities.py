@@ -20,6 +20,7 @@ from asperity.laws import (
     registered,
     registry,
 )
+from asperity.loads import Excitation
 from asperity.slider import QuasiStatic, Slider
 from asperity.solve.perturbation import perturb
 
@@ -93,12 +94,12 @@ def quasi_static(law: Law) -> QuasiStatic:
     return QuasiStatic(Slider(law, spring=2e5, load=7.0), V=SPEEDS, omega=2 * jnp.pi * 120.0)
 
 
-def motion(system: QuasiStatic, seed: int = 0) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Y, w and dw/dtheta away from steady sliding."""
+def motion(system: QuasiStatic, seed: int = 0) -> tuple[jax.Array, Excitation]:
+    """States and excitation away from steady sliding."""
     rng = np.random.default_rng(seed)
     Y = system.steady() * (1 + 0.01 * rng.normal(size=(system.size, *SPEEDS.shape)))
     w, slope = rng.uniform(0.95, 1.05, SPEEDS.shape), rng.uniform(-0.1, 0.1, SPEEDS.shape)
-    return Y, jnp.asarray(w), jnp.asarray(slope)
+    return Y, Excitation(jnp.asarray(w), jnp.asarray(slope))
 
 
 # The identities. Each raises AssertionError where a law breaks it.
@@ -214,7 +215,7 @@ def check_units(law: Law, example: Example) -> None:
     )
     where = motion(system)
     np.testing.assert_allclose(other.steady(), system.steady(), rtol=EXACT)
-    np.testing.assert_allclose(other.force(*where[:2]), system.force(*where[:2]), rtol=EXACT)
+    np.testing.assert_allclose(other.force(*where), system.force(*where), rtol=EXACT)
     if example.invertible:
         # Exponents of some tens multiply round-off.
         np.testing.assert_allclose(other.rates(*where), system.rates(*where), rtol=1e-9)
@@ -226,20 +227,22 @@ def check_units(law: Law, example: Example) -> None:
 def check_kinematics(system: QuasiStatic) -> None:
     """Spring and asperities in series: v = V - (dF/dt)/K, v_plastic = v - lambda d(F/W)/dt."""
     law, omega = system.slider.law, system.omega
-    Y, w, slope = motion(system)
-    rates = system.rates(Y, w, slope)
+    Y, at = motion(system)
+    rates = system.rates(Y, at)
 
     def along(function):
-        return jax.jvp(function, (Y, w), (rates, slope))[1]
+        return jax.jvp(
+            lambda Y, w: function(Y, Excitation(w)), (Y, at.w), (rates, at.w_slope)
+        )[1]
 
     v = system.V * (1 - along(system.force) / system.kappa)
-    strain_rate = law.elastic_length * omega * along(lambda Y, w: system.force(Y, w) / w)
+    strain_rate = law.elastic_length * omega * along(lambda Y, at: system.force(Y, at) / at.w)
     plastic = v - strain_rate
     # What is left of V after subtracting the stretching of springs: cancellation of some 1e3.
     np.testing.assert_allclose(
-        plastic / system.V, jnp.exp(system.log_slip(Y, w)), rtol=1e-9, atol=1e-10
+        plastic / system.V, jnp.exp(system.log_slip(Y, at)), rtol=1e-9, atol=1e-10
     )
-    expected = [r / omega for r in law.state_rate(v, plastic, tuple(Y[1:]), w)]
+    expected = [r / omega for r in law.state_rate(v, plastic, tuple(Y[1:]), at.w)]
     scale = np.abs(np.asarray(rates[1:])).max(0, initial=0)
     np.testing.assert_allclose(rates[1:] / scale, np.stack(expected) / scale, rtol=0, atol=1e-8)
 
@@ -376,12 +379,12 @@ def test_planted_mistake_is_caught(mistake, name, check):
 
 
 class LoadRateDropped(QuasiStatic):
-    def rates(self, Y, w, w_slope):
-        return super().rates(Y, w, jnp.zeros_like(w_slope))
+    def rates(self, Y, at):
+        return super().rates(Y, at._replace(w_slope=0.0))
 
 
 class CompliancesSwapped(QuasiStatic):
-    def force(self, Y, w):
+    def force(self, Y, at):
         return Y[0] / (1 + self.compliance_ratio)
 
 

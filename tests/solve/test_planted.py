@@ -114,8 +114,8 @@ def test_mistaken_laws(reference, truth, law, mistaken):
 def test_load_rate_forgotten_in_the_elastic_force(reference, truth, monkeypatch):
     original = QuasiStatic.rates
 
-    def forgetful(self, Y, w, w_slope):
-        return original(self, Y, w, 0 * w_slope)
+    def forgetful(self, Y, at):
+        return original(self, Y, at._replace(w_slope=0.0))
 
     # A subclass, lest programs compiled for the correct equations be used.
     class Forgetful(ElastoPlastic):

@@ -1,5 +1,7 @@
-"""Normal-load programmes: W(t)/W0 and its derivative, knowing nothing of friction."""
+"""Modulation programmes: load, shear force and pulling velocity, knowing nothing of friction."""
 
+from asperity.loads.excitation import Excitation
 from asperity.loads.harmonic import Harmonic
+from asperity.loads.periodic import Periodic
 
-__all__ = ["Harmonic"]
+__all__ = ["Excitation", "Harmonic", "Periodic"]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import equinox as eqx
 import jax.numpy as jnp
-from jax import Array
 from jax.typing import ArrayLike
+
+from asperity.loads.excitation import Excitation
 
 
 class Harmonic(eqx.Module):
@@ -20,10 +21,12 @@ class Harmonic(eqx.Module):
 
     epsilon: ArrayLike
 
-    def load(self, theta: ArrayLike) -> Array:
-        """W/W0 at the phase `theta` (rad)."""
-        return 1 + self.epsilon * jnp.cos(theta)
+    def at(self, theta: ArrayLike) -> Excitation:
+        """Load and slope at the phase `theta` (rad)."""
+        return Excitation(
+            w=1 + self.epsilon * jnp.cos(theta), w_slope=-self.epsilon * jnp.sin(theta)
+        )
 
-    def slope(self, theta: ArrayLike) -> Array:
-        """d(W/W0)/d(theta)."""
-        return -self.epsilon * jnp.sin(theta)
+    def scaled(self, share: ArrayLike) -> Harmonic:
+        """The modulation with `share` of its amplitude: 0 is steady sliding."""
+        return Harmonic(self.epsilon * share)

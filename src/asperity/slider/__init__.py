@@ -1,6 +1,19 @@
 """Law + spring + mass + load = equation of motion."""
 
+from asperity.slider.choice import equation_of_motion
+from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
+from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic
+from asperity.slider.radiating import Radiating
 from asperity.slider.slider import Slider
 
-__all__ = ["QuasiStatic", "Slider"]
+__all__ = [
+    "Inertial",
+    "Motion",
+    "QuasiStatic",
+    "Radiating",
+    "RadiatingAsperities",
+    "Slider",
+    "StiffInertial",
+    "equation_of_motion",
+]

@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from asperity.loads import Excitation
 from asperity.slider import QuasiStatic
 from asperity.solve.linear import Matrix, inverse_points
 
@@ -129,7 +130,7 @@ def _newton_step(system: QuasiStatic, centre: tuple[Array, ...], w: Array, weigh
     flat = jnp.zeros_like(w)  # constant states: terms in dw/dtheta have zero mean
 
     def rates(*Y: Array) -> tuple[Array, ...]:
-        return tuple(system.rates(jnp.stack(Y), w, flat))
+        return tuple(system.rates(jnp.stack(Y), Excitation(w, flat)))
 
     value, push = jax.linearize(rates, *(c + flat for c in centre))
     one = jnp.ones_like(w)

@@ -17,7 +17,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.loads import Harmonic
+from asperity.loads import Excitation, Harmonic
 from asperity.slider import QuasiStatic
 from asperity.solve.averaged import averaged_limit
 from asperity.solve.cyclic import solve_cyclic
@@ -43,7 +43,7 @@ def averaged_orbit(
 ) -> Orbit:
     """The averaged limit as a first guess."""
     orbit = steady_orbit(system, points, intervals=intervals, grading=grading)
-    w = load.load(orbit.stage_phases).reshape(-1, points)
+    w = load.at(orbit.stage_phases).w.reshape(-1, points)
     weights = (jnp.asarray(GAUSS_B)[:, None, None] * orbit.widths).reshape(-1, points)
     averaged = averaged_limit(system, w, weights[:, 0] / (2 * jnp.pi))
     return orbit._replace(centre=jnp.stack(averaged.centre))
@@ -63,7 +63,7 @@ def steady_orbit(system: QuasiStatic, points: int, *, intervals: int, grading: f
 class _Local(NamedTuple):
     """The equations at the collocation points."""
 
-    w: Array
+    at: Excitation
     states: Array
     rates: Array
     jacobian: Array  # (row, column, STAGES, intervals, points)
@@ -71,10 +71,10 @@ class _Local(NamedTuple):
 
 def _localise(system: QuasiStatic, load: Harmonic, orbit: Orbit) -> _Local:
     theta = orbit.stage_phases
-    w, w_slope = load.load(theta), load.slope(theta)
+    at = load.at(theta)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
-    rates, columns = jacobian_columns(lambda Y: system.rates(Y, w, w_slope), states)
-    return _Local(w, states, rates, jnp.stack(columns, axis=1))
+    rates, columns = jacobian_columns(lambda Y: system.rates(Y, at), states)
+    return _Local(at, states, rates, jnp.stack(columns, axis=1))
 
 
 def _condense(local: _Local, orbit: Orbit) -> tuple[Array, Array]:
@@ -176,7 +176,7 @@ def newton_orbit(
         orbit, _, steps = carry
         local, nodes, slopes = _newton_step(system, load, orbit)
         stages = nodes[:, None] + orbit.widths * stage_sums(slopes)
-        _, exponent = jax.jvp(lambda Y: system.log_slip(Y, local.w), (local.states,), (stages,))
+        _, exponent = jax.jvp(lambda Y: system.log_slip(Y, local.at), (local.states,), (stages,))
         change = jnp.maximum(
             jnp.abs(exponent).max((0, 1)), jnp.abs(stages[1:]).max((0, 1, 2), initial=0.0)
         )
@@ -201,9 +201,9 @@ def newton_orbit(
 
 def refined(system: QuasiStatic, load: Harmonic, orbit: Orbit, intervals: int) -> Orbit:
     """The orbit on an equidistributed mesh of `intervals` intervals."""
-    w = load.load(orbit.stage_phases)
+    at = load.at(orbit.stage_phases)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
-    _, sensitivity = jacobian_columns(lambda Y: system.log_slip(Y, w)[None], states)
+    _, sensitivity = jacobian_columns(lambda Y: system.log_slip(Y, at)[None], states)
     scales = jnp.stack([jnp.abs(s[0]).mean(0) for s in sensitivity])
     # Logarithmic states matter on their own, not only through the slip they allow.
     scales = scales.at[1:].set(jnp.maximum(scales[1:], 1.0))
@@ -233,7 +233,7 @@ def collocation_response(
     local = _localise(system, load, orbit)
     weights = jnp.asarray(GAUSS_B)[:, None, None] * orbit.widths / (2 * jnp.pi)
     constant, rest = system.force_split(
-        orbit.centre[:, None, None], orbit.stage_deviations, local.w
+        orbit.centre[:, None, None], orbit.stage_deviations, local.at
     )
     theta = orbit.stage_phases
     phasors = [

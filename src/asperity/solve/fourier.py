@@ -29,7 +29,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.loads import Harmonic
+from asperity.loads import Excitation, Harmonic
 from asperity.slider import QuasiStatic
 from asperity.solve.averaged import averaged_limit
 from asperity.solve.linear import Matrix, inverse_points
@@ -61,8 +61,7 @@ class Cycle(NamedTuple):
     theta: np.ndarray  # (nodes,)
     stretch: np.ndarray  # (nodes,), dtheta/dtau
     integral: np.ndarray  # (nodes, nodes), zero-mean antiderivative in tau
-    w: Array  # (nodes, points)
-    w_slope: Array
+    at: Excitation  # arrays (nodes, points)
 
     @property
     def share(self) -> np.ndarray:
@@ -84,14 +83,14 @@ def load_cycle(load: Harmonic, nodes: int, grading: float) -> Cycle:
     tau, integral = grid(nodes)
     theta = tau + grading * np.sin(tau)
     column = jnp.asarray(theta)[:, None]
-    return Cycle(theta, 1 + grading * np.cos(tau), integral, load.load(column), load.slope(column))
+    return Cycle(theta, 1 + grading * np.cos(tau), integral, load.at(column))
 
 
 def rates_on(system: QuasiStatic, cycle: Cycle) -> Callable[..., States]:
     """The rates per radian on the grid, as a function of the states one by one."""
 
     def rates(*states: Array) -> States:
-        return tuple(system.rates(jnp.stack(states), cycle.w, cycle.w_slope))
+        return tuple(system.rates(jnp.stack(states), cycle.at))
 
     return rates
 
@@ -180,7 +179,7 @@ def fourier_orbit(
     cycle = load_cycle(load, nodes, grading)
     half = nodes // 2  # of a symmetric grid: the averaged limit needs no more
     averaged = averaged_limit(
-        system, cycle.w[:half], 2 * cycle.share[:half], tolerance=_AVERAGED_TOLERANCE
+        system, cycle.at.w[:half], 2 * cycle.share[:half], tolerance=_AVERAGED_TOLERANCE
     )
     inverse = inverse_points(averaged.matrix)
     rates_of = rates_on(system, cycle)

@@ -85,7 +85,7 @@ def force_spectrum(
     system: QuasiStatic, cycle: Cycle, mean: States, rest: States, harmonics: int
 ) -> tuple[Array, Array]:
     """Mean of F/W0 and its complex harmonics, shape (harmonics, points)."""
-    constant, force = system.force_split(jnp.stack(mean), jnp.stack(rest), cycle.w)
+    constant, force = system.force_split(jnp.stack(mean), jnp.stack(rest), cycle.at)
     angle = np.arange(harmonics + 1)[:, None] * cycle.theta
     # One product for all: a mean, cosines and sines.
     spectrum = (np.concatenate([np.cos(angle), -np.sin(angle[1:])]) * cycle.share) @ force
@@ -107,8 +107,8 @@ def fourier_waveform(
     k = np.arange(1, nodes // 2)[:, None, None]
     interpolate = (2 / nodes) * np.cos(k * (tau[:, None] - grid(nodes)[0])).sum(0)
     Y = jnp.stack([m + interpolate @ y for m, y in zip(orbit.mean, orbit.rest, strict=True)])
-    w = load.load(jnp.asarray(theta)[:, None])
-    return jnp.stack([system.force(Y, w), system.log_slip(Y, w)])
+    at = load.at(jnp.asarray(theta)[:, None])
+    return jnp.stack([system.force(Y, at), system.log_slip(Y, at)])
 
 
 def _truncation(orbit: FourierOrbit, harmonics: int) -> Array:

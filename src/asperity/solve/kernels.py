@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity.loads import Excitation
 from asperity.solve.averaged import slip_pulse
 from asperity.solve.collocation import (
     NewtonResult,
@@ -63,8 +64,8 @@ def stiffness_of_steady_sliding(problem: Problem) -> Array:
     """Largest rate per radian of a perturbation of steady sliding: small for fast modulation."""
     system = problem.system
     steady = jnp.broadcast_to(system.steady(), (system.size, _points(problem)))
-    one, flat = jnp.ones(steady.shape[1:]), jnp.zeros(steady.shape[1:])
-    _, columns = jacobian_columns(lambda Y: system.rates(Y, one, flat), steady)
+    at = Excitation(jnp.ones(steady.shape[1:]))
+    _, columns = jacobian_columns(lambda Y: system.rates(Y, at), steady)
     return spectral_radius(jnp.stack(columns, axis=1))
 
 
@@ -72,7 +73,7 @@ def stiffness_of_steady_sliding(problem: Problem) -> Array:
 def sharpness_of_slip(problem: Problem) -> Array:
     """Half the range of the exponent of the slip rate over the cycle."""
     system, load = problem
-    extremes = load.load(jnp.array([[0.0], [jnp.pi]])) * jnp.ones(_points(problem))
+    extremes = load.at(jnp.array([[0.0], [jnp.pi]])).w * jnp.ones(_points(problem))
     return slip_pulse(system, extremes).sharpness
 
 
@@ -125,8 +126,8 @@ def _read(problem: Problem, orbit: Orbit, harmonics: int, phases: int) -> Readin
     theta = theta * jnp.ones(_points(problem))
     if phases:
         Y = orbit.centre[:, None] + evaluate(orbit, theta)[0]
-        w = load.load(theta)
-        waveform = jnp.stack([system.force(Y, w), system.log_slip(Y, w)])
+        at = load.at(theta)
+        waveform = jnp.stack([system.force(Y, at), system.log_slip(Y, at)])
     else:
         waveform = jnp.zeros((2, 0, _points(problem)))
     return Reading(*response, waveform)

@@ -159,7 +159,7 @@ def _proportional(problem: Problem, points: int, harmonics: int, phases: int) ->
 
     def force(samples: int) -> np.ndarray:
         theta = 2 * np.pi * np.arange(samples)[:, None] / max(samples, 1)
-        w = load.load(theta)
+        w = load.at(theta).w
         state = system.slider.law.steady_state(system.V)
         return np.asarray(w * system.slider.law.friction(system.V, state, w))
 

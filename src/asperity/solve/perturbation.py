@@ -30,6 +30,7 @@ from jax.typing import ArrayLike
 
 from asperity.errors import InputError
 from asperity.laws.parameter import checked
+from asperity.loads import Excitation
 from asperity.slider import QuasiStatic, Slider
 from asperity.solve.linear import jacobian_columns, solve_points
 
@@ -181,10 +182,10 @@ def _expand(system: QuasiStatic) -> PerturbationResponse:
     steady: Point = (Y0, one, jnp.zeros_like(one))
 
     def rates(point: Point) -> Array:
-        return system.rates(*point)
+        return system.rates(point[0], Excitation(*point[1:]))
 
     def force(point: Point) -> Array:
-        return system.force(point[0], point[1])[None]
+        return system.force(point[0], Excitation(*point[1:]))[None]
 
     jacobian = jnp.stack(jacobian_columns(lambda Y: rates((Y, *steady[1:])), Y0)[1], axis=1)
     force_gradient = jnp.stack(jacobian_columns(lambda Y: force((Y, *steady[1:])), Y0)[1])[:, 0]
