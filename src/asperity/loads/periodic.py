@@ -1,0 +1,57 @@
+"""Any periodic modulation: of the load, of a shear force, of the pulling velocity, together.
+
+    w(theta)     = 1 + sum a_k cos k theta + b_k sin k theta,     theta = omega t,
+
+and the same, without the 1, for the shear force over W0, and with it for the velocity over V.
+"""
+
+from __future__ import annotations
+
+from typing import TypeAlias
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.loads.excitation import Excitation
+
+#: Pairs (a_k, b_k) for k = 1, 2, ...; arrays over the operating points.
+Series: TypeAlias = tuple[tuple[ArrayLike, ArrayLike], ...]
+
+
+class Periodic(eqx.Module):
+    """One period of an excitation given by Fourier coefficients.
+
+    Parameters
+    ----------
+    load, shear, pull : tuple of pairs
+        (a_k, b_k) for k = 1, 2, ...; empty where nothing is modulated. The load must stay
+        positive, which whoever builds the programme sees to.
+    """
+
+    load: Series = ()
+    shear: Series = ()
+    pull: Series = ()
+
+    def at(self, theta: ArrayLike) -> Excitation:
+        """Values and slopes at the phase `theta` (rad)."""
+        w, w_slope = _sum(self.load, theta)
+        shear, shear_slope = _sum(self.shear, theta)
+        pull, _ = _sum(self.pull, theta)
+        return Excitation(1 + w, w_slope, shear, shear_slope, 1 + pull)
+
+    def scaled(self, share: ArrayLike) -> Periodic:
+        """The modulation with `share` of its amplitude: 0 is steady sliding."""
+        parts = (self.load, self.shear, self.pull)
+        return Periodic(*(tuple((share * a, share * b) for a, b in s) for s in parts))
+
+
+def _sum(series: Series, theta: ArrayLike) -> tuple[Array, Array]:
+    """Value and slope of a series."""
+    value = slope = jnp.zeros(jnp.shape(theta))
+    for k, (a, b) in enumerate(series, start=1):
+        cos, sin = jnp.cos(k * theta), jnp.sin(k * theta)
+        value = value + a * cos + b * sin
+        slope = slope + k * (b * cos - a * sin)
+    return value, slope

@@ -1,0 +1,157 @@
+"""Equations of motion with inertia, radiation damping, or both.
+
+    M dv/dt = F + S - F_i - eta v,      dF/dt = K (V p - v),
+
+F the spring force, S a shear force besides it, F_i = W F_i/W the interface force, eta v the force
+that waves radiated into the half-spaces take (Rice, 1993), the substitute for inertia in models
+of faults. Asperities of stiffness W/lambda make F_i/W a state of its own,
+
+    d(F_i/W)/dt = (v - v_pl) / lambda,
+
+which has no dW/dt in it and takes the stiffness away: the slider swings on the asperities near
+sqrt(W0 / (lambda M)). Without asperities v is what the friction law resists, and ln v is the state.
+
+Source: Bureau et al. (2000), Eqs. (8), (26)-(29).
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.loads import Excitation
+from asperity.slider.motion import Motion
+
+
+class _Damped(Motion):
+    """Adds the radiation damping to what the slider and the drive give.
+
+    Parameters
+    ----------
+    eta : array
+        Radiation damping, force per velocity (N s/m); 0 for none.
+    """
+
+    eta: ArrayLike = 0.0
+
+    @property
+    def damping(self) -> Array:
+        """Force of radiation damping at the pulling velocity, over W0."""
+        return self.eta * self.V / self.slider.W0
+
+    @property
+    def mobility(self) -> Array:
+        """W0 / (M V omega): gain of v/V per radian and unit force over W0."""
+        return self.slider.W0 / (self.slider.M * self.V * self.omega)
+
+    def _law_rates(self, v: ArrayLike, slip: ArrayLike, Y: Array, at: Excitation) -> list[Array]:
+        law = self.slider.law
+        rates = law.state_rate(self.V * v, self.V * slip, self.law_state(Y), at.w)
+        return [r / self.omega for r in rates]
+
+
+class _OnAsperities(_Damped):
+    """Elastic asperities: the state "friction" is F_i/W."""
+
+    @property
+    def strain(self) -> Array:
+        """V / (lambda omega): gain of F_i/W per radian while the slider moves at V on its joint."""
+        return self.V / (self.slider.law.elastic_length * self.omega)
+
+    def force(self, Y: Array, at: Excitation) -> Array:
+        """F/W0."""
+        return Y[0]
+
+    def _friction(self, Y: Array) -> Array:
+        return Y[self.mechanical.index("friction")]
+
+    def log_slip(self, Y: Array, at: Excitation) -> Array:
+        """ln(v_pl / V)."""
+        law = self.slider.law
+        return law.log_velocity(self._friction(Y), self.law_state(Y), at.w) - jnp.log(self.V)
+
+    def rates(self, Y: Array, at: Excitation) -> Array:
+        """dY/dtheta."""
+        v, slip = self.slider_velocity(Y, at), jnp.exp(self.log_slip(Y, at))
+        rates = [self.kappa * (at.pull - v), self.strain * (v - slip)]
+        rates[1:1] = self._acceleration(Y, at)
+        return jnp.stack(jnp.broadcast_arrays(*rates, *self._law_rates(v, slip, Y, at)))
+
+    def _acceleration(self, Y: Array, at: Excitation) -> list[Array]:
+        return []
+
+
+class Inertial(_OnAsperities):
+    """Inertia on elastic asperities; states Y = (F/W0, v/V, F_i/W, *law states)."""
+
+    name: ClassVar[str] = "inertial"
+    mechanical: ClassVar[tuple[str, ...]] = ("force", "velocity", "friction")
+    logarithmic: ClassVar[tuple[bool, ...]] = (False, False, False)
+
+    def steady(self) -> Array:
+        """Steady sliding."""
+        mu = self.slider.law.mu_ss(self.V)
+        return self._steady_states(mu + self.damping, 1.0, mu)
+
+    def slider_velocity(self, Y: Array, at: Excitation) -> Array:
+        """dx/dt over V."""
+        return Y[1]
+
+    def _acceleration(self, Y: Array, at: Excitation) -> list[Array]:
+        return [self.mobility * (Y[0] + at.shear - at.w * Y[2] - self.damping * Y[1])]
+
+
+class RadiatingAsperities(_OnAsperities):
+    """Radiation damping on elastic asperities, no mass; states Y = (F/W0, F_i/W, *law states)."""
+
+    name: ClassVar[str] = "radiation-damped"
+    mechanical: ClassVar[tuple[str, ...]] = ("force", "friction")
+    logarithmic: ClassVar[tuple[bool, ...]] = (False, False)
+
+    def steady(self) -> Array:
+        """Steady sliding."""
+        mu = self.slider.law.mu_ss(self.V)
+        return self._steady_states(mu + self.damping, mu)
+
+    def slider_velocity(self, Y: Array, at: Excitation) -> Array:
+        """dx/dt over V."""
+        return (Y[0] + at.shear - at.w * Y[1]) / self.damping
+
+
+class StiffInertial(_Damped):
+    """Inertia without asperities; states Y = (F/W0, ln(v/V), *law states).
+
+    Singularly perturbed: velocities relax at the rate A W / (M v), which grows without bound as
+    v -> 0.
+    """
+
+    name: ClassVar[str] = "inertial"
+    mechanical: ClassVar[tuple[str, ...]] = ("force", "log_velocity")
+    logarithmic: ClassVar[tuple[bool, ...]] = (False, True)
+
+    def steady(self) -> Array:
+        """Steady sliding."""
+        return self._steady_states(self.slider.law.mu_ss(self.V) + self.damping, 0.0)
+
+    def force(self, Y: Array, at: Excitation) -> Array:
+        """F/W0."""
+        return Y[0]
+
+    def log_slip(self, Y: Array, at: Excitation) -> Array:
+        """ln(v / V), a state."""
+        return Y[1]
+
+    def slider_velocity(self, Y: Array, at: Excitation) -> Array:
+        """dx/dt over V."""
+        return jnp.exp(Y[1])
+
+    def rates(self, Y: Array, at: Excitation) -> Array:
+        """dY/dtheta."""
+        v = jnp.exp(Y[1])
+        friction = self.slider.law.friction(self.V * v, self.law_state(Y), at.w)
+        excess = Y[0] + at.shear - at.w * friction - self.damping * v
+        rates = [self.kappa * (at.pull - v), self.mobility * excess * jnp.exp(-Y[1])]
+        return jnp.stack(jnp.broadcast_arrays(*rates, *self._law_rates(v, v, Y, at)))

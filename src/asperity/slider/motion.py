@@ -1,0 +1,103 @@
+"""What the solvers ask of an equation of motion."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.loads import Excitation
+from asperity.slider.slider import Slider
+
+
+class Motion(eqx.Module):
+    """Rates of the states Y per radian of the modulation, for one law, slider and drive.
+
+    The states begin with mechanical ones and end with those of the law. With omega = 1 rad/s
+    a radian is a second, and the same equations serve for transients.
+
+    Class attributes
+    ----------------
+    name : str
+        What results call the equation of motion.
+    mechanical : tuple of str
+        Names of the mechanical states.
+    logarithmic : tuple of bool
+        Which mechanical states are logarithms, as the law's states are.
+
+    Parameters
+    ----------
+    slider : Slider
+    V : array
+        Pulling velocity (m/s): where it is modulated, its mean.
+    omega : array
+        Angular frequency of the modulation (rad/s).
+    """
+
+    name: ClassVar[str]
+    mechanical: ClassVar[tuple[str, ...]]
+    logarithmic: ClassVar[tuple[bool, ...]]
+
+    slider: Slider
+    V: ArrayLike
+    omega: ArrayLike
+
+    @property
+    def size(self) -> int:
+        """Number of states."""
+        return len(self.mechanical) + len(self.slider.law.state_names)
+
+    @property
+    def linear(self) -> tuple[int, ...]:
+        """Which of the states are no logarithms."""
+        return tuple(i for i, log in enumerate(self.logarithmic) if not log)
+
+    @property
+    def kappa(self) -> Array:
+        """Spring force gained per radian while the slider sticks, over W0."""
+        return self.V * self.slider.K / (self.omega * self.slider.W0)
+
+    @property
+    def compliance_ratio(self) -> Array:
+        """L = lambda K / W0: stiffness of the spring over that of the asperities."""
+        return self.slider.law.elastic_length * self.slider.K / self.slider.W0
+
+    def law_state(self, Y: Array) -> tuple[Array, ...]:
+        """The law's states."""
+        return tuple(Y[len(self.mechanical) :])
+
+    @abstractmethod
+    def steady(self) -> Array:
+        """States of steady sliding under constant load, shape (size, ...)."""
+
+    @abstractmethod
+    def force(self, Y: Array, at: Excitation) -> Array:
+        """Spring force over W0, F/W0."""
+
+    def force_split(self, centre: Array, y: Array, at: Excitation) -> tuple[Array, Array]:
+        """F/W0 at Y = centre + y as a constant plus a rest that is small when y is.
+
+        The split keeps the relative accuracy of harmonics that are many orders of magnitude
+        smaller than the mean.
+        """
+        return centre[0], y[0]
+
+    @abstractmethod
+    def log_slip(self, Y: Array, at: Excitation) -> Array:
+        """ln(v_pl / V), the exponent that makes the equations stiff."""
+
+    @abstractmethod
+    def slider_velocity(self, Y: Array, at: Excitation) -> Array:
+        """dx/dt over V; may be negative."""
+
+    @abstractmethod
+    def rates(self, Y: Array, at: Excitation) -> Array:
+        """dY/dtheta, same shape as Y, (size, ...)."""
+
+    def _steady_states(self, *mechanical: ArrayLike) -> Array:
+        law = self.slider.law
+        return jnp.stack(jnp.broadcast_arrays(*mechanical, *law.steady_state(self.V)))
