@@ -2,6 +2,7 @@
 
 from asperity.loads.excitation import Excitation
 from asperity.loads.harmonic import Harmonic
+from asperity.loads.modulation import Modulation
 from asperity.loads.periodic import Periodic
 
-__all__ = ["Excitation", "Harmonic", "Periodic"]
+__all__ = ["Excitation", "Harmonic", "Modulation", "Periodic"]

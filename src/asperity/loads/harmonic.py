@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from asperity.loads.excitation import Excitation
+from asperity.loads.modulation import Modulation
 
 
-class Harmonic(eqx.Module):
+class Harmonic(Modulation):
     """One period of w(theta) = 1 + eps cos(theta), theta = omega t.
 
     Parameters
@@ -26,6 +26,11 @@ class Harmonic(eqx.Module):
         return Excitation(
             w=1 + self.epsilon * jnp.cos(theta), w_slope=-self.epsilon * jnp.sin(theta)
         )
+
+    @property
+    def amplitude(self) -> ArrayLike:
+        """Epsilon."""
+        return self.epsilon
 
     def scaled(self, share: ArrayLike) -> Harmonic:
         """The modulation with `share` of its amplitude: 0 is steady sliding."""

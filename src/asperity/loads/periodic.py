@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.loads.excitation import Excitation
+from asperity.loads.modulation import Modulation
 
 #: Pairs (a_k, b_k) for k = 1, 2, ...; arrays over the operating points.
 Series: TypeAlias = tuple[tuple[ArrayLike, ArrayLike], ...]
 
 
-class Periodic(eqx.Module):
+class Periodic(Modulation):
     """One period of an excitation given by Fourier coefficients.
 
     Parameters
@@ -40,6 +40,11 @@ class Periodic(eqx.Module):
         shear, shear_slope = _sum(self.shear, theta)
         pull, _ = _sum(self.pull, theta)
         return Excitation(1 + w, w_slope, shear, shear_slope, 1 + pull)
+
+    @property
+    def amplitude(self) -> ArrayLike:
+        """Amplitude of the first harmonic of the load; 0 where the load is constant."""
+        return jnp.hypot(*self.load[0]) if self.load else 0.0
 
     def scaled(self, share: ArrayLike) -> Periodic:
         """The modulation with `share` of its amplitude: 0 is steady sliding."""

@@ -47,6 +47,10 @@ class _Damped(Motion):
         """W0 / (M V omega): gain of v/V per radian and unit force over W0."""
         return self.slider.W0 / (self.slider.M * self.V * self.omega)
 
+    def _balance(self, friction: Array, velocity: Array, at: Excitation) -> Array:
+        """Spring force over W0 that balances friction and damping."""
+        return at.w * friction + self.damping * velocity - at.shear
+
     def _law_rates(self, v: ArrayLike, slip: ArrayLike, Y: Array, at: Excitation) -> list[Array]:
         law = self.slider.law
         rates = law.state_rate(self.V * v, self.V * slip, self.law_state(Y), at.w)
@@ -100,6 +104,12 @@ class Inertial(_OnAsperities):
         """dx/dt over V."""
         return Y[1]
 
+    def mechanical_states(
+        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
+    ) -> tuple[Array, ...]:
+        """Force, velocity, friction."""
+        return self._balance(friction, velocity, at), velocity, friction
+
     def _acceleration(self, Y: Array, at: Excitation) -> list[Array]:
         return [self.mobility * (Y[0] + at.shear - at.w * Y[2] - self.damping * Y[1])]
 
@@ -119,6 +129,12 @@ class RadiatingAsperities(_OnAsperities):
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
         return (Y[0] + at.shear - at.w * Y[1]) / self.damping
+
+    def mechanical_states(
+        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
+    ) -> tuple[Array, ...]:
+        """Force, friction."""
+        return self._balance(friction, velocity, at), friction
 
 
 class StiffInertial(_Damped):
@@ -147,6 +163,12 @@ class StiffInertial(_Damped):
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
         return jnp.exp(Y[1])
+
+    def mechanical_states(
+        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
+    ) -> tuple[Array, ...]:
+        """Force, ln(v/V)."""
+        return self._balance(friction, jnp.exp(log_slip), at), log_slip
 
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta."""

@@ -95,6 +95,12 @@ class Motion(eqx.Module):
         """dx/dt over V; may be negative."""
 
     @abstractmethod
+    def mechanical_states(
+        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
+    ) -> tuple[Array, ...]:
+        """The mechanical states that F_i/W, v/V and ln(v_pl/V) amount to, leaving inertia out."""
+
+    @abstractmethod
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta, same shape as Y, (size, ...)."""
 

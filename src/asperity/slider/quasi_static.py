@@ -62,6 +62,12 @@ class QuasiStatic(Motion):
         """dx/dt over V, from the plastic velocity and the strain rate of the asperities."""
         return self._velocity(Y, at, jnp.exp(self.log_slip(Y, at)))
 
+    def mechanical_states(
+        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
+    ) -> tuple[Array, ...]:
+        """z."""
+        return (friction * (at.w + self.compliance_ratio) - at.shear,)
+
     def _velocity(self, Y: Array, at: Excitation, slip: Array) -> Array:
         ratio = self.compliance_ratio
         # Of the excitation alone: loops over the states divide once, before they start.

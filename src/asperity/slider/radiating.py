@@ -49,6 +49,12 @@ class Radiating(_Damped):
         """dx/dt over V."""
         return jnp.exp(self.log_slip(Y, at))
 
+    def mechanical_states(
+        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
+    ) -> tuple[Array, ...]:
+        """Force."""
+        return (self._balance(friction, jnp.exp(log_slip), at),)
+
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta."""
         v = self.slider_velocity(Y, at)

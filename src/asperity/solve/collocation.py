@@ -17,8 +17,8 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.loads import Excitation, Harmonic
-from asperity.slider import QuasiStatic
+from asperity.loads import Excitation, Modulation
+from asperity.slider import Motion, QuasiStatic
 from asperity.solve.averaged import averaged_limit
 from asperity.solve.cyclic import solve_cyclic
 from asperity.solve.linear import (
@@ -39,7 +39,7 @@ from asperity.solve.mesh import (
 
 
 def averaged_orbit(
-    system: QuasiStatic, load: Harmonic, points: int, *, intervals: int, grading: float
+    system: QuasiStatic, load: Modulation, points: int, *, intervals: int, grading: float
 ) -> Orbit:
     """The averaged limit as a first guess."""
     orbit = steady_orbit(system, points, intervals=intervals, grading=grading)
@@ -49,7 +49,7 @@ def averaged_orbit(
     return orbit._replace(centre=jnp.stack(averaged.centre))
 
 
-def steady_orbit(system: QuasiStatic, points: int, *, intervals: int, grading: float) -> Orbit:
+def steady_orbit(system: Motion, points: int, *, intervals: int, grading: float) -> Orbit:
     """Steady sliding under constant load: the orbit at epsilon = 0."""
     n = system.size
     return Orbit(
@@ -58,6 +58,28 @@ def steady_orbit(system: QuasiStatic, points: int, *, intervals: int, grading: f
         jnp.zeros((n, intervals, points)),
         jnp.zeros((n, STAGES, intervals, points)),
     )
+
+
+def lifted(
+    quasi_static: QuasiStatic, system: Motion, load: Modulation, orbit: Orbit
+) -> Orbit:
+    """A quasi-static orbit as a first guess of another equation of motion."""
+
+    def convert(Y: Array, theta: Array) -> Array:
+        at = load.at(theta)
+        mechanical = system.mechanical_states(
+            quasi_static.friction(Y, at),
+            quasi_static.slider_velocity(Y, at),
+            quasi_static.log_slip(Y, at),
+            at,
+        )
+        return jnp.stack([*mechanical, *quasi_static.law_state(Y)])
+
+    stages = orbit.centre[:, None, None] + orbit.stage_deviations
+    theta = orbit.stage_phases
+    _, slopes = jax.jvp(convert, (stages, theta), (orbit.slopes, jnp.ones_like(theta)))
+    nodes = convert(orbit.centre[:, None] + orbit.nodes, orbit.mesh[:-1])
+    return Orbit(orbit.mesh, nodes[:, 0], nodes - nodes[:, :1], slopes)
 
 
 class _Local(NamedTuple):
@@ -69,7 +91,7 @@ class _Local(NamedTuple):
     jacobian: Array  # (row, column, STAGES, intervals, points)
 
 
-def _localise(system: QuasiStatic, load: Harmonic, orbit: Orbit) -> _Local:
+def _localise(system: Motion, load: Modulation, orbit: Orbit) -> _Local:
     theta = orbit.stage_phases
     at = load.at(theta)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
@@ -122,7 +144,7 @@ def _transfer_maps(response: Array, widths: Array) -> Array:
     return identity + widths * jnp.einsum("k,nkcmb->ncmb", GAUSS_B, response)
 
 
-def _newton_step(system: QuasiStatic, load: Harmonic, orbit: Orbit) -> tuple[_Local, Array, Array]:
+def _newton_step(system: Motion, load: Modulation, orbit: Orbit) -> tuple[_Local, Array, Array]:
     local = _localise(system, load, orbit)
     response, constant = _condense(local, orbit)
     maps = _transfer_maps(response, orbit.widths)
@@ -133,7 +155,7 @@ def _newton_step(system: QuasiStatic, load: Harmonic, orbit: Orbit) -> tuple[_Lo
     return local, nodes, slopes
 
 
-def newton_update(system: QuasiStatic, load: Harmonic, orbit: Orbit) -> Orbit:
+def newton_update(system: Motion, load: Modulation, orbit: Orbit) -> Orbit:
     """One undamped Newton step: at a converged orbit an identity with the orbit's derivative."""
     _, nodes, slopes = _newton_step(system, load, orbit)
     return orbit._replace(nodes=orbit.nodes + nodes, slopes=orbit.slopes + slopes)
@@ -172,24 +194,26 @@ def newton_orbit(
         Bound on the change of an exponent or logarithmic state in one step.
     """
 
+    linear = jnp.array(system.linear)
+    logarithmic = jnp.array([i for i in range(system.size) if i not in system.linear], int)
+    # Against round-off where there is hardly any swing: of a force, see its rate.
+    floor = 1e-4 * jnp.minimum(system.kappa, 1.0)
+
     def body(carry: tuple) -> tuple:
         orbit, _, steps = carry
         local, nodes, slopes = _newton_step(system, load, orbit)
         stages = nodes[:, None] + orbit.widths * stage_sums(slopes)
         _, exponent = jax.jvp(lambda Y: system.log_slip(Y, local.at), (local.states,), (stages,))
-        change = jnp.maximum(
-            jnp.abs(exponent).max((0, 1)), jnp.abs(stages[1:]).max((0, 1, 2), initial=0.0)
-        )
+        logarithms = jnp.abs(stages[logarithmic]).max((0, 1, 2), initial=0.0)
+        change = jnp.maximum(jnp.abs(exponent).max((0, 1)), logarithms)
         damping = jnp.minimum(1.0, largest_change / jnp.where(change > 0, change, 1.0))
         nodes = orbit.nodes + damping * nodes
         centre = orbit.centre + nodes[:, 0]
         nodes = nodes - nodes[:, :1]
         moved = Orbit(orbit.mesh, centre, nodes, orbit.slopes + damping * slopes)
-        swing = jnp.abs(moved.nodes[0]).max(0)
-        # Against round-off where there is hardly any swing: of z, see the rate of z.
-        swing = swing + 1e-4 * jnp.minimum(system.kappa, 1.0)
-        relative = jnp.abs(stages[0] - stages[0, :1, :1]).max((0, 1)) / swing
-        error = jnp.maximum(change, relative)
+        swing = jnp.abs(moved.nodes[linear]).max(1) + floor
+        relative = jnp.abs(stages[linear] - stages[linear, :1, :1]).max((1, 2)) / swing
+        error = jnp.maximum(change, relative.max(0))
         return moved, jnp.where(jnp.isfinite(error), error, jnp.inf), steps + 1
 
     def unfinished(carry: tuple) -> Array:
@@ -199,14 +223,20 @@ def newton_orbit(
     return NewtonResult(*jax.lax.while_loop(unfinished, body, start))
 
 
-def refined(system: QuasiStatic, load: Harmonic, orbit: Orbit, intervals: int) -> Orbit:
+def refined(system: Motion, load: Modulation, orbit: Orbit, intervals: int) -> Orbit:
     """The orbit on an equidistributed mesh of `intervals` intervals."""
     at = load.at(orbit.stage_phases)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
     _, sensitivity = jacobian_columns(lambda Y: system.log_slip(Y, at)[None], states)
     scales = jnp.stack([jnp.abs(s[0]).mean(0) for s in sensitivity])
-    # Logarithmic states matter on their own, not only through the slip they allow.
-    scales = scales.at[1:].set(jnp.maximum(scales[1:], 1.0))
+    for i in range(system.size):
+        if i not in system.linear:
+            # Logarithmic states matter on their own, not only through the slip they allow.
+            scales = scales.at[i].set(jnp.maximum(scales[i], 1.0))
+        else:
+            # Slip does not feel every force and velocity: those count beside their own swing.
+            swing = jnp.abs(orbit.nodes[i]).max(0) + 1e-4 * jnp.minimum(system.kappa, 1.0)
+            scales = scales.at[i].set(jnp.where(scales[i] > 0, scales[i], 1 / swing))
     return equidistributed(orbit, scales, intervals)
 
 
@@ -227,7 +257,7 @@ class CollocationResponse(NamedTuple):
 
 
 def collocation_response(
-    system: QuasiStatic, load: Harmonic, orbit: Orbit, *, harmonics: int
+    system: Motion, load: Modulation, orbit: Orbit, *, harmonics: int
 ) -> CollocationResponse:
     """Mean, harmonics and monodromy of a converged orbit."""
     local = _localise(system, load, orbit)

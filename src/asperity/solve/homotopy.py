@@ -30,8 +30,7 @@ _ACCEPTED = 1e-5
 
 def along_amplitude(problem: Problem, t: Float) -> Problem:
     """Epsilon reaches t of its value."""
-    load = eqx.tree_at(lambda q: q.epsilon, problem.load, problem.load.epsilon * t)
-    return problem._replace(load=load)
+    return problem._replace(load=problem.load.scaled(t))
 
 
 def along_frequency(start: Float) -> Path:

@@ -11,11 +11,13 @@ import numpy as np
 from jax import Array
 
 from asperity.loads import Excitation
+from asperity.slider import QuasiStatic
 from asperity.solve.averaged import slip_pulse
 from asperity.solve.collocation import (
     NewtonResult,
     averaged_orbit,
     collocation_response,
+    lifted,
     newton_orbit,
     refined,
 )
@@ -135,10 +137,13 @@ def _read(problem: Problem, orbit: Orbit, harmonics: int, phases: int) -> Readin
 
 @partial(jax.jit, static_argnames=("intervals",))
 def first_orbit(problem: Problem, *, intervals: int) -> tuple[Orbit, Array]:
-    """Collocation from the averaged limit."""
+    """Collocation from the averaged limit, of which only the quasi-static equations are sure."""
     system, load = problem
-    guess = averaged_orbit(system, load, _points(problem), intervals=intervals, grading=0.5)
-    result = _newton(problem, guess, 30)
+    quasi_static = QuasiStatic(system.slider, system.V, system.omega)
+    guess = averaged_orbit(quasi_static, load, _points(problem), intervals=intervals, grading=0.5)
+    result = _newton(Problem(quasi_static, load), guess, 30)
+    if not isinstance(system, QuasiStatic):
+        result = _newton(problem, lifted(quasi_static, system, load, result.orbit), 30)
     return result.orbit, result.error
 
 

@@ -22,8 +22,7 @@ _SENTENCES = {
     Outcome.CONVERGED: "converged",
     Outcome.NO_ORBIT: (
         "no periodic orbit found: followed from steady sliding the branch stops at "
-        "epsilon = {detail:.4g}, short of the amplitude asked for; "
-        "lower epsilon or stiffen the spring"
+        "{detail:.4g} of the amplitude asked for; lower epsilon or stiffen the spring"
     ),
     Outcome.NOT_RESOLVED: (
         "an orbit was found but not resolved: refining the mesh still changes it by {detail:.1e} "

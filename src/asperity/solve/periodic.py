@@ -10,30 +10,33 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError
-from asperity.loads import Harmonic
-from asperity.slider import QuasiStatic, Slider
+from asperity.loads import Harmonic, Modulation
+from asperity.slider import Slider, equation_of_motion
 from asperity.solve.found import Found
 from asperity.solve.kernels import Problem
 from asperity.solve.outcome import Outcome
 from asperity.solve.parallel import WORTHWHILE, available_cores, find_orbits_on_cores
 from asperity.solve.response import PeriodicResponse
 from asperity.solve.search import find_orbits
-from asperity.units import to_si
+from asperity.units import KINDS, to_si
 
 
 def periodic_response(
     slider: Slider,
     *,
     velocity: ArrayLike | str,
-    epsilon: ArrayLike | str,
+    epsilon: ArrayLike | str | None = None,
     frequency: ArrayLike | str,
+    modulation: Modulation | None = None,
+    inertia: bool = False,
+    radiation_damping: ArrayLike | str | None = None,
     harmonics: int = 8,
     waveform: int = 0,
     progress: Callable[[int], None] | None = None,
     methods: tuple[str, ...] = ("fourier", "collocation"),
     workers: int | None = None,
 ) -> PeriodicResponse:
-    """Periodic response to W = W0 (1 + eps cos wt), stable or not, without inertia.
+    """Periodic response to W = W0 (1 + eps cos wt), stable or not.
 
     Arrays may stand wherever a number does, the parameters of the slider included; they
     broadcast as NumPy's do, and every operating point is solved on its own.
@@ -47,6 +50,13 @@ def periodic_response(
         Relative amplitude of the load that the contacts carry, 0 <= eps < 1.
     frequency : array or str
         Modulation frequency (Hz), positive; not rad/s.
+    modulation : Modulation, optional
+        In place of `epsilon`: any periodic load, shear force and pulling velocity, from
+        `asperity.loads.modulated` or `asperity.loads.sampled`.
+    inertia : bool
+        Whether the mass of the slider counts.
+    radiation_damping : array or str, optional
+        eta (N s/m), positive: waves radiated from the interface take the force eta v.
     harmonics : int
         Number of harmonics of the force, at least 2.
     waveform : int
@@ -71,16 +81,20 @@ def periodic_response(
 
     Notes
     -----
-    Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (29), quasi-static. Where converged,
+    Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). Where converged,
     mean, mu1, mu2 and multipliers are good to 1e-8 relative (multipliers of modulus below 1e-12:
     to 1e-20 absolute).
     """
     V = checked_positive(velocity, "velocity", "velocity")
     f = checked_positive(frequency, "frequency", "frequency")
-    eps = checked_epsilon(epsilon)
+    load = checked_modulation(epsilon, modulation)
+    eta = None
+    if radiation_damping is not None:
+        eta = checked_positive(radiation_damping, "damping", "radiation_damping")
     if harmonics < 2:
         raise InputError(f"harmonics must be at least 2, got {harmonics}; ask for 2 or more")
-    problem = Problem(QuasiStatic(slider, V, 2 * np.pi * f), Harmonic(eps))
+    motion = equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta)
+    problem = Problem(motion, load)
     flat, shape = flatten(problem)
     points = int(np.prod(shape, dtype=int))
     report = progress or (lambda _: None)
@@ -96,7 +110,7 @@ def periodic_response(
         found = _proportional(flat, points, harmonics, waveform)
         report(points)
     mu_ss = np.asarray(slider.law.mu_ss(V)) * np.ones(shape)
-    return PeriodicResponse.from_search(found, shape, mu_ss, slider, V, eps, f)
+    return PeriodicResponse.from_search(found, shape, mu_ss, motion, load, f)
 
 
 def checked_positive(value: Any, kind: str, name: str) -> np.ndarray:
@@ -110,11 +124,28 @@ def checked_positive(value: Any, kind: str, name: str) -> np.ndarray:
     array = np.asarray(to_si(value, kind, name), dtype=float)
     bad = array[~(array > 0)]
     if bad.size:
-        unit = {"velocity": "m/s", "frequency": "Hz"}[kind]
+        unit = KINDS[kind].si
         raise InputError(
             f"{name} must be positive, got {bad.flat[0]:g} {unit}; give a value above zero"
         )
     return array
+
+
+def checked_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation:
+    """The modulation asked for, as an amplitude or as a programme.
+
+    Raises
+    ------
+    InputError
+        Unless exactly one of the two is given; as `checked_epsilon`.
+    """
+    if (epsilon is None) == (modulation is None):
+        given = "neither" if epsilon is None else "both"
+        raise InputError(
+            f"exactly one of epsilon and modulation must be given, got {given}; "
+            "give epsilon for a harmonic load and modulation for any other"
+        )
+    return Harmonic(checked_epsilon(epsilon)) if modulation is None else modulation
 
 
 def checked_epsilon(value: Any) -> np.ndarray:

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._version import __version__
-from asperity.slider import Slider
+from asperity.loads import Modulation
+from asperity.slider import Motion, QuasiStatic, Slider
 from asperity.solve.floquet import from_logs, without_lost_arguments
 from asperity.solve.outcome import Outcome, sentences
 
@@ -55,8 +56,10 @@ class PeriodicResponse:
     waveform : array, shape (2, ..., samples)
         F/W0 and ln(v_plastic / V) at the phases `theta`.
     theta : array, shape (samples,)
+    motion : Motion
+        Equation of motion, with the slider.
     slider, velocity, epsilon, frequency
-        What was asked, in SI.
+        What was asked, in SI; epsilon is the amplitude of the load's first harmonic.
     """
 
     mean_friction: Float
@@ -67,8 +70,7 @@ class PeriodicResponse:
     iterations: NDArray[np.int64]
     outcome: NDArray[np.int64]
     detail: Float
-    slider: Slider
-    velocity: Float
+    motion: Motion
     epsilon: Float
     frequency: Float
 
@@ -78,9 +80,8 @@ class PeriodicResponse:
         found: Any,
         shape: tuple[int, ...],
         mu_ss: Float,
-        slider: Slider,
-        velocity: Float,
-        epsilon: Float,
+        motion: Motion,
+        load: Modulation,
         frequency: Float,
     ) -> PeriodicResponse:
         """Lay the results of a search out in the shape of the question."""
@@ -97,11 +98,20 @@ class PeriodicResponse:
             iterations=shaped(found.iterations),
             outcome=shaped(found.outcome),
             detail=shaped(found.detail),
-            slider=slider,
-            velocity=velocity,
-            epsilon=epsilon,
+            motion=motion,
+            epsilon=np.asarray(load.amplitude),
             frequency=frequency,
         )
+
+    @property
+    def slider(self) -> Slider:
+        """Law, spring, mass and mean load."""
+        return self.motion.slider
+
+    @property
+    def velocity(self) -> Float:
+        """Pulling velocity (m/s)."""
+        return np.asarray(self.motion.V)
 
     @property
     def delta_mu(self) -> Float:
@@ -222,7 +232,7 @@ class PeriodicResponse:
             "asperity_version": __version__,
             "law": law.name,
             "source": law.source,
-            "equation_of_motion": "quasi-static",
+            "equation_of_motion": self.motion.name,
             "parameters": self._parameters(),
             "relative_tolerance": 1e-8,
             "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), w(t) = 1 + eps cos(w t)",
@@ -236,6 +246,8 @@ class PeriodicResponse:
             for field in dataclasses.fields(law)
         }
         values |= {"K": (self.slider.K, "N/m"), "W0": (self.slider.W0, "N")}
+        if not isinstance(self.motion, QuasiStatic):
+            values |= {"M": (self.slider.M, "kg"), "eta": (self.motion.eta, "N s/m")}
         values |= {"V": (self.velocity, "m/s"), "epsilon": (self.epsilon, "")}
         values["frequency"] = (self.frequency, "Hz")
         return "; ".join(f"{name} = {_shown(*value)}" for name, value in values.items())

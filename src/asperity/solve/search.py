@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from asperity.loads import Harmonic
+from asperity.slider import QuasiStatic
 from asperity.solve.batch import Indices, run_chunks, take
 from asperity.solve.found import Float, Found, Options, logs_of, store
 from asperity.solve.kernels import (
@@ -69,12 +71,17 @@ def find_orbits(
     found = Found.empty(problem.system.size, points, harmonics, phases)
     options = Options(harmonics, phases, progress)
     left = np.arange(points)
-    if "fourier" in methods:
+    if "fourier" in methods and _is_fast(problem):
         left = _fourier_stages(problem, found, left, options)
     if "collocation" in methods:
         for start in range(0, len(left), _BLOCK):
             _collocate(problem, found, left[start : start + _BLOCK], options)
     return found
+
+
+def _is_fast(problem: Problem) -> bool:
+    """Whether the fast method knows these equations: its grid has one weakest contact, at pi."""
+    return isinstance(problem.system, QuasiStatic) and isinstance(problem.load, Harmonic)
 
 
 def _fourier_stages(problem: Problem, found: Found, index: Indices, options: Options) -> Indices:
@@ -115,6 +122,6 @@ def _collocate(problem: Problem, found: Found, block: Indices, options: Options)
     """Collocation, however far the start has to be fetched, and refinement of a block."""
     part = take(problem, block)
     start = starting_orbits(part, len(block))
-    found.detail[block] = start.reached * np.asarray(part.load.epsilon)
+    found.detail[block] = start.reached
     options.progress(int((~start.found).sum()))
     refine(part, found, block, start.orbit, np.flatnonzero(start.found), options)

@@ -54,6 +54,12 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "stiffness": Kind(
             "a stiffness", "N/m", "0.2 N/um", (("mN/m", -3), ("N/m", 0), ("N/mm", 3), ("N/um", 6))
         ),
+        "damping": Kind(
+            "a damping",
+            "N*s/m",
+            "500 N*s/m",
+            (("N*s/m", 0), ("kN*s/m", 3), ("MN*s/m", 6)),
+        ),
         "mass": Kind("a mass", "kg", "1.6 kg", (("mg", -6), ("g", -3), ("kg", 0))),
         "length": Kind(
             "a length",
