@@ -22,14 +22,13 @@ from asperity.solve.linear import (
     spectral_radius,
 )
 from asperity.solve.mesh import (
-    GAUSS_C,
-    STAGES,
     Orbit,
     equidistributed,
     evaluate,
     graded_mesh,
     split,
 )
+from asperity.solve.scheme import GAUSS, STAGES
 
 #: Round-off times the condition of a random small matrix.
 EXACT = 1e-11
@@ -151,7 +150,7 @@ def on_split_mesh(problem, *, parts):
     corners = np.arange((len(COARSE) - 1) * parts + 1) / parts
     mesh = np.interp(corners, np.arange(len(COARSE)), COARSE)[:, None] * np.ones(2)
     orbit = averaged_orbit(*problem, 2, intervals=len(mesh) - 1, grading=0.0)
-    orbit = orbit._replace(mesh=jnp.asarray(mesh))
+    orbit = orbit.moved(mesh=jnp.asarray(mesh))
     result = newton_orbit(*problem, orbit, tolerance=1e-12, max_steps=12, largest_change=2.0)
     read = collocation_response(*problem, result.orbit, harmonics=2)
     trace = jnp.trace(read.monodromy) * jnp.exp(read.log_scale)
@@ -173,11 +172,11 @@ def test_order_of_convergence():
 
 def polynomial_orbit(mesh, power):
     """Orbit whose two states are theta^power and 2 - theta, not periodic."""
-    bare = Orbit(mesh, jnp.zeros((2, mesh.shape[1])), None, None)
+    bare = Orbit(mesh, jnp.zeros((2, mesh.shape[1])), None, None, GAUSS)
     theta = bare.stage_phases
     nodes = jnp.stack([mesh[:-1] ** power, -mesh[:-1]])
     slopes = jnp.stack([power * theta ** (power - 1), -jnp.ones_like(theta)])
-    return bare._replace(nodes=nodes, slopes=slopes)
+    return bare.moved(nodes=nodes, slopes=slopes)
 
 
 THETA = np.sort(np.random.default_rng(7).uniform(0, 2 * np.pi, (40, 3)), axis=0)
@@ -209,7 +208,7 @@ def test_stage_deviations_are_the_states_at_the_stages():
         orbit.stage_deviations[0], orbit.stage_phases**4, rtol=EXACT, atol=EXACT
     )
     assert orbit.stage_phases.shape == (STAGES, 9, 3)
-    np.testing.assert_allclose(orbit.stage_phases[:, 0, 0], GAUSS_C * orbit.widths[0, 0])
+    np.testing.assert_allclose(orbit.stage_phases[:, 0, 0], GAUSS.c * orbit.widths[0, 0])
 
 
 def test_split_cuts_every_interval_and_keeps_the_orbit():
@@ -224,10 +223,10 @@ def test_split_cuts_every_interval_and_keeps_the_orbit():
 def peaked_orbit(intervals):
     """A state that rises within 0.1 rad of theta = 4."""
     mesh = graded_mesh(intervals, 3, 0.0)
-    bare = Orbit(mesh, jnp.zeros((1, 3)), None, None)
+    bare = Orbit(mesh, jnp.zeros((1, 3)), None, None, GAUSS)
     nodes = jnp.arctan((mesh[:-1] - 4) / 0.1)[None]
     slopes = (0.1 / ((bare.stage_phases - 4) ** 2 + 0.01))[None]
-    return bare._replace(nodes=nodes, slopes=slopes)
+    return bare.moved(nodes=nodes, slopes=slopes)
 
 
 def test_equidistributed_keeps_a_polynomial_orbit():
@@ -255,7 +254,7 @@ def test_scales_choose_the_state_that_matters():
     orbit = peaked_orbit(200)
     slopes = jnp.concatenate([orbit.slopes, orbit.slopes[:, ::-1, ::-1]])
     nodes = jnp.zeros((2, 200, 3))  # only slopes are looked at
-    both = Orbit(orbit.mesh, jnp.zeros((2, 3)), nodes, slopes)
+    both = Orbit(orbit.mesh, jnp.zeros((2, 3)), nodes, slopes, GAUSS)
     for weights, at in (([1.0, 0.0], 4.0), ([0.0, 1.0], 2 * np.pi - 4.0)):
         scales = jnp.asarray(weights)[:, None, None] * jnp.ones((2, 200, 3))
         mesh = np.asarray(equidistributed(both, scales, 60).mesh)[:, 0]

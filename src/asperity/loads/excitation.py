@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from jax import Array
 from jax.typing import ArrayLike
 
 
@@ -23,7 +24,7 @@ class Excitation(NamedTuple):
         Velocity of the far end of the spring over its mean V.
     """
 
-    w: ArrayLike
+    w: Array
     w_slope: ArrayLike = 0.0
     shear: ArrayLike = 0.0
     shear_slope: ArrayLike = 0.0

@@ -52,6 +52,11 @@ class Motion(eqx.Module):
         return len(self.mechanical) + len(self.slider.law.state_names)
 
     @property
+    def damping(self) -> ArrayLike:
+        """Force of radiation damping at the pulling velocity, over W0."""
+        return 0.0
+
+    @property
     def linear(self) -> tuple[int, ...]:
         """Which of the states are no logarithms."""
         return tuple(i for i, log in enumerate(self.logarithmic) if not log)

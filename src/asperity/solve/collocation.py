@@ -28,14 +28,12 @@ from asperity.solve.linear import (
     spectral_abscissa,
 )
 from asperity.solve.mesh import (
-    GAUSS_A,
-    GAUSS_B,
-    STAGES,
     Orbit,
     equidistributed,
+    evaluate,
     graded_mesh,
-    stage_sums,
 )
+from asperity.solve.scheme import STAGES, scheme_for
 
 
 def averaged_orbit(
@@ -44,9 +42,9 @@ def averaged_orbit(
     """The averaged limit as a first guess."""
     orbit = steady_orbit(system, points, intervals=intervals, grading=grading)
     w = load.at(orbit.stage_phases).w.reshape(-1, points)
-    weights = (jnp.asarray(GAUSS_B)[:, None, None] * orbit.widths).reshape(-1, points)
+    weights = (jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths).reshape(-1, points)
     averaged = averaged_limit(system, w, weights[:, 0] / (2 * jnp.pi))
-    return orbit._replace(centre=jnp.stack(averaged.centre))
+    return orbit.moved(centre=jnp.stack(averaged.centre))
 
 
 def steady_orbit(system: Motion, points: int, *, intervals: int, grading: float) -> Orbit:
@@ -57,12 +55,11 @@ def steady_orbit(system: Motion, points: int, *, intervals: int, grading: float)
         jnp.broadcast_to(system.steady(), (n, points)),
         jnp.zeros((n, intervals, points)),
         jnp.zeros((n, STAGES, intervals, points)),
+        scheme_for(system),
     )
 
 
-def lifted(
-    quasi_static: QuasiStatic, system: Motion, load: Modulation, orbit: Orbit
-) -> Orbit:
+def lifted(quasi_static: QuasiStatic, system: Motion, load: Modulation, orbit: Orbit) -> Orbit:
     """A quasi-static orbit as a first guess of another equation of motion."""
 
     def convert(Y: Array, theta: Array) -> Array:
@@ -75,11 +72,14 @@ def lifted(
         )
         return jnp.stack([*mechanical, *quasi_static.law_state(Y)])
 
-    stages = orbit.centre[:, None, None] + orbit.stage_deviations
-    theta = orbit.stage_phases
-    _, slopes = jax.jvp(convert, (stages, theta), (orbit.slopes, jnp.ones_like(theta)))
     nodes = convert(orbit.centre[:, None] + orbit.nodes, orbit.mesh[:-1])
-    return Orbit(orbit.mesh, nodes[:, 0], nodes - nodes[:, :1], slopes)
+    bare = Orbit(orbit.mesh, nodes[:, 0], nodes - nodes[:, :1], orbit.slopes, scheme_for(system))
+    theta = bare.stage_phases
+    inside, slopes = evaluate(orbit, theta.reshape(-1, theta.shape[-1]))
+    states = (orbit.centre[:, None] + inside).reshape(-1, *theta.shape)
+    slopes = slopes.reshape(states.shape)
+    _, slopes = jax.jvp(convert, (states, theta), (slopes, jnp.ones_like(theta)))
+    return bare.moved(slopes=slopes)
 
 
 class _Local(NamedTuple):
@@ -109,7 +109,7 @@ def _condense(local: _Local, orbit: Orbit) -> tuple[Array, Array]:
     per_stage = jnp.transpose(local.jacobian, (2, 0, 1, 3, 4))  # (stage, row, column, ...)
     constant = jnp.swapaxes(local.rates - orbit.slopes, 0, 1)[:, :, None]
     # Row blocks (I - h a_jk J_j | J_j, F_j - K_j), one per stage j, columns (k, state).
-    coupling = per_stage[:, :, None] * (orbit.widths * GAUSS_A[:, None, :, None, None, None])
+    coupling = per_stage[:, :, None] * (orbit.widths * orbit.scheme.a[:, None, :, None, None, None])
     identity = jnp.eye(STAGES)[:, None, :, None] * jnp.eye(n)[:, None, :]
     left = (identity[..., None, None] - coupling).reshape(STAGES, n, -1, *orbit.widths.shape)
     solution = _eliminate_stages(jnp.concatenate([left, per_stage, constant], axis=2))
@@ -139,17 +139,17 @@ def _eliminate_stages(rows: Array) -> Array:
     return jnp.stack(solved)
 
 
-def _transfer_maps(response: Array, widths: Array) -> Array:
+def _transfer_maps(response: Array, orbit: Orbit) -> Array:
     identity = jnp.eye(response.shape[0])[:, :, None, None]
-    return identity + widths * jnp.einsum("k,nkcmb->ncmb", GAUSS_B, response)
+    return identity + orbit.widths * jnp.einsum("k,nkcmb->ncmb", orbit.scheme.b, response)
 
 
 def _newton_step(system: Motion, load: Modulation, orbit: Orbit) -> tuple[_Local, Array, Array]:
     local = _localise(system, load, orbit)
     response, constant = _condense(local, orbit)
-    maps = _transfer_maps(response, orbit.widths)
+    maps = _transfer_maps(response, orbit)
     gap = jnp.roll(orbit.nodes, -1, axis=1) - orbit.nodes
-    rise = orbit.widths * jnp.einsum("k,nkmb->nmb", GAUSS_B, orbit.slopes + constant)
+    rise = orbit.widths * jnp.einsum("k,nkmb->nmb", orbit.scheme.b, orbit.slopes + constant)
     nodes = solve_cyclic(maps, rise - gap)
     slopes = jnp.einsum("nkcmb,cmb->nkmb", response, nodes) + constant
     return local, nodes, slopes
@@ -158,7 +158,7 @@ def _newton_step(system: Motion, load: Modulation, orbit: Orbit) -> tuple[_Local
 def newton_update(system: Motion, load: Modulation, orbit: Orbit) -> Orbit:
     """One undamped Newton step: at a converged orbit an identity with the orbit's derivative."""
     _, nodes, slopes = _newton_step(system, load, orbit)
-    return orbit._replace(nodes=orbit.nodes + nodes, slopes=orbit.slopes + slopes)
+    return orbit.moved(nodes=orbit.nodes + nodes, slopes=orbit.slopes + slopes)
 
 
 class NewtonResult(NamedTuple):
@@ -170,8 +170,8 @@ class NewtonResult(NamedTuple):
 
 
 def newton_orbit(
-    system: QuasiStatic,
-    load: Harmonic,
+    system: Motion,
+    load: Modulation,
     orbit: Orbit,
     *,
     tolerance: float,
@@ -193,7 +193,6 @@ def newton_orbit(
     largest_change : float
         Bound on the change of an exponent or logarithmic state in one step.
     """
-
     linear = jnp.array(system.linear)
     logarithmic = jnp.array([i for i in range(system.size) if i not in system.linear], int)
     # Against round-off where there is hardly any swing: of a force, see its rate.
@@ -202,7 +201,7 @@ def newton_orbit(
     def body(carry: tuple) -> tuple:
         orbit, _, steps = carry
         local, nodes, slopes = _newton_step(system, load, orbit)
-        stages = nodes[:, None] + orbit.widths * stage_sums(slopes)
+        stages = nodes[:, None] + orbit.widths * orbit.stage_sums(slopes)
         _, exponent = jax.jvp(lambda Y: system.log_slip(Y, local.at), (local.states,), (stages,))
         logarithms = jnp.abs(stages[logarithmic]).max((0, 1, 2), initial=0.0)
         change = jnp.maximum(jnp.abs(exponent).max((0, 1)), logarithms)
@@ -210,7 +209,8 @@ def newton_orbit(
         nodes = orbit.nodes + damping * nodes
         centre = orbit.centre + nodes[:, 0]
         nodes = nodes - nodes[:, :1]
-        moved = Orbit(orbit.mesh, centre, nodes, orbit.slopes + damping * slopes)
+        slopes = orbit.slopes + damping * slopes
+        moved = orbit.moved(centre=centre, nodes=nodes, slopes=slopes)
         swing = jnp.abs(moved.nodes[linear]).max(1) + floor
         relative = jnp.abs(stages[linear] - stages[linear, :1, :1]).max((1, 2)) / swing
         error = jnp.maximum(change, relative.max(0))
@@ -261,7 +261,7 @@ def collocation_response(
 ) -> CollocationResponse:
     """Mean, harmonics and monodromy of a converged orbit."""
     local = _localise(system, load, orbit)
-    weights = jnp.asarray(GAUSS_B)[:, None, None] * orbit.widths / (2 * jnp.pi)
+    weights = jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths / (2 * jnp.pi)
     constant, rest = system.force_split(
         orbit.centre[:, None, None], orbit.stage_deviations, local.at
     )
@@ -271,7 +271,7 @@ def collocation_response(
     ]
     mean = constant.reshape(-1) + (weights * rest).sum((0, 1))
     response, _ = _condense(local, orbit)
-    monodromy, log_scale = _scaled_product(_transfer_maps(response, orbit.widths))
+    monodromy, log_scale = _scaled_product(_transfer_maps(response, orbit))
     trace = jnp.trace(local.jacobian)
     return CollocationResponse(
         mean,

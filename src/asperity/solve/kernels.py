@@ -31,6 +31,9 @@ from asperity.solve.mesh import Orbit, evaluate, split
 _LARGEST_CHANGE = 2.0
 _NEWTON_TOLERANCE = 1e-8
 
+#: Times that a mesh is laid and Newton's method tried on it.
+_ROUNDS = 4
+
 #: Points in a block of the fast method; no power of two, at which arrays share cache lines.
 FAST_BLOCK = 240
 
@@ -167,12 +170,34 @@ def refine_orbit(
     one than what the failure left.
     """
     problem, guess = problem_and_orbit
-    guess = refined(*problem, guess, intervals)
-    result = _newton(problem, guess, 15)
-    orbit = jax.tree.map(
-        lambda new, old: jnp.where(result.error < ACCEPTED, new, old), result.orbit, guess
-    )
-    return orbit, _read(problem, orbit, harmonics, phases), result.error
+
+    def unfinished(carry: tuple) -> Array:
+        _, error, rounds = carry
+        return (rounds < _ROUNDS) & jnp.any(error > ACCEPTED)
+
+    def body(carry: tuple) -> tuple:
+        best, error, rounds = carry
+        mesh = refined(*problem, best, intervals)
+        result = _newton(problem, mesh, 15)
+        done = error < ACCEPTED
+        # What a failure left has at least put the mesh where the orbit is steep.
+        usable = jnp.isfinite(result.error)
+        moved = _where(usable, result.orbit, mesh)
+        return (
+            _where(done, best, moved),
+            jnp.where(done, error, result.error),
+            rounds + 1,
+        )
+
+    first = refined(*problem, guess, intervals)
+    start = (first, jnp.full(_points(problem), jnp.inf), 0)
+    orbit, error, _ = jax.lax.while_loop(unfinished, body, start)
+    orbit = _where(error < ACCEPTED, orbit, first)
+    return orbit, _read(problem, orbit, harmonics, phases), error
+
+
+def _where(condition: Array, yes: Orbit, no: Orbit) -> Orbit:
+    return jax.tree.map(lambda a, b: jnp.where(condition, a, b), yes, no)
 
 
 @partial(jax.jit, static_argnames=("parts",))

@@ -72,6 +72,10 @@ def solve_columns(matrix: Array, rhs: Array) -> Array:
         (a, b), (c, d) = matrix
         return jnp.stack([d * rhs[0] - b * rhs[1], a * rhs[1] - c * rhs[0]]) / (a * d - b * c)
     rest = jnp.concatenate([matrix, rhs], axis=1)
+    # Reflections mix rows: one that outweighs the others by more than 1e16, as those of fast
+    # motions do, would leave nothing of them.
+    size = jax.lax.stop_gradient(jnp.abs(matrix).max(1, keepdims=True))
+    rest = rest / jnp.where(size > 0, size, 1.0)
     diagonal, rows = [], []
     for _ in range(n):
         pivot, rest = reflect(rest)

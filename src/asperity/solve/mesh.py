@@ -5,35 +5,21 @@ A mesh is an array (intervals + 1, points) that rises from 0 to 2 pi for each op
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import dataclasses
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-#: Stages of the Gauss-Legendre collocation: order 8 at the nodes.
-STAGES = 4
+from asperity.solve.scheme import STAGES, Scheme
 
 #: Share of a mesh that is spread evenly whatever the error estimate says.
 _EVEN_SHARE = 0.3
 
 
-def _gauss_legendre(stages: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes c, matrix a and weights b of the Gauss-Legendre method on [0, 1]."""
-    x, weights = np.polynomial.legendre.leggauss(stages)
-    c = (x + 1) / 2
-    powers = np.arange(1, stages + 1)
-    a = (c[:, None] ** powers / powers) @ np.linalg.inv(np.vander(c, stages, increasing=True))
-    return c, a, weights / 2
-
-
-GAUSS_C, GAUSS_A, GAUSS_B = _gauss_legendre(STAGES)
-_MONOMIALS = np.linalg.inv(np.vander(GAUSS_C, STAGES, increasing=True))
-_TOP_LEGENDRE = np.linalg.inv(np.polynomial.legendre.legvander(2 * GAUSS_C - 1, STAGES - 1))[-1]
-
-
-class Orbit(NamedTuple):
+class Orbit(eqx.Module):
     """A piecewise polynomial periodic orbit of every operating point.
 
     Attributes
@@ -45,22 +31,29 @@ class Orbit(NamedTuple):
         States at the mesh points less `centre`, so that a small orbit keeps its relative accuracy.
     slopes : array, shape (size, STAGES, intervals, points)
         Derivatives at the collocation points.
+    scheme : Scheme
     """
 
     mesh: Array
     centre: Array
     nodes: Array
     slopes: Array
+    scheme: Scheme = eqx.field(static=True)
 
     @classmethod
-    def empty(cls, size: int, intervals: int, points: int) -> Orbit:
+    def empty(cls, scheme: Scheme, size: int, intervals: int, points: int) -> Orbit:
         """NumPy arrays to be filled in."""
         return cls(
             np.zeros((intervals + 1, points)),
             np.zeros((size, points)),
             np.zeros((size, intervals, points)),
             np.zeros((size, STAGES, intervals, points)),
+            scheme,
         )
+
+    def moved(self, **parts: Array) -> Orbit:
+        """The same with other arrays."""
+        return dataclasses.replace(self, **parts)
 
     @property
     def widths(self) -> Array:
@@ -70,17 +63,16 @@ class Orbit(NamedTuple):
     @property
     def stage_phases(self) -> Array:
         """Phases of the collocation points, shape (STAGES, intervals, points)."""
-        return self.mesh[:-1] + jnp.asarray(GAUSS_C)[:, None, None] * self.widths
+        return self.mesh[:-1] + jnp.asarray(self.scheme.c)[:, None, None] * self.widths
+
+    def stage_sums(self, slopes: Array) -> Array:
+        """a_jk slopes_k: increments of the states at the stages per unit width."""
+        return jnp.einsum("jk,nkmb->njmb", self.scheme.a, slopes)
 
     @property
     def stage_deviations(self) -> Array:
         """States at the collocation points less `centre`, shape as `slopes`."""
-        return self.nodes[:, None] + self.widths * stage_sums(self.slopes)
-
-
-def stage_sums(slopes: Array) -> Array:
-    """a_jk slopes_k: increments of the states at the stages per unit width."""
-    return jnp.einsum("jk,nkmb->njmb", GAUSS_A, slopes)
+        return self.nodes[:, None] + self.widths * self.stage_sums(self.slopes)
 
 
 def graded_mesh(intervals: int, points: int, grading: float) -> Array:
@@ -103,7 +95,7 @@ def evaluate(orbit: Orbit, theta: Array) -> tuple[Array, Array]:
 
     width = pick(orbit.widths)
     x = (theta - pick(orbit.mesh[:-1])) / width
-    coefficients = jnp.einsum("kj,njmb->nkmb", _MONOMIALS, orbit.slopes)
+    coefficients = jnp.einsum("kj,njmb->nkmb", orbit.scheme.monomials, orbit.slopes)
     states, slopes = [], []
     for node, coefficient in zip(orbit.nodes, coefficients, strict=True):
         picked = [pick(c) for c in coefficient]
@@ -116,10 +108,10 @@ def evaluate(orbit: Orbit, theta: Array) -> tuple[Array, Array]:
 def on_mesh(orbit: Orbit, mesh: Array) -> Orbit:
     """The same orbit represented on another mesh."""
     nodes, _ = evaluate(orbit, mesh[:-1])
-    bare = Orbit(mesh, orbit.centre, nodes, orbit.slopes)
+    bare = orbit.moved(mesh=mesh, nodes=nodes)
     phases = bare.stage_phases
     _, slopes = evaluate(orbit, phases.reshape(-1, phases.shape[-1]))
-    return bare._replace(slopes=slopes.reshape(nodes.shape[0], *phases.shape))
+    return bare.moved(slopes=slopes.reshape(nodes.shape[0], *phases.shape))
 
 
 def split(orbit: Orbit, parts: int) -> Orbit:
@@ -142,7 +134,7 @@ def equidistributed(orbit: Orbit, scales: Array, intervals: int) -> Orbit:
         Intervals of the new mesh.
     """
     widths = orbit.widths
-    top = jnp.einsum("k,nkmb->nmb", _TOP_LEGENDRE, orbit.slopes)
+    top = jnp.einsum("k,nkmb->nmb", orbit.scheme.top, orbit.slopes)
     local = (jnp.abs(top) * widths * scales).max(0)
     density = (local + 1e-14) ** (1 / (STAGES + 1)) / widths
     density = density / (density * widths).sum(0)

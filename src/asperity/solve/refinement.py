@@ -77,7 +77,7 @@ def refine(
     """
     previous: dict[int, _State] = {}
     for intervals in MESHES:
-        finer = Orbit.empty(problem.system.size, intervals, len(block))
+        finer = Orbit.empty(orbit.scheme, problem.system.size, intervals, len(block))
         solve = partial(
             refine_orbit,
             intervals=intervals,

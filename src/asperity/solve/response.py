@@ -247,7 +247,8 @@ class PeriodicResponse:
         }
         values |= {"K": (self.slider.K, "N/m"), "W0": (self.slider.W0, "N")}
         if not isinstance(self.motion, QuasiStatic):
-            values |= {"M": (self.slider.M, "kg"), "eta": (self.motion.eta, "N s/m")}
+            eta = self.motion.damping * self.slider.W0 / self.velocity
+            values |= {"M": (self.slider.M, "kg"), "eta": (eta, "N s/m")}
         values |= {"V": (self.velocity, "m/s"), "epsilon": (self.epsilon, "")}
         values["frequency"] = (self.frequency, "Hz")
         return "; ".join(f"{name} = {_shown(*value)}" for name, value in values.items())

@@ -14,6 +14,7 @@ from asperity.solve.homotopy import along_amplitude, along_frequency, follow
 from asperity.solve.kernels import ACCEPTED, Problem, first_orbit, stiffness_of_steady_sliding
 from asperity.solve.mesh import Orbit
 from asperity.solve.refinement import MESHES, chunk_size
+from asperity.solve.scheme import scheme_for
 
 Float = NDArray[np.float64]
 
@@ -39,7 +40,8 @@ def starting_orbits(problem: Problem, points: int) -> Start:
         NumPy arrays with the points along the last axis.
     points : int
     """
-    orbit = Orbit.empty(problem.system.size, _INTERVALS, points)
+    system = problem.system
+    orbit = Orbit.empty(scheme_for(system), system.size, _INTERVALS, points)
     solved = _from_averaged(problem, orbit, np.arange(points))
     reached = solved.astype(float)
     lost = np.flatnonzero(~solved)
