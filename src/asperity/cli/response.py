@@ -33,9 +33,9 @@ F/W0 = mean_friction + sum of mu_n cos(n w t + phase_n).
 
 \b
 Table: columns law, A, B, D0, mu0, V0, K, M, W0, alpha, lambda, V, epsilon,
-frequency, in SI and without units. What a row leaves open is taken from --law,
---set, -V, -e, -f and --material; other columns are kept. A row that cannot be
-solved says why in the column 'result'.
+frequency, inertia (1 or 0), eta (N s/m), in SI and without units. What a row
+leaves open is taken from --law, --set, -V, -e, -f and --material; other columns
+are kept. A row that cannot be solved says why in the column 'result'.
 """
 
 
@@ -45,6 +45,12 @@ solved says why in the column 'result'.
 @click.option("-V", "--velocity", metavar="VALUE", help='Pulling velocity, like "1 um/s".')
 @click.option("-e", "--epsilon", metavar="VALUE", help="Relative amplitude of the load, 0 to < 1.")
 @click.option("-f", "--frequency", metavar="VALUE", help='Modulation frequency, like "120 Hz".')
+@click.option("--inertia", is_flag=True, help="Let the mass of the slider count.")
+@click.option(
+    "--radiation-damping",
+    metavar="VALUE",
+    help='Force of radiated waves per velocity, like "500 N*s/m".',
+)
 @set_option('--set A=0.013 --set "K=0.3 N/um"')
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
 @click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
@@ -56,6 +62,8 @@ def response(
     velocity: str | None,
     epsilon: str | None,
     frequency: str | None,
+    inertia: bool,
+    radiation_damping: str | None,
     settings: tuple[str, ...],
     table: Path | None,
     out: Path | None,
@@ -65,10 +73,17 @@ def response(
     """Periodic response to a modulated normal load.
 
     Mean friction, harmonics of the force and Floquet multipliers of the periodic orbit, be it
-    stable or not, without inertia.
+    stable or not; without inertia unless it is asked for.
     """
     given = settings_of(settings)
-    for name, value in (("V", velocity), ("epsilon", epsilon), ("frequency", frequency)):
+    options = {
+        "V": velocity,
+        "epsilon": epsilon,
+        "frequency": frequency,
+        "inertia": "1" if inertia else None,
+        "eta": radiation_damping,
+    }
+    for name, value in options.items():
         add_setting(given, name, value)
     if table is not None:
         if out is None:

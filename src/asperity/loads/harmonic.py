@@ -24,7 +24,7 @@ class Harmonic(Modulation):
     def at(self, theta: ArrayLike) -> Excitation:
         """Load and slope at the phase `theta` (rad)."""
         return Excitation(
-            w=1 + self.epsilon * jnp.cos(theta), w_slope=-self.epsilon * jnp.sin(theta)
+            w=jnp.asarray(1 + self.epsilon * jnp.cos(theta)), w_slope=-self.epsilon * jnp.sin(theta)
         )
 
     @property

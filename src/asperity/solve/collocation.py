@@ -22,9 +22,9 @@ from asperity.slider import Motion, QuasiStatic
 from asperity.solve.averaged import averaged_limit
 from asperity.solve.cyclic import solve_cyclic
 from asperity.solve.linear import (
+    inverse_points,
     jacobian_columns,
     product,
-    solve_columns,
     spectral_abscissa,
 )
 from asperity.solve.mesh import (
@@ -82,7 +82,7 @@ def lifted(quasi_static: QuasiStatic, system: Motion, load: Modulation, orbit: O
     return bare.moved(slopes=slopes)
 
 
-class _Local(NamedTuple):
+class Local(NamedTuple):
     """The equations at the collocation points."""
 
     at: Excitation
@@ -91,30 +91,30 @@ class _Local(NamedTuple):
     jacobian: Array  # (row, column, STAGES, intervals, points)
 
 
-def _localise(system: Motion, load: Modulation, orbit: Orbit) -> _Local:
+def localise(system: Motion, load: Modulation, orbit: Orbit) -> Local:
     theta = orbit.stage_phases
     at = load.at(theta)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
     rates, columns = jacobian_columns(lambda Y: system.rates(Y, at), states)
-    return _Local(at, states, rates, jnp.stack(columns, axis=1))
+    return Local(at, states, rates, jnp.stack(columns, axis=1))
 
 
-def _condense(local: _Local, orbit: Orbit) -> tuple[Array, Array]:
+def condense(local: Local, orbit: Orbit, *right: Array) -> list[Array]:
     """Slopes at the stages as a linear function of the state at the left node.
 
-    Returns the matrix (n, STAGES, n, intervals, points) and the constant part
-    (n, STAGES, intervals, points) of the change of the slopes.
+    Returns the matrix (n, STAGES, n, intervals, points) and for each right-hand side, of shape
+    (n, STAGES, intervals, points), the constant part of the change of the slopes.
     """
     n = local.rates.shape[0]
     per_stage = jnp.transpose(local.jacobian, (2, 0, 1, 3, 4))  # (stage, row, column, ...)
-    constant = jnp.swapaxes(local.rates - orbit.slopes, 0, 1)[:, :, None]
+    constants = [jnp.swapaxes(r, 0, 1)[:, :, None] for r in right]
     # Row blocks (I - h a_jk J_j | J_j, F_j - K_j), one per stage j, columns (k, state).
     coupling = per_stage[:, :, None] * (orbit.widths * orbit.scheme.a[:, None, :, None, None, None])
     identity = jnp.eye(STAGES)[:, None, :, None] * jnp.eye(n)[:, None, :]
     left = (identity[..., None, None] - coupling).reshape(STAGES, n, -1, *orbit.widths.shape)
-    solution = _eliminate_stages(jnp.concatenate([left, per_stage, constant], axis=2))
+    solution = _eliminate_stages(jnp.concatenate([left, per_stage, *constants], axis=2))
     solution = jnp.swapaxes(solution, 0, 1)
-    return solution[:, :, :n], solution[:, :, n]
+    return [solution[:, :, :n], *(solution[:, :, n + i] for i in range(len(right)))]
 
 
 def _eliminate_stages(rows: Array) -> Array:
@@ -127,7 +127,8 @@ def _eliminate_stages(rows: Array) -> Array:
     solved = []
     for _ in range(stages):
         pivot, rest = rows[0, :, :n], rows[0, :, n:]
-        own = solve_columns(pivot, rest)
+        inverse = inverse_points([list(row) for row in pivot])
+        own = product(jnp.stack([jnp.stack(row) for row in inverse]), rest)
         below, rows = rows[1:, :, :n], rows[1:, :, n:]
         rows = rows - (below[:, :, :, None] * own[None, None]).sum(2)
         solved.append(own)
@@ -139,15 +140,15 @@ def _eliminate_stages(rows: Array) -> Array:
     return jnp.stack(solved)
 
 
-def _transfer_maps(response: Array, orbit: Orbit) -> Array:
+def transfer_maps(response: Array, orbit: Orbit) -> Array:
     identity = jnp.eye(response.shape[0])[:, :, None, None]
     return identity + orbit.widths * jnp.einsum("k,nkcmb->ncmb", orbit.scheme.b, response)
 
 
-def _newton_step(system: Motion, load: Modulation, orbit: Orbit) -> tuple[_Local, Array, Array]:
-    local = _localise(system, load, orbit)
-    response, constant = _condense(local, orbit)
-    maps = _transfer_maps(response, orbit)
+def _newton_step(system: Motion, load: Modulation, orbit: Orbit) -> tuple[Local, Array, Array]:
+    local = localise(system, load, orbit)
+    response, constant = condense(local, orbit, local.rates - orbit.slopes)
+    maps = transfer_maps(response, orbit)
     gap = jnp.roll(orbit.nodes, -1, axis=1) - orbit.nodes
     rise = orbit.widths * jnp.einsum("k,nkmb->nmb", orbit.scheme.b, orbit.slopes + constant)
     nodes = solve_cyclic(maps, rise - gap)
@@ -260,7 +261,7 @@ def collocation_response(
     system: Motion, load: Modulation, orbit: Orbit, *, harmonics: int
 ) -> CollocationResponse:
     """Mean, harmonics and monodromy of a converged orbit."""
-    local = _localise(system, load, orbit)
+    local = localise(system, load, orbit)
     weights = jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths / (2 * jnp.pi)
     constant, rest = system.force_split(
         orbit.centre[:, None, None], orbit.stage_deviations, local.at
@@ -270,8 +271,8 @@ def collocation_response(
         2 * (weights * rest * jnp.exp(-1j * k * theta)).sum((0, 1)) for k in range(1, harmonics + 1)
     ]
     mean = constant.reshape(-1) + (weights * rest).sum((0, 1))
-    response, _ = _condense(local, orbit)
-    monodromy, log_scale = _scaled_product(_transfer_maps(response, orbit))
+    (response,) = condense(local, orbit)
+    monodromy, log_scale = _scaled_product(transfer_maps(response, orbit))
     trace = jnp.trace(local.jacobian)
     return CollocationResponse(
         mean,

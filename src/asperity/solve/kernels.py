@@ -200,6 +200,13 @@ def _where(condition: Array, yes: Orbit, no: Orbit) -> Orbit:
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), yes, no)
 
 
+@partial(jax.jit, static_argnames=("harmonics",))
+def read_orbit(problem_and_orbit: tuple[Problem, Orbit], *, harmonics: int) -> Reading:
+    """The reading of an orbit as it is."""
+    problem, orbit = problem_and_orbit
+    return _read(problem, orbit, harmonics, 0)
+
+
 @partial(jax.jit, static_argnames=("parts",))
 def split_reading(problem_and_orbit: tuple[Problem, Orbit], *, parts: int) -> Reading:
     """Multipliers by transfer maps over parts of the intervals, for stiff but smooth orbits."""

@@ -29,10 +29,36 @@ def inverse_points(matrix: Matrix) -> Matrix:
         (a, b), (c, d) = matrix
         scale = 1 / (a * d - b * c)
         return [[d * scale, -b * scale], [-c * scale, a * scale]]
-    entries = jnp.stack([jnp.stack(row) for row in matrix])
-    identity = jnp.eye(n).reshape((n, n) + (1,) * (entries.ndim - 2))
-    inverse = solve_columns(entries, jnp.broadcast_to(identity, entries.shape))
-    return [list(row) for row in inverse]
+    # By the Schur complement of the first two unknowns: the mechanical ones, which a step of the
+    # spring and the mass never makes singular.
+    upper = [row[:2] for row in matrix[:2]], [row[2:] for row in matrix[:2]]
+    lower = [row[:2] for row in matrix[2:]], [row[2:] for row in matrix[2:]]
+    first = inverse_points(upper[0])
+    across, down = _multiply(first, upper[1]), _multiply(lower[0], first)
+    rest = inverse_points(_subtract(lower[1], _multiply(lower[0], across)))
+    corner = _multiply(rest, down)
+    return [
+        *(
+            [*a, *(-b for b in c)]
+            for a, c in zip(
+                _add(first, _multiply(across, corner)), _multiply(across, rest), strict=True
+            )
+        ),
+        *([*(-a for a in b), *c] for b, c in zip(corner, rest, strict=True)),
+    ]
+
+
+def _multiply(a: Matrix, b: Matrix) -> Matrix:
+    columns = list(zip(*b, strict=True))
+    return [[sum(x * y for x, y in zip(row, c, strict=True)) for c in columns] for row in a]
+
+
+def _add(a: Matrix, b: Matrix) -> Matrix:
+    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+
+
+def _subtract(a: Matrix, b: Matrix) -> Matrix:
+    return [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
 
 
 def solve_points(matrix: Array, rhs: Array) -> Array:

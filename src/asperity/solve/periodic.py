@@ -82,8 +82,9 @@ def periodic_response(
     Notes
     -----
     Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). Where converged,
-    mean, mu1, mu2 and multipliers are good to 1e-8 relative (multipliers of modulus below 1e-12:
-    to 1e-20 absolute).
+    mean, mu1, mu2 and multipliers are good to 1e-8 relative (multipliers of modulus below 1e-12
+    to 1e-20 absolute; with inertia or several states of the law, those below 1e-6 to 1e-14, and
+    those below 1e-7 of the largest to 1e-15 of that).
     """
     V = checked_positive(velocity, "velocity", "velocity")
     f = checked_positive(frequency, "frequency", "frequency")

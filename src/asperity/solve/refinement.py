@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 from asperity.solve.batch import Indices, put, run_chunks, take
 from asperity.solve.floquet import LARGEST_LOG, from_logs
 from asperity.solve.found import Found, Options, logs_of, store
-from asperity.solve.kernels import ACCEPTED, Problem, Reading, refine_orbit, split_reading
+from asperity.solve.kernels import (
+    ACCEPTED,
+    Problem,
+    Reading,
+    read_orbit,
+    refine_orbit,
+    split_reading,
+)
 from asperity.solve.mesh import Orbit
 from asperity.solve.outcome import Outcome
 
@@ -21,13 +28,19 @@ AGREEMENT = 2e-7
 
 #: Orbits are followed on the first of these meshes, and refined up to the last.
 MESHES = (48, 144, 432, 1296)
-_SPLITS = (3, 9)
+_SPLITS = (3, 9, 27)
 
-#: Interval-points in a chunk: keeps the working set of collocation within a core's cache.
-_CHUNK_INTERVALS = 1536
+#: Agreement between two different meshes of one size, at which either is trusted to 1e-8.
+_SAME_SIZE_AGREEMENT = 1e-9
 
-#: Multipliers below this modulus are compared absolutely: no experiment sees them.
-_VANISHING = 1e-12
+#: Interval-points in a chunk, for up to two states and for more: keeps the working set of
+#: collocation within a core's cache.
+_CHUNK_INTERVALS = (1536, 384)
+
+#: Multipliers below this modulus are compared absolutely: no experiment sees them. Two have their
+#: product from Liouville's formula; of more the small ones drown in the round-off of the large.
+_VANISHING = (1e-12, 1e-6)
+_DROWNED = 1e-7
 
 #: Where the largest eigenvalue of the Jacobian integrates to less than this, all multipliers
 #: vanish, by many orders of magnitude, whatever the transfer maps of a stiff method say of them.
@@ -38,9 +51,9 @@ _DEAD = -200.0
 _OVERFLOW, _HOPELESS = 750.0, 5000.0
 
 
-def chunk_size(intervals: int) -> int:
-    """Points per chunk on a mesh of `intervals`."""
-    return max(4, _CHUNK_INTERVALS // intervals)
+def chunk_size(intervals: int, size: int) -> int:
+    """Points per chunk on a mesh of `intervals`, for `size` states."""
+    return max(4, _CHUNK_INTERVALS[size > 2] // intervals)
 
 
 class _State(NamedTuple):
@@ -75,9 +88,11 @@ def refine(
         Points of the block that have an orbit.
     options : Options
     """
-    previous: dict[int, _State] = {}
+    size = problem.system.size
+    previous = _states(problem, orbit, index, options)
+    agreement = _SAME_SIZE_AGREEMENT
     for intervals in MESHES:
-        finer = Orbit.empty(orbit.scheme, problem.system.size, intervals, len(block))
+        finer = Orbit.empty(orbit.scheme, size, intervals, len(block))
         solve = partial(
             refine_orbit,
             intervals=intervals,
@@ -86,12 +101,13 @@ def refine(
         )
         settled = np.zeros(len(block), dtype=bool)
         for part, (fine, reading, error) in run_chunks(
-            solve, (problem, orbit), index, chunk_size(intervals)
+            solve, (problem, orbit), index, chunk_size(intervals, size)
         ):
             put(finer, part, fine)
             found.iterations[block[part]] = intervals
-            settled[part] = _compare(found, block[part], part, previous, reading, error)
+            settled[part] = _compare(found, block[part], part, previous, reading, error, agreement)
         options.progress(int(settled[index].sum()))
+        agreement = AGREEMENT
         orbit, index = finer, index[~settled[index]]
         if not len(index):
             return
@@ -101,6 +117,18 @@ def refine(
     options.progress(len(index))
 
 
+def _states(problem: Problem, orbit: Orbit, index: Indices, options: Options) -> dict[int, _State]:
+    """What the orbits on the mesh that they were found on are worth."""
+    states: dict[int, _State] = {}
+    solve = partial(read_orbit, harmonics=options.harmonics)
+    chunk = chunk_size(MESHES[0], problem.system.size)
+    for part, reading in run_chunks(solve, (problem, orbit), index, chunk):
+        logs = logs_of(reading)
+        for k, point in enumerate(part):
+            states[point] = _State(reading.mean_friction[k], reading.harmonics[:2, k], logs[:, k])
+    return states
+
+
 def _compare(
     found: Found,
     rows: Indices,
@@ -108,6 +136,7 @@ def _compare(
     previous: dict[int, _State],
     reading: Reading,
     error: NDArray[np.float64],
+    agreement: float,
 ) -> NDArray[np.bool_]:
     """Hold each point against its previous mesh; returns which of them are settled."""
     settled = np.zeros(len(part), dtype=bool)
@@ -119,16 +148,16 @@ def _compare(
         state = _State(reading.mean_friction[k], reading.harmonics[:2, k], logs[:, k])
         before, previous[point] = previous.get(point), state
         orbit_gap, multiplier_gap = _gaps(before, state)
-        if orbit_gap <= AGREEMENT and reading.growth[k] < _DEAD:
+        if orbit_gap <= agreement and reading.growth[k] < _DEAD:
             logs[:, k], multiplier_gap = _frozen_logs(reading, k), 0.0
-        elif orbit_gap <= AGREEMENT and reading.log_determinant[k] > _HOPELESS * len(logs):
+        elif orbit_gap <= agreement and reading.log_determinant[k] > _HOPELESS * len(logs):
             logs[:, k], multiplier_gap = (
                 _overflowing_logs(len(logs), reading.log_determinant[k]),
                 0.0,
             )
-        if orbit_gap > AGREEMENT:
+        if orbit_gap > agreement:
             found.outcome[rows[k]], found.detail[rows[k]] = Outcome.NOT_RESOLVED, orbit_gap
-        elif multiplier_gap > AGREEMENT:
+        elif multiplier_gap > agreement:
             found.outcome[rows[k]] = Outcome.MULTIPLIERS_NOT_RESOLVED
             found.detail[rows[k]] = multiplier_gap
         else:
@@ -147,7 +176,7 @@ def _split(problem: Problem, found: Found, block: Indices, orbit: Orbit, index: 
     """Settle the multipliers of resolved orbits on ever finer transfer maps."""
     for parts in _SPLITS:
         solve = partial(split_reading, parts=parts)
-        chunk = max(1, chunk_size(MESHES[-1] * parts))
+        chunk = max(1, chunk_size(MESHES[-1] * parts, problem.system.size))
         for part, reading in run_chunks(solve, (problem, orbit), index, chunk):
             logs, rows = logs_of(reading), block[part]
             gap = np.array(
@@ -208,7 +237,10 @@ def _multiplier_gap(before: NDArray[np.complex128], now: NDArray[np.complex128])
     # Beyond doubles the logarithms are compared, the multipliers elsewhere.
     huge = now.real > LARGEST_LOG
     with np.errstate(invalid="ignore", over="ignore"):
-        gaps = np.abs(old - new) / np.maximum(np.abs(new), _VANISHING)
+        several = len(new) > 2
+        largest = np.minimum(np.abs(new).max(initial=0.0), np.exp(LARGEST_LOG))
+        floor = max(_VANISHING[several], several * _DROWNED * largest)
+        gaps = np.abs(old - new) / np.maximum(np.abs(new), floor)
         turned = np.abs(np.exp(1j * (before.imag - now.imag)) - 1)
         apart = np.abs(before.real - now.real) / np.abs(now.real)
         gaps = np.where(huge, np.maximum(apart, turned), gaps)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.polynomial.legendre import Legendre, leggauss, legvander
 from numpy.typing import NDArray
 
-from asperity.slider import Motion, StiffInertial
+from asperity.slider import Motion, RadiatingAsperities, StiffInertial
 
 #: Collocation points in an interval.
 STAGES = 4
@@ -72,4 +72,4 @@ RADAU = Scheme.at("Radau IIA", _radau_points())
 
 def scheme_for(system: Motion) -> Scheme:
     """The method for an equation of motion."""
-    return RADAU if isinstance(system, StiffInertial) else GAUSS
+    return RADAU if isinstance(system, StiffInertial | RadiatingAsperities) else GAUSS

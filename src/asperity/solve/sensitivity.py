@@ -107,7 +107,7 @@ def sensitivities(
         _differentiate,
         (problem, start.orbit),
         np.flatnonzero(start.found),
-        chunk_size(_INTERVALS),
+        chunk_size(_INTERVALS, size),
     ):
         converged[part] = error < ACCEPTED
         kept = np.flatnonzero(error < ACCEPTED)

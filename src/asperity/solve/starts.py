@@ -57,7 +57,9 @@ def starting_orbits(problem: Problem, points: int) -> Start:
 def _from_averaged(problem: Problem, orbit: Orbit, index: Indices) -> NDArray[np.bool_]:
     solved = np.zeros(orbit.centre.shape[-1], dtype=bool)
     solve = partial(first_orbit, intervals=_INTERVALS)
-    for part, (first, error) in run_chunks(solve, problem, index, chunk_size(_INTERVALS)):
+    for part, (first, error) in run_chunks(
+        solve, problem, index, chunk_size(_INTERVALS, problem.system.size)
+    ):
         good = error < ACCEPTED
         put(orbit, part[good], take(first, np.flatnonzero(good)))
         solved[part] = good

@@ -1,7 +1,7 @@
 """One operating point from numbers by name: law, machine and drive as tables write them.
 
-The names are those of the table's columns: the parameters of the law, ``K, W0, M`` of the machine,
-``V, epsilon, frequency`` of the drive.
+The names are those of the table's columns: the parameters of the law, ``K, W0, M, eta`` of the
+machine, ``V, epsilon, frequency`` of the drive, and ``inertia``, 1 where the mass counts.
 """
 
 from __future__ import annotations
@@ -10,6 +10,9 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
 from asperity.laws import Law, get_law, registered
@@ -33,10 +36,16 @@ class Quantity:
         A key of `KINDS`.
     check : callable
         Text with a unit, number or array to SI; raises `InputError` if the value breaks the rule.
+    default : float or None
+        What holds where nothing is given; None where something must be.
+    words : mapping of str to float
+        Texts that stand for numbers.
     """
 
     kind: str
     check: Callable[[Any], Any]
+    default: float | None = None
+    words: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def unit(self) -> str:
@@ -57,22 +66,42 @@ class Sourced:
     origin: str
 
 
-def _quantity(name: str, kind: str, rule: str) -> Quantity:
-    return Quantity(kind, partial(checked, name=name, kind=kind, rule=rule))
+def _quantity(name: str, kind: str, rule: str, default: float | None = None) -> Quantity:
+    return Quantity(kind, partial(checked, name=name, kind=kind, rule=rule), default)
+
+
+_WORDS = {"true": 1.0, "yes": 1.0, "false": 0.0, "no": 0.0}
+
+
+def _switch(value: Any) -> Any:
+    """1 or 0, or a word for it."""
+    array = np.asarray(
+        _WORDS.get(value.strip().lower(), value) if isinstance(value, str) else value
+    )
+    try:
+        numbers = array.astype(float)
+    except ValueError:
+        numbers = np.array(np.nan)
+    bad = array[~np.isin(numbers, (0.0, 1.0))]
+    if bad.size:
+        raise InputError(
+            f"inertia must be 1 or 0, got {bad.flat[0]}; write 1 where the mass counts, 0 elsewhere"
+        )
+    return numbers
 
 
 _MACHINE = {
     "K": _quantity("slider.K", "stiffness", "positive"),
     "W0": _quantity("slider.W0", "force", "positive"),
-    "M": _quantity("slider.M", "mass", "not negative"),
+    "M": _quantity("slider.M", "mass", "not negative", 0.0),
+    "eta": _quantity("radiation_damping", "damping", "not negative", 0.0),
 }
 _DRIVE = {
     "V": _quantity("velocity", "velocity", "positive"),
     "epsilon": Quantity("dimensionless", checked_epsilon),
     "frequency": _quantity("frequency", "frequency", "positive"),
+    "inertia": Quantity("dimensionless", _switch, 0.0, _WORDS),
 }
-#: The quasi-static equations do not contain the mass.
-_OPTIONAL = frozenset({"M"})
 
 
 def quantities(law: type[Law]) -> dict[str, Quantity]:
@@ -91,7 +120,7 @@ def all_quantities() -> dict[str, Quantity]:
 
 def required(law: type[Law]) -> tuple[str, ...]:
     """Names of the numbers without which a point with this law cannot be solved."""
-    return tuple(name for name in quantities(law) if name not in _OPTIONAL)
+    return tuple(name for name, q in quantities(law).items() if q.default is None)
 
 
 def _of_field(field: dataclasses.Field[Any]) -> Quantity:
@@ -179,17 +208,41 @@ def respond(
     ----------
     law : type of Law
     values : mapping of str to number or array
-        SI values by the names of `quantities`.
+        SI values by the names of `quantities`. Inertia, damping and elastic asperities
+        must count at all points or at none: see `motions`.
     progress : callable, optional
         See `periodic_response`.
     """
     fields = {f.name: values[f.name.rstrip("_")] for f in dataclasses.fields(law)}
-    mass = {"mass": values["M"]} if "M" in values else {}
-    slider = Slider(law(**fields), spring=values["K"], load=values["W0"], **mass)
+    slider = Slider(law(**fields), spring=values["K"], load=values["W0"], mass=values.get("M", 0.0))
+    damped = np.any(np.asarray(values.get("eta", 0.0)) > 0)
     return periodic_response(
         slider,
         velocity=values["V"],
         epsilon=values["epsilon"],
         frequency=values["frequency"],
+        inertia=bool(np.any(values.get("inertia", 0.0))),
+        radiation_damping=values["eta"] if damped else None,
         progress=progress,
     )
+
+
+def motions(values: Mapping[str, NDArray[np.float64]]) -> list[NDArray[np.intp]]:
+    """Groups of points with one equation of motion, as indices.
+
+    Parameters
+    ----------
+    values : mapping of str to array, shape (points,)
+        As for `respond`.
+    """
+    rows = len(values["V"])
+    traits = [np.asarray(values.get(n, np.zeros(rows))) > 0 for n in ("inertia", "eta", "lambda")]
+    kinds = sum(trait * 2**i for i, trait in enumerate(traits))
+    # Without inertia and damping elastic and rigid asperities share their equation.
+    kinds = np.where(kinds % 4 == 0, 0, kinds)
+    return [np.flatnonzero(kinds == kind) for kind in np.unique(kinds)]
+
+
+def without_mass(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.bool_]:
+    """Points that ask for inertia and have no mass."""
+    return (np.asarray(values["inertia"]) > 0) & ~(np.asarray(values["M"]) > 0)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.laws import Law
-from asperity.study.operating_point import Quantity, quantities, required
+from asperity.study.operating_point import Quantity, quantities, required, without_mass
 
 Row = list[str]
 
@@ -55,7 +55,8 @@ def read_numbers(
     for name, quantity in quantities(law).items():
         place = columns.get(name)
         cells = [""] * len(rows) if place is None else [row[place] for row in rows]
-        numbers = _parsed(cells, name, quantity, filled.get(name, math.nan), reasons)
+        default = math.nan if quantity.default is None else quantity.default
+        numbers = _parsed(cells, name, quantity, filled.get(name, default), reasons)
         absent = np.isnan(numbers)
         if name in required(law):
             for i in np.flatnonzero(absent):
@@ -64,9 +65,11 @@ def read_numbers(
                     "material that has it"
                 )
         _check(numbers, ~absent, quantity, reasons)
-        # An optional number is used where the whole block has it.
-        if name in required(law) or not absent.any():
-            values[name] = numbers
+        values[name] = numbers
+    for i in np.flatnonzero(without_mass(values)):
+        reasons[i] = reasons[i] or (
+            "M must be positive where inertia is 1, got 0; fill it in or name a material with it"
+        )
     return values, reasons
 
 
@@ -92,7 +95,7 @@ def _number(
     if not text:
         return fill
     try:
-        number = float(text)
+        number = quantity.words[text.lower()] if text.lower() in quantity.words else float(text)
     except ValueError:
         number = math.nan
     if math.isfinite(number):

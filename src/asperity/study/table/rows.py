@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from asperity.errors import InputError
 from asperity.laws import get_law
 from asperity.solve import PeriodicResponse
-from asperity.study.operating_point import respond
+from asperity.study.operating_point import motions, respond
 from asperity.study.table.cells import Row, fit_width, read_numbers
 from asperity.study.table.columns import RESULTS
 
@@ -92,11 +92,11 @@ def solve_block(
     results = Results([reason for _, reason in fitted])
     for name, members in _by_law(rows, columns.get("law"), law, results.reasons).items():
         solved = _solve_law(name, [rows[i] for i in members], columns, filled, progress)
-        index, response, reasons = solved
+        responses, reasons = solved
         for i, reason in zip(members, reasons, strict=True):
             results.reasons[i] = reason
-        progress(len(members) - len(index))
-        if response is not None:
+        progress(sum(bool(reason) for reason in reasons))
+        for index, response in responses:
             results.put(np.array(members)[index], response)
     return rows, results
 
@@ -119,16 +119,17 @@ def _solve_law(
     columns: Mapping[str, int],
     filled: Mapping[str, float],
     progress: Callable[[int], None],
-) -> tuple[NDArray[np.intp], PeriodicResponse | None, list[str]]:
-    """Rows that could be solved, their response, and the reason of each row that could not."""
-    nothing = np.array([], dtype=np.intp)
+) -> tuple[list[tuple[NDArray[np.intp], PeriodicResponse]], list[str]]:
+    """Groups of rows and their response, and the reason of each row that has none."""
     try:
         kind = get_law(name)
     except InputError as error:
-        return nothing, None, [str(error)] * len(rows)
+        return [], [str(error)] * len(rows)
     values, reasons = read_numbers(rows, kind, columns, filled)
     index = np.array([i for i, reason in enumerate(reasons) if not reason], dtype=np.intp)
-    if not index.size:
-        return nothing, None, reasons
-    response = respond(kind, {n: v[index] for n, v in values.items()}, progress)
-    return index, response, reasons
+    values = {n: v[index] for n, v in values.items()}
+    responses = [
+        (index[group], respond(kind, {n: v[group] for n, v in values.items()}, progress))
+        for group in motions(values)
+    ]
+    return responses, reasons
