@@ -1,48 +1,14 @@
-"""A friction law written outside the package: Ruina's slip law.
+"""Ageing or slip? Two laws with one linear response, told apart by the mean under modulation.
 
-Friction as in Rice-Ruina (Eq. 1 of Bureau et al. 2000); the state moves only while the slider
-slips, whereas in the ageing law it grows at rest, too:
+Friction is that of Eq. (1) of Bureau et al. (2000) in both. The state grows at rest in the ageing
+law, and moves only while the slider slips in that of Ruina (1983):
 
-    dPhi/dt = -(v Phi / D0) ln(v Phi / D0).
-
-The law's equations are all there is to write:
-periodic response, stability and linear response come with the package.
+    dPhi/dt = 1 - v Phi / D0        dPhi/dt = -(v Phi / D0) ln(v Phi / D0).
 """
 
-from typing import ClassVar
-
-import jax.numpy as jnp
 import numpy as np
 
 import asperity as asp
-from asperity.laws import Law, parameter, register
-
-
-@register
-class RuinaSlip(Law):
-    """Rice-Ruina friction with the slip law (Ruina 1983); state: ``phi = ln(V0 Phi / D0)``."""
-
-    name: ClassVar[str] = "ruina-slip"
-    source: ClassVar[str] = "ruina1983"
-    state_names: ClassVar[tuple[str, ...]] = ("log_age",)
-
-    mu0: float = parameter("law.mu0", "dimensionless")
-    A: float = parameter("law.A", "dimensionless")
-    B: float = parameter("law.B", "dimensionless")
-    D0: float = parameter("law.D0", "length")
-    V0: float = parameter("law.V0", "velocity")
-
-    def friction(self, v, state, w):
-        """F/W = mu0 + A ln(v/V0) + B phi."""
-        return self.mu0 + self.A * jnp.log(v / self.V0) + self.B * state[0]
-
-    def state_rate(self, v, v_plastic, state, w):
-        """dphi/dt = -(v/D0) [phi + ln(v/V0)]."""
-        return (-v_plastic / self.D0 * (state[0] + jnp.log(v_plastic / self.V0)),)
-
-    def steady_state(self, v):
-        """Phi = D0/v."""
-        return (-jnp.log(v / self.V0),)
 
 
 def main():

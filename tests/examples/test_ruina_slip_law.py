@@ -1,59 +1,50 @@
-"""A law written outside the package is solved like any other, with nothing else changed."""
+"""The example that holds the slip law against the ageing law, and what is known of the two."""
 
 import runpy
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 import asperity as asp
-from asperity.laws import RiceRuina, registry
+from asperity.laws import RiceRuina, RuinaSlip
 
 SCRIPT = Path(__file__).parents[2] / "examples" / "ruina_slip_law.py"
 PARAMETERS = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
-
-
-@pytest.fixture
-def example(monkeypatch):
-    """Names of the script, whose law is registered only for the length of a test."""
-    monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
-    return runpy.run_path(str(SCRIPT))
 
 
 def slider(law):
     return asp.Slider(law(**PARAMETERS), spring=2e5, load=7.0)
 
 
-def test_script_prints_a_converged_response(example, capsys):
-    example["main"]()
+def test_script_prints_a_converged_response(capsys):
+    runpy.run_path(str(SCRIPT))["main"]()
     lines = capsys.readouterr().out.splitlines()
     responses = [line for line in lines if "  eps = " in line]
     assert len(responses) == 8
     assert all(line.endswith("converged") for line in responses)
-    assert asp.laws.get_law("ruina-slip") is example["RuinaSlip"]
 
 
-def test_linear_response_is_that_of_the_ageing_law(example):
+def test_linear_response_is_that_of_the_ageing_law():
     """Both laws have the same linearisation, at any frequency."""
     point = {"velocity": 1e-6, "frequency": np.geomspace(1e-3, 1e3, 7)}
-    slip = asp.perturbation_response(slider(example["RuinaSlip"]), **point)
+    slip = asp.perturbation_response(slider(RuinaSlip), **point)
     ageing = asp.perturbation_response(slider(RiceRuina), **point)
     np.testing.assert_allclose(slip.transfer, ageing.transfer, rtol=1e-10)
     np.testing.assert_allclose(slip.eigenvalues, ageing.eigenvalues, rtol=1e-10)
 
 
-def test_mean_drop_has_the_high_frequency_limit(example):
+def test_mean_drop_has_the_high_frequency_limit():
     """<v ln(v Phi/D0)> = 0 adds -B mu^2/(4 A^2) to Eq. (22)."""
     mu, A, B = 0.5, 0.013, 0.026
-    response = asp.perturbation_response(slider(example["RuinaSlip"]), velocity=1e-6, frequency=1e5)
+    response = asp.perturbation_response(slider(RuinaSlip), velocity=1e-6, frequency=1e5)
     expected = -mu * (mu + 2 * A) / (4 * A) - B * mu**2 / (4 * A**2)
     np.testing.assert_allclose(response.mean_curvature, expected, rtol=1e-4)
 
 
-def test_periodic_response_is_stable_only_when_modulated(example):
+def test_periodic_response_is_stable_only_when_modulated():
     """The growth rate at eps = 0 is that of a stiffness below critical; modulation stabilises."""
     response = asp.periodic_response(
-        slider(example["RuinaSlip"]), velocity=1e-6, epsilon=[0.01, 0.24], frequency=120.0
+        slider(RuinaSlip), velocity=1e-6, epsilon=[0.01, 0.24], frequency=120.0
     )
     assert response.converged.all()
     assert response.stable.tolist() == [False, True]

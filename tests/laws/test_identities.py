@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping
+from typing import NamedTuple
 
 import equinox as eqx
 import jax
@@ -11,11 +12,17 @@ import pytest
 from jax.test_util import check_grads
 
 from asperity.laws import (
+    CutOff,
     ElastoPlastic,
     Law,
     LinkerDieterich,
+    Nagata,
+    PerrinRiceZheng,
+    PrakashClifton,
+    Regularised,
     RiceRuina,
     StrengthArea,
+    TwoState,
     get_law,
     registered,
     registry,
@@ -30,23 +37,51 @@ EXACT = 1e-12
 RATE_AND_STATE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 3e-6}
 
 #: Exponents of (length, time, force) in the parameters that have a unit.
-DIMENSIONS = {"D0": (1, 0, 0), "V0": (1, -1, 0), "lambda_": (1, 0, 0)}
+LENGTH, VELOCITY = (1, 0, 0), (1, -1, 0)
+DIMENSIONS = dict.fromkeys(("D0", "D2", "L", "lambda_"), LENGTH)
+DIMENSIONS |= dict.fromkeys(("V0", "V1", "V2", "V_star"), VELOCITY)
+
+Parameters = Mapping[str, float]
+
+
+class Limit(NamedTuple):
+    """The law that another becomes for `exact` parameters, and nearly becomes for `near` ones.
+
+    states: turns a state of motion (Y, w) into one at which the two laws agree.
+    """
+
+    law: str
+    exact: Parameters
+    near: Parameters
+    states: Callable[[jax.Array, jax.Array], jax.Array] = lambda Y, w: Y
+
+
+def vanishing(law: str, **parameters: float) -> tuple[Limit, ...]:
+    """What a law becomes when these parameters, given with a typical size, vanish."""
+    near = {name: 1e-12 * value for name, value in parameters.items()}
+    return (Limit(law, dict.fromkeys(parameters, 0.0), near),)
 
 
 @dataclasses.dataclass(frozen=True)
 class Example:
     """Parameters of a law, and what its published equations say of it.
 
-    slope: d mu_ss / d ln v; limits: the law it becomes when a parameter vanishes; load_step: F/W
-    changes by -load_step ln(W_after/W_before) when W jumps at constant v; age_velocity: the
-    velocity that the state sees.
+    slope: d mu_ss / d ln v. limits: what it becomes. load_step: F/W after W has jumped from w by a
+    factor, at constant v and continuous state, where it was f. age_velocity: the velocity that the
+    states see. memoryless: parameters with which friction forgets; rate: friction then.
     """
 
-    parameters: Mapping[str, float]
-    slope: Callable[[Mapping[str, float], float], float] = lambda p, v: p["A"] - p["B"]
-    limits: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    load_step: float = 0.0
+    parameters: Parameters
+    slope: Callable[[Parameters, float], float] = lambda p, v: p["A"] - p["B"]
+    limits: tuple[Limit, ...] = ()
+    load_step: Callable[[Parameters, jax.Array, jax.Array, float], jax.Array] = (
+        lambda p, f, w, factor: f
+    )
     age_velocity: str | None = "slider"
+    memoryless: Parameters = dataclasses.field(default_factory=lambda: {"B": 1e-200})
+    rate: Callable[[Parameters, jax.Array, tuple[jax.Array, ...], jax.Array], jax.Array] = (
+        lambda p, v, state, w: p["mu0"] + p["A"] * np.log(v / p["V0"])
+    )
     invertible: bool = True
 
     def law(self, kind: type[Law], **changes: float) -> Law:
@@ -59,21 +94,70 @@ def product_slope(p: Mapping[str, float], v: float) -> float:
     return p["mu0"] * (eta * (1 - m * log) - m * (1 + eta * log))
 
 
+def regularised_slope(p: Parameters, v: float) -> float:
+    """Derivative of A asinh(x), x = v/(2 V0) exp((mu0 - B ln(v/V0))/A)."""
+    x = v / (2 * p["V0"]) * np.exp((p["mu0"] - p["B"] * np.log(v / p["V0"])) / p["A"])
+    return (p["A"] - p["B"]) / np.sqrt(1 + x**-2)
+
+
 EXAMPLES = {
     "amontons": Example({"mu0": 0.5}, slope=lambda p, v: 0.0, age_velocity=None, invertible=False),
     "rice-ruina": Example(RATE_AND_STATE),
     "linker-dieterich": Example(
-        {**RATE_AND_STATE, "alpha": 0.2}, limits={"alpha": "rice-ruina"}, load_step=0.2
+        {**RATE_AND_STATE, "alpha": 0.2},
+        limits=vanishing("rice-ruina", alpha=0.2),
+        load_step=lambda p, f, w, factor: f - p["alpha"] * np.log(factor),
+        memoryless={"B": 1e-200, "alpha": 0.0},
     ),
     "elasto-plastic": Example(
-        {**RATE_AND_STATE, "lambda_": 7e-7}, limits={"lambda_": "rice-ruina"}
+        {**RATE_AND_STATE, "lambda_": 7e-7}, limits=vanishing("rice-ruina", lambda_=7e-7)
     ),
     "elasto-plastic-age": Example(
         {**RATE_AND_STATE, "lambda_": 7e-7},
-        limits={"lambda_": "rice-ruina"},
+        limits=vanishing("rice-ruina", lambda_=7e-7),
         age_velocity="plastic",
     ),
     "strength-area": Example(RATE_AND_STATE, slope=product_slope),
+    # The laws differ by exp(-2 F/(A W)), 1e-30 here.
+    "regularised": Example(RATE_AND_STATE, slope=regularised_slope, limits=vanishing("rice-ruina")),
+    "cut-off": Example(
+        {**RATE_AND_STATE, "V1": 1e-8, "V2": 1e-4},
+        slope=lambda p, v: p["A"] * v / (v + p["V1"]) - p["B"] * p["V2"] / (v + p["V2"]),
+        limits=(
+            Limit("rice-ruina", {"V1": 0.0, "V2": 1e30}, {"V1": 1e-20, "V2": 1e8}),
+            Limit("rice-ruina", {"V1": 1e-30, "V2": 1e30}, {"V1": 1e-20, "V2": 1e30}),
+        ),
+        memoryless={"B": 1e-200, "V1": 1e-5},
+        rate=lambda p, v, state, w: p["mu0"] + p["A"] * np.log((v + p["V1"]) / (p["V0"] + p["V1"])),
+    ),
+    "ruina-slip": Example(RATE_AND_STATE, age_velocity="plastic"),
+    "perrin-rice-zheng": Example(RATE_AND_STATE),
+    # The values that the authors measured.
+    "nagata": Example(
+        {**RATE_AND_STATE, "A": 0.051, "B": 0.0565, "c": 2.0},
+        limits=vanishing("rice-ruina", c=2.0),
+        load_step=lambda p, f, w, factor: f * (1 + p["c"] * w) / (1 + p["c"] * w * factor),
+        age_velocity="plastic",
+        memoryless={"B": 1e-200, "c": 0.0},
+    ),
+    "two-state": Example(
+        {**RATE_AND_STATE, "B2": -0.008, "D2": 5e-6},
+        slope=lambda p, v: p["A"] - p["B"] - p["B2"],
+        limits=vanishing("ruina-slip", B2=0.008),
+        age_velocity="plastic",
+        memoryless={"B": 1e-200, "B2": 0.0},
+    ),
+    "prakash-clifton": Example(
+        {**RATE_AND_STATE, "L": 3e-7, "V_star": 1e-7},
+        limits=(
+            # The effective load has reached the applied one.
+            Limit("rice-ruina", {}, {}, lambda Y, w: Y.at[-1].set(jnp.log(w))),
+        ),
+        load_step=lambda p, f, w, factor: f / factor,
+        rate=lambda p, v, state, w: (
+            (p["mu0"] + p["A"] * np.log(v / p["V0"])) * np.exp(state[1]) / w
+        ),
+    ),
 }
 
 ALL = sorted(EXAMPLES)
@@ -135,13 +219,15 @@ def check_inverse(law: Law, example: Example) -> None:
     friction = law.friction(v, state, w)
     for inverse in (law.log_velocity, lambda *a: Law.log_velocity(law, *a)):
         np.testing.assert_allclose(inverse(friction, state, w), jnp.log(v), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(law.velocity(friction, state, w), v, rtol=1e-11)
 
 
 def check_load_step(law: Law, example: Example) -> None:
-    """A step of the load at constant velocity and continuous state changes F/W by -alpha ln."""
+    """F/W after a step of the load at constant velocity and continuous state."""
     v, state, w = sample(law)
-    change = law.friction(v, state, 1.3 * w) - law.friction(v, state, w)
-    np.testing.assert_allclose(change, -example.load_step * np.log(1.3), rtol=1e-11, atol=EXACT)
+    before, after = law.friction(v, state, w), law.friction(v, state, 1.3 * w)
+    expected = example.load_step(example.parameters, before, w, 1.3)
+    np.testing.assert_allclose(after, expected, rtol=1e-11)
 
 
 def check_age_velocity(law: Law, example: Example) -> None:
@@ -160,43 +246,52 @@ def check_age_velocity(law: Law, example: Example) -> None:
 
 
 def check_limits(law: Law, example: Example) -> None:
-    """A vanishing parameter turns the law into the one it extends, continuously."""
-    for parameter, name in example.limits.items():
-        shared = {k: v for k, v in example.parameters.items() if k != parameter}
-        limit = quasi_static(get_law(name)(**shared))
-        where = motion(limit)
-        for value, rtol in ((0.0, EXACT), (1e-12 * example.parameters[parameter], 1e-6)):
-            system = quasi_static(example.law(type(law), **{parameter: value}))
-            np.testing.assert_allclose(system.rates(*where), limit.rates(*where), rtol=rtol)
+    """At limits of its parameters a law becomes the one it extends, continuously."""
+    for limit in example.limits:
+        kind = get_law(limit.law)
+        own = [f.name for f in dataclasses.fields(kind)]
+        simple = quasi_static(kind(**{name: example.parameters[name] for name in own}))
+        for changes, rtol in ((limit.exact, EXACT), (limit.near, 1e-6)):
+            system = quasi_static(example.law(type(law), **changes))
+            Y, at = motion(system)
+            Y = limit.states(Y, at.w)
+            found, expected = system.rates(Y, at), simple.rates(Y[: simple.size], at)
+            np.testing.assert_allclose(found[: simple.size], expected, rtol=rtol)
 
 
 def check_no_memory(law: Law, example: Example) -> None:
     """B -> 0: friction forgets the age and keeps the direct effect."""
-    p = example.parameters
-    tiny = {"B": 1e-200} | ({"alpha": 0.0} if "alpha" in p else {})
+    p = {**example.parameters, **example.memoryless}
     v, state, w = sample(law)
-    friction = example.law(type(law), **tiny).friction(v, state, w)
-    np.testing.assert_allclose(friction, p["mu0"] + p["A"] * np.log(v / p["V0"]), rtol=EXACT)
+    friction = type(law)(**p).friction(v, state, w)
+    np.testing.assert_allclose(friction, example.rate(p, v, state, w), rtol=EXACT)
 
 
 def check_derivatives(law: Law, example: Example) -> None:
-    """First and second derivatives of friction and rates against finite differences."""
+    """First and second derivatives with respect to every argument against finite differences."""
     v, state, w = (jax.tree.map(lambda x: x[1], part) for part in sample(law))
-    kind = type(law)
 
-    def friction(parameters: dict[str, float], log_v, state, w):
-        return kind(**parameters).friction(jnp.exp(log_v), state, w)
+    def changed(logs: dict[str, jax.Array]) -> Law:
+        """The law with its parameters multiplied: in units of their own."""
+        return type(law)(**{k: p * jnp.exp(logs[k]) for k, p in example.parameters.items()})
 
-    def ageing(log_v, state, w):
-        return law.state_rate(jnp.exp(log_v), jnp.exp(log_v), state, w)
+    def friction(logs, log_v, state, w):
+        return changed(logs).friction(jnp.exp(log_v), state, w)
 
-    free = {k: v for k, v in example.parameters.items() if k not in DIMENSIONS}
-    fixed = {k: v for k, v in example.parameters.items() if k in DIMENSIONS}
+    def rates(logs, log_v, state, w):
+        return changed(logs).state_rate(jnp.exp(log_v), jnp.exp(log_v), state, w)
+
+    def inverse(logs, friction, state, w):
+        law, at = changed(logs), (example.parameters["mu0"] + 0.01 * friction, state, w)
+        return law.log_velocity(*at), jnp.log(law.velocity(*at))
+
+    unchanged = dict.fromkeys(example.parameters, 0.0)
     options = {"order": 2, "modes": ["fwd", "rev"], "rtol": 1e-5, "atol": 1e-6, "eps": 1e-4}
-    args = (jnp.log(v), state, w)
-    check_grads(lambda p, *a: friction({**p, **fixed}, *a), (free, *args), **options)
+    check_grads(friction, (unchanged, jnp.log(v), state, w), **options)
     if law.state_names:
-        check_grads(ageing, args, **options)
+        check_grads(rates, (unchanged, jnp.log(v), state, w), **options)
+    if example.invertible:
+        check_grads(inverse, (unchanged, 0.0, state, w), **options | {"eps": 1e-5})
 
 
 def check_units(law: Law, example: Example) -> None:
@@ -231,9 +326,7 @@ def check_kinematics(system: QuasiStatic) -> None:
     rates = system.rates(Y, at)
 
     def along(function):
-        return jax.jvp(
-            lambda Y, w: function(Y, Excitation(w)), (Y, at.w), (rates, at.w_slope)
-        )[1]
+        return jax.jvp(lambda Y, w: function(Y, Excitation(w)), (Y, at.w), (rates, at.w_slope))[1]
 
     v = system.V * (1 - along(system.force) / system.kappa)
     strain_rate = law.elastic_length * omega * along(lambda Y, at: system.force(Y, at) / at.w)
@@ -355,6 +448,35 @@ class AgeRemembered(RiceRuina):
         return state[0] * (1 + self.A / self.B)
 
 
+class NoHalf(Regularised):
+    def friction(self, v, state, w):
+        return super().friction(2 * v, state, w)
+
+
+class CutOffNotInTheReference(CutOff):
+    def friction(self, v, state, w):
+        return super().friction(v, state, w) + self.A * jnp.log(1 + self.V1 / self.V0)
+
+
+class HalfTheAge(PerrinRiceZheng):
+    def steady_state(self, v):
+        return (-jnp.log(2 * v / self.V0),)
+
+
+class StressRateForgotten(Nagata):
+    friction = RiceRuina.friction
+    log_velocity = RiceRuina.log_velocity
+
+
+class SecondStateForgotten(TwoState):
+    log_velocity = RiceRuina.log_velocity
+
+
+class LoadFollowedAtOnce(PrakashClifton):
+    friction = RiceRuina.friction
+    log_velocity = RiceRuina.log_velocity
+
+
 @pytest.mark.parametrize(
     ("mistake", "name", "check"),
     [
@@ -369,6 +491,12 @@ class AgeRemembered(RiceRuina):
         (LimitMissed, "elasto-plastic", check_limits),
         (WrongDerivative, "rice-ruina", check_derivatives),
         (AgeRemembered, "rice-ruina", check_no_memory),
+        (NoHalf, "regularised", check_slope),
+        (CutOffNotInTheReference, "cut-off", check_slope),
+        (HalfTheAge, "perrin-rice-zheng", check_steady_state),
+        (StressRateForgotten, "nagata", check_load_step),
+        (SecondStateForgotten, "two-state", check_inverse),
+        (LoadFollowedAtOnce, "prakash-clifton", check_load_step),
     ],
 )
 def test_planted_mistake_is_caught(mistake, name, check):

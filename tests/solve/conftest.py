@@ -1,8 +1,9 @@
 """An integration of the published equations that shares nothing with the package.
 
-The equations are written in physical units as the paper prints them. States: the extension d of
-the spring (m, counted from steady sliding) and the age Phi (s); with inertia, also the velocity v
-(m/s) and the elastic displacement of the asperities (m). One period is integrated by SciPy's DOP853
+The equations are written in physical units as the papers print them. States: the extension d of
+the spring (m, counted from steady sliding) and those of the law, all positive, the age Phi (s)
+first; with inertia, also the velocity v (m/s) and the elastic displacement of the asperities (m).
+One period is integrated by SciPy's DOP853
 and the periodic solution found by Newton's method on the end point; `multiple_shooting` does so for
 many operating points, stable or not, and gives the Floquet multipliers too.
 """
@@ -69,29 +70,53 @@ class Printed:
         return self.D0 / self.V0 * np.exp(log_age)
 
     @property
+    def internal_steady(self) -> list[float]:
+        """States of the law in steady sliding at V."""
+        return [self.D0 / self.V]
+
+    @property
     def scale(self) -> np.ndarray:
         """Typical changes of the states."""
         inertial = [self.V, self.A * self.lambda_] if self.M else []
-        return np.array([self.A * self.W0 / self.K, self.D0 / self.V, *inertial])
+        return np.array([self.A * self.W0 / self.K, *self.internal_steady, *inertial])
 
     @property
     def steady(self) -> np.ndarray:
         inertial = [self.V, self.mu * self.lambda_] if self.M else []
-        return np.array([0.0, self.D0 / self.V, *inertial])
+        return np.array([0.0, *self.internal_steady, *inertial])
+
+    def slip(self, F: float, W: float, internal: list[float]) -> float:
+        """The plastic velocity."""
+        return self.plastic_velocity(F / W, *internal)
+
+    def internal_rates(
+        self, v: float, plastic: float, internal: list[float], W: float, dW: float
+    ) -> list[float]:
+        """Time derivatives of the states of the law."""
+        return [self.ageing_rate(v, plastic, *internal, dW / W)]
+
+    def internal_guess(self, F: np.ndarray, W: np.ndarray, v: np.ndarray) -> list[np.ndarray]:
+        """States of the law with which the force F goes with the velocity v, roughly.
+
+        Each shape (points, phases). One is given by the friction law; further ones are taken
+        to be constant over a period, which is short.
+        """
+        return [self.age(F / W, v)]
 
     def rates(self, t: float, state: np.ndarray, epsilon: float) -> list[float]:
         """Time derivatives of the states; with M, also of v and of the elastic displacement."""
-        d, age = state[:2]
+        d = state[0]
         W = self.W0 * (1 + epsilon * np.cos(self.omega * t))
         dW = -self.W0 * epsilon * self.omega * np.sin(self.omega * t) * self.load_rate
         F = self.mu * self.W0 + self.K * d
         if self.M:
-            return self._inertial(F, W, dW, age, *state[2:])
-        plastic = self.plastic_velocity(F / W, age)
+            return self._inertial(F, W, dW, *state[1:])
+        internal = list(state[1:])
+        plastic = self.slip(F, W, internal)
         # v - d(F lambda/W)/dt = plastic, with dF/dt = K (V - v)
         soft = self.lambda_ * self.K / W
         v = (plastic + soft * self.V - self.lambda_ * F * dW / W**2) / (1 + soft)
-        return [self.V - v, self.ageing_rate(v, plastic, age, dW / W)]
+        return [self.V - v, *self.internal_rates(v, plastic, internal, W, dW)]
 
     def _inertial(self, F, W, dW, age, v, elastic) -> list[float]:
         """Eq. (8); the asperities carry F_i = W elastic/lambda, or are rigid."""
@@ -112,6 +137,146 @@ class Printed:
             return -renewed * np.log(renewed)
         jump = self.alpha / self.B * log_load_rate * age if self.alpha else 0.0
         return 1 - renewed - jump
+
+
+@dataclasses.dataclass(frozen=True)
+class PrintedRegularised(Printed):
+    """Rice, Lapusta and Ranjith (2001): F/W = A asinh[v/(2 V0) exp((mu0 + B ln(V0 Phi/D0))/A)]."""
+
+    @property
+    def mu(self) -> float:
+        strength = self.mu0 - self.B * np.log(self.V / self.V0)
+        return self.A * np.arcsinh(self.V / (2 * self.V0) * np.exp(strength / self.A))
+
+    def plastic_velocity(self, friction: float, age: float) -> float:
+        strength = self.mu0 + self.B * np.log(self.V0 * age / self.D0)
+        return 2 * self.V0 * np.sinh(friction / self.A) * np.exp(-strength / self.A)
+
+    def age(self, friction: float, velocity: float) -> float:
+        strength = self.A * np.log(2 * self.V0 / velocity * np.sinh(friction / self.A))
+        return self.D0 / self.V0 * np.exp((strength - self.mu0) / self.B)
+
+
+@dataclasses.dataclass(frozen=True)
+class PrintedCutOff(Printed):
+    """F/W = f0 + A ln(1 + v/V1) + B ln(1 + V2 Phi/D0), with mu0 at V0."""
+
+    V1: float = 1e-8
+    V2: float = 1e-4
+
+    @property
+    def f0(self) -> float:
+        rate, state = np.log(1 + self.V0 / self.V1), np.log(1 + self.V2 / self.V0)
+        return self.mu0 - self.A * rate - self.B * state
+
+    @property
+    def mu(self) -> float:
+        rate, state = np.log(1 + self.V / self.V1), np.log(1 + self.V2 / self.V)
+        return self.f0 + self.A * rate + self.B * state
+
+    def plastic_velocity(self, friction: float, age: float) -> float:
+        rate = friction - self.f0 - self.B * np.log(1 + self.V2 * age / self.D0)
+        return self.V1 * (np.exp(rate / self.A) - 1)
+
+    def age(self, friction: float, velocity: float) -> float:
+        state = friction - self.f0 - self.A * np.log(1 + velocity / self.V1)
+        return self.D0 / self.V2 * (np.exp(state / self.B) - 1)
+
+
+@dataclasses.dataclass(frozen=True)
+class PrintedPerrinRiceZheng(Printed):
+    """dPhi/dt = 1 - (v Phi/(2 D0))^2; friction sees V0 Phi/(2 D0)."""
+
+    @property
+    def internal_steady(self) -> list[float]:
+        return [2 * self.D0 / self.V]
+
+    def plastic_velocity(self, friction: float, age: float) -> float:
+        return super().plastic_velocity(friction, age / 2)
+
+    def age(self, friction: float, velocity: float) -> float:
+        return 2 * super().age(friction, velocity)
+
+    def ageing_rate(self, v: float, plastic: float, age: float, log_load_rate: float) -> float:
+        return 1 - (v * age / (2 * self.D0)) ** 2
+
+
+@dataclasses.dataclass(frozen=True)
+class PrintedNagata(Printed):
+    """dPhi/dt = 1 - v Phi/D0 - (c/B) Phi (dF/dt)/W0."""
+
+    A: float = 0.051
+    B: float = 0.0565
+    c: float = 2.0
+
+    def ageing_rate(self, v: float, plastic: float, age: float, log_load_rate: float) -> float:
+        force_rate = self.K * (self.V - v)
+        return 1 - v * age / self.D0 - self.c / self.B * age * force_rate / self.W0
+
+
+@dataclasses.dataclass(frozen=True)
+class PrintedTwoState(Printed):
+    """Friction mu0 + A ln(v/V0) + B ln(V0 Phi/D0) + B2 ln(V0 Phi2/D2), the slip law for both."""
+
+    B2: float = 0.005
+    D2: float = 1.5e-6
+
+    @property
+    def mu(self) -> float:
+        return self.mu0 - (self.B + self.B2 - self.A) * np.log(self.V / self.V0)
+
+    @property
+    def internal_steady(self) -> list[float]:
+        return [self.D0 / self.V, self.D2 / self.V]
+
+    def slip(self, F: float, W: float, internal: list[float]) -> float:
+        second = self.B2 * np.log(self.V0 * internal[1] / self.D2)
+        return self.plastic_velocity(F / W - second, internal[0])
+
+    def internal_rates(self, v, plastic, internal, W, dW) -> list[float]:
+        renewed = [v * internal[0] / self.D0, v * internal[1] / self.D2]
+        return [-x * np.log(x) for x in renewed]
+
+    def internal_guess(self, F, W, v) -> list[np.ndarray]:
+        log_v = np.log(v / self.V0)
+        log_age = -(v * log_v).mean(1, keepdims=True) / v.mean(1, keepdims=True) + 0 * v
+        return [self.age(F / W - self.B2 * log_age, v), self.D2 / self.V0 * np.exp(log_age)]
+
+
+@dataclasses.dataclass(frozen=True)
+class PrintedPrakashClifton(Printed):
+    """F = W_e mu(v, Phi), dW_e/dt = -(v + V_star)/L (W_e - W)."""
+
+    L: float = 3e-7
+    V_star: float = 1e-7
+
+    @property
+    def internal_steady(self) -> list[float]:
+        return [self.D0 / self.V, self.W0 + 0 * self.V]
+
+    def slip(self, F: float, W: float, internal: list[float]) -> float:
+        return self.plastic_velocity(F / internal[1], internal[0])
+
+    def internal_rates(self, v, plastic, internal, W, dW) -> list[float]:
+        age, effective = internal
+        relaxation = (v + self.V_star) / self.L * (effective - W)
+        return [self.ageing_rate(v, plastic, age, 0.0), -relaxation]
+
+    def internal_guess(self, F, W, v) -> list[np.ndarray]:
+        weight = v + self.V_star
+        effective = (weight * W).mean(1, keepdims=True) / weight.mean(1, keepdims=True) + 0 * v
+        return [self.age(F / effective, v), effective]
+
+
+#: Laws with equations of their own, by the name that the package gives them.
+PRINTED = {
+    "regularised": PrintedRegularised,
+    "cut-off": PrintedCutOff,
+    "perrin-rice-zheng": PrintedPerrinRiceZheng,
+    "nagata": PrintedNagata,
+    "two-state": PrintedTwoState,
+    "prakash-clifton": PrintedPrakashClifton,
+}
 
 
 def one_period(p: Printed, start: np.ndarray, epsilon: float) -> np.ndarray:
@@ -183,15 +348,15 @@ def multiple_shooting(
     """Newton's method on the ends of the segments of a period, with variational equations.
 
     Parameters of `p` that vary and `epsilon` have shape (points, 1); `force` and `log_slip`, F/W0
-    and ln(v_pl/V) at equally spaced phases, (points, segments), are where it starts. The age, which
-    varies by many orders of magnitude, is carried by its logarithm.
+    and ln(v_pl/V) at equally spaced phases, (points, segments), are where it starts. The states of
+    the law, which vary by many orders of magnitude, are carried by their logarithms.
     """
     segments = force.shape[1]
-    W = 1 + epsilon * np.cos(2 * np.pi * np.arange(segments) / segments)
-    age = p.age(force / W, p.V * np.exp(log_slip))
-    start = np.stack([(force - p.mu) * p.W0 / p.K, np.log(age)])
+    W = p.W0 * (1 + epsilon * np.cos(2 * np.pi * np.arange(segments) / segments))
+    internal = p.internal_guess(p.W0 * force, W, p.V * np.exp(log_slip))
+    start = np.stack([(force - p.mu) * p.W0 / p.K, *np.log(internal)])
     swing = np.ptp(start[0], axis=1, keepdims=True)
-    scale = np.stack([swing, np.ones_like(swing)])
+    scale = np.stack([swing, *(np.ones_like(swing) for _ in internal)])
     for _ in range(8):
         ends, maps, integrals = _segments(p, epsilon, start, scale)
         gap = (ends - np.roll(start, -1, axis=2)) / scale
@@ -215,29 +380,31 @@ def _segments(p: Printed, epsilon, start, scale) -> tuple[np.ndarray, np.ndarray
     The integrals are the means over the period of d - d(0) times 1, e^-iwt and e^-2iwt, and
     the integral of the trace of the Jacobian.
     """
-    shape = start.shape[1:]
+    n, shape = start.shape[0], start.shape[1:]
     length = np.broadcast_to(1 / (p.frequency * shape[1]), (shape[0], 1))
     begin = np.arange(shape[1]) * length
-    count = 2 + 4 + 4
+    count = n + n**2 + 4
     step = 1e-30
 
     def rates(s: float, packed: np.ndarray) -> np.ndarray:
         y = packed.view(complex).reshape(count, *shape)
-        state, maps, t = start + y[:2].real, y[2:6].real.reshape(2, 2, *shape), begin + s * length
+        state, t = start + y[:n].real, begin + s * length
+        maps = y[n : n + n**2].real.reshape(n, n, *shape)
         columns = []
-        for k in range(2):
+        for k in range(n):
             moved = state.astype(complex)
             moved[k] += 1j * step * scale[k]
-            extension, age = moved[0], np.exp(moved[1])
-            rate = p.rates(t, np.stack([extension, age]), epsilon)
-            columns.append(np.stack([rate[0], rate[1] / age]))
+            physical = [moved[0], *np.exp(moved[1:])]
+            rate = p.rates(t, np.stack(physical), epsilon)
+            logs = (r / x for r, x in zip(rate[1:], physical[1:], strict=True))
+            columns.append(np.stack([rate[0], *logs]))
         jacobian = np.stack([c.imag / step / scale for c in columns], axis=1)
         turn = np.exp(-1j * p.omega * t)
         away = (state[0] - start[0, :, :1]) * p.frequency
         return length * np.concatenate(
             [
                 columns[0].real,
-                np.einsum("ij...,jk...->ik...", jacobian, maps).reshape(4, *shape),
+                np.einsum("ij...,jk...->ik...", jacobian, maps).reshape(n**2, *shape),
                 np.stack([away, away * turn, away * turn**2, np.trace(jacobian)]),
             ]
         )
@@ -246,38 +413,43 @@ def _segments(p: Printed, epsilon, start, scale) -> tuple[np.ndarray, np.ndarray
         return rates(s, packed).astype(complex).ravel().view(float)
 
     first = np.zeros((count, *shape), dtype=complex)
-    first[2], first[5] = 1, 1
+    first[n : n + n**2 : n + 1] = 1
     size = np.ones((count, *shape))
-    size[:2] = scale
-    size[6:9] = scale[0]
+    size[:n] = scale
+    size[n + n**2 : n + n**2 + 3] = scale[0]
     bound = np.repeat(1e-12 * size.ravel(), 2)
     run = solve_ivp(flat, (0, 1), first.ravel().view(float), "DOP853", rtol=1e-11, atol=bound)
     last = run.y[:, -1].copy().view(complex).reshape(count, *shape)
-    return start + last[:2].real, last[2:6].real.reshape(2, 2, *shape), last[6:]
+    maps = last[n : n + n**2].real.reshape(n, n, *shape)
+    return start + last[:n].real, maps, last[n + n**2 :]
 
 
 def _around_the_period(maps: np.ndarray, gap: np.ndarray) -> np.ndarray:
     """Solve d_next - map d = gap around the cycle for every point."""
-    points, segments = gap.shape[1:]
-    matrix = np.zeros((points, segments, 2, segments, 2))
+    n, points, segments = gap.shape
+    matrix = np.zeros((points, segments, n, segments, n))
     for i in range(segments):
-        matrix[:, i, :, (i + 1) % segments] += np.eye(2)
+        matrix[:, i, :, (i + 1) % segments] += np.eye(n)
         matrix[:, i, :, i] -= np.moveaxis(maps[..., i], -1, 0)
-    matrix = matrix.reshape(points, 2 * segments, 2 * segments)
-    right = np.moveaxis(gap, 0, 2).reshape(points, 2 * segments, 1)
-    return np.moveaxis(np.linalg.solve(matrix, right).reshape(points, segments, 2), 2, 0)
+    matrix = matrix.reshape(points, n * segments, n * segments)
+    right = np.moveaxis(gap, 0, 2).reshape(points, n * segments, 1)
+    return np.moveaxis(np.linalg.solve(matrix, right).reshape(points, segments, n), 2, 0)
 
 
 def _log_multipliers(maps: np.ndarray, log_determinant: np.ndarray) -> np.ndarray:
     """Logarithms; the smaller of a real pair from the determinant, which loses no digits."""
-    found = []
+    found, n = [], maps.shape[0]
     for point, determinant in zip(np.moveaxis(maps, 2, 0), log_determinant, strict=True):
-        total, log_scale = np.eye(2), 0.0
+        total, log_scale = np.eye(n), 0.0
         for i in range(point.shape[2]):
             total = point[..., i] @ total
             log_scale += np.log(np.abs(total).max())
             total = total / np.abs(total).max()
         values = np.linalg.eigvals(total).astype(complex)
+        if n > 2:
+            logs = np.log(values) + log_scale
+            found.append(logs[np.lexsort((-logs.imag, -logs.real.round(9)))])
+            continue
         log = np.log(values[np.argmax(np.abs(values))])
         if log.imag in (0, np.pi):
             found.append([log + log_scale, determinant - log.real - log_scale + 1j * log.imag])
@@ -305,6 +477,7 @@ class Reference(NamedTuple):
     """What tests use of this file."""
 
     Printed: type[Printed]
+    printed: dict[str, type[Printed]]
     expansion: Callable[..., np.ndarray]
     periodic_response: Callable[..., np.ndarray]
     multiple_shooting: Callable[..., Shot]
@@ -313,4 +486,6 @@ class Reference(NamedTuple):
 
 @pytest.fixture(scope="session")
 def reference() -> Reference:
-    return Reference(Printed, expansion, periodic_response, multiple_shooting, disagreement)
+    return Reference(
+        Printed, PRINTED, expansion, periodic_response, multiple_shooting, disagreement
+    )

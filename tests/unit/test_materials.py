@@ -138,8 +138,10 @@ def test_a_material_is_frozen_and_travels(pmma: Material) -> None:
     assert Material.model_validate_json(pmma.model_dump_json()) == pmma
 
 
-@pytest.mark.parametrize("name", registered())
-def test_every_law_is_built_from_the_paper(pmma: Material, name: str) -> None:
+@pytest.mark.parametrize(
+    "name", [name for name, law in registered().items() if law.source.startswith("bureau2000")]
+)
+def test_every_law_of_the_paper_is_built_from_it(pmma: Material, name: str) -> None:
     law = pmma.law(name)
     assert type(law) is registered()[name]
     for parameter in law_parameters(type(law)):
@@ -156,6 +158,15 @@ def test_overrides(pmma: Material) -> None:
     assert float(law.D0) == pmma.D0
     assert float(pmma.law("elasto-plastic", **{"lambda": 0.0}).lambda_) == 0.0
     np.testing.assert_array_equal(pmma.law("rice-ruina", A=[0.01, 0.02]).A, [0.01, 0.02])
+
+
+def test_numbers_that_the_paper_has_not_are_given_beside_it(pmma: Material) -> None:
+    law = pmma.law("cut-off", V1="1 nm/s", V2=1e-3)
+    assert (float(law.V1), float(law.V2), float(law.A)) == (1e-9, 1e-3, pmma.A)
+    with pytest.raises(InputError, match="V1 must be a velocity"):
+        pmma.law("cut-off", V1="1 nm", V2=1e-3)
+    with pytest.raises(InputError, match=r"cut-off.V2 must be given, got nothing"):
+        pmma.law("cut-off", V1="1 nm/s")
 
 
 def test_overrides_can_be_differentiated(pmma: Material) -> None:

@@ -12,12 +12,12 @@ from abc import abstractmethod
 from typing import ClassVar, TypeAlias
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
 from asperity._jax import configure
+from asperity.laws.inverse import invert_friction
 
 configure()  # double precision, before any law makes an array
 
@@ -60,8 +60,8 @@ class Law(eqx.Module):
             Velocity of the slider dx/dt (m/s); may be negative for an instant when the asperities
             unload elastically.
         v_plastic : array
-            Plastic (irreversible) sliding velocity (m/s), always positive. Equal to `v`
-            when the law has no elastic asperities.
+            Plastic (irreversible) sliding velocity (m/s): that of `velocity`, positive unless the
+            law allows rest and reversal. Equal to `v` when the law has no elastic asperities.
         state : tuple of arrays
         w : array
             W/W0.
@@ -85,30 +85,26 @@ class Law(eqx.Module):
     def log_velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
         """ln(v in m/s) at which the law carries the force `friction` = F_i/W: its inverse.
 
-        A law with a closed form overrides this; the default solves it by Newton's method on
-        ln v, in which every rate-and-state law is close to linear.
+        For slip in the direction of the force, v > 0. A law with a closed form overrides this,
+        in a form that stays finite for any argument however large; the default finds it by
+        Newton's method on ln v, see `asperity.laws.inverse`.
+
+        Returns
+        -------
+        array
+            -inf where the force is too small for the law to slip.
         """
-        return _invert_friction(self, friction, state, w)
+        return invert_friction(self, friction, state, w)
+
+    def velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
+        """Slip velocity (m/s) at which the law carries the force `friction` = F_i/W.
+
+        The exponential of `log_velocity`, unless the law is defined at rest and in reversed
+        motion: such a law overrides this with a velocity that has the sign of the force, or is
+        zero, and is finite for friction <= 0.
+        """
+        return jnp.exp(self.log_velocity(friction, state, w))
 
     def mu_ss(self, v: ArrayLike) -> Array:
         """Steady-sliding friction coefficient at velocity `v` (m/s) under constant load."""
         return self.friction(v, self.steady_state(v), jnp.ones_like(jnp.asarray(v, float)))
-
-
-#: Newton steps of the generic inverse. Quadratic convergence from within a few units of ln v
-#: reaches round-off in far fewer; the loop is of fixed length so that it can be differentiated.
-_INVERSE_STEPS = 12
-
-
-def _invert_friction(law: Law, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
-    def value_and_slope(log_v: Array) -> tuple[Array, Array]:
-        return jax.jvp(
-            lambda q: law.friction(jnp.exp(q), state, w), (log_v,), (jnp.ones_like(log_v),)
-        )
-
-    shape = jnp.broadcast_shapes(*(jnp.shape(a) for a in (friction, w, *state)))
-    log_v = jnp.full(shape, jnp.log(1e-6))
-    for _ in range(_INVERSE_STEPS):
-        value, slope = value_and_slope(log_v)
-        log_v = log_v - (value - friction) / slope
-    return log_v

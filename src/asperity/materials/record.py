@@ -129,10 +129,10 @@ class Material(BaseModel):
                     f"such number; write {parameter}=... beside the law's name"
                 )
             return number.si
-        # A parameter of a user's own law, of which no file tells the dimension, is taken as SI.
-        dimension = number.dimension if number is not None else "dimensionless"
-        value = to_si(given[parameter], dimension, f"{owner}.{parameter}")
-        check_sign(parameter, value, owner, number.si_unit if number is not None else "")
+        if number is None:  # of which only the law's own declaration knows the unit and the rule
+            return given[parameter]
+        value = to_si(given[parameter], number.dimension, f"{owner}.{parameter}")
+        check_sign(parameter, value, owner, number.si_unit)
         return value
 
 

@@ -72,6 +72,9 @@ def fourier_response(
     trace = sum(row[i].mean(0) for i, row in enumerate(J))
     exponent, floquet_error = _floquet_exponent(cycle, J, max_steps)
     error = jnp.maximum(orbit.error, _truncation(orbit, harmonics))
+    # An interface that sticks for part of the period has kinks, which no Fourier series resolves.
+    sticks = jnp.isneginf(system.log_slip(jnp.stack(states), cycle.at)).any(0)
+    error = jnp.where(sticks, jnp.inf, error)
     return FourierResponse(
         mean,
         phasors,

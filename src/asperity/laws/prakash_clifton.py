@@ -1,0 +1,64 @@
+"""Rice-Ruina friction that remembers the normal load: it follows a change of W by and by.
+
+After Prakash (1998), in the form of Cochard and Rice (2000): the interface force is that of a load
+W_e, which relaxes to the applied one over a slip of length L, or a time L/V_star at rest::
+
+    F_i      = W_e [mu0 + A ln(v / V0) + B ln(V0 Phi / D0)]
+    dW_e/dt  = -(|v| + V_star) / L  (W_e - W)
+    dPhi/dt  = 1 - v Phi / D0
+
+State: ``m = ln(W_e / W0)``, with dm/dt = (|v| + V_star)/L (W/W_e - 1). A step of the load leaves
+the force as it is at first. Under constant load the law is Rice-Ruina.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.laws.law import State
+from asperity.laws.parameter import parameter
+from asperity.laws.rice_ruina import RiceRuina
+
+
+class PrakashClifton(RiceRuina):
+    """Rice-Ruina law with memory of the normal load; states: (phi, m).
+
+    Parameters
+    ----------
+    L : float
+        Slip over which the force follows the load (m).
+    V_star : float
+        Velocity that adds to slip in the relaxation (m/s), not negative: L/V_star is its time at
+        rest. With 0 the load is remembered for as long as there is no slip.
+    mu0, A, B, D0, V0 : float
+        As in `RiceRuina`.
+    """
+
+    name: ClassVar[str] = "prakash-clifton"
+    source: ClassVar[str] = "prakash1998, cochard2000"
+    state_names: ClassVar[tuple[str, ...]] = ("log_age", "log_load")
+
+    L: ArrayLike = parameter("law.L", "length")
+    V_star: ArrayLike = parameter("law.V_star", "velocity", "not negative")
+
+    def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
+        """Rice-Ruina friction times W_e/W."""
+        return super().friction(v, state, w) * jnp.exp(state[1]) / w
+
+    def log_velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
+        """The same solved for the velocity."""
+        return super().log_velocity(friction * w * jnp.exp(-state[1]), state, w)
+
+    def state_rate(self, v: ArrayLike, v_plastic: ArrayLike, state: State, w: ArrayLike) -> State:
+        """Ageing, and relaxation of the load."""
+        relaxation = (jnp.abs(v) + self.V_star) / self.L
+        return self.ageing(v, state, w), relaxation * (w * jnp.exp(-state[1]) - 1)
+
+    def steady_state(self, v: ArrayLike) -> State:
+        """Phi = D0/v, W_e = W0."""
+        (log_age,) = super().steady_state(v)
+        return log_age, jnp.zeros_like(log_age)
