@@ -1,0 +1,119 @@
+"""Headings over a table of text: names, the row of units below them, and what is neither."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from asperity.instrument.readers.text_lines import Line, cells_of, decoded
+from asperity.instrument.readers.unit_text import is_empty, usual
+
+_DELIMITERS = ("\t", ";", ",", "|", None)
+_WIDE = re.compile(r"\s{2,}|\t")
+#: Cells that name nothing: numbers, and the counts of records that xlook writes.
+_COUNT = re.compile(r"[-+\d.,eE]*\d[-+\d.,eE]*(\s*recs?)?")
+_LONGEST_UNIT = 14
+
+
+@dataclass(frozen=True)
+class Headings:
+    """Names and units of the columns of a text.
+
+    Attributes
+    ----------
+    names : list of str
+        One a column, as written, unit included; empty where the file has none.
+    units : list of str or None
+        The row of units, where there is one.
+    """
+
+    names: list[str]
+    units: list[str] | None
+
+
+def headings(above: Sequence[Line], delimiter: str | None, width: int) -> Headings:
+    """Headings among the lines above the first row of numbers.
+
+    The last lines with as many cells as the table are taken; commented ones only where no other
+    fits. A table with one column more than names has counted its rows first.
+    """
+    plain = [line.text for line in above if not line.comment and not line.blank]
+    rows = _fitting(plain, (delimiter,), width)
+    if not rows:
+        bare = [line.text.strip().strip('"').lstrip("#%!/ ") for line in above if line.comment]
+        rows = _fitting(bare, (delimiter, *_DELIMITERS), width)
+    rows = [row for row in rows if 2 * sum(bool(_COUNT.fullmatch(c)) for c in row) <= len(row)]
+    if not rows:
+        return Headings([""] * width, None)
+    if len(rows) > 1 and _are_units(rows[-1], rows[-2]):
+        return Headings(
+            rows[-2], [c if _bracketed(c) is None else str(_bracketed(c)) for c in rows[-1]]
+        )
+    # LabVIEW's text has the units above the names, and time in seconds.
+    labview = next((row[1:] for row in rows[:-1] if row[0] == "Y_Unit_Label"), None)
+    return Headings(rows[-1], ["s", *labview] if labview else None)
+
+
+def _fitting(texts: Sequence[str], delimiters: Sequence[str | None], width: int) -> list[list[str]]:
+    """Rows of `width` cells, the first delimiter that gives them being used for each line."""
+    rows = []
+    for text in texts:
+        for delimiter in delimiters:
+            row = _row(decoded(text), delimiter, width)
+            if row is not None:
+                rows.append(row)
+                break
+    return rows
+
+
+def _row(text: str, delimiter: str | None, width: int) -> list[str] | None:
+    ways = [cells_of(text, delimiter)]
+    if delimiter is None:
+        # Names with blanks in them over a table that blanks divide.
+        ways += [
+            [cell.strip('" ') for cell in _WIDE.split(text.strip())],
+            _quoted(text),
+            _with_units(text.split()),
+        ]
+    for cells in ways:
+        if len(cells) == width:
+            return cells
+        # LabVIEW has a column of comments, and no delimiter where there is none.
+        if len(cells) == width + 1 and cells[-1].lower() in ("", "comment", "comments"):
+            return cells[:-1]
+    for cells in ways:
+        if len(cells) == width - 1 and width > 2 and all(cells):
+            return ["row", *cells]
+    return None
+
+
+def _quoted(text: str) -> list[str]:
+    return [a or b for a, b in re.findall(r'"([^"]*)"|(\S+)', text)]
+
+
+def _with_units(tokens: list[str]) -> list[str]:
+    """Words with a unit in brackets that follows joined to the name before it."""
+    joined: list[str] = []
+    for token in tokens:
+        if joined and token[0] in "([{" and token[-1] in ")]}":
+            joined[-1] += " " + token
+        else:
+            joined.append(token)
+    return joined
+
+
+def _bracketed(cell: str) -> str | None:
+    match = re.fullmatch(r"[\[({<](.*)[\])}>]", cell.strip())
+    return match[1].strip() if match else None
+
+
+def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
+    """Whether a row holds units: a third of it at least does, under names that are none."""
+    known = sum(_is_unit(cell) for cell in row)
+    short = all(len(cell) <= _LONGEST_UNIT for cell in row)
+    return short and 3 * known >= len(row) and sum(map(_is_unit, above)) < known
+
+
+def _is_unit(cell: str) -> bool:
+    return not is_empty(cell) and (usual(cell) is not None or _bracketed(cell) is not None)
