@@ -17,6 +17,7 @@ Examples:
   asperity response --law elasto-plastic --material bureau2000 \\
       -V "1 um/s" -e 0.24 -f "120 Hz" --json
   asperity response --table points.csv --out responses.csv --material bureau2000
+  asperity measure recording.csv --json --plot recording.png
   asperity air --material bureau2000 -f "120 Hz" -f "200 Hz"
   asperity materials bureau2000
 """
@@ -27,6 +28,7 @@ Examples:
     commands={
         "air": "asperity.cli.air",
         "materials": "asperity.cli.materials",
+        "measure": "asperity.cli.measure",
         "reproduce": "asperity.cli.reproduce",
         "response": "asperity.cli.response",
     },

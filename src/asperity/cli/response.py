@@ -143,7 +143,8 @@ def _text(law: str, found: PeriodicResponse, numbers: dict[str, Sourced]) -> str
         ("phase1", f"{found.phase1:.9g} rad", "against the load"),
         ("phase2", f"{found.phase2:.9g} rad", "against the load"),
         ("floquet_max", f"{found.floquet_max:.9g}", "largest modulus of the multipliers"),
-        ("stable", "yes" if found.stable else "no", ""),
+        ("stable", "yes" if found.stable else "no", f"leading mode: {found.mode[()]}"),
+        ("mode_frequency", f"{found.mode_frequency:.6g} Hz", "of the leading mode, modulo f"),
     ]
     return f"{law}\n{aligned(inputs, '  ')}\nresponse\n{aligned(outputs, '  ')}"
 

@@ -79,6 +79,32 @@ def from_logs(logs: Complex) -> Complex:
         return modulus * np.cos(angle) + 1j * imaginary
 
 
+#: What an orbit turns into where its leading multiplier leaves the unit circle.
+FOLD, PERIOD_DOUBLING, NEIMARK_SACKER = "fold", "period doubling", "Neimark-Sacker"
+
+#: Arguments (rad) below this, and as close to pi, are real multipliers.
+_REAL = 1e-12
+
+
+def kind_of_crossing(logs: Complex) -> NDArray[np.object_]:
+    """Bifurcation that a multiplier stands for, by its argument; "" where that is not known.
+
+    Real and positive: a fold. Real and negative: period doubling, a response that repeats only
+    after two periods. A complex pair: Neimark-Sacker, a slow oscillation on top of the modulation.
+
+    Parameters
+    ----------
+    logs : complex array
+        ln|m| + i arg m.
+    """
+    angle = np.abs(logs.imag)
+    kinds = np.full(logs.shape, NEIMARK_SACKER, dtype=object)
+    kinds[angle < _REAL] = FOLD
+    kinds[np.abs(angle - np.pi) < _REAL] = PERIOD_DOUBLING
+    kinds[np.isnan(angle)] = ""
+    return kinds
+
+
 def without_lost_arguments(logs: Complex) -> Complex:
     """The same with NaN for the argument of a multiplier that overflows."""
     kept = logs.copy()

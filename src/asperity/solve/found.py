@@ -22,6 +22,7 @@ class Found(NamedTuple):
     mean_friction: Float
     harmonics: NDArray[np.complex128]
     log_multipliers: NDArray[np.complex128]
+    start: Float
     waveform: Float
     iterations: NDArray[np.int64]
     outcome: NDArray[np.int64]
@@ -34,6 +35,7 @@ class Found(NamedTuple):
             np.full(points, np.nan),
             np.full((harmonics, points), np.nan + 0j),
             np.full((size, points), np.nan + 0j),
+            np.full((size, points), np.nan),
             np.full((2, phases, points), np.nan),
             np.zeros(points, dtype=np.int64),
             np.full(points, int(Outcome.NO_ORBIT)),
@@ -42,7 +44,7 @@ class Found(NamedTuple):
 
     def discard(self, rows: Indices) -> None:
         """Take the numbers of failed points back, so that none is mistaken for an answer."""
-        for values in self[:4]:
+        for values in self[:5]:
             values[..., rows] = np.nan
 
 
@@ -68,5 +70,6 @@ def store(found: Found, rows: Indices, reading: Reading, logs: NDArray[np.comple
     found.mean_friction[rows] = reading.mean_friction
     found.harmonics[:, rows] = reading.harmonics
     found.log_multipliers[:, rows] = logs
+    found.start[:, rows] = reading.start
     found.waveform[..., rows] = reading.waveform
     found.outcome[rows] = Outcome.CONVERGED

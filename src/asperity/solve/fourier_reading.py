@@ -96,6 +96,14 @@ def force_spectrum(
     return constant + spectrum[0], 2 * jax.lax.complex(cosine, sine)
 
 
+def fourier_start(orbit: FourierOrbit) -> Array:
+    """The states at theta = 0, shape (size, points)."""
+    nodes = len(orbit.rest[0])
+    k = np.arange(1, nodes // 2)[:, None]
+    interpolate = (2 / nodes) * np.cos(k * grid(nodes)[0]).sum(0)
+    return jnp.stack([m + interpolate @ y for m, y in zip(orbit.mean, orbit.rest, strict=True)])
+
+
 def fourier_waveform(
     system: QuasiStatic, load: Harmonic, orbit: FourierOrbit, *, grading: float, phases: int
 ) -> Array:

@@ -22,7 +22,7 @@ from asperity.solve.collocation import (
     refined,
 )
 from asperity.solve.fourier import fourier_orbit
-from asperity.solve.fourier_reading import fourier_response, fourier_waveform
+from asperity.solve.fourier_reading import fourier_response, fourier_start, fourier_waveform
 from asperity.solve.linear import jacobian_columns, spectral_radius
 from asperity.solve.mesh import Orbit, evaluate, split
 
@@ -57,6 +57,7 @@ class Reading(NamedTuple):
     log_scale: Array
     log_determinant: Array
     growth: Array
+    start: Array  # (size, points): the states at theta = 0
     waveform: Array  # (2, phases, points): F/W0 and ln(v_pl/V)
 
 
@@ -119,6 +120,7 @@ def _fast_block(
         zero,
         response.log_determinant,
         zero,
+        fourier_start(orbit),
         fourier_waveform(system, load, orbit, grading=grading, phases=phases),
     )
     return reading, response.error, jnp.full(points, orbit.steps)
@@ -135,7 +137,7 @@ def _read(problem: Problem, orbit: Orbit, harmonics: int, phases: int) -> Readin
         waveform = jnp.stack([system.force(Y, at), system.log_slip(Y, at)])
     else:
         waveform = jnp.zeros((2, 0, _points(problem)))
-    return Reading(*response, waveform)
+    return Reading(*response, orbit.centre, waveform)
 
 
 @partial(jax.jit, static_argnames=("intervals",))

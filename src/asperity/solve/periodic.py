@@ -201,6 +201,7 @@ def _proportional(problem: Problem, points: int, harmonics: int, phases: int) ->
         spectrum[0].real,
         2 * spectrum[1 : harmonics + 1],
         np.zeros((0, points), dtype=complex),
+        np.zeros((0, points)),
         wave,
         np.zeros(points, dtype=np.int64),
         np.full(points, int(Outcome.CONVERGED)),

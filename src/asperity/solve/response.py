@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from asperity._version import __version__
 from asperity.loads import Modulation
 from asperity.slider import Motion, QuasiStatic, Slider
-from asperity.solve.floquet import from_logs, without_lost_arguments
+from asperity.solve.floquet import from_logs, kind_of_crossing, without_lost_arguments
 from asperity.solve.outcome import Outcome, sentences
 
 if TYPE_CHECKING:
@@ -38,6 +38,8 @@ class PeriodicResponse:
         Friction coefficient of unmodulated steady sliding.
     harmonics : complex array, shape (..., count)
         c_1, c_2, ...
+    mode, mode_frequency, growth_rate : array, shape (...)
+        What the leading multiplier stands for, its frequency (Hz) and growth rate (1/s).
     multipliers : complex array, shape (..., states)
         Floquet multipliers, by falling modulus.
     log_multipliers : complex array, shape (..., states)
@@ -53,6 +55,8 @@ class PeriodicResponse:
         `Outcome` of each point.
     result : str array, shape (...)
         "converged", or why not.
+    start : array, shape (..., states)
+        States of `motion` at the phase theta = 0.
     waveform : array, shape (2, ..., samples)
         F/W0 and ln(v_plastic / V) at the phases `theta`.
     theta : array, shape (samples,)
@@ -66,6 +70,7 @@ class PeriodicResponse:
     mu_ss: Float
     harmonics: NDArray[np.complex128]
     log_multipliers: NDArray[np.complex128]
+    start: Float
     waveform: Float
     iterations: NDArray[np.int64]
     outcome: NDArray[np.int64]
@@ -94,6 +99,7 @@ class PeriodicResponse:
             mu_ss=mu_ss,
             harmonics=shaped(found.harmonics),
             log_multipliers=without_lost_arguments(shaped(found.log_multipliers)),
+            start=shaped(found.start),
             waveform=np.stack([shaped(found.waveform[0]), shaped(found.waveform[1])]),
             iterations=shaped(found.iterations),
             outcome=shaped(found.outcome),
@@ -163,6 +169,34 @@ class PeriodicResponse:
             return self.converged & np.asarray(self.floquet_max < 1)
 
     @property
+    def mode(self) -> NDArray[np.object_]:
+        """Bifurcation that the leading multiplier stands for, whether it has crossed or not.
+
+        "fold", "period doubling" or "Neimark-Sacker"; "" where not converged or not known.
+        """
+        if self.log_multipliers.shape[-1] == 0:
+            return np.full(self.mean_friction.shape, "", dtype=object)
+        return kind_of_crossing(self.log_multipliers[..., 0])
+
+    @property
+    def mode_frequency(self) -> Float:
+        """Frequency of the leading mode (Hz): 0 at a fold, f/2 at a period doubling.
+
+        Known from the monodromy up to multiples of the modulation frequency f and up to its sign.
+        """
+        if self.log_multipliers.shape[-1] == 0:
+            return np.full(self.mean_friction.shape, np.nan)
+        turn = np.abs(self.log_multipliers[..., 0].imag) / (2 * np.pi)
+        return np.asarray(turn * self.frequency)
+
+    @property
+    def growth_rate(self) -> Float:
+        """Rate at which the leading mode grows (1/s); negative where the orbit is stable."""
+        if self.log_multipliers.shape[-1] == 0:
+            return np.full(self.mean_friction.shape, -np.inf)
+        return np.asarray(self.log_multipliers[..., 0].real * self.frequency)
+
+    @property
     def result(self) -> NDArray[np.object_]:
         """Of each point: converged, or the reason why not."""
         return sentences(np.asarray(self.outcome), np.asarray(self.detail))
@@ -206,6 +240,9 @@ class PeriodicResponse:
             "phase1": variable(self.phase1, "rad", "phase of the first harmonic"),
             "phase2": variable(self.phase2, "rad", "phase of the second harmonic"),
             "floquet_max": variable(self.floquet_max, "1", "largest modulus of the multipliers"),
+            "mode": variable(self.mode.astype(str), "1", "bifurcation of the leading multiplier"),
+            "mode_frequency": variable(self.mode_frequency, "Hz", "frequency of the leading mode"),
+            "growth_rate": variable(self.growth_rate, "1/s", "growth rate of the leading mode"),
             "stable": variable(self.stable, "1", "all multipliers inside the unit circle"),
             "converged": variable(self.converged, "1", "whether the point was solved"),
             "result": variable(self.result.astype(str), "1", "converged, or why not"),

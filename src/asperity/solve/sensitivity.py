@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from asperity.laws import law_parameters
 from asperity.loads import Harmonic
-from asperity.slider import QuasiStatic, Slider
+from asperity.slider import QuasiStatic, Slider, equation_of_motion
 from asperity.solve.batch import run_chunks, take
 from asperity.solve.collocation import (
     CollocationResponse,
@@ -48,8 +48,8 @@ class Sensitivities:
     Attributes
     ----------
     parameters : tuple of str
-        Names, in the order of the last axis: those of the law, then K, W0, M, V, frequency and
-        epsilon.
+        Names, in the order of the last axis: those of the law, then K, W0, M, V, frequency, eta
+        (with inertia or radiation damping only) and epsilon.
     converged : bool array, shape (...)
         False where no orbit was found; the derivatives there are NaN.
     mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
@@ -74,6 +74,8 @@ def sensitivities(
     velocity: ArrayLike | str,
     epsilon: ArrayLike | str,
     frequency: ArrayLike | str,
+    inertia: bool = False,
+    radiation_damping: ArrayLike | str | None = None,
 ) -> Sensitivities:
     """Derivatives of mean, harmonics and multipliers with respect to every parameter.
 
@@ -81,7 +83,7 @@ def sensitivities(
     ----------
     slider : Slider
         With a rate-dependent law.
-    velocity, epsilon, frequency
+    velocity, epsilon, frequency, inertia, radiation_damping
         As in `periodic_response`; arrays broadcast.
 
     Returns
@@ -96,10 +98,16 @@ def sensitivities(
     V = checked_positive(velocity, "velocity", "velocity")
     f = checked_positive(frequency, "frequency", "frequency")
     eps = checked_epsilon(epsilon)
-    problem, shape = flatten(Problem(QuasiStatic(slider, V, 2 * np.pi * f), Harmonic(eps)))
+    eta = None
+    if radiation_damping is not None:
+        eta = checked_positive(radiation_damping, "damping", "radiation_damping")
+    motion = equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta)
+    problem, shape = flatten(Problem(motion, Harmonic(eps)))
     points = int(np.prod(shape, dtype=int))
     start = starting_orbits(problem, points)
-    names = (*law_parameters(type(slider.law)), "K", "W0", "M", "V", "frequency", "epsilon")
+    damping = () if isinstance(motion, QuasiStatic) else ("eta",)
+    drive = ("K", "W0", "M", "V", "frequency", *damping, "epsilon")
+    names = (*law_parameters(type(slider.law)), *drive)
     size = problem.system.size
     outputs = np.full((len(names), len(_SCALARS) + size, points), np.nan, dtype=complex)
     converged = np.zeros(points, dtype=bool)

@@ -1,0 +1,189 @@
+"""Normal equations of the lock-in, block by block.
+
+The columns of `asperity.instrument.lock_in_basis` are closed under a shift of time, so a block of
+evenly sampled data needs no sine or cosine of its own: one table serves all blocks, each turned by
+its own phase. Whatever is summed is kept for each block, so that the residual near any harmonic is
+known afterwards without reading the samples again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.instrument.lock_in_basis import Basis
+
+Array = NDArray[np.float64]
+
+#: Phase (rad) of the highest harmonic by which a clock may miss an even grid and count as even.
+_EVEN = 1e-8
+#: Samples in one table or one buffer: small enough for the second cache.
+_BUFFER = 4096
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """Sums over blocks of samples; a longer recording has more of them, or longer ones.
+
+    Attributes
+    ----------
+    basis : Basis
+    gram : array, (blocks, size, size)
+        Sums of products of columns.
+    moments : array, (blocks, size, channels)
+        Sums of columns times channels.
+    count : array, (blocks,)
+        Samples.
+    middle : array, (blocks,)
+        Mean time (s).
+    """
+
+    basis: Basis
+    gram: Array
+    moments: Array
+    count: Array
+    middle: Array
+
+    def totals(self) -> tuple[Array, Array]:
+        """Normal equations of all blocks together, (size, size) and (size, channels)."""
+        return self.gram.sum(0), self.moments.sum(0)
+
+
+def join(parts: list[Blocks]) -> Blocks:
+    """The blocks of recordings, or of pieces of one, that follow each other.
+
+    Parameters
+    ----------
+    parts : list of Blocks
+        With equal bases.
+    """
+    names = ("gram", "moments", "count", "middle")
+    together = (np.concatenate([getattr(part, name) for part in parts]) for name in names)
+    return Blocks(parts[0].basis, *together)
+
+
+def even_step(time: Array, omega: float) -> float | None:
+    """Sampling interval (s) of an even clock; None if it is not even.
+
+    Parameters
+    ----------
+    time : array, (n,)
+    omega : float
+        Angular frequency (rad/s) of the highest harmonic that must not notice.
+    """
+    if time.size < 2 * _BUFFER:
+        return None  # a table would not pay
+    step = float(time[-1] - time[0]) / (time.size - 1)
+    ramp = step * np.arange(4 * _BUFFER)
+    buffer = np.empty(ramp.size)
+    for at in range(0, time.size, ramp.size):
+        piece = time[at : at + ramp.size]
+        off = np.subtract(piece, ramp[: piece.size], out=buffer[: piece.size])
+        even = time[0] + step * at
+        if not omega * max(off.max() - even, even - off.min()) <= _EVEN:
+            return None
+    return step
+
+
+def sums(
+    basis: Basis,
+    time: Array,
+    channels: list[Array],
+    *,
+    blocks: int = 1,
+    step: float | None = None,
+) -> Blocks:
+    """Sum a recording in blocks of equally many samples.
+
+    Parameters
+    ----------
+    basis : Basis
+    time : array, (n,)
+    channels : list of array, (n,)
+    blocks : int
+        About how many; the last may be shorter than the others.
+    step : float, optional
+        Of an even clock, from `even_step`.
+    """
+    length = max(1, -(-time.size // blocks))
+    if step is None:
+        return _uneven(basis, time, channels, length)
+    return _even(basis, time, channels, min(length, _BUFFER), step)
+
+
+def _even(basis: Basis, time: Array, channels: list[Array], length: int, step: float) -> Blocks:
+    table = basis.columns(basis.centre + step * np.arange(float(length)))
+    whole = time.size // length
+    parts = [_turned(basis, time[0], channels, table, step, 0, whole)]
+    if rest := time.size - whole * length:
+        tail = [channel[whole * length :] for channel in channels]
+        parts.append(_turned(basis, time[0], tail, table[:, :rest].copy(), step, whole * length, 1))
+    return join(parts)
+
+
+def _turned(
+    basis: Basis,
+    begin: float,
+    channels: list[Array],
+    table: Array,
+    step: float,
+    first: int,
+    blocks: int,
+) -> Blocks:
+    """Blocks of the table's length by a matrix product, then each turned by its phase."""
+    length = table.shape[1]
+    raw = np.stack(
+        [c[: blocks * length].reshape(blocks, length) @ table.T for c in channels], axis=-1
+    )
+    start = begin + step * (first + length * np.arange(blocks))
+    shift = basis.shift(start)
+    gram = shift @ (table @ table.T) @ shift.transpose(0, 2, 1)
+    count = np.full(blocks, float(length))
+    return Blocks(basis, gram, shift @ raw, count, start + step * (length - 1) / 2)
+
+
+def _uneven(basis: Basis, time: Array, channels: list[Array], length: int) -> Blocks:
+    blocks = -(-time.size // length)
+    gram = np.zeros((blocks, basis.size, basis.size))
+    moments = np.zeros((blocks, basis.size, len(channels)))
+    if length >= _BUFFER // 8:
+        _long_blocks(basis, time, channels, length, gram, moments)
+    else:
+        _short_blocks(basis, time, channels, length, gram, moments)
+    edges = np.arange(0, time.size, length)
+    count = np.diff(np.append(edges, time.size)).astype(float)
+    return Blocks(basis, gram, moments, count, np.add.reduceat(time, edges) / count)
+
+
+def _long_blocks(
+    basis: Basis, time: Array, channels: list[Array], length: int, gram: Array, moments: Array
+) -> None:
+    buffer = np.empty((basis.size, _BUFFER))
+    for b in range(gram.shape[0]):
+        end = min((b + 1) * length, time.size)
+        for at in range(b * length, end, _BUFFER):
+            stop = min(at + _BUFFER, end)
+            columns = basis.columns(time[at:stop], buffer[:, : stop - at])
+            gram[b] += columns @ columns.T
+            for c, channel in enumerate(channels):
+                moments[b, :, c] += columns @ channel[at:stop]
+
+
+def _short_blocks(
+    basis: Basis, time: Array, channels: list[Array], length: int, gram: Array, moments: Array
+) -> None:
+    """Many blocks at once: padded to equal length, the padding weighs nothing."""
+    together = max(1, _BUFFER // length)
+    for b in range(0, gram.shape[0], together):
+        at, stop = b * length, min((b + together) * length, time.size)
+        held = -(-(stop - at) // length)
+        padded = np.zeros((basis.size, held * length))
+        padded[:, : stop - at] = basis.columns(time[at:stop])
+        columns = padded.reshape(basis.size, held, length).transpose(1, 0, 2)
+        values = np.zeros((held * length, len(channels)))
+        for c, channel in enumerate(channels):
+            values[: stop - at, c] = channel[at:stop]
+        gram[b : b + held] = columns @ columns.transpose(0, 2, 1)
+        moments[b : b + held] = columns @ values.reshape(held, length, -1)

@@ -1,0 +1,71 @@
+"""A harmonic with its uncertainty."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Phasor:
+    """Complex amplitude c of Re(c e^(i n phi)), phi the phase of the load.
+
+    Attributes
+    ----------
+    value : complex
+        Its modulus is the peak amplitude, its argument the phase against the load.
+    covariance : array, (2, 2)
+        Of the real and the imaginary part.
+    dof : float
+        Degrees of freedom that the covariance was estimated with.
+    """
+
+    value: complex
+    covariance: Array
+    dof: float
+
+    @property
+    def amplitude(self) -> float:
+        """Peak amplitude."""
+        return abs(self.value)
+
+    @property
+    def phase(self) -> float:
+        """Phase (rad) in (-pi, pi]."""
+        angle = math.atan2(self.value.imag, self.value.real)
+        return math.pi if angle == -math.pi else angle
+
+    @property
+    def amplitude_uncertainty(self) -> float:
+        """Standard uncertainty of the amplitude, to first order: good above three of itself."""
+        return self._along(self._direction)
+
+    @property
+    def phase_uncertainty(self) -> float:
+        """Standard uncertainty (rad) of the phase; infinite for an amplitude of zero."""
+        if not self.amplitude:
+            return math.inf
+        along = self._direction
+        return self._along(np.array([-along[1], along[0]])) / self.amplitude
+
+    def excludes(self, value: complex, level: float = 0.95) -> bool:
+        """Whether the confidence ellipse of so much probability leaves a value out."""
+        from scipy.special import fdtri
+
+        away = np.array([value.real - self.value.real, value.imag - self.value.imag])
+        distance = float(away @ np.linalg.solve(self.covariance, away)) / 2
+        return bool(distance > fdtri(2, self.dof, level))
+
+    @property
+    def _direction(self) -> Array:
+        if not self.amplitude:
+            return np.array([1.0, 0.0])
+        return np.array([self.value.real, self.value.imag]) / self.amplitude
+
+    def _along(self, direction: Array) -> float:
+        return math.sqrt(max(float(direction @ self.covariance @ direction), 0.0))

@@ -1,0 +1,254 @@
+"""The questions that are put to a lock-in reading, each with its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.instrument.finding import Finding
+from asperity.instrument.lock_in_reading import Reading
+from asperity.instrument.measure_series import Level
+from asperity.instrument.quality import Check, judged
+from asperity.instrument.quality_oscillation import slow_line
+
+Array = NDArray[np.float64]
+
+#: Where suspicious and bad begin.
+LIMITS: dict[str, tuple[float, float]] = {
+    "modulation": (20.0, 5.0),
+    "periods": (5.0, 2.0),
+    "signal": (10.0, 3.0),
+    "leakage": (0.01, 0.1),
+    "drift": (0.005, 0.02),
+    "transient": (0.001, 0.01),
+    "stick-slip": (0.0005, 0.005),
+    "load harmonics": (0.05, 0.3),
+    "resolution": (0.1, 1.0),
+    "saturation": (0.0, 0.01),
+    "nan": (0.0, 0.25),
+    "infinite": (0.0, 0.25),
+    "gap": (0.0, 0.25),
+    "uneven sampling": (20.0, 1000.0),
+}
+
+#: Spectral lines on each side of the load's own that belong to it if it is not pure.
+_SIDEBANDS = 16
+#: Decay times of transients that are tried, in windows.
+_DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
+#: A line this often above its background is no accident of a spectrum of 1e5 lines.
+_LINE = 6.0
+
+
+def modulation(reading: Reading) -> Check:
+    """Whether the load is modulated at all."""
+    number = abs(reading.epsilon) / max(reading.uncertainty("epsilon"), 1e-300)
+    return judged(
+        "modulation",
+        number,
+        LIMITS["modulation"],
+        f"the load's amplitude is {_times(number)} its uncertainty, epsilon = "
+        f"{reading.epsilon:.4g} at {reading.frequency:.6g} Hz",
+    )
+
+
+def periods(reading: Reading) -> Check:
+    """Whether the window holds enough of them."""
+    number = reading.periods
+    return judged(
+        "periods",
+        number,
+        LIMITS["periods"],
+        f"the window holds {number:.5g} periods; below five, harmonics and drift are hard to tell "
+        "apart",
+    )
+
+
+def signal(reading: Reading) -> Check:
+    """Whether the first harmonic stands out of the noise."""
+    phasor = reading.phasor(1)
+    number = phasor.amplitude / max(phasor.amplitude_uncertainty, 1e-300)
+    return judged(
+        "signal",
+        number,
+        LIMITS["signal"],
+        f"mu1 is {_times(number)} its standard uncertainty; below three its amplitude is "
+        "biased and its phase unknown",
+    )
+
+
+def leakage(reading: Reading) -> Check:
+    """Whether the load is one line, as the reading takes it to be."""
+    blocks, basis = reading.blocks, reading.blocks.basis
+    at = (blocks.middle - basis.centre) / (2 * basis.half_width)
+    most = min(3 * _SIDEBANDS, int(reading.periods / 2), at.size // 4)
+    offsets = np.arange(2, most + 1)
+    number, beyond = 0.0, np.inf
+    if offsets.size:
+        angle = 2 * np.pi * np.concatenate([-offsets, offsets])[:, None] * at
+        turned = (np.cos(angle) - 1j * np.sin(angle)) @ reading.residual[:, 1, 0]
+        carrier = abs(reading.epsilon * reading.W0) * reading.samples / 2
+        power = (np.abs(turned / carrier) ** 2).reshape(2, -1).sum(0)
+        near = offsets <= _SIDEBANDS
+        number = float(np.sqrt(power[near].sum()))
+        far = power[~near].mean() if (~near).any() else 0.0
+        beyond = power[near].mean() / max(far, 1e-300)
+    return judged(
+        "leakage",
+        number,
+        LIMITS["leakage"],
+        f"sidebands of the load hold {_percent(number)} of its amplitude; the rest of the load is "
+        "no steady line of one frequency if that is much",
+        significant=beyond > 3.0,
+    )
+
+
+def load_harmonics(reading: Reading) -> Check:
+    """How much of mu2 can come from a second harmonic of the load."""
+    if reading.harmonics.size < 2:
+        return judged("load harmonics", 0.0, LIMITS["load harmonics"], "mu2 was not asked for")
+    second, own = reading.load_phasor(2), reading.phasor(2)
+    share = second.amplitude
+    effect = reading.phasor(1).amplitude / abs(reading.epsilon) * share
+    number = effect / max(own.amplitude, 1e-300)
+    return judged(
+        "load harmonics",
+        number,
+        LIMITS["load harmonics"],
+        f"the load's second harmonic is {share:.3g} W0; answered as the first is, it makes "
+        f"{effect:.2g} of mu2 = {own.amplitude:.3g}, and at most "
+        f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once",
+        significant=share > 4 * second.amplitude_uncertainty and effect > own.amplitude_uncertainty,
+    )
+
+
+def drift(reading: Reading, before: Level | None, after: Level | None) -> Check:
+    """Whether F(0) is the same after the modulation as before it."""
+    if before is not None and after is not None:
+        change = after.value - before.value
+        doubt = float(np.hypot(before.uncertainty, after.uncertainty))
+        number = abs(change / before.value) if before.value else np.inf
+        told = (
+            f"F(0) after the modulation differs by {_percent(change / before.value)} from F(0) "
+            "before it"
+        )
+        significant = abs(change) > 3 * doubt
+    else:
+        change = float(reading.drift[1].sum())
+        number = abs(change / reading.mean_force) if reading.mean_force else np.inf
+        told = (
+            f"the force drifts by {_percent(change / reading.mean_force)} over the window; F(0) "
+            "before and after is not in the recording"
+        )
+        significant = abs(change) > 10 * reading.uncertainty("mean_force")
+    return judged("drift", number, LIMITS["drift"], told, significant=significant)
+
+
+def transient(reading: Reading) -> Check:
+    """Whether the mean force is still settling."""
+    blocks = reading.blocks
+    together = max(1, blocks.count.size // 128)
+    cuts = np.arange(0, blocks.count.size, together)
+    count = np.add.reduceat(blocks.count, cuts)
+    left = np.add.reduceat(reading.residual[:, 0, 1].real, cuts) / count
+    at = np.add.reduceat(blocks.middle * blocks.count, cuts) / count
+    u = (at - reading.start) / (reading.end - reading.start)
+    drifts = np.polynomial.legendre.legvander(2 * u - 1, blocks.basis.degree)
+    best, height = 0.0, 0.0
+    mean = abs(reading.mean_force)
+    for decay in _DECAYS:
+        shape = np.exp(-u / decay)
+        inside = shape - drifts @ np.linalg.lstsq(drifts, shape)[0]
+        norm = float(inside @ inside)
+        if norm < 1e-12 * u.size:
+            continue
+        amplitude = float(inside @ left) / norm
+        rest = left - amplitude * inside
+        doubt = np.sqrt(rest @ rest / max(u.size - 4, 1) * _correlation(rest) / norm)
+        score = abs(amplitude) / max(float(doubt), 1e-300)
+        if score > best:
+            best, height = score, amplitude
+    number = float(abs(height)) / mean if mean else 0.0
+    return judged(
+        "transient",
+        number,
+        LIMITS["transient"],
+        f"a decay of {_percent(number)} of the mean force fits the beginning of the window best",
+        significant=best > 5.0,
+    )
+
+
+def stick_slip(reading: Reading, time: Array, force: Array) -> Check:
+    """Whether there is a slow oscillation below the frequency of the modulation."""
+    line = slow_line(reading, time, force)
+    number, told, seen = 0.0, "no oscillation below the modulation's frequency stands out", False
+    if line is not None:
+        number = line.amplitude / max(abs(reading.mean_force), 1e-300)
+        seen = line.amplitude > _LINE * line.background
+        if seen:
+            told = (
+                f"the force oscillates at {line.frequency:.4g} Hz, below the modulation, by "
+                f"{_percent(number)} of its mean"
+            )
+    return judged("stick-slip", number, LIMITS["stick-slip"], told, significant=seen)
+
+
+def resolution(reading: Reading, force: Array) -> Check:
+    """Whether the steps of the recorder are small against the first harmonic.
+
+    Noise of half a step smooths them; without it a harmonic below a step is no harmonic.
+    """
+    piece = force[: 1 << 14]
+    steps = np.diff(np.unique(piece))
+    step = float(steps.min()) if steps.size else 0.0
+    noise = float(np.sqrt(reading.noise.spectra[1:, 1, 1].real.mean()))
+    number = step / max(reading.phasor(1).amplitude * abs(reading.W0), 1e-300)
+    return judged(
+        "resolution",
+        number,
+        LIMITS["resolution"],
+        f"the force is recorded in steps of {number:.2g} of its first harmonic, with noise of "
+        f"{noise / step if step else np.inf:.2g} steps",
+        significant=noise < 0.5 * step,
+    )
+
+
+def findings(found: list[Finding], samples: int, span: float) -> list[Check]:
+    """What the reader and the checks of the recording say about the window.
+
+    Parameters
+    ----------
+    found : list of Finding
+    samples : int
+        In the window.
+    span : float
+        Its length (s).
+    """
+    return [_finding(finding, samples, span) for finding in found]
+
+
+def _finding(found: Finding, samples: int, span: float) -> Check:
+    told = found.sentence.rstrip(".") + (f" ({found.where})" if found.where else "")
+    # Shares of the window, where the number of the finding can be made one.
+    shares = {"saturation": 1.0, "nan": 1 / samples, "infinite": 1 / samples, "gap": 1 / span}
+    if found.name in shares:
+        return judged(found.name, found.number * shares[found.name], LIMITS[found.name], told)
+    if found.name in LIMITS:
+        return judged(found.name, found.number, LIMITS[found.name], told)
+    grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[found.severity]
+    return judged(found.name, 1.0, grave, told)
+
+
+def _correlation(series: Array) -> float:
+    """Inflation of a variance by neighbours that resemble each other."""
+    power = float(series @ series)
+    neighbour = float(series[1:] @ series[:-1]) / power if power else 0.0
+    neighbour = min(max(neighbour, 0.0), 0.95)
+    return (1 + neighbour) / (1 - neighbour)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _times(number: float) -> str:
+    return f"{number:.3g} times" if number < 1e6 else "more than a million times"

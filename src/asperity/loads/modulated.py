@@ -1,0 +1,188 @@
+"""Modulations from what a user knows of them: amplitudes and phases, or a sampled period."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from jax.typing import ArrayLike
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.loads.periodic import Periodic, Series
+from asperity.units import to_si
+
+#: Phases of the period at which the load is held to be positive.
+_PHASES = 2 * np.pi * np.arange(720) / 720
+
+#: Fourier coefficients of a sampled period below this share of the largest are left out.
+_NEGLIGIBLE = 1e-13
+
+
+def modulated(
+    epsilon: ArrayLike | str = 0.0,
+    *,
+    load: Mapping[int, tuple[Any, Any]] | None = None,
+    velocity: ArrayLike | str = 0.0,
+    velocity_phase: ArrayLike = 0.0,
+    tilt: ArrayLike | str = 0.0,
+) -> Periodic:
+    """Modulation of load, shear force and pulling velocity from amplitudes and phases.
+
+        W/W0 = 1 + eps cos wt + sum over n of e_n cos(n wt + p_n)
+        V(t) = V [1 + velocity cos(wt + velocity_phase)]
+
+    Parameters
+    ----------
+    epsilon : array or str
+        Relative amplitude of the load at the modulation frequency, its phase being zero.
+    load : mapping of int to (amplitude, phase), optional
+        Further harmonics of the load: n -> (e_n, p_n), phases in rad.
+    velocity : array or str
+        Relative amplitude of the pulling velocity.
+    velocity_phase : array
+        Its phase against the load (rad).
+    tilt : array or str
+        Angle between the direction in which the modulated force acts and the interface's normal
+        (rad, in (-pi/2, pi/2)), positive where a growing load also pushes the slider along
+        the pulling direction. The shear force on the slider is then tan(tilt) times the modulated
+        part of the load.
+
+    Returns
+    -------
+    Periodic
+
+    Raises
+    ------
+    InputError
+        If the load would vanish within the period, or a value breaks its rule.
+    """
+    terms = {1: (to_si(epsilon, "dimensionless", "epsilon"), 0.0)}
+    for n, (amplitude, phase) in (load or {}).items():
+        if n < 2 or n != int(n):
+            raise InputError(
+                f"load must have harmonics from 2 on, got {n}; give the first one as epsilon"
+            )
+        terms[int(n)] = (to_si(amplitude, "dimensionless", f"load[{n}]"), phase)
+    series = tuple(_pair(*terms.get(n, (0.0, 0.0))) for n in range(1, max(terms) + 1))
+    speed = _pair(to_si(velocity, "dimensionless", "velocity"), velocity_phase)
+    gain = np.tan(_checked_tilt(tilt))
+    shear = tuple((gain * a, gain * b) for a, b in series) if np.any(gain) else ()
+    _require_contact(series)
+    return Periodic(series, shear, (speed,) if np.any(speed) else ())
+
+
+def sampled(
+    load: ArrayLike | None = None,
+    *,
+    velocity: ArrayLike | None = None,
+    shear: ArrayLike | None = None,
+    harmonics: int | None = None,
+) -> Periodic:
+    """Modulation from evenly spaced samples of one period, the first at theta = 0.
+
+    Between the samples it is their trigonometric interpolation, as exact as the samples
+    are for a signal without harmonics beyond half their number.
+
+    Parameters
+    ----------
+    load : array, shape (samples,), optional
+        W at each sample; its mean counts as W0.
+    velocity : array, shape (samples,), optional
+        Pulling velocity; its mean counts as V.
+    shear : array, shape (samples,), optional
+        Force on the slider along the pulling direction besides the spring's, over W0, of mean
+        zero.
+    harmonics : int, optional
+        Harmonics to keep, all by default.
+
+    Raises
+    ------
+    InputError
+        If samples are missing or not finite, a mean is not positive, or the load vanishes.
+    """
+    given = {"load": load, "velocity": velocity, "shear": shear}
+    if all(values is None for values in given.values()):
+        raise InputError("load, velocity or shear must be given, got none; give samples of one")
+    series = {name: _series_of(name, values, harmonics) for name, values in given.items()}
+    _require_contact(series["load"])
+    return Periodic(series["load"], series["shear"], series["velocity"])
+
+
+def _pair(amplitude: ArrayLike, phase: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
+    """Coefficients of cos and sin of amplitude cos(n theta + phase)."""
+    size = np.asarray(amplitude, float)
+    return size * np.cos(phase), -size * np.sin(phase)
+
+
+def _checked_tilt(value: Any) -> NDArray[np.float64]:
+    angle = np.asarray(_radians(value), float)
+    bad = angle[~(np.abs(angle) < np.pi / 2)]
+    if bad.size:
+        raise InputError(
+            f"tilt must be less than a right angle, got {bad.flat[0]:g} rad; "
+            "give the angle from the normal, such as '5 deg'"
+        )
+    return angle
+
+
+def _radians(value: Any) -> Any:
+    """An angle in rad; a text is in degrees if it says so."""
+    if not isinstance(value, str):
+        return value
+    number, _, unit = value.strip().partition(" ")
+    scales = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degrees": np.pi / 180}
+    try:
+        return float(number) * scales[unit.strip()]
+    except (KeyError, ValueError):
+        raise InputError(
+            f"tilt must be an angle in rad or deg, got '{value}'; write it like '5 deg'"
+        ) from None
+
+
+def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Series:
+    if values is None:
+        return ()
+    samples = np.asarray(values, float)
+    if samples.ndim != 1 or len(samples) < 3 or not np.isfinite(samples).all():
+        raise InputError(
+            f"{name} must be at least 3 finite samples of one period, got an array of shape "
+            f"{samples.shape}; give evenly spaced samples without the end point"
+        )
+    spectrum = np.fft.rfft(samples) / len(samples)
+    scale = 1.0
+    if name != "shear":
+        scale = spectrum[0].real
+        if not scale > 0:
+            raise InputError(
+                f"{name} must have a positive mean, got {scale:g}; give it in the sense of sliding"
+            )
+    # At half the number of samples, cos and sin are not told apart.
+    top = (len(samples) - 1) // 2
+    kept = spectrum[1 : min(top, harmonics or top) + 1] / scale
+    size = np.abs(kept).max(initial=0.0)
+    kept = kept[: np.flatnonzero(np.abs(kept) > _NEGLIGIBLE * size).max(initial=-1) + 1]
+    return tuple((2 * c.real, -2 * c.imag) for c in kept)
+
+
+def _require_contact(series: Series) -> None:
+    """Hold the load against zero over the period, a few points at a time."""
+    pairs = [np.broadcast_arrays(*np.broadcast_arrays(a, b)) for a, b in series]
+    if not pairs:
+        return
+    shape = np.broadcast_shapes(*(np.shape(a) for a, _ in pairs))
+    flat = [[np.broadcast_to(part, shape).ravel() for part in pair] for pair in pairs]
+    lowest = np.inf
+    for start in range(0, max(int(np.prod(shape)), 1), 4096):
+        part = slice(start, start + 4096)
+        w = sum(
+            a[part] * np.cos(k * _PHASES[:, None]) + b[part] * np.sin(k * _PHASES[:, None])
+            for k, (a, b) in enumerate(flat, start=1)
+        )
+        lowest = min(lowest, 1 + float(np.min(w)))
+    if not lowest > 0:
+        raise InputError(
+            f"load must stay positive over the period, so that contact is never lost, got a "
+            f"lowest W/W0 of {lowest:.4g}; lower the amplitudes"
+        )

@@ -1,0 +1,196 @@
+"""`asperity measure` on recordings that the tests write."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+F, EPSILON, MU1, PHASE1 = 40.02, 0.2, 2e-3, -1.4
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory) -> Path:
+    """Ten seconds of modulation between pauses, with units in the header."""
+    rng = np.random.default_rng(0)
+    time = np.arange(12_000) * 1e-3
+    phi = 2 * np.pi * F * time + 0.3
+    on = (time > 2) & (time < 10)
+    load = 7 * (1 + EPSILON * on * np.cos(phi)) + 1e-3 * rng.standard_normal(time.size)
+    force = 7 * (0.4 - 0.06 * on + on * MU1 * np.cos(phi + PHASE1))
+    force = force + 1e-3 * rng.standard_normal(time.size)
+    path = tmp_path_factory.mktemp("lab") / "recording.csv"
+    header = "time (s),normal force (N),shear force (N)"
+    np.savetxt(path, np.c_[time, load, force], "%.7f", ",", header=header, comments="")
+    return path
+
+
+@pytest.fixture(scope="module")
+def step(tmp_path_factory) -> Path:
+    """A velocity step as rock laboratories write it: tabs, microns, MPa, two rates."""
+    rng = np.random.default_rng(1)
+    time = np.concatenate([np.arange(0, 60, 0.1), np.arange(60, 120, 0.02)])
+    after = np.clip(time - 70, 0, None)
+    slip = 3 * np.minimum(time, 70) + 10 * after
+    friction = 0.6 + np.where(time >= 70, -0.003 + 0.012 * np.exp(-after), 0)
+    friction = friction + 4e-4 * rng.standard_normal(time.size)
+    stress = 20 + 1e-3 * rng.standard_normal(time.size)
+    path = tmp_path_factory.mktemp("rock") / "step.txt"
+    header = "Time(s)\tDispl(microns)\tFriction\tNormal_stress(MPa)"
+    np.savetxt(path, np.c_[time, slip, friction, stress], "%.6f", "\t", header=header, comments="")
+    return path
+
+
+def record(result) -> dict:
+    assert result.stdout.startswith("{")
+    return json.loads(result.stdout)
+
+
+def test_json_has_the_planted_numbers(asperity, recording) -> None:
+    result = asperity("measure", recording, "--json")
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    found = record(result)
+    doubt = found["uncertainties"]
+    truth = {"epsilon": EPSILON, "frequency": F, "mu1": MU1, "phase1": PHASE1, "delta_mu": -0.06}
+    for name, true in truth.items():
+        assert abs(found[name] - true) < 5 * doubt[name], name
+        assert doubt[name] > 0
+    assert found["verdict"] == "ok"
+    assert found["unit"] == "N"
+    assert found["channels"] == {"W": "normal force", "F": "shear force"}
+    assert found["window"]["chosen_by"] == "program"
+    assert 2 < found["window"]["start"] < found["window"]["end"] < 10
+    assert {"name", "number", "suspicious", "bad", "verdict", "sentence"} == set(found["checks"][0])
+    assert found["provenance"]["recording"] == str(recording)
+
+
+def test_text_says_the_same(asperity, recording) -> None:
+    result = asperity("measure", recording, "--harmonics", "2")
+    assert result.exit_code == 0
+    lines = [line.split() for line in result.stdout.splitlines()]
+    told = {words[0]: words[1:] for words in lines if words}
+    assert abs(float(told["mu1"][0]) - MU1) < 5 * float(told["mu1"][2])
+    assert abs(float(told["frequency"][0]) - F) < 5 * float(told["frequency"][3])
+    assert "mu2" in told
+    assert "mu3" not in told
+    assert "quality" in told
+    assert sum(words[0] == "ok" for words in lines if words) == 9
+
+
+def test_options_reach_the_reading(asperity, recording) -> None:
+    options = ("--load", "normal force", "--force", "shear force", "--time", "time")
+    reading = ("--window", "3:9.5", "--detrend", "none", "--whole-periods", "-f", "41 Hz")
+    found = record(asperity("measure", recording, *options, *reading, "--json"))
+    window = found["window"]
+    assert window["start"] == pytest.approx(3)
+    assert 9.5 - 1 / F - 2e-3 < window["end"] <= 9.5
+    assert window["chosen_by"] == "user"
+    assert abs(found["frequency"] - F) < 5 * found["uncertainties"]["frequency"]
+
+
+def test_columns_and_units_that_the_file_leaves_open(asperity, recording, tmp_path) -> None:
+    bare = tmp_path / "bare.csv"
+    rows = recording.read_text().splitlines()[1:]
+    bare.write_text("t,a,b\n" + "\n".join(rows))
+    options = ("--load", "a", "--force", "b", "--unit", "a=N", "--unit", "b=N", "--time", "t")
+    found = record(asperity("measure", bare, *options, "--unit", "t=s", "--json"))
+    assert found["unit"] == "N"
+    assert abs(found["mu1"] - MU1) < 5 * found["uncertainties"]["mu1"]
+
+
+@pytest.mark.parametrize("window", ["4 s:9 s", "4:9", "4000 ms: 9"])
+def test_windows_as_people_write_them(asperity, recording, window) -> None:
+    found = record(asperity("measure", recording, "--window", window, "--json"))
+    assert found["window"]["start"] == pytest.approx(4, abs=1e-6)
+    assert found["window"]["end"] == pytest.approx(9, abs=1e-6)
+
+
+def test_an_exact_frequency_is_not_fitted(asperity, recording) -> None:
+    result = asperity("measure", recording, "-f", f"{F} Hz", "--exact-frequency", "--json")
+    found = record(result)
+    assert found["frequency"] == pytest.approx(F, rel=1e-12)
+    assert found["uncertainties"]["frequency"] == 0
+
+
+def test_a_bad_verdict_is_exit_code_1_with_its_sentence(asperity, recording, tmp_path) -> None:
+    rows = recording.read_text().splitlines()
+    noisy = tmp_path / "slow.csv"
+    shaken = [rows[0]]
+    for row in rows[1:]:
+        t, w, f = map(float, row.split(","))
+        shaken.append(f"{t:.4f},{w:.6f},{f + 0.2 * np.sin(2 * np.pi * 1.7 * t):.6f}")
+    noisy.write_text("\n".join(shaken))
+    result = asperity("measure", noisy)
+    assert result.exit_code == 1
+    assert "asperity: stick-slip is bad" in result.stderr
+    assert "1.70" in result.stderr
+
+
+def test_plots_are_pictures(asperity, recording, step, tmp_path) -> None:
+    for arguments in ((recording,), (step, "--no-modulation")):
+        picture = tmp_path / f"{arguments[0].stem}.png"
+        result = asperity("measure", *arguments, "--plot", picture)
+        assert result.exit_code == 0, result.output
+        content = picture.read_bytes()
+        assert content.startswith(b"\x89PNG")
+        assert len(content) > 20_000
+
+
+def test_a_velocity_step(asperity, step) -> None:
+    result = asperity("measure", step, "--no-modulation", "--json")
+    assert result.exit_code == 0, result.output
+    found = record(result)
+    first, second = found["segments"]
+    assert second["start"] == pytest.approx(70, abs=0.2)
+    assert first["velocity"] == pytest.approx(3e-6, rel=1e-2)
+    assert second["velocity"] == pytest.approx(10e-6, rel=1e-2)
+    (change,) = found["steps"]
+    assert abs(change["change"] + 0.003) < 5 * change["uncertainty"]
+    assert change["rate_dependence"] == pytest.approx(-0.003 / np.log(10 / 3), abs=3e-4)
+    assert found["load"]["value"] == pytest.approx(20e6, rel=1e-3)
+    assert [rate["rate"] for rate in found["rates"]] == pytest.approx([50, 10])
+    text = asperity("measure", step, "--no-modulation", "--window", ":119").stdout
+    assert "A - B" in text
+    assert "um/s" in text
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--window", "10"), "--window must be START:END"),
+        (("--window", "a:b"), "--window must"),
+        (("--window", "5:4"), "window must enclose"),
+        (("--frequency", "120"), "--frequency must carry a unit"),
+        (("--frequency", "40 rpm"), "--frequency must"),
+        (("--exact-frequency",), "--exact-frequency must go with --frequency"),
+        (("--detrend", "cubic"), "detrend must be none, linear or quadratic"),
+        (("--harmonics", "0"), "--harmonics"),
+        (("--harmonics", "40"), "below half the sampling rate"),
+        (("--load", "nothing"), "nothing"),
+        (("--unit", "N"), "--unit must be NAME=VALUE"),
+        (("--column", "velocity"), "--column must be NAME=VALUE"),
+        (("--plot", "out.pdf"), "--plot must be a PNG file"),
+        (("--plot", "no/such/folder/out.png"), "--plot must lie in a folder that exists"),
+    ],
+)
+def test_bad_input_is_one_sentence(asperity, recording, options, message) -> None:
+    result = asperity("measure", recording, *options)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_file_that_is_not_there(asperity, tmp_path) -> None:
+    result = asperity("measure", tmp_path / "none.csv")
+    assert (result.exit_code, result.stdout) == (2, "")
+    assert result.stderr.count("\n") == 1
+
+
+def test_a_constant_load_is_told_what_to_do(asperity, tmp_path) -> None:
+    path = tmp_path / "constant.csv"
+    rows = [f"{i * 1e-3:.3f},7,{2.8 + 0.01 * (i % 7)}" for i in range(500)]
+    path.write_text("time (s),W (N),F (N)\n" + "\n".join(rows))
+    result = asperity("measure", path)
+    assert result.exit_code == 2
+    assert "must be modulated" in result.stderr
