@@ -24,7 +24,7 @@ def _arguments() -> argparse.Namespace:
 
 def _rows(points: int, repeats: int, million: int, cores: set[int]) -> Iterator:
     # Only now: libraries count the cores when they are imported.
-    from benchmarks import ours, peers, processes
+    from benchmarks import ours, peers, processes, transient
 
     def at_most(most: int) -> int:
         return min(points, most)
@@ -44,6 +44,7 @@ def _rows(points: int, repeats: int, million: int, cores: set[int]) -> Iterator:
         yield from processes.whole_batch_rows(law, points, repeats, cores)
     yield from processes.whole_batch_rows(LAWS[-1], million, 0, cores)
     yield from processes.start_up_rows(repeats)
+    yield from transient.transient_rows(min(8.0, max(0.05, points / 1000)), repeats)
 
 
 def _ratios(rows: list) -> str:

@@ -17,6 +17,9 @@ WORST = {
     "SciPy shooting": 1e-7,
     "SciPy LSODA marching": 1e-7,
     "diffrax marching": 1e-7,
+    "asperity transient": 1e-6,
+    "solve_ivp LSODA": 1e-6,
+    "odeint LSODA": 1e-6,
 }
 
 

@@ -79,7 +79,8 @@ class _OnAsperities(_Damped):
 
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta."""
-        v, slip = self.slider_velocity(Y, at), jnp.exp(self.log_slip(Y, at))
+        v = self.slider_velocity(Y, at)
+        slip = self.slip_velocity(self._friction(Y), Y, at)
         rates = [self.kappa * (at.pull - v), self.strain * (v - slip)]
         rates[1:1] = self._acceleration(Y, at)
         return jnp.stack(jnp.broadcast_arrays(*rates, *self._law_rates(v, slip, Y, at)))

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity.laws import Law
 from asperity.loads import Excitation
 from asperity.slider.slider import Slider
 
@@ -71,6 +72,11 @@ class Motion(eqx.Module):
         """L = lambda K / W0: stiffness of the spring over that of the asperities."""
         return self.slider.law.elastic_length * self.slider.K / self.slider.W0
 
+    @property
+    def signed(self) -> bool:
+        """Whether the law is defined at rest and in reversed motion."""
+        return type(self.slider.law).velocity is not Law.velocity
+
     def law_state(self, Y: Array) -> tuple[Array, ...]:
         """The law's states."""
         return tuple(Y[len(self.mechanical) :])
@@ -94,6 +100,13 @@ class Motion(eqx.Module):
     @abstractmethod
     def log_slip(self, Y: Array, at: Excitation) -> Array:
         """ln(v_pl / V), the exponent that makes the equations stiff."""
+
+    def slip_velocity(self, friction: Array, Y: Array, at: Excitation) -> Array:
+        """v_pl over V where the interface carries F_i/W = `friction`; signed if the law is."""
+        law = self.slider.law
+        if self.signed:
+            return law.velocity(friction, self.law_state(Y), at.w) / self.V
+        return jnp.exp(self.log_slip(Y, at))
 
     @abstractmethod
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:

@@ -60,7 +60,7 @@ class QuasiStatic(Motion):
 
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V, from the plastic velocity and the strain rate of the asperities."""
-        return self._velocity(Y, at, jnp.exp(self.log_slip(Y, at)))
+        return self._velocity(Y, at, self.slip_velocity(self.friction(Y, at), Y, at))
 
     def mechanical_states(
         self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
@@ -79,7 +79,7 @@ class QuasiStatic(Motion):
 
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta."""
-        slip = jnp.exp(self.log_slip(Y, at))
+        slip = self.slip_velocity(self.friction(Y, at), Y, at)
         z_rate = self.kappa * (at.pull - slip)
         v = self.V * self._velocity(Y, at, slip)
         law = self.slider.law

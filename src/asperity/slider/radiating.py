@@ -47,7 +47,12 @@ class Radiating(_Damped):
 
     def slider_velocity(self, Y: Array, at: Excitation) -> Array:
         """dx/dt over V."""
-        return jnp.exp(self.log_slip(Y, at))
+        if not self.signed:
+            return jnp.exp(self.log_slip(Y, at))
+        # Friction and damping are both odd in v.
+        force = Y[0] + at.shear
+        forward = Y.at[0].set(jnp.abs(force) - at.shear)
+        return jnp.sign(force) * jnp.exp(self.log_slip(forward, at))
 
     def mechanical_states(
         self, friction: Array, velocity: Array, log_slip: Array, at: Excitation

@@ -1,0 +1,134 @@
+"""Segments given by formulas: levels, ramps and harmonic modulation."""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.loads.programme_segments import Scalar, Segment, number
+
+
+class Levels(Segment):
+    """Load and velocity that rise or fall linearly, with a harmonic modulation on top.
+
+        W = (W1 + dW t) (1 + eps(t) cos psi),     psi = 2 pi f t + phase,
+        V = (V1 + dV t) (1 + eps_v cos psi),      S = ratio (W - W1 - dW t).
+
+    eps(t) goes smoothly, with two continuous derivatives, from eps1 to eps2 within `rise`.
+
+    Parameters
+    ----------
+    duration : array
+        Seconds.
+    load1, load_rate : array
+        W1 (N) and dW (N/s).
+    pull1, pull_rate : array
+        V1 (m/s) and dV (m/s^2).
+    epsilon1, epsilon2, rise : array
+        Relative amplitudes and the time (s) from one to the other; 0 is sudden.
+    frequency, phase : array
+        f (Hz) and the phase (rad) at the beginning of the segment.
+    epsilon_v : array
+        Relative amplitude of the pulling velocity.
+    shear_ratio : array
+        Shear force per modulated normal force, of an exciter at an angle.
+    """
+
+    duration: Scalar = eqx.field(converter=jnp.asarray)
+    load1: Scalar = eqx.field(converter=jnp.asarray)
+    pull1: Scalar = eqx.field(converter=jnp.asarray)
+    load_rate: Scalar = number(0.0)
+    pull_rate: Scalar = number(0.0)
+    epsilon1: Scalar = number(0.0)
+    epsilon2: Scalar = number(0.0)
+    rise: Scalar = number(0.0)
+    frequency: Scalar = number(0.0)
+    phase: Scalar = number(0.0)
+    epsilon_v: Scalar = number(0.0)
+    shear_ratio: Scalar = number(0.0)
+
+    def _angle(self, t: ArrayLike) -> Array:
+        return 2 * jnp.pi * self.frequency * t + self.phase
+
+    def _modulated(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Part of the load that the modulation adds (N), and its rate (N/s)."""
+        slow = self.rise > 0
+        x = jnp.where(slow, jnp.clip(t / jnp.where(slow, self.rise, 1.0), 0.0, 1.0), 1.0)
+        change = self.epsilon2 - self.epsilon1
+        epsilon = self.epsilon1 + change * x**3 * (10 - 15 * x + 6 * x**2)
+        growth = 30 * (x * (1 - x)) ** 2 * change / jnp.where(slow, self.rise, 1.0)
+        cos, sin = jnp.cos(self._angle(t)), jnp.sin(self._angle(t))
+        level = self.load1 + self.load_rate * t
+        turning = 2 * jnp.pi * self.frequency * sin
+        rate = self.load_rate * epsilon * cos + level * (growth * cos - epsilon * turning)
+        return level * epsilon * cos, rate
+
+    def load(self, t: ArrayLike) -> tuple[Array, Array]:
+        """W and dW/dt."""
+        part, rate = self._modulated(t)
+        return self.load1 + self.load_rate * t + part, self.load_rate + rate
+
+    def shear(self, t: ArrayLike) -> tuple[Array, Array]:
+        """S and dS/dt."""
+        part, rate = self._modulated(t)
+        return self.shear_ratio * part, self.shear_ratio * rate
+
+    def pull(self, t: ArrayLike) -> Array:
+        """V."""
+        level = self.pull1 + self.pull_rate * t
+        return level * (1 + self.epsilon_v * jnp.cos(self._angle(t)))
+
+    def position(self, t: ArrayLike) -> Array:
+        """Integral of V, in closed form."""
+        smooth = self.pull1 * t + 0.5 * self.pull_rate * t**2
+        turns = self.frequency > 0
+        omega = 2 * jnp.pi * jnp.where(turns, self.frequency, 1.0)
+        sin, cos = jnp.sin(self._angle(t)), jnp.cos(self._angle(t))
+        sin0, cos0 = jnp.sin(self.phase), jnp.cos(self.phase)
+        swing = self.pull1 * (sin - sin0) / omega
+        swing = swing + self.pull_rate * (t * sin / omega + (cos - cos0) / omega**2)
+        return smooth + self.epsilon_v * jnp.where(turns, swing, smooth * cos0)
+
+    @property
+    def lowest_load(self) -> float:
+        """Of either end of the level, at the larger amplitude."""
+        end = self.load1 + self.load_rate * self.duration
+        epsilon = max(abs(float(self.epsilon1)), abs(float(self.epsilon2)))
+        return min(float(level) * (1 - epsilon) for level in (self.load1, end))
+
+    @property
+    def fastest_pull(self) -> float:
+        """Of either end."""
+        end = self.pull1 + self.pull_rate * self.duration
+        return max(abs(float(v)) for v in (self.pull1, end)) * (1 + abs(float(self.epsilon_v)))
+
+    @property
+    def longest_step(self) -> float:
+        """A tenth of a period, or an eighth of a ramp."""
+        if self._swings:
+            return 0.1 / float(self.frequency)
+        duration = float(self.duration)
+        return duration if self.constant else duration / 8
+
+    @property
+    def _swings(self) -> bool:
+        amplitudes = (self.epsilon1, self.epsilon2, self.epsilon_v)
+        return float(self.frequency) > 0 and any(float(a) != 0 for a in amplitudes)
+
+    @property
+    def _level(self) -> bool:
+        """Whether neither load nor velocity nor amplitude changes by and by."""
+        fixed = float(self.epsilon1) == float(self.epsilon2) or float(self.rise) == 0
+        return fixed and float(self.load_rate) == 0 and float(self.pull_rate) == 0
+
+    @property
+    def period(self) -> float | None:
+        """1/f of a steady modulation."""
+        return 1 / float(self.frequency) if self._swings and self._level else None
+
+    @property
+    def constant(self) -> bool:
+        """Neither ramp nor modulation."""
+        return self._level and not self._swings

@@ -1,0 +1,227 @@
+"""What happens on the way: found between steps, located on the dense output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.slider import Motion, QuasiStatic, StiffInertial
+from asperity.solve.transients.equations import Reading, System, read
+from asperity.solve.transients.pieces import Pieces
+from asperity.solve.transients.stops import Stop
+
+#: Instants of every step at which is looked for a change of sign.
+_PARTS = 4
+
+_ROOT_STEPS = 60
+
+#: v/V below which a slider whose velocity is about to vanish counts as at rest.
+_REST = 1e-9
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened.
+
+    Attributes
+    ----------
+    time : float
+        Seconds.
+    kind : str
+        "slip start", "slip end", "steady", "reversal", or the kind of a `Stop`.
+    """
+
+    time: float
+    kind: str
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """When something counts as an event.
+
+    Attributes
+    ----------
+    slip : float
+        Velocity of the slider (m/s) above which it slips.
+    runaway : float
+        Plastic velocity (m/s) that a slider without inertia cannot reach by itself.
+    steady : float
+        Deviation from steady sliding that is none: relative velocity, or state over a period.
+    """
+
+    slip: float
+    runaway: float
+    steady: float
+
+
+#: Signed distance from a threshold; an event is a change of its sign.
+Distance = Callable[[Reading], np.ndarray]
+
+
+class Watch:
+    """Looks for events, chunk by chunk.
+
+    Parameters
+    ----------
+    motion : Motion
+    thresholds : Thresholds
+    """
+
+    def __init__(self, motion: Motion, thresholds: Thresholds) -> None:
+        self._may_run_away = isinstance(motion, QuasiStatic)
+        self._reverses = motion.signed
+        self._may_come_to_rest = motion.signed and isinstance(motion, StiffInertial)
+        V = float(motion.V)
+
+        def log_speed(velocity: np.ndarray, threshold: float) -> np.ndarray:
+            return np.log(np.maximum(velocity * V, 1e-300) / threshold)
+
+        self._slip: Distance = lambda r: log_speed(r.slip, thresholds.slip)
+        self._runaway: Distance = lambda r: log_speed(r.slip, thresholds.runaway)
+        self._unrest: Distance = lambda r: np.log(r.unrest / thresholds.steady)
+        self._friction: Distance = lambda r: r.friction
+        self._steady = thresholds.steady
+        self._before: dict[str, float] = {}
+
+    def enter(self, system: System, start: float) -> None:
+        """Begin a segment; what went on before it goes on."""
+        self._system, self._start = system, start
+        self._settled = not system.segment.constant
+        self._strobes = _Strobes(system.segment.period, self._steady)
+
+    def underflow(self, t: float, states: np.ndarray) -> Stop:
+        """Why no step was accurate at the time `t` of the segment, shape (size + 1,)."""
+        now = read(self._system, np.array([t]), states[:, None])
+        kind = "no accurate step"
+        if self._may_run_away and not self._slip(now)[0] < 0:
+            kind = "runaway"
+        if self._may_come_to_rest and now.velocity[0] < _REST:
+            kind = "rest"
+        return Stop(kind, self._start + t)
+
+    def look(self, pieces: Pieces) -> tuple[list[Event], Stop | None]:
+        """Events on the pieces, in the order of time, and the first one that ends it all."""
+        if len(pieces.begin) == 0:
+            return [], None
+        times = pieces.refined(_PARTS)
+        reading = read(self._system, times, pieces.evaluate(times))
+        found = [
+            Event(t, "slip start" if up else "slip end")
+            for t, up in self._crossings("slip", self._slip, times, reading, pieces)
+        ]
+        stops = []
+        if self._may_run_away:
+            crossed = self._crossings("runaway", self._runaway, times, reading, pieces)
+            stops += [Stop("runaway", t) for t, up in crossed if up and t > self._start]
+        reversals = self._crossings("friction", self._friction, times, reading, pieces)
+        if self._reverses:
+            found += [Event(t, "reversal") for t, _ in reversals]
+        else:
+            stops += [Stop("reversal", t) for t, up in reversals if not up]
+        found += self._rest(times, reading, pieces)
+        stop = min(stops, key=lambda s: s.time, default=None)
+        return sorted(found, key=lambda e: e.time), stop
+
+    def _rest(self, times: np.ndarray, reading: Reading, pieces: Pieces) -> list[Event]:
+        """Steady sliding, or a steady response to a modulation, at most once in a segment."""
+        t = self._strobes.look(pieces)
+        if t is not None:
+            return [Event(self._start + t, "steady")]
+        if self._settled:
+            return []
+        if reading.unrest[0] < self._steady and pieces.begin[0] == 0:
+            self._settled = True
+            return [Event(self._start, "steady")]
+        self._before.pop("unrest", None)
+        crossed = self._crossings("unrest", self._unrest, times, reading, pieces)
+        down = [t for t, up in crossed if not up][:1]
+        self._settled = bool(down)
+        return [Event(t, "steady") for t in down]
+
+    def _crossings(
+        self, name: str, distance: Distance, times: np.ndarray, reading: Reading, pieces: Pieces
+    ) -> list[tuple[float, bool]]:
+        """Times (s) at which a distance changes its sign, and whether it rises."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = distance(reading)
+        before = self._before.get(name)
+        self._before[name] = float(values[-1])
+        crossings = []
+        # A step of the load takes it across at the break point itself.
+        if before is not None and np.sign(before) * np.sign(values[0]) < 0:
+            crossings.append((self._start + float(times[0]), bool(values[0] > 0)))
+        change = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
+        if change.size:
+            ends = times[change], times[change + 1]
+            roots = self._roots(distance, *ends, values[change], values[change + 1], pieces)
+            crossings += [
+                (self._start + float(t), bool(values[i] < 0))
+                for t, i in zip(roots, change, strict=True)
+            ]
+        return crossings
+
+    def _roots(
+        self,
+        distance: Distance,
+        left: np.ndarray,
+        right: np.ndarray,
+        f_left: np.ndarray,
+        f_right: np.ndarray,
+        pieces: Pieces,
+    ) -> np.ndarray:
+        """Roots between `left` and `right`, all at once, by the Illinois method."""
+        left, right, f_left, f_right = (a.copy() for a in (left, right, f_left, f_right))
+        for _ in range(_ROOT_STEPS):
+            middle = right - f_right * (right - left) / (f_right - f_left)
+            middle = np.where(np.isfinite(middle), middle, 0.5 * (left + right))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                value = distance(read(self._system, middle, pieces.evaluate(middle)))
+            beyond = np.sign(value) * np.sign(f_right) < 0
+            left = np.where(beyond, right, left)
+            f_left = np.where(beyond, f_right, 0.5 * f_left)
+            converged = np.abs(middle - right) <= 4e-16 * np.abs(middle)
+            right, f_right = middle, value
+            if np.all(converged | (np.abs(value) < 1e-13)):
+                break
+        return right
+
+
+class _Strobes:
+    """States once a period of a modulation: steady when they repeat themselves."""
+
+    def __init__(self, period: float | None, tolerance: float) -> None:
+        self._period, self._tolerance = period, tolerance
+        self._last: np.ndarray | None = None
+        self._change = np.inf
+        self._next = 0
+
+    def look(self, pieces: Pieces) -> float | None:
+        """Time of the segment at which the response has become steady, once."""
+        if self._period is None:
+            return None
+        last = int(np.floor(pieces.end / self._period))
+        times = self._period * np.arange(self._next, last + 1)
+        times = times[times <= pieces.end]
+        self._next += len(times)
+        if times.size == 0:
+            return None
+        # The displacement goes on.
+        states = pieces.evaluate(times)[:-1]
+        before = states[:, :1] if self._last is None else self._last
+        changes = np.abs(np.diff(np.concatenate([before, states], axis=1))).max(0)
+        if self._last is None:
+            changes[0] = np.inf
+        # Of changes that fall geometrically, what is still to come; or one that is lost in
+        # the errors of the steps, and falls no further.
+        previous = np.append(self._change, changes[:-1])
+        known = np.isfinite(previous) & (changes < previous)
+        ratios = np.where(known, changes / np.where(known, previous, 1.0), 1.0)
+        left = changes * np.minimum(ratios / np.maximum(1 - ratios, 1e-12), 1e3)
+        self._last, self._change = states[:, -1:], changes[-1]
+        settled = np.flatnonzero(left < self._tolerance)
+        if settled.size == 0:
+            return None
+        self._period = None
+        return float(times[settled[0]])

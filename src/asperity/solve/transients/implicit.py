@@ -1,0 +1,237 @@
+"""Implicit steps: Radau collocation with five stages, of order 9, for stiff equations.
+
+    Z_i = h sum_j a_ij f(t + c_j h, Y + Z_j),        Y_new = Y + Z_5,
+
+solved by simplified Newton iterations in the eigenvectors of the matrix a, which splits them into
+one real and two complex systems of the size of one state. The displacement, on which no rate
+depends, is a quadrature. Dense output is the collocation polynomial.
+
+Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. (Springer,
+1996), section IV.8; J. Comput. Appl. Math. 111, 93 (1999) for other numbers of stages. The
+coefficients are computed from their definition.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.polynomial import Legendre
+
+from asperity.loads import Excitation
+from asperity.solve.linear import jacobian_columns, product, solve_columns
+from asperity.solve.transients.equations import System
+from asperity.solve.transients.pieces import GOING_ON, STEPS, UNDERFLOW, Chunk
+
+STAGES = 5
+_SAFETY, _SHRINK, _GROW = 0.9, 0.1, 8.0
+
+_NEWTON_STEPS = 10
+#: Newton's method stops where what is left is this share of the tolerated error.
+_NEWTON_SHARE = 0.01
+
+#: Product of step and largest eigenvalue up to which explicit steps would cost less.
+_MILD = 8.0
+
+#: Squarings of the Jacobian that tell its largest eigenvalue from its norm.
+_SQUARINGS = 4
+
+
+class _Tableau(NamedTuple):
+    c: np.ndarray  # (s,)
+    a: np.ndarray  # (s, s)
+    inverse: np.ndarray  # of a
+    eigenvalues: np.ndarray  # of the inverse: the real one and those with Im > 0, (pairs,)
+    to_modes: np.ndarray  # (pairs, s)
+    from_modes: np.ndarray  # (s, pairs); the real part of the sum
+    error: np.ndarray  # (s,), weights of Z in the error estimate
+    powers: np.ndarray  # (s + 1, s): polynomial through 0 and Z in rising powers
+
+
+@cache
+def _tableau() -> _Tableau:
+    s = STAGES
+    # Right Radau points: zeros of P_s - P_(s-1), mapped to (0, 1].
+    c = (np.sort((Legendre.basis(s) - Legendre.basis(s - 1)).roots().real) + 1) / 2
+    c[-1] = 1.0
+    k = np.arange(1, s + 1)
+    vandermonde = c[:, None] ** (k - 1)
+    a = (c[:, None] ** k / k) @ np.linalg.inv(vandermonde)
+    inverse = np.linalg.inv(a)
+    values, vectors = np.linalg.eig(inverse)
+    kept = np.flatnonzero(values.imag > -1e-9)
+    kept = kept[np.argsort(np.abs(values[kept].imag))]
+    # A complex pair adds twice its real part.
+    twice = np.where(np.abs(values[kept].imag) < 1e-9, 1.0, 2.0)
+    # An embedded quadrature of order s on the same points and on t itself, which has the weight
+    # of the real eigenvalue, so that the matrix at hand filters what is stiff out of it.
+    gamma = 1 / values[kept[0]].real
+    weights = np.linalg.solve(vandermonde.T, 1 / k - gamma * (k == 1))
+    powers = np.zeros((s + 1, s))
+    powers[1:] = np.linalg.inv(c[:, None] ** k)
+    return _Tableau(
+        c, a, inverse, values[kept], np.linalg.inv(vectors)[kept], vectors[:, kept] * twice,
+        (weights - a[-1]) @ inverse, powers,
+    )  # fmt: skip
+
+
+class _Carry(NamedTuple):
+    t: Array
+    Y: Array
+    h: Array
+    taken: Array
+    rejected: Array
+    mild: Array
+    status: Array
+    guess: Array  # polynomial of the last accepted step, (s + 1, size)
+    guess_length: Array
+    begin: Array
+    length: Array
+    coefficients: Array
+
+
+def advance(
+    system: System, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
+) -> Chunk:
+    """March from `t` towards `end`, at most `STEPS` accepted steps; as `explicit.advance`."""
+    return _advance(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+
+
+@jax.jit
+def _advance(
+    system: System,
+    t: Array,
+    Y: Array,
+    h: Array,
+    end: Array,
+    longest: Array,
+    rtol: Array,
+    atol: Array,
+) -> Chunk:
+    table = _tableau()
+    powers = jnp.asarray(table.powers)
+
+    def unfinished(carry: _Carry) -> Array:
+        return (carry.t < end) & (carry.taken < STEPS) & (carry.status == GOING_ON)
+
+    def body(carry: _Carry) -> _Carry:
+        t, Y, i = carry.t, carry.Y, carry.taken
+        h = jnp.minimum(carry.h, longest)
+        target = jnp.minimum(end, system.segment.next_kink(t))
+        cut = t + h >= target
+        h = jnp.where(cut, target - t, h)
+        scale = system.scale(Y, rtol, atol)
+        Z, error, steps, slope = _step(system, t, Y, h, _extrapolated(carry, h), scale)
+        good = error < 1
+        # Steps on which Newton's method laboured should not grow.
+        safety = _SAFETY * (2 * _NEWTON_STEPS + 1) / (2 * _NEWTON_STEPS + steps)
+        factor = jnp.clip(safety * error ** (-1 / (STAGES + 1)), _SHRINK, _GROW)
+        factor = jnp.where(jnp.isfinite(error), factor, _SHRINK)
+        factor = jnp.where(good, factor, jnp.minimum(factor, _SAFETY))
+        h_next = h * factor
+        lost = ~good & (t + h_next <= t)
+        piece = (powers @ Z.T).at[0].set(Y)
+        return _Carry(
+            jnp.where(good, jnp.where(cut, target, t + h), t),
+            jnp.where(good, Y + Z[:, -1], Y),
+            jnp.where(good & cut, jnp.maximum(h_next, carry.h), h_next),
+            i + good,
+            carry.rejected + ~good,
+            carry.mild + (good & (h * slope < _MILD)),
+            jnp.where(lost, UNDERFLOW, GOING_ON),
+            jnp.where(good, piece, carry.guess),
+            jnp.where(good, h, carry.guess_length),
+            carry.begin.at[i].set(t),
+            carry.length.at[i].set(h),
+            carry.coefficients.at[i].set(piece),
+        )
+
+    size = Y.shape[0]
+    none, empty = jnp.asarray(0), jnp.zeros(STEPS)
+    h = jnp.where(h > 0, h, system.first_length(t, Y))
+    first = _Carry(
+        t, Y, h, none, none, none, jnp.asarray(GOING_ON),
+        jnp.zeros((STAGES + 1, size)).at[0].set(Y), jnp.ones(()), empty, empty,
+        jnp.zeros((STEPS, STAGES + 1, size)),
+    )  # fmt: skip
+    run = jax.lax.while_loop(unfinished, body, first)
+    return Chunk(
+        run.begin, run.length, run.coefficients, run.taken, run.t, run.Y, run.h,
+        run.rejected, run.status, run.mild,
+    )  # fmt: skip
+
+
+def _extrapolated(carry: _Carry, h: Array) -> Array:
+    """Where the last polynomial leads to, less the state, shape (size, stages)."""
+    share = 1 + h / carry.guess_length * jnp.asarray(_tableau().c)
+    ahead = (share[:, None] ** np.arange(STAGES + 1)) @ carry.guess
+    # Far beyond its step a polynomial tells nothing.
+    near = (h < 3 * carry.guess_length) & (carry.taken > 0)
+    return jnp.where(near, ahead.T - carry.Y[:, None], 0.0)
+
+
+def _step(
+    system: System, t: Array, Y: Array, h: Array, guess: Array, scale: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Stages Z, shape (size, stages), error, Newton iterations, and largest eigenvalue."""
+    table = _tableau()
+    n = Y.shape[0] - 1
+    now, at = system.at(t), system.at(t + jnp.asarray(table.c) * h)
+    value, columns = jacobian_columns(lambda y: _stacked(system, now, y), Y[:n])
+    jacobian = jnp.stack([c[:n] for c in columns], axis=1)
+    values = jnp.asarray(table.eigenvalues)
+    identity = jnp.eye(n)[:, :, None]
+    matrices = identity * values / h - jacobian[:, :, None]
+    inverses = solve_columns(matrices, jnp.broadcast_to(identity + 0j, matrices.shape))
+
+    def newton(carry: tuple) -> tuple:
+        Z, steps, change, _ = carry
+        rates, _ = system.motion_rates(at, Y[:n, None] + Z)
+        residual = rates - Z @ table.inverse.T / h
+        modes = residual @ table.to_modes.T
+        correction = (jnp.einsum("ijk,jk->ik", inverses, modes) @ table.from_modes.T).real
+        size = jnp.sqrt(jnp.mean(jnp.square(correction / scale[:n, None])))
+        return Z + correction, steps + 1, size, size / change
+
+    def unfinished(carry: tuple) -> Array:
+        _, steps, size, rate = carry
+        hopeless = (steps > 1) & (rate > 2)
+        return (steps < _NEWTON_STEPS) & (_left(size, rate) > _NEWTON_SHARE) & ~hopeless
+
+    start = (guess[:n], jnp.asarray(0), jnp.asarray(1.0), jnp.asarray(1.0))
+    Z, steps, size, rate = jax.lax.while_loop(unfinished, newton, start)
+    converged = _left(size, rate) <= _NEWTON_SHARE
+    _, x_rate = system.motion_rates(at, Y[:n, None] + Z)
+    x = h * (jnp.asarray(table.a) @ (x_rate * jnp.ones(STAGES)))
+    Z = jnp.concatenate([Z, x[None]])
+    real = table.eigenvalues[0].real
+    raw = h * value / real + Z @ table.error
+    filtered = (inverses[:, :, 0].real @ raw[:n]) * real / h
+    error = jnp.concatenate([filtered, raw[n:]]) / scale
+    size = jnp.sqrt(jnp.mean(jnp.square(error)))
+    return Z, jnp.where(converged, size, jnp.inf), steps, _largest_eigenvalue(jacobian)
+
+
+def _largest_eigenvalue(matrix: Array) -> Array:
+    """Modulus, from above: limit of |matrix^k|^(1/k)."""
+    log = jnp.zeros(())
+    for i in range(_SQUARINGS):
+        size = jnp.abs(matrix).max() + 1e-300
+        log = log + jnp.log(size) / 2**i
+        matrix = product(matrix / size, matrix / size)
+    return jnp.exp(log + jnp.log(jnp.abs(matrix).max() + 1e-300) / 2**_SQUARINGS)
+
+
+def _left(size: Array, rate: Array) -> Array:
+    """What is left after corrections that fall geometrically; 0 to round-off where exact."""
+    return size * jnp.minimum(rate / jnp.maximum(1 - rate, 1e-3), 1.0)
+
+
+def _stacked(system: System, at: Excitation, states: Array) -> Array:
+    """Rates of the motion's states and of the displacement, shape (size + 1,)."""
+    rates, x_rate = system.motion_rates(at, states)
+    return jnp.concatenate([rates, jnp.reshape(x_rate, (1,))])

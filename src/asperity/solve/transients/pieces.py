@@ -1,0 +1,84 @@
+"""The solution between two instants, as polynomials in time, one a step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jax import Array
+
+#: Steps that a compiled program takes before it hands over what it has.
+STEPS = 1024
+
+#: What a program that advances the states may report.
+GOING_ON, UNDERFLOW = 0, 1
+
+
+class Chunk(NamedTuple):
+    """Some steps, as a compiled program returns them.
+
+    Attributes
+    ----------
+    begin, length : array, shape (STEPS,)
+        Beginning of each accepted step and its length (s).
+    coefficients : array, shape (STEPS, degree + 1, size)
+        Of rising powers of the share of the step gone by.
+    taken : int
+        Number of accepted steps; what lies beyond is meaningless.
+    t, Y : array
+        Where the last of them ended.
+    next_length : array
+        Proposal for the next step (s).
+    rejected : int
+        Number of rejected steps.
+    status : int
+        GOING_ON, or UNDERFLOW where no step however short was accurate.
+    doubtful : int
+        Steps of the explicit method at its limit of stability, or of the implicit method that an
+        explicit one could have made.
+    """
+
+    begin: Array
+    length: Array
+    coefficients: Array
+    taken: Array
+    t: Array
+    Y: Array
+    next_length: Array
+    rejected: Array
+    status: Array
+    doubtful: Array
+
+
+class Pieces(NamedTuple):
+    """Steps one after the other; arrays as in `Chunk`, without what is meaningless."""
+
+    begin: np.ndarray
+    length: np.ndarray
+    coefficients: np.ndarray
+
+    @classmethod
+    def of(cls, chunk: Chunk) -> Pieces:
+        """The steps of a chunk."""
+        kept = slice(int(chunk.taken))
+        return cls(*(np.asarray(a)[kept] for a in chunk[:3]))
+
+    @property
+    def end(self) -> float:
+        """Where the last step ends (s)."""
+        return float(self.begin[-1] + self.length[-1])
+
+    def evaluate(self, t: np.ndarray) -> np.ndarray:
+        """States at the times `t`, shape (size, n), within the pieces."""
+        i = np.clip(np.searchsorted(self.begin, t, side="right") - 1, 0, len(self.begin) - 1)
+        share = (t - self.begin[i]) / self.length[i]
+        value = self.coefficients[i, -1]
+        for k in range(self.coefficients.shape[1] - 2, -1, -1):
+            value = value * share[:, None] + self.coefficients[i, k]
+        return value.T
+
+    def refined(self, parts: int) -> np.ndarray:
+        """Times that divide every step in `parts`, with the end, shape (parts count + 1,)."""
+        shares = np.arange(parts) / parts
+        inner = (self.begin[:, None] + self.length[:, None] * shares).ravel()
+        return np.append(inner, self.end)
