@@ -14,6 +14,7 @@ POINT = ("--law", "elasto-plastic", "-V", "1 um/s", "-e", "0.24", "-f", "120 Hz"
 KEYS = {
     *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
     *("harmonics", "floquet", "log_floquet"),
+    *("mode", "mode_frequency", "growth_rate"),
     *("stable", "converged", "result", "provenance"),
 }
 
@@ -101,6 +102,7 @@ def test_a_failed_point_says_why_and_gives_no_number(asperity) -> None:
     assert set(record) == KEYS
     assert (record["converged"], record["stable"]) == (False, False)
     assert record["result"] != "converged"
+    assert (record["mode"], record["growth_rate"]) == ("", None)
     assert record["mean_friction"] is record["mu1"] is record["phase2"] is None
     assert record["harmonics"] == [[None, None]] * 8
     assert record["floquet"] == record["log_floquet"] == [[None, None]] * 2

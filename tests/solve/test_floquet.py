@@ -9,6 +9,7 @@ from asperity.laws import ElastoPlastic, RiceRuina
 from asperity.solve.floquet import (
     LARGEST_LOG,
     from_logs,
+    kind_of_crossing,
     log_multipliers,
     without_lost_arguments,
 )
@@ -225,3 +226,37 @@ def test_threshold_of_stability(reference):
     )
     assert np.abs(shot.multipliers[1, 0]) == pytest.approx(1, abs=1e-10)
     assert np.abs(shot.multipliers[0, 0]) > 1 > np.abs(shot.multipliers[2, 0])
+
+
+@pytest.mark.parametrize(
+    ("multiplier", "kind"),
+    [
+        (1.2, "fold"),
+        (0.3, "fold"),
+        (-1.2, "period doubling"),
+        (1.1 * np.exp(0.3j), "Neimark-Sacker"),
+        (1.1 * np.exp(-3.1j), "Neimark-Sacker"),
+        (complex(np.nan, 0.0), ""),
+    ],
+)
+def test_what_a_leading_multiplier_stands_for(multiplier, kind):
+    logs = np.log(np.array([multiplier], dtype=complex))
+    assert kind_of_crossing(logs)[0] == kind
+
+
+def test_the_slow_mode_of_unmodulated_sliding():
+    """Its frequency and growth are the closed form's, at any amplitude small enough."""
+    response = periodic_response(
+        Slider(RiceRuina(**BASE), spring=K, load=W0),
+        velocity=1e-6,
+        epsilon=1e-6,
+        frequency=120.0,
+    )
+    A, B = BASE["A"], BASE["B"]
+    rate, loading = 1e-6 / BASE["D0"], K * 1e-6 / W0
+    # Characteristic equation of steady sliding, s^2 + b s + c = 0.
+    b, c = rate * (1 - B / A) + loading / A, loading * rate / A
+    root = -b / 2 + np.sqrt(complex(b**2 / 4 - c))
+    assert response.mode == "Neimark-Sacker"
+    assert response.growth_rate == pytest.approx(root.real, rel=1e-5)
+    assert response.mode_frequency == pytest.approx(root.imag / (2 * np.pi), rel=1e-5)

@@ -101,7 +101,7 @@ def kind_of_crossing(logs: Complex) -> NDArray[np.object_]:
     kinds = np.full(logs.shape, NEIMARK_SACKER, dtype=object)
     kinds[angle < _REAL] = FOLD
     kinds[np.abs(angle - np.pi) < _REAL] = PERIOD_DOUBLING
-    kinds[np.isnan(angle)] = ""
+    kinds[np.isnan(angle) | np.isnan(logs.real)] = ""
     return kinds
 
 
