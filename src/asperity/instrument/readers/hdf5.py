@@ -91,7 +91,7 @@ def _values(file: Any, item: Any, matlab: bool) -> Any:
 
     if matlab and item.attrs.get("MATLAB_class") == b"char":
         return "".join(map(chr, np.asarray(item[()]).reshape(-1, order="F")))
-    if item.dtype == h5py.ref_dtype:
+    if h5py.check_ref_dtype(item.dtype) is not None:
         # Cells of MATLAB are references to their contents.
         return [_values(file, file[r], matlab) for r in np.asarray(item[()]).reshape(-1, order="F")]
     if h5py.check_string_dtype(item.dtype) is not None:

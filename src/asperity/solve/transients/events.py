@@ -201,6 +201,8 @@ class _Strobes:
         """Time of the segment at which the response has become steady, once."""
         if self._period is None:
             return None
+        # A resumed segment begins within.
+        self._next = max(self._next, int(np.ceil(pieces.begin[0] / self._period)))
         last = int(np.floor(pieces.end / self._period))
         times = self._period * np.arange(self._next, last + 1)
         times = times[times <= pieces.end]

@@ -1,0 +1,87 @@
+"""Figure of a run: load, force and velocity over time, with what happened."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, RICE_RUINA, new_figure
+
+if TYPE_CHECKING:
+    from asperity.study.protocol import Outline
+
+#: Events that are marked; more of them than fit are counted instead.
+_MARKED = {"slip start": LINKER_DIETERICH, "steady": GREY}
+_MOST_MARKS = 60
+
+
+def draw_run(run: Outline) -> Figure:
+    """Load, spring force, and velocity of the slider over time.
+
+    Where a curve turns faster than the figure can show, the band between its extremes is filled.
+
+    Parameters
+    ----------
+    run : Outline
+    """
+    figure = new_figure(5.0, 6.2)
+    load, force, velocity = figure.subplots(3, 1, sharex=True)
+    _draw_band(load, run, "load", RICE_RUINA, 1.0)
+    _draw_band(force, run, "force", ELASTO_PLASTIC, 1.0)
+    _draw_band(velocity, run, "velocity", ELASTO_PLASTIC, 1e6)
+    load.set_ylabel("$W$ (N)")
+    force.set_ylabel("$F$ (N)")
+    velocity.set_ylabel("velocity (µm/s)")
+    velocity.set_xlabel("time (s)")
+    _scale_velocity(velocity, run)
+    _mark_events(force, run)
+    if run.title:
+        load.set_title(run.title)
+    for axis, letter in zip((load, force, velocity), "abc", strict=True):
+        axis.text(0.015, 0.94, f"({letter})", transform=axis.transAxes, va="top", fontsize=10)
+    velocity.set_xlim(run.time[0], run.time[-1])
+    return figure
+
+
+def _draw_band(axis: Axes, run: Outline, name: str, color: str, scale: float) -> None:
+    low, high = scale * run.low[name], scale * run.high[name]
+    axis.fill_between(run.time, low, high, color=color, alpha=0.45, linewidth=0)
+    # The edges of the band, which are one line where it has no width.
+    for edge in (low, high):
+        axis.plot(run.time, edge, color=color, linewidth=0.7)
+    span = float(np.max(high) - np.min(low))
+    if span <= 1e-9 * abs(float(np.max(high))):
+        middle = float(np.max(high))
+        axis.set_ylim(middle - 0.1 * abs(middle) - 1e-12, middle + 0.1 * abs(middle) + 1e-12)
+    else:
+        axis.set_ylim(float(np.min(low)) - 0.06 * span, float(np.max(high)) + 0.22 * span)
+
+
+def _scale_velocity(axis: Axes, run: Outline) -> None:
+    """Pulses and holds are decades apart: logarithmic where the velocity stays positive."""
+    low, high = 1e6 * run.low["velocity"], 1e6 * run.high["velocity"]
+    if np.min(low) > 0 and np.max(high) > 30 * np.min(low):
+        axis.set_yscale("log")
+        axis.set_ylim(max(float(np.min(low)), 1e-9 * float(np.max(high))) / 2, 8 * np.max(high))
+    else:
+        size = max(float(np.max(np.abs([low, high]))), 1e-300)
+        if size > 30 * np.median(np.maximum(np.abs(low), np.abs(high))):
+            # Linear up to a power of ten, which then is the first of the marks.
+            axis.set_yscale("symlog", linthresh=10.0 ** (np.floor(np.log10(size)) - 1))
+            axis.autoscale(axis="y")
+
+
+def _mark_events(axis: Axes, run: Outline) -> None:
+    for kind, color in _MARKED.items():
+        times = [t for t, k in run.events if k == kind]
+        if not 0 < len(times) <= _MOST_MARKS:
+            continue
+        for i, t in enumerate(times):
+            axis.axvline(
+                t, color=color, linewidth=0.7, linestyle="dotted", label=None if i else kind
+            )
+    if axis.get_legend_handles_labels()[0]:
+        axis.legend(loc="upper right", ncols=2, frameon=True, framealpha=1.0, edgecolor="none")

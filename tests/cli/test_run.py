@@ -1,0 +1,199 @@
+"""`asperity run`: files, exit codes, and Ctrl-C in a real process."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray
+
+from asperity.instrument import read
+from asperity.study.protocol import RunInterrupted, load_protocol, run_protocol
+
+PROTOCOL = """
+title = "modulation"
+law = "elasto-plastic"
+material = "bureau2000"
+steps = ["slide for 0.2 s", "modulate 24 % at 120 Hz for 0.3 s"]
+
+[parameters]
+K = "0.5 N/um"
+
+[start]
+velocity = "10 um/s"
+
+[solver]
+sampling = "2 kHz"
+"""
+
+
+@pytest.fixture
+def protocol(tmp_path) -> Path:
+    path = tmp_path / "protocol.toml"
+    path.write_text(PROTOCOL, encoding="utf-8")
+    return path
+
+
+def test_a_run_with_text_and_picture(asperity, protocol, tmp_path) -> None:
+    out = tmp_path / "run.nc"
+    result = asperity("run", protocol, "--out", out, "--csv", "--plot", "--json")
+    assert result.exit_code == 0, result.output
+    assert result.stderr == ""
+    told = json.loads(result.stdout)
+    assert told == {
+        "rows": 1001,
+        "events": told["events"],
+        "time": 0.5,
+        "duration": 0.5,
+        "stopped": None,
+        "files": [str(tmp_path / name) for name in ("run.nc", "run.csv", "run.png")],
+    }
+    with xarray.open_dataset(out) as run:
+        assert run.sizes["time"] == 1001
+        trace = read(tmp_path / "run.csv")
+        np.testing.assert_allclose(trace.channel("F").values, run.force, rtol=1e-11)
+        np.testing.assert_allclose(trace.channel("W").values, run["load"], rtol=1e-11)
+    assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "run.png").stat().st_size > 10_000
+
+
+_TRIBOMETER = """
+[tribometer]
+rate = "1 kHz"
+
+[tribometer.sensors."shear force"]
+type = "spring gauge"
+stiffness = "0.5 N/um"
+bandwidth = "1 kHz"
+
+[tribometer.sensors."normal force"]
+type = "load cell"
+bandwidth = "1 kHz"
+"""
+
+
+def test_a_run_is_recorded(asperity, protocol, tmp_path) -> None:
+    protocol.write_text(PROTOCOL + _TRIBOMETER)
+    recording = tmp_path / "recording.csv"
+    result = asperity("run", protocol, "--out", tmp_path / "run.nc", "--record", recording)
+    assert result.exit_code == 0, result.output
+    assert "recording.csv" in result.stdout
+    trace = read(recording)
+    assert trace.sample_rate == pytest.approx(1000)
+    # Of the amplitude a first-order sensor leaves 1/sqrt(1 + (120/1000)^2).
+    modulated = trace.slice(0.4, 0.5).channel("W").values
+    amplitude = np.ptp(modulated) / 2
+    assert amplitude == pytest.approx(0.24 * 7 / np.hypot(1, 0.12), rel=0.01)
+
+
+def test_a_recording_without_tribometer_or_format_costs_no_work(
+    asperity, protocol, tmp_path
+) -> None:
+    result = asperity("run", protocol, "--out", tmp_path / "run.nc", "--record", "x.csv")
+    assert result.exit_code == 2
+    assert "--record must go with a [tribometer]" in result.stderr
+    protocol.write_text(PROTOCOL + _TRIBOMETER)
+    result = asperity("run", protocol, "--out", tmp_path / "run.nc", "--record", "x.xlsx")
+    assert result.exit_code == 2
+    assert "must end in the name of a format" in result.stderr
+    assert list(tmp_path.iterdir()) == [protocol]
+
+
+def test_text_of_a_run(asperity, protocol, tmp_path) -> None:
+    result = asperity("run", protocol, "--out", tmp_path / "run.nc")
+    assert result.exit_code == 0
+    assert result.stdout.splitlines()[0] == "elasto-plastic"
+    assert "0.5 s" in result.stdout
+    assert "run.nc" in result.stdout
+
+
+def test_a_motion_that_ends_early_is_exit_code_1(asperity, protocol, tmp_path) -> None:
+    protocol.write_text(PROTOCOL.replace("24 %", "120 %"))
+    result = asperity("run", protocol, "--out", tmp_path / "run.nc")
+    assert result.exit_code == 1
+    assert result.stderr.startswith("asperity: contact was lost at t = 0.2")
+
+
+def test_all_mistakes_are_exit_code_2_and_a_line_each(asperity, protocol, tmp_path) -> None:
+    text = PROTOCOL.replace("slide for 0.2 s", "slid for 0.2 s").replace("120 Hz", "120")
+    protocol.write_text(text)
+    result = asperity("run", protocol, "--out", tmp_path / "run.nc")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    lines = result.stderr.splitlines()
+    assert len(lines) == 2
+    assert lines[0].startswith(f"asperity: {protocol}: step 1 must be a step, got 'slid for 0.2 s'")
+    assert "'slide at 10 um/s for 60 s'" in lines[0]
+    assert "step 2.frequency must carry a unit" in lines[1]
+    assert list(tmp_path.iterdir()) == [protocol]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["none.toml", "--out", "run.nc"], "protocol must be a file"),
+        (["protocol.toml"], "--out"),
+        (["protocol.toml", "--out", "../{}/protocol.toml"], "another file than the protocol"),
+        (["protocol.toml", "--out", "run.csv", "--csv"], "must be another file"),
+        (["protocol.toml", "--out", "nowhere/run.nc"], "folder that exists"),
+    ],
+)
+def test_bad_input_is_one_sentence(asperity, protocol, monkeypatch, arguments, told) -> None:
+    monkeypatch.chdir(protocol.parent)
+    result = asperity("run", *(a.format(protocol.parent.name) for a in arguments))
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert told in result.stderr
+
+
+def test_resume_goes_on_to_the_same_file(asperity, protocol, tmp_path) -> None:
+    def stop(reached: float) -> None:
+        if reached > 0.3:
+            raise KeyboardInterrupt
+
+    protocol.write_text(PROTOCOL.replace("2 kHz", "100 kHz"))
+    out, whole = tmp_path / "run.nc", tmp_path / "whole.nc"
+    with pytest.raises(RunInterrupted):
+        run_protocol(load_protocol(protocol), out, progress=stop)
+    refused = asperity("run", protocol, "--out", out)
+    assert refused.exit_code == 2
+    assert "go on with --resume" in refused.stderr
+    assert asperity("run", protocol, "--out", out, "--resume").exit_code == 0
+    assert asperity("run", protocol, "--out", whole).exit_code == 0
+    assert out.read_bytes() == whole.read_bytes()
+
+
+# A shell hands SIGINT on as ignored to what it runs in the background: not what is tested here.
+_START = """
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)
+import asperity.study.protocol.run as module
+module._ROWS, module.run_protocol.__kwdefaults__["rows"] = 500, 500
+from asperity.cli.main import main
+main(sys.argv[1:], prog_name="asperity")
+"""
+
+
+def test_ctrl_c_keeps_what_is_done(protocol, tmp_path) -> None:
+    protocol.write_text(PROTOCOL.replace("0.3 s", "60 s"))
+    out = tmp_path / "run.nc"
+    command = [sys.executable, "-c", _START, "run", str(protocol), "--out", str(out)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
+        note = tmp_path / "run.nc.partial.json"
+        for _ in range(1200):
+            if note.exists() or process.poll() is not None:
+                break
+            time.sleep(0.05)
+        process.send_signal(signal.SIGINT)
+        _, said = process.communicate(timeout=60)
+    assert process.returncode == 130, said
+    assert "interrupted after" in said
+    assert "Traceback" not in said
+    with xarray.open_dataset(tmp_path / "run.nc.partial") as partial:
+        assert partial.sizes["time"] >= 500
+        assert np.isfinite(partial.force).all()
