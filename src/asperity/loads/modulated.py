@@ -70,7 +70,8 @@ def modulated(
     gain = np.tan(_checked_tilt(tilt))
     shear = tuple((gain * a, gain * b) for a, b in series) if np.any(gain) else ()
     _require_contact(series)
-    return Periodic(series, shear, (speed,) if np.any(speed) else ())
+    pull = (speed,) if any(np.any(part) for part in speed) else ()
+    return Periodic(series, shear, pull)
 
 
 def sampled(

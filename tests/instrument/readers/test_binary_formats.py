@@ -87,6 +87,16 @@ def test_hdf5(tmp_path, planted, write):
     assert_planted(read(path), planted)
 
 
+def test_text_beside_the_numbers_of_hdf5_does_not_matter(tmp_path, planted):
+    path = tmp_path / "recording.h5"
+    with h5py.File(path, "w") as file:
+        h5_datasets(file, planted)
+        file["operator"] = ["first", "second"]
+        file["remark"] = "text of variable length"
+    trace = read(path)
+    assert np.allclose(trace.channel("W").values, planted.W, rtol=1e-15)
+
+
 def test_netcdf(tmp_path, planted):
     """What a trace itself is written to comes back as it was."""
     source = tmp_path / "a.h5"
