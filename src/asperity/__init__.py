@@ -11,14 +11,29 @@ from typing import TYPE_CHECKING, Any
 from asperity._version import __version__
 
 if TYPE_CHECKING:
-    from asperity import air, figures, laws, materials, report, solve, study, units
+    from asperity import (
+        air,
+        figures,
+        instrument,
+        laws,
+        loads,
+        materials,
+        report,
+        solve,
+        study,
+        units,
+    )
     from asperity.errors import InputError
     from asperity.slider import Slider
     from asperity.solve import (
         averaged_response,
+        continuation,
+        doubled_branch,
         periodic_response,
         perturbation_response,
         sensitivities,
+        stability_boundary,
+        transient,
     )
 
 #: Public names and the module each is defined in.
@@ -26,11 +41,18 @@ _HOMES = {
     "InputError": "asperity.errors",
     "Slider": "asperity.slider",
     "averaged_response": "asperity.solve",
+    "continuation": "asperity.solve",
+    "doubled_branch": "asperity.solve",
     "periodic_response": "asperity.solve",
     "perturbation_response": "asperity.solve",
     "sensitivities": "asperity.solve",
+    "stability_boundary": "asperity.solve",
+    "transient": "asperity.solve",
 }
-_MODULES = ("air", "figures", "laws", "materials", "report", "solve", "study", "units")
+_MODULES = (
+    *("air", "figures", "instrument", "laws", "loads"),
+    *("materials", "report", "solve", "study", "units"),
+)
 
 __all__ = [
     "InputError",
@@ -38,15 +60,21 @@ __all__ = [
     "__version__",
     "air",
     "averaged_response",
+    "continuation",
+    "doubled_branch",
     "figures",
+    "instrument",
     "laws",
+    "loads",
     "materials",
     "periodic_response",
     "perturbation_response",
     "report",
     "sensitivities",
     "solve",
+    "stability_boundary",
     "study",
+    "transient",
     "units",
 ]
 

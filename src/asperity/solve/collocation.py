@@ -30,7 +30,6 @@ from asperity.solve.linear import (
 from asperity.solve.mesh import (
     Orbit,
     equidistributed,
-    evaluate,
     graded_mesh,
 )
 from asperity.solve.scheme import STAGES, scheme_for
@@ -59,29 +58,6 @@ def steady_orbit(system: Motion, points: int, *, intervals: int, grading: float)
     )
 
 
-def lifted(quasi_static: QuasiStatic, system: Motion, load: Modulation, orbit: Orbit) -> Orbit:
-    """A quasi-static orbit as a first guess of another equation of motion."""
-
-    def convert(Y: Array, theta: Array) -> Array:
-        at = load.at(theta)
-        mechanical = system.mechanical_states(
-            quasi_static.friction(Y, at),
-            quasi_static.slider_velocity(Y, at),
-            quasi_static.log_slip(Y, at),
-            at,
-        )
-        return jnp.stack([*mechanical, *quasi_static.law_state(Y)])
-
-    nodes = convert(orbit.centre[:, None] + orbit.nodes, orbit.mesh[:-1])
-    bare = Orbit(orbit.mesh, nodes[:, 0], nodes - nodes[:, :1], orbit.slopes, scheme_for(system))
-    theta = bare.stage_phases
-    inside, slopes = evaluate(orbit, theta.reshape(-1, theta.shape[-1]))
-    states = (orbit.centre[:, None] + inside).reshape(-1, *theta.shape)
-    slopes = slopes.reshape(states.shape)
-    _, slopes = jax.jvp(convert, (states, theta), (slopes, jnp.ones_like(theta)))
-    return bare.moved(slopes=slopes)
-
-
 class Local(NamedTuple):
     """The equations at the collocation points."""
 
@@ -92,6 +68,7 @@ class Local(NamedTuple):
 
 
 def localise(system: Motion, load: Modulation, orbit: Orbit) -> Local:
+    """The equations and their derivatives at the collocation points of an orbit."""
     theta = orbit.stage_phases
     at = load.at(theta)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
@@ -141,6 +118,7 @@ def _eliminate_stages(rows: Array) -> Array:
 
 
 def transfer_maps(response: Array, orbit: Orbit) -> Array:
+    """Maps (n, n, intervals, points) from a change at the left node to that at the right."""
     identity = jnp.eye(response.shape[0])[:, :, None, None]
     return identity + orbit.widths * jnp.einsum("k,nkcmb->ncmb", orbit.scheme.b, response)
 
@@ -258,9 +236,9 @@ class CollocationResponse(NamedTuple):
 
 
 def collocation_response(
-    system: Motion, load: Modulation, orbit: Orbit, *, harmonics: int
+    system: Motion, load: Modulation, orbit: Orbit, *, harmonics: int, growth: bool = True
 ) -> CollocationResponse:
-    """Mean, harmonics and monodromy of a converged orbit."""
+    """Mean, harmonics and monodromy of a converged orbit; `growth` may be left out as inf."""
     local = localise(system, load, orbit)
     weights = jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths / (2 * jnp.pi)
     constant, rest = system.force_split(
@@ -274,13 +252,16 @@ def collocation_response(
     (response,) = condense(local, orbit)
     monodromy, log_scale = _scaled_product(transfer_maps(response, orbit))
     trace = jnp.trace(local.jacobian)
+    # Of two states it costs next to nothing.
+    wanted = growth or system.size <= 2
+    abscissa = spectral_abscissa(local.jacobian) if wanted else jnp.full_like(trace, jnp.inf)
     return CollocationResponse(
         mean,
         jnp.stack(phasors),
         monodromy,
         log_scale,
         2 * jnp.pi * (weights * trace).sum((0, 1)),
-        2 * jnp.pi * (weights * spectral_abscissa(local.jacobian)).sum((0, 1)),
+        2 * jnp.pi * (weights * abscissa).sum((0, 1)),
     )
 
 

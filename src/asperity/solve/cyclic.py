@@ -10,11 +10,13 @@ orthogonal elimination along the mesh is not (Wright, SIAM J. Sci. Stat. Comput.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import jax
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.solve.linear import reflect
+from asperity.solve.linear import product, reflect, solve_points
 
 
 def _triangularise(rows: Array, columns: int) -> Array:
@@ -85,3 +87,81 @@ def solve_cyclic(maps: Array, rhs: Array) -> Array:
 
     _, inner = jax.lax.scan(backward, start, eliminated, reverse=True)
     return jnp.moveaxis(jnp.concatenate([start[None], inner]), 0, 1)
+
+
+class Border(NamedTuple):
+    """One more unknown p and one more equation, sum_i row_i . d_i + corner p = value.
+
+    Attributes
+    ----------
+    column : array, shape (n, intervals, points)
+        What a unit of p adds to the right-hand sides.
+    row : array, shape (n, intervals, points)
+    corner, value : array, shape (points,)
+    """
+
+    column: Array
+    row: Array
+    corner: Array
+    value: Array
+
+
+def solve_bordered(maps: Array, rhs: Array, border: Border) -> tuple[Array, Array]:
+    """Solve d_{i+1} - T_i d_i = r_i + p column_i, d_M = d_0, with the equation of the border.
+
+    The elimination runs once for all; what closes it is one system for d_0 and p together, so that
+    a fold, where the periodic recurrence alone is singular, makes no difference.
+
+    Parameters
+    ----------
+    maps : array, shape (n, n, intervals, points)
+    rhs : array, shape (n, intervals, points)
+    border : Border
+
+    Returns
+    -------
+    d : array, shape (n, intervals, points)
+    p : array, shape (points,)
+    """
+    n, _, _, points = maps.shape
+    identity = jnp.broadcast_to(jnp.eye(n)[:, :, None], (n, n, points))
+    maps = jnp.moveaxis(maps, 2, 0)
+    rights = jnp.moveaxis(jnp.stack([rhs, border.column], axis=1), 2, 0)
+
+    def forward(relation: tuple, interval: tuple) -> tuple:
+        first, last, right = relation  # first d_0 + last d_i = right (1, p)
+        T, r = interval
+        zero = jnp.zeros_like(T)
+        upper = jnp.concatenate([last, first, zero, right], axis=1)
+        lower = jnp.concatenate([-T, zero, identity, r], axis=1)
+        rows = _triangularise(jnp.concatenate([upper, lower]), n)
+        rest = rows[n:]
+        return (rest[:, n : 2 * n], rest[:, 2 * n : 3 * n], rest[:, 3 * n :]), rows[:n]
+
+    start = (-maps[0], identity, rights[0])
+    rows: Array
+    (first, last, right), rows = jax.lax.scan(forward, start, (maps[1:], rights[1:]))
+
+    # Every d_i as columns times (1, p, d_0).
+    closed = jnp.concatenate([jnp.zeros((n, 2, points)), identity], axis=1)
+
+    def backward(after: Array, rows: Array) -> tuple[Array, Array]:
+        known = jnp.concatenate([rows[:, 3 * n :], -rows[:, n : 2 * n]], axis=1)
+        here = _back_substitute(rows[:, :n], known - product(rows[:, 2 * n : 3 * n], after))
+        return here, here
+
+    _, inner = jax.lax.scan(backward, closed, rows, reverse=True)
+    columns = jnp.concatenate([closed[None], inner])  # (intervals, n, 2 + n, points)
+    weighted = jnp.einsum("nmb,mncb->cb", border.row, columns)
+    constant, along = weighted[0], weighted[1] + border.corner
+    top = jnp.concatenate([first + last, -right[:, 1:]], axis=1)
+    bottom = jnp.concatenate([weighted[2:], along[None]])
+    matrix = jnp.concatenate([top, bottom[None]])
+    known = jnp.concatenate([right[:, 0], (border.value - constant)[None]])
+    closing = solve_points(matrix, known)
+    d = (
+        columns[:, :, 0]
+        + columns[:, :, 1] * closing[n]
+        + jnp.einsum("mncb,cb->mnb", columns[:, :, 2:], closing[:n])
+    )
+    return jnp.moveaxis(d, 0, 1), closing[n]

@@ -21,8 +21,9 @@ Float = NDArray[np.float64]
 Path = Callable[[Problem, Float], Problem]
 
 _GROWTH, _SHRINKAGE = 1.6, 0.35
-_SMALLEST_STEP = 1e-4
-_MOST_STEPS = 250
+#: Paths that need smaller or more steps than these are left to the arclength.
+_SMALLEST_STEP = 1e-3
+_MOST_STEPS = 60
 _CHUNK = 16
 #: A step is accepted when Newton's method has converged to this; the end point is solved again.
 _ACCEPTED = 1e-5
@@ -31,6 +32,15 @@ _ACCEPTED = 1e-5
 def along_amplitude(problem: Problem, t: Float) -> Problem:
     """Epsilon reaches t of its value."""
     return problem._replace(load=problem.load.scaled(t))
+
+
+def along_rest(share: Float) -> Path:
+    """The last of the path in amplitude, from `share` of epsilon, which may be beyond it."""
+
+    def path(problem: Problem, t: Float) -> Problem:
+        return along_amplitude(problem, share + (1 - share) * t)
+
+    return path
 
 
 def along_frequency(start: Float) -> Path:

@@ -17,12 +17,12 @@ from asperity.solve.collocation import (
     NewtonResult,
     averaged_orbit,
     collocation_response,
-    lifted,
     newton_orbit,
     refined,
 )
 from asperity.solve.fourier import fourier_orbit
 from asperity.solve.fourier_reading import fourier_response, fourier_start, fourier_waveform
+from asperity.solve.lift import lifted
 from asperity.solve.linear import jacobian_columns, spectral_radius
 from asperity.solve.mesh import Orbit, evaluate, split
 
@@ -30,6 +30,10 @@ from asperity.solve.mesh import Orbit, evaluate, split
 #: the slip rate is e to that.
 _LARGEST_CHANGE = 2.0
 _NEWTON_TOLERANCE = 1e-8
+
+#: Meshes with fewer intervals are not read for the growth along the orbit, which takes as long as
+#: the rest and matters for stiff orbits only.
+_COARSE = 100
 
 #: Times that a mesh is laid and Newton's method tried on it.
 _ROUNDS = 4
@@ -128,7 +132,8 @@ def _fast_block(
 
 def _read(problem: Problem, orbit: Orbit, harmonics: int, phases: int) -> Reading:
     system, load = problem
-    response = collocation_response(system, load, orbit, harmonics=harmonics)
+    fine = orbit.mesh.shape[0] > _COARSE
+    response = collocation_response(system, load, orbit, harmonics=harmonics, growth=fine)
     theta = jnp.asarray(2 * np.pi * np.arange(phases) / max(phases, 1))[:, None]
     theta = theta * jnp.ones(_points(problem))
     if phases:

@@ -10,12 +10,18 @@ from numpy.typing import NDArray
 
 
 class Outcome(IntEnum):
-    """Outcome of a periodic solve."""
+    """Outcome of a periodic solve.
+
+    FOLDED and RUNAWAY are answers: the branch of orbits that begins with steady sliding does not
+    reach the amplitude asked for. Other orbits, not connected to it, may exist.
+    """
 
     CONVERGED = 0
     NO_ORBIT = 1
     NOT_RESOLVED = 2
     MULTIPLIERS_NOT_RESOLVED = 3
+    FOLDED = 4
+    RUNAWAY = 5
 
 
 _SENTENCES = {
@@ -31,6 +37,15 @@ _SENTENCES = {
     Outcome.MULTIPLIERS_NOT_RESOLVED: (
         "the orbit is resolved but its Floquet multipliers are not: refining the mesh "
         "still changes them by {detail:.1e} relative, above 1e-8"
+    ),
+    Outcome.FOLDED: (
+        "the branch from steady sliding folds back at epsilon = {detail:.3g}, below the amplitude "
+        "asked for; lower epsilon or stiffen the spring"
+    ),
+    Outcome.RUNAWAY: (
+        "on the branch from steady sliding slip runs away: at epsilon = {detail:.3g} its pulses "
+        "are faster than e^13 V already, without inertia nothing bounds them; "
+        "lower epsilon or let inertia or radiation damping count"
     ),
 }
 

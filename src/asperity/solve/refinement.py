@@ -26,12 +26,13 @@ from asperity.solve.outcome import Outcome
 #: times the intervals its own error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
 AGREEMENT = 2e-7
 
-#: Orbits are followed on the first of these meshes, and refined up to the last.
-MESHES = (48, 144, 432, 1296)
+#: Intervals of the mesh that orbits are followed on, and of those that they are refined on.
+FIRST_MESH = 48
+MESHES = (72, 216, 648, 1296)
 _SPLITS = (3, 9, 27)
 
-#: Agreement between two different meshes of one size, at which either is trusted to 1e-8.
-_SAME_SIZE_AGREEMENT = 1e-9
+#: The same between the mesh of the start and the first, and between the last two, which are closer.
+_CLOSE_AGREEMENT = 4e-8
 
 #: Interval-points in a chunk, for up to two states and for more: keeps the working set of
 #: collocation within a core's cache.
@@ -71,6 +72,7 @@ def refine(
     orbit: Orbit,
     index: Indices,
     options: Options,
+    meshes: tuple[int, ...] = MESHES,
 ) -> None:
     """Refine the orbits of the points `index` and write what settles into `found`.
 
@@ -90,8 +92,9 @@ def refine(
     """
     size = problem.system.size
     previous = _states(problem, orbit, index, options)
-    agreement = _SAME_SIZE_AGREEMENT
-    for intervals in MESHES:
+    for intervals in meshes:
+        close = intervals in (meshes[0], meshes[-1])
+        agreement = _CLOSE_AGREEMENT if close else AGREEMENT
         finer = Orbit.empty(orbit.scheme, size, intervals, len(block))
         solve = partial(
             refine_orbit,
@@ -107,7 +110,6 @@ def refine(
             found.iterations[block[part]] = intervals
             settled[part] = _compare(found, block[part], part, previous, reading, error, agreement)
         options.progress(int(settled[index].sum()))
-        agreement = AGREEMENT
         orbit, index = finer, index[~settled[index]]
         if not len(index):
             return
@@ -121,7 +123,7 @@ def _states(problem: Problem, orbit: Orbit, index: Indices, options: Options) ->
     """What the orbits on the mesh that they were found on are worth."""
     states: dict[int, _State] = {}
     solve = partial(read_orbit, harmonics=options.harmonics)
-    chunk = chunk_size(MESHES[0], problem.system.size)
+    chunk = chunk_size(FIRST_MESH, problem.system.size)
     for part, reading in run_chunks(solve, (problem, orbit), index, chunk):
         logs = logs_of(reading)
         for k, point in enumerate(part):

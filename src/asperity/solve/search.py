@@ -3,7 +3,8 @@
 1. Fourier collocation, on a grid as fine as the slip pulse needs, for points whose orbit moves
    little within a period.
 2. Collocation with Newton's method from the averaged limit.
-3. Collocation along a path in amplitude, then in frequency.
+3. Collocation along a path in amplitude; along the branch from steady sliding, by its arclength;
+   along a path in frequency.
 4. Whatever stages 2 and 3 found is solved on finer and finer meshes, until mean, first and second
    harmonic and multipliers agree between two meshes to `refinement.AGREEMENT`.
 """
@@ -28,8 +29,13 @@ from asperity.solve.kernels import (
     stiffness_of_steady_sliding,
 )
 from asperity.solve.outcome import Outcome
-from asperity.solve.refinement import refine
-from asperity.solve.starts import starting_orbits
+from asperity.solve.refinement import MESHES, refine
+from asperity.solve.starts import (
+    Start,
+    near_orbits,
+    orbits_along_branches,
+    orbits_from_high_frequency,
+)
 
 #: Fourier grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for:
 #: the nodes that a pulse needs grow with the root of it. Sharper ones are left to collocation.
@@ -120,8 +126,39 @@ def _measured(measure: Callable[[Problem], Any], problem: Problem, index: Indice
 
 def _collocate(problem: Problem, found: Found, block: Indices, options: Options) -> None:
     """Collocation, however far the start has to be fetched, and refinement of a block."""
-    part = take(problem, block)
-    start = starting_orbits(part, len(block))
-    found.detail[block] = start.reached
-    options.progress(int((~start.found).sum()))
-    refine(part, found, block, start.orbit, np.flatnonzero(start.found), options)
+    part, points = take(problem, block), len(block)
+    silent = options._replace(progress=lambda _: None)
+    start = near_orbits(part, points)
+    _settle(part, found, block, start, np.arange(points), silent)
+    told = _told(found, block, options, 0)
+    for search, again in ((orbits_along_branches, True), (orbits_from_high_frequency, False)):
+        # Also what was found on a coarse mesh and lost on every finer one is sought again.
+        outcome, detail = found.outcome[block], found.detail[block]
+        lost = outcome == Outcome.NO_ORBIT
+        lost |= again & (outcome == Outcome.NOT_RESOLVED) & np.isinf(detail)
+        index = np.flatnonzero(lost)
+        if len(index):
+            _settle(part, found, block, search(part, points, index), index, silent)
+            told = _told(found, block, options, told)
+    options.progress(points - told)
+
+
+def _told(found: Found, block: Indices, options: Options, before: int) -> int:
+    """Tell how many more points of a block are solved; returns how many are."""
+    solved = int((found.outcome[block] == Outcome.CONVERGED).sum())
+    options.progress(solved - before)
+    return solved
+
+
+def _settle(
+    problem: Problem, found: Found, block: Indices, start: Start, index: Indices, options: Options
+) -> None:
+    """Refine what was found of the points `index`; keep the reason of the rest."""
+    # A path that came to nothing does not take back what an earlier one had to say.
+    said = start.found | (start.detail > 0)
+    found.outcome[block[said]], found.detail[block[said]] = start.outcome[said], start.detail[said]
+    coarse = start.orbit.mesh.shape[0] - 1
+    meshes = tuple(intervals for intervals in MESHES if intervals >= coarse)
+    chosen = index[start.found[index]]
+    if len(chosen):
+        refine(problem, found, block, start.orbit, chosen, options, meshes)

@@ -1,0 +1,1 @@
+"""Continuation of periodic orbits in parameters, their bifurcations, and stability boundaries."""

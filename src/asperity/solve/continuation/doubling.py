@@ -1,0 +1,165 @@
+"""Switching onto the branch of doubled period at a period doubling, and following it.
+
+An orbit of two periods of the modulation is an orbit of one period of a modulation repeated twice
+in it, at half the frequency. Where a multiplier of the simple orbit is -1 its eigenvector v changes
+sign from one period to the next: (v, -v) is the direction in which the doubled orbits leave.
+
+Source: R. Seydel, Practical Bifurcation and Stability Analysis, section 7.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.errors import InputError
+from asperity.loads import Excitation, Modulation
+from asperity.solve.collocation import condense, localise, transfer_maps
+from asperity.solve.continuation.arclength import Point, Tangent, slip_units, weighted_row
+from asperity.solve.continuation.branch import Bifurcation, Branch
+from asperity.solve.continuation.line import Line
+from asperity.solve.continuation.record import INTERVALS, Record
+from asperity.solve.continuation.walk import Station, Walker
+from asperity.solve.kernels import Problem
+from asperity.solve.mesh import Orbit
+
+#: Distances at which the doubled branch is sought, in units of the exponent of the slip rate.
+_DISTANCES = (0.05, 0.02, 0.1, 0.2)
+
+
+class Repeated(Modulation):
+    """A modulation run through twice while theta runs from 0 to 2 pi.
+
+    Parameters
+    ----------
+    load : Modulation
+    """
+
+    load: Modulation
+
+    def at(self, theta: ArrayLike) -> Excitation:
+        """Values and slopes at the phase `theta` (rad) of the double period."""
+        once = self.load.at(2 * jnp.asarray(theta))
+        return once._replace(w_slope=2 * once.w_slope, shear_slope=2 * once.shear_slope)
+
+    @property
+    def amplitude(self) -> ArrayLike:
+        """That of the modulation."""
+        return self.load.amplitude
+
+    def scaled(self, share: ArrayLike) -> Repeated:
+        """The modulation with `share` of its amplitude."""
+        return Repeated(self.load.scaled(share))
+
+
+def doubled_branch(
+    branch: Branch,
+    bifurcation: Bifurcation,
+    *,
+    most_steps: int = 1000,
+    progress: Callable[[float], None] | None = None,
+) -> Branch:
+    """Follow the branch of doubled period that leaves a branch at a period doubling.
+
+    Parameters
+    ----------
+    branch : Branch
+        Of simple period.
+    bifurcation : Bifurcation
+        One of its period doublings.
+    most_steps : int
+    progress : callable, optional
+        Called with each value of the parameter reached.
+
+    Returns
+    -------
+    Branch
+        With `periods` 2: its harmonics c_n belong to n f / 2, its multipliers to two periods. It
+        starts beside the period doubling and is followed within the same span. The two halves of a
+        doubled branch are one orbit, begun a period later: one of them is followed.
+
+    Raises
+    ------
+    InputError
+        If the bifurcation is no period doubling, the branch is itself one of doubled period,
+        or no doubled orbit is found beside it.
+    """
+    if bifurcation.kind != "period doubling":
+        raise InputError(
+            f"bifurcation must be a period doubling, got a {bifurcation.kind}; choose another one"
+        )
+    if branch.periods != 1:
+        raise InputError(
+            f"branch must have the period of the modulation, got one of {branch.periods} periods; "
+            "follow further doublings in the multipliers of this branch"
+        )
+    walker, moving, problem = branch.path
+    simple = walker.finer(bifurcation.critical.point, INTERVALS)
+    twice = Walker(_doubled_line(walker.line), 2 * walker.harmonics)
+    start = None if simple is None else _beside(walker, twice, simple)
+    if start is None:
+        raise InputError(
+            "bifurcation must have a doubled orbit beside it, got none that Newton's method finds; "
+            "continue in another parameter"
+        )
+    record = Record(twice, moving, start, progress or (lambda _: None), periods=2)
+    return record.branch(record.walk(most_steps), problem)
+
+
+def _doubled_line(line: Line) -> Line:
+    def doubled(problem: Problem, factor: float) -> Problem:
+        omega = problem.system.omega * factor
+        system = eqx.tree_at(lambda q: q.omega, problem.system, omega)
+        return Problem(system, Repeated(problem.load))
+
+    # Rates of growth are relative: half the frequency grows by the same factor.
+    return Line(doubled(line.origin, 0.5), doubled(line.added, 0.5), doubled(line.growth, 1.0))
+
+
+def _beside(walker: Walker, twice: Walker, simple: Station) -> Station | None:
+    """A doubled orbit near the critical simple one."""
+    point = simple.point
+    orbit, tangent = _alternating(walker.line, point.orbit, point.t)
+    for distance in _DISTANCES:
+        station, _ = twice.step(Point(orbit, point.t, tangent), distance)
+        if station is not None:
+            return station
+    return None
+
+
+@jax.jit
+def _maps(line: Line, orbit: Orbit, t: Array) -> tuple[Array, Array, Array]:
+    """Transfer maps, response of the slopes, and units of the states."""
+    (response,) = condense(localise(*line.at(t), orbit), orbit)
+    return transfer_maps(response, orbit), response, slip_units(line, orbit, t)
+
+
+def _alternating(line: Line, orbit: Orbit, t: Array) -> tuple[Orbit, Tangent]:
+    """The simple orbit twice, and the unit direction that changes sign in between."""
+    maps, response, units = (np.asarray(a) for a in _maps(line, orbit, t))
+    total = np.eye(len(maps))
+    for i in range(maps.shape[2]):
+        total = maps[:, :, i, 0] @ total
+    values, vectors = np.linalg.eig(total)
+    vector = vectors[:, np.argmin(np.abs(values + 1))].real
+    nodes = np.empty(orbit.nodes.shape)
+    for i in range(maps.shape[2]):
+        nodes[:, i, 0] = vector
+        vector = maps[:, :, i, 0] @ vector
+    slopes = 2 * np.einsum("nkcmb,cmb->nkmb", response, nodes)
+    mesh = np.concatenate([orbit.mesh / 2, np.pi + orbit.mesh[1:] / 2])
+    twice = orbit.moved(
+        mesh=mesh,
+        nodes=np.concatenate([orbit.nodes, orbit.nodes], axis=1),
+        slopes=2 * np.concatenate([orbit.slopes, orbit.slopes], axis=2),
+    )
+    nodes = np.concatenate([nodes, -nodes], axis=1)
+    slopes = np.concatenate([slopes, -slopes], axis=2)
+    size = np.sqrt((np.asarray(weighted_row(twice, nodes, units)) * nodes).sum())
+    return twice, Tangent(nodes / size, slopes / size, np.zeros(1))
