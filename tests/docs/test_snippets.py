@@ -23,7 +23,9 @@ _spec.loader.exec_module(pages)
 ROOT = pages.ROOT
 RUNNABLE = [page for page in pages.PAGES if pages.snippets(page)]
 #: Pages whose code takes more than about ten seconds.
-SLOW = {"docs/claims.md", "docs/theory/numerical_method.md", "docs/findings.md"}
+SLOW = {"docs/claims.md", "docs/theory/numerical_method.md", "docs/findings.md"} | {
+    "docs/theory/stabilisation.md"
+}
 
 
 def named(page: Path) -> str:

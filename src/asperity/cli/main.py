@@ -18,6 +18,9 @@ Examples:
       -V "1 um/s" -e 0.24 -f "120 Hz" --json
   asperity response --table points.csv --out responses.csv --material bureau2000
   asperity measure recording.csv --json --plot recording.png
+  asperity run protocol.toml --out run.nc --plot
+  asperity map --law elasto-plastic --material bureau2000 -V "1 um/s" -f "120 Hz" \\
+      --x "epsilon=0.01:0.5:200" --y "K=0.05:0.5:200 N/um" --out map.nc --plot map.png
   asperity air --material bureau2000 -f "120 Hz" -f "200 Hz"
   asperity materials bureau2000
 """
@@ -27,10 +30,12 @@ Examples:
     cls=Shell,
     commands={
         "air": "asperity.cli.air",
+        "map": "asperity.cli.map",
         "materials": "asperity.cli.materials",
         "measure": "asperity.cli.measure",
         "reproduce": "asperity.cli.reproduce",
         "response": "asperity.cli.response",
+        "run": "asperity.cli.run",
     },
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},

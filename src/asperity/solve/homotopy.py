@@ -8,6 +8,7 @@ steps along its path: longer after a success, shorter after a failure.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import equinox as eqx
 import numpy as np
@@ -21,9 +22,18 @@ Float = NDArray[np.float64]
 Path = Callable[[Problem, Float], Problem]
 
 _GROWTH, _SHRINKAGE = 1.6, 0.35
-#: Paths that need smaller or more steps than these are left to the arclength.
-_SMALLEST_STEP = 1e-3
-_MOST_STEPS = 60
+
+
+class Patience(NamedTuple):
+    """Smallest step of a path, and how many of them it may take."""
+
+    smallest_step: float
+    most_steps: int
+
+
+#: For paths that arclength continuation takes up where they fail, and for those that it does not.
+BRIEF, LONG = Patience(1e-3, 60), Patience(1e-4, 250)
+
 _CHUNK = 16
 #: A step is accepted when Newton's method has converged to this; the end point is solved again.
 _ACCEPTED = 1e-5
@@ -60,6 +70,7 @@ def follow(
     index: Indices,
     *,
     first_step: float,
+    patience: Patience = BRIEF,
 ) -> Float:
     """Follow the orbits of the points `index` along `path` from t = 0 to t = 1.
 
@@ -74,6 +85,7 @@ def follow(
     index : array of int
         Points to work on.
     first_step : float
+    patience : Patience
 
     Returns
     -------
@@ -88,7 +100,7 @@ def follow(
     def advance(inputs: tuple[Problem, Orbit]) -> tuple[Orbit, Float]:
         return follow_orbit(inputs, intervals=intervals, max_steps=10)
 
-    for _ in range(_MOST_STEPS):
+    for _ in range(patience.most_steps):
         if not len(active):
             break
         trial = np.minimum(1.0, t + step)
@@ -99,5 +111,5 @@ def follow(
             put(orbit, part[good], take(moved, np.flatnonzero(good)))
             t[part[good]] = trial[part[good]]
             step[part] *= np.where(good, _GROWTH, _SHRINKAGE)
-        active = active[(t[active] < 1) & (step[active] > _SMALLEST_STEP)]
+        active = active[(t[active] < 1) & (step[active] > patience.smallest_step)]
     return t

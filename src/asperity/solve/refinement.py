@@ -32,7 +32,7 @@ MESHES = (72, 216, 648, 1296)
 _SPLITS = (3, 9, 27)
 
 #: The same between the mesh of the start and the first, and between the last two, which are closer.
-_CLOSE_AGREEMENT = 4e-8
+_CLOSE_AGREEMENT = 1e-8
 
 #: Interval-points in a chunk, for up to two states and for more: keeps the working set of
 #: collocation within a core's cache.

@@ -124,6 +124,10 @@ def _measured(measure: Callable[[Problem], Any], problem: Problem, index: Indice
     return values
 
 
+#: What the branch from steady sliding may have come to; another branch may have an orbit.
+_WITHOUT_ORBIT = (Outcome.NO_ORBIT, Outcome.FOLDED, Outcome.RUNAWAY)
+
+
 def _collocate(problem: Problem, found: Found, block: Indices, options: Options) -> None:
     """Collocation, however far the start has to be fetched, and refinement of a block."""
     part, points = take(problem, block), len(block)
@@ -134,7 +138,7 @@ def _collocate(problem: Problem, found: Found, block: Indices, options: Options)
     for search, again in ((orbits_along_branches, True), (orbits_from_high_frequency, False)):
         # Also what was found on a coarse mesh and lost on every finer one is sought again.
         outcome, detail = found.outcome[block], found.detail[block]
-        lost = outcome == Outcome.NO_ORBIT
+        lost = np.isin(outcome, _WITHOUT_ORBIT)
         lost |= again & (outcome == Outcome.NOT_RESOLVED) & np.isinf(detail)
         index = np.flatnonzero(lost)
         if len(index):

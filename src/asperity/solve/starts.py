@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from asperity.solve.batch import Indices, put, run_chunks, take
 from asperity.solve.continuation.pursuit import INTERVALS as PURSUIT_INTERVALS
 from asperity.solve.continuation.pursuit import pursue
-from asperity.solve.homotopy import along_amplitude, along_frequency, along_rest, follow
+from asperity.solve.homotopy import LONG, along_amplitude, along_frequency, along_rest, follow
 from asperity.solve.kernels import (
     ACCEPTED,
     Problem,
@@ -150,5 +150,5 @@ def _from_high_frequency(problem: Problem, start: Start, index: Indices) -> None
     path = along_frequency(omega * np.maximum(stiffness / _FAST_MODULATION, 1.0))
     _from_averaged(path(problem, np.zeros_like(omega)), start, index)
     begun = index[start.found[index]]
-    reached = follow(problem, path, start.orbit, begun, first_step=0.02)
+    reached = follow(problem, path, start.orbit, begun, first_step=0.02, patience=LONG)
     start.found[index] = reached[index] >= 1

@@ -14,15 +14,16 @@ from asperity.solve import Trajectory, integrate_blocks
 
 Array = NDArray[np.float64]
 
-#: Samples of the motion for one of the recorder's, at least.
-_FINER = 4
+#: Samples of the motion for one of the recorder's, at least: with half as many amplitudes would be
+#: 4e-5 too small.
+_FINER = 8
 
 
 def motion_rate(tribometer: Tribometer) -> float:
     """Rate (Hz) at which a motion has to be sampled for a tribometer: a multiple of its own."""
     recorder = float(tribometer.recorder.rate)
     fastest = max(float(sensor.bandwidth) for sensor in tribometer.sensors.values())
-    return recorder * max(_FINER, int(np.ceil(2 * fastest / recorder)))
+    return recorder * max(_FINER, int(np.ceil(4 * fastest / recorder)))
 
 
 def signals(

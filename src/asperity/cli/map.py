@@ -1,0 +1,239 @@
+"""``asperity map``: response and stability over two numbers, as NetCDF and as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.options import (
+    add_setting,
+    json_option,
+    material_named,
+    material_option,
+    set_option,
+    settings_of,
+)
+from asperity.errors import InputError, closest
+
+if TYPE_CHECKING:
+    import xarray
+
+_EPILOG = """\b
+Examples:
+  asperity map --law elasto-plastic --material bureau2000 -V "1 um/s" -f "120 Hz" \\
+      --x "epsilon=0.01:0.5:200" --y "K=0.05:0.5:200 N/um" --out map.nc --plot map.png
+  asperity map --law rice-ruina --material bureau2000 -V "1 um/s" -e 0.2 \\
+      --x "frequency=0.5:100:60 Hz" --log-x --y "K=0.1:0.6:60 N/um" --out map.nc
+
+\b
+An axis is NAME=LOW:HIGH:COUNT UNIT, for any parameter of the law, K, W0, M, eta,
+V, epsilon or frequency. The file holds the response at each point, and the
+stability boundary with the bifurcation and the frequency of its mode.
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.option("--x", "x", metavar="AXIS", help='Number along x, like "epsilon=0.01:0.5:200".')
+@click.option("--y", "y", metavar="AXIS", help='Number along y, like "K=0.05:0.5:200 N/um".')
+@click.option("--log-x", is_flag=True, help="Points along x at equal ratios.")
+@click.option("--log-y", is_flag=True, help="Points along y at equal ratios.")
+@click.option("--law", metavar="NAME", help="Friction law, such as elasto-plastic.")
+@material_option()
+@click.option("-V", "--velocity", metavar="VALUE", help='Pulling velocity, like "1 um/s".')
+@click.option("-e", "--epsilon", metavar="VALUE", help="Relative amplitude of the load, 0 to < 1.")
+@click.option("-f", "--frequency", metavar="VALUE", help='Modulation frequency, like "120 Hz".')
+@click.option("--inertia", is_flag=True, help="Let the mass of the slider count.")
+@click.option(
+    "--radiation-damping",
+    metavar="VALUE",
+    help='Force of radiated waves per velocity, like "500 N*s/m".',
+)
+@set_option('--set A=0.013 --set "K=0.3 N/um"')
+@click.option("--out", type=Path, metavar="NC", help="Where the map goes, as NetCDF.")
+@click.option("--plot", type=Path, metavar="PNG", help="Where a picture goes.")
+@click.option(
+    "--show",
+    metavar="QUANTITY",
+    default="growth_rate",
+    show_default=True,
+    help="What the picture shows: mu1, delta_mu, floquet_max, ...",
+)
+@click.option("--resume", is_flag=True, help="Go on with an interrupted map.")
+@json_option()
+def map(
+    x: str | None,
+    y: str | None,
+    log_x: bool,
+    log_y: bool,
+    law: str | None,
+    material: str | None,
+    velocity: str | None,
+    epsilon: str | None,
+    frequency: str | None,
+    inertia: bool,
+    radiation_damping: str | None,
+    settings: tuple[str, ...],
+    out: Path | None,
+    plot: Path | None,
+    show: str,
+    resume: bool,
+    as_json: bool,
+) -> int:
+    """Response and stability over any two numbers, with the stability boundary.
+
+    The boundary is located to 1e-4 of the axes or better, with the bifurcation and the frequency
+    of the mode at each of its points.
+    """
+    given = settings_of(settings)
+    options = {
+        "V": velocity,
+        "epsilon": epsilon,
+        "frequency": frequency,
+        "inertia": "1" if inertia else None,
+        "eta": radiation_damping,
+    }
+    for name, value in options.items():
+        add_setting(given, name, value)
+    _check_outputs(out, plot, show)
+    found = _solve(law, material, given, (x, log_x), (y, log_y), out, resume)
+    if plot is not None:
+        _plot(found, plot, show)
+    _print(found, out, as_json)
+    loose = int(found.attrs["boundary_loose_chords"])
+    if loose:
+        click.echo(
+            f"asperity: the boundary bends too much for the grid at {loose} places, where it is "
+            "not known to 1e-4; refine the grid",
+            err=True,
+        )
+    failed = int((~found["converged"]).sum())
+    if failed:
+        click.echo(
+            f"asperity: {failed} of {found['converged'].size} points have no response; the "
+            f"variable 'result' of {out} says why",
+            err=True,
+        )
+    return 1 if failed else 0
+
+
+def _solve(
+    law: str | None,
+    material: str | None,
+    given: dict[str, str],
+    x: tuple[str | None, bool],
+    y: tuple[str | None, bool],
+    out: Path | None,
+    resume: bool,
+) -> xarray.Dataset:
+    from asperity.cli.progress import bar
+    from asperity.laws import registered
+    from asperity.study.map import Axis, write_map
+    from asperity.study.operating_point import refuse_foreign, sourced_numbers
+
+    if law is None:
+        raise InputError(
+            f"--law must be given, got nothing; choose one of {', '.join(sorted(registered()))}"
+        )
+    axes = []
+    for option, (text, log) in (("--x", x), ("--y", y)):
+        if text is None:
+            raise InputError(
+                f"{option} must be given, got nothing; write it like {option} "
+                "'epsilon=0.01:0.5:200'"
+            )
+        axes.append(Axis.parse(text, log))
+    refuse_foreign(law, given)
+    numbers = sourced_numbers(given, material_named(material), "command line")
+    # A material's number gives way to an axis; one that was given for this map does not.
+    numbers = {n: s for n, s in numbers.items() if n in given or n not in {a.name for a in axes}}
+    assert out is not None
+    with bar("point") as update:
+        return write_map(
+            out,
+            law,
+            numbers,
+            x=axes[0],
+            y=axes[1],
+            resume=resume,
+            progress=lambda done, total: update(done, total, ""),
+        )
+
+
+def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
+    """Before anything is solved: a mistake must not cost the work."""
+    from asperity.study.map import SHOWN
+
+    if show not in SHOWN:
+        raise InputError(
+            f"--show must be a quantity of the map, got '{show}'; {closest(show, SHOWN)}"
+        )
+    if out is None:
+        raise InputError("--out must be given, got nothing; name the file, like --out map.nc")
+    if plot is not None and plot.suffix.lower() != ".png":
+        raise InputError(f"--plot must be a PNG file, got '{plot}'; write it like --plot map.png")
+    if plot is not None and not plot.resolve().parent.is_dir():
+        raise InputError(
+            f"--plot must lie in a folder that exists, got '{plot}'; make the folder or choose "
+            "another"
+        )
+
+
+def _plot(found: xarray.Dataset, path: Path, show: str) -> None:
+    from asperity.figures.map import draw_map
+    from asperity.figures.style import style
+
+    with style():
+        figure = draw_map(found, show)
+        try:
+            figure.savefig(path, metadata={"Software": None})
+        except OSError as error:
+            raise InputError(
+                f"--plot must be a file that can be written, got '{path}' ({error.strerror}); "
+                "choose another place"
+            ) from None
+
+
+def _print(found: xarray.Dataset, out: Path | None, as_json: bool) -> None:
+    from asperity.cli.report import aligned, to_json
+
+    record = _record(found, out)
+    if as_json:
+        click.echo(to_json(record))
+        return
+    rows = [(name, str(record[name])) for name in ("points", "stable", "unstable", "failed")]
+    click.echo(aligned(rows))
+    for line in record["boundaries"]:
+        kinds = " and ".join(dict.fromkeys(line["kind"]))
+        spans = ", ".join(
+            f"{name} {min(line[name]):.6g} to {max(line[name]):.6g}"
+            for name in (record["x"], record["y"])
+        )
+        click.echo(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
+
+
+def _record(found: xarray.Dataset, out: Path | None) -> dict[str, Any]:
+    converged = found["converged"].values
+    stable = int(found["stable"].values.sum())
+    sides = (found.attrs["x"], found.attrs["y"])
+    number = found["boundary_line"].values
+    kinds = found["boundary_kind"].values.astype(str)
+
+    def line(index: Any) -> dict[str, Any]:
+        values = {name: found[f"boundary_{name}"].values[index].tolist() for name in sides}
+        frequency = found["boundary_mode_frequency"].values[index].tolist()
+        return {**values, "kind": kinds[index].tolist(), "mode_frequency": frequency}
+
+    return {
+        "points": int(converged.size),
+        "stable": stable,
+        "unstable": int(converged.sum()) - stable,
+        "failed": int((~converged).sum()),
+        "x": sides[0],
+        "y": sides[1],
+        "boundaries": [line(number == k) for k in range(number.max(initial=-1) + 1)],
+        "boundary_not_found": int((number < 0).sum()),
+        "boundary_loose_chords": int(found.attrs["boundary_loose_chords"]),
+        "out": str(out),
+    }

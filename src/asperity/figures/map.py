@@ -1,0 +1,299 @@
+"""A map as a picture: a quantity in colour, the stability boundary drawn by its kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from cmcrameri import cm
+from matplotlib import patheffects
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.collections import QuadMesh
+from matplotlib.colors import CenteredNorm, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from matplotlib.ticker import FuncFormatter
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt
+
+from asperity.figures.style import new_figure
+from asperity.units import KINDS
+
+if TYPE_CHECKING:
+    import xarray
+
+Float = NDArray[np.float64]
+
+#: Line of each kind of bifurcation.
+KIND_LINES: dict[str, Any] = {
+    "Neimark-Sacker": "solid",
+    "period doubling": (0, (4.0, 1.6)),
+    "fold": (0, (1.0, 1.2)),
+}
+_KIND_NAMES = {"Neimark-Sacker": "Neimark–Sacker", "": "multiplier lost"}
+_LINE = "#111111"
+_UNMODULATED: dict[str, Any] = {"color": _LINE, "linewidth": 0.9, "linestyle": (0, (6, 2, 1, 2))}
+_FAILED: dict[str, Any] = {
+    "facecolor": "#D9D9D9",
+    "edgecolor": "#909090",
+    "hatch": "xxxx",
+    "linewidth": 0,
+}
+
+#: Symbol of a quantity, and of one that is drawn.
+_SYMBOLS = {
+    "epsilon": r"amplitude $\epsilon$",
+    "K": r"spring stiffness $K$",
+    "W0": r"load $W_0$",
+    "M": r"mass $M$",
+    "eta": r"radiation damping $\eta$",
+    "V": r"velocity $V$",
+    "frequency": r"frequency $f$",
+    "A": r"$A$",
+    "B": r"$B$",
+    "D0": r"memory length $D_0$",
+    "mu0": r"$\mu_0$",
+    "alpha": r"$\alpha$",
+    "lambda": r"shear length $\lambda$",
+}
+_SHOWN = {
+    "mean_friction": r"mean of $F/W_0$",
+    "delta_mu": r"$\Delta\bar{\mu}$",
+    "mu1": r"$\mu_1$",
+    "mu2": r"$\mu_2$",
+    "phase1": r"phase of $\mu_1$ (rad)",
+    "phase2": r"phase of $\mu_2$ (rad)",
+    "floquet_max": r"leading multiplier $|m|$",
+    "log_multiplier": r"$\ln|m|$",
+    "mode_frequency": "frequency of the leading mode (Hz)",
+    "growth_rate": r"growth rate (1/s)",
+}
+_CYCLIC = ("phase1", "phase2")
+_SIGNED = ("log_multiplier", "growth_rate", "floquet_max")
+#: Ratio of its largest to its smallest values above which a positive quantity is shown in decades.
+_DECADES = 50.0
+#: Ratio of the ends of a logarithmic axis below which decades alone would leave it bare.
+_FEW_DECADES = 30.0
+#: Quantiles of a quantity that its colours span: a few extreme points must not take them all.
+_SPAN = (0.02, 0.98)
+#: Smallest region, in parts of the shorter side, that has room for its name.
+_ROOM = 0.075
+
+
+def draw_map(found: xarray.Dataset, show: str = "growth_rate") -> Figure:
+    """A quantity over the plane, with the stability boundary.
+
+    Parameters
+    ----------
+    found : Dataset
+        From `asperity.study.map.response_map`.
+    show : str
+        A key of `asperity.study.map.SHOWN`.
+    """
+    figure = new_figure(5.0, 4.1)
+    axis = figure.subplots()
+    mesh = draw_plane(axis, found, show)
+    bar = figure.colorbar(mesh, ax=axis, pad=0.02, aspect=28, extend=_extend(found, show, mesh))
+    bar.set_label(_SHOWN[show])
+    bar.ax.minorticks_off()
+    handles = keys(found)
+    if handles:
+        figure.legend(
+            handles=handles, loc="outside lower center", ncols=2 if len(handles) != 3 else 3
+        )
+    return figure
+
+
+def draw_plane(
+    axis: Axes, found: xarray.Dataset, show: str, norm: Normalize | None = None
+) -> QuadMesh:
+    """The plane alone, without colour bar and legend.
+
+    Parameters
+    ----------
+    axis : Axes
+    found : Dataset
+    show : str
+    norm : Normalize, optional
+        Colours in common with another plane.
+    """
+    x, y = (found[found.attrs[side]] for side in "xy")
+    units = [axis_unit(side) for side in (x, y)]
+    log = [found.attrs[f"{side}_scale"] == "log" for side in "xy"]
+    values = np.ma.masked_invalid(found[show].values)
+    norm = norm or colours(found, show)
+    edges = [_edges(v.values / u[0], k) for v, u, k in zip((x, y), units, log, strict=True)]
+    axis.set_facecolor(_FAILED["facecolor"])
+    mesh = axis.pcolormesh(
+        *edges, values, norm=norm, cmap=_colour_map(show), rasterized=True, shading="flat"
+    )
+    _draw_failed(axis, found, units)
+    _draw_boundary(axis, found, units)
+    _draw_unmodulated(axis, found, units)
+    for side, values_of, unit, is_log in (("x", x, units[0], log[0]), ("y", y, units[1], log[1])):
+        axis.set(**{f"{side}label": label(values_of, unit)})
+        ends = values_of.values[[0, -1]] / unit[0]
+        if is_log:
+            axis.set(**{f"{side}scale": "log"})
+            _write_numbers(axis.xaxis if side == "x" else axis.yaxis, ends[1] / ends[0])
+        axis.set(**{f"{side}lim": ends})
+    axis.tick_params(which="both", color="#333333")
+    _name_regions(axis, found)
+    return mesh
+
+
+def colours(found: xarray.Dataset, show: str) -> Normalize:
+    """How values become colours."""
+    values = found[show].values
+    values = values[np.isfinite(values)]
+    if show in _CYCLIC:
+        return Normalize(-np.pi, np.pi)
+    low, high = np.quantile(values, _SPAN) if values.size else (0.0, 1.0)
+    if show in _SIGNED:
+        middle = 1.0 if show == "floquet_max" else 0.0
+        reach = max(abs(low - middle), abs(high - middle)) or 1.0
+        return CenteredNorm(middle, halfrange=reach)
+    if low > 0 and high > _DECADES * low:
+        return LogNorm(values.min(), values.max())
+    return Normalize(values.min(), values.max()) if values.size else Normalize(0.0, 1.0)
+
+
+def keys(found: xarray.Dataset) -> list[Any]:
+    """Entries of the legend: kinds of bifurcation that occur, and whatever else is drawn."""
+    kinds = _kinds(found)
+    entries: list[Any] = [
+        Line2D([], [], color=_LINE, linestyle=line, label=_KIND_NAMES.get(kind, kind))
+        for kind, line in KIND_LINES.items()
+        if kind in kinds
+    ]
+    if "critical_stiffness" in found:
+        entries.append(Line2D([], [], label="$K=K_c$ (unmodulated)", **_UNMODULATED))
+    if not found["converged"].values.all():
+        entries.append(Patch(label="no response found", **_FAILED))
+    return entries
+
+
+def axis_unit(side: xarray.DataArray) -> tuple[float, str]:
+    """Factor and name of the unit in which an axis reads best."""
+    unit = side.attrs["units"]
+    ladder = next((k.ladder for k in KINDS.values() if k.si == unit), ())
+    top = float(np.max(side.values))
+    fitting = [(10.0**power, name) for name, power in ladder if top >= 10.0**power]
+    return fitting[-1] if fitting else (1.0, "" if unit == "1" else unit)
+
+
+def label(side: xarray.DataArray, unit: tuple[float, str]) -> str:
+    """Symbol and unit of an axis."""
+    name = _SYMBOLS.get(str(side.name), str(side.name))
+    shown = unit[1].replace("um", "µm")
+    return f"{name} ({shown})" if shown else name
+
+
+def _write_numbers(axis: Axis, ratio: float) -> None:
+    """Plain numbers on a logarithmic axis; between the decades too where there are few."""
+    few = ratio < _FEW_DECADES
+
+    def text(value: float, position: int | None = None) -> str:
+        digit = round(value / 10 ** np.floor(np.log10(value) + 1e-9))
+        return f"{value:g}" if digit == 1 or (few and digit in (2, 3, 5)) else ""
+
+    axis.set_major_formatter(FuncFormatter(text))
+    axis.set_minor_formatter(FuncFormatter(text))
+
+
+def _edges(values: Float, log: bool) -> Float:
+    """Borders of the cells around the points of the grid."""
+    v = np.log(values) if log else values
+    half = np.diff(v)[[0, -1]] / 2
+    edges = np.concatenate([[v[0] - half[0]], (v[1:] + v[:-1]) / 2, [v[-1] + half[1]]])
+    return np.exp(edges) if log else edges
+
+
+def _colour_map(show: str) -> Any:
+    if show in _CYCLIC:
+        return cm.romaO
+    if show in _SIGNED:
+        return cm.vik
+    return cm.batlow_r if show == "delta_mu" else cm.batlow
+
+
+def _draw_failed(axis: Axes, found: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+    failed = ~found["converged"].values.astype(bool)
+    if not failed.any():
+        return
+    x, y = (found[found.attrs[s]].values / u[0] for s, u in zip("xy", units, strict=True))
+    hatched = axis.contourf(x, y, failed.astype(float), levels=[0.5, 1.5], colors="none",
+                            hatches=["xxxx"])  # fmt: skip
+    hatched.set_edgecolor(_FAILED["edgecolor"])
+    hatched.set_linewidth(0.0)
+
+
+def _draw_boundary(axis: Axes, found: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+    lines = found["boundary_line"].values
+    kinds = found["boundary_kind"].values.astype(str)
+    x, y = (
+        found[f"boundary_{found.attrs[s]}"].values / u[0] for s, u in zip("xy", units, strict=True)
+    )
+    halo = [patheffects.Stroke(linewidth=3.4, foreground="white", alpha=0.8), patheffects.Normal()]
+    for number in range(lines.max(initial=-1) + 1):
+        (index,) = np.nonzero(lines == number)
+        for start, end, kind in _runs(kinds[index]):
+            part = index[start:end]
+            axis.plot(
+                x[part], y[part], color=_LINE, linestyle=KIND_LINES.get(kind, "solid"),
+                path_effects=halo, zorder=4, solid_capstyle="butt", dash_capstyle="butt",
+            )  # fmt: skip
+
+
+def _runs(kinds: NDArray[np.str_]) -> list[tuple[int, int, str]]:
+    """Stretches of one kind, each up to the first point of the next, so that no gap is left."""
+    changes = np.flatnonzero(kinds[1:] != kinds[:-1]) + 1
+    starts = [0, *changes.tolist()]
+    ends = [min(k + 1, len(kinds)) for k in [*changes.tolist(), len(kinds)]]
+    return [(a, b, str(kinds[a])) for a, b in zip(starts, ends, strict=True)]
+
+
+def _draw_unmodulated(axis: Axes, found: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+    if "critical_stiffness" not in found:
+        return
+    Kc = found["critical_stiffness"]
+    other = str(Kc.dims[0])
+    sides = [found.attrs[s] for s in "xy"]
+    along = found[other].values / units[sides.index(other)][0]
+    stiffness = Kc.values / units[sides.index("K")][0]
+    pair = (along, stiffness) if sides[0] == other else (stiffness, along)
+    halo = [patheffects.withStroke(linewidth=2.2, foreground="white", alpha=0.7)]
+    axis.plot(*pair, zorder=3, path_effects=halo, **_UNMODULATED)
+
+
+def _name_regions(axis: Axes, found: xarray.Dataset) -> None:
+    """The words stable and unstable, each where its region is widest."""
+    solved = found["converged"].values.astype(bool)
+    stable = found["stable"].values.astype(bool)
+    room = _ROOM * min(stable.shape)
+    for word, region in (("stable", solved & stable), ("unstable", solved & ~stable)):
+        depth = np.asarray(distance_transform_edt(np.pad(region, 1)))[1:-1, 1:-1]
+        if depth.max() < room:
+            continue
+        row, column = np.unravel_index(np.argmax(depth), depth.shape)
+        at = ((column + 0.5) / stable.shape[1], (row + 0.5) / stable.shape[0])
+        axis.text(
+            *at, word, transform=axis.transAxes, ha="center", va="center", zorder=5,
+            path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white", alpha=0.8)],
+        )  # fmt: skip
+
+
+def _kinds(found: xarray.Dataset) -> set[str]:
+    on_lines = found["boundary_line"].values >= 0
+    return set(found["boundary_kind"].values.astype(str)[on_lines])
+
+
+def _extend(found: xarray.Dataset, show: str, mesh: QuadMesh) -> str:
+    """Which ends of the colour bar stand for values beyond it."""
+    values = found[show].values[np.isfinite(found[show].values)]
+    if not values.size or mesh.norm.vmin is None or mesh.norm.vmax is None:
+        return "neither"
+    below, above = values.min() < mesh.norm.vmin, values.max() > mesh.norm.vmax
+    return {(1, 1): "both", (1, 0): "min", (0, 1): "max"}.get((int(below), int(above)), "neither")
