@@ -127,7 +127,7 @@ def _states(problem: Problem, orbit: Orbit, index: Indices, options: Options) ->
     for part, reading in run_chunks(solve, (problem, orbit), index, chunk):
         logs = logs_of(reading)
         for k, point in enumerate(part):
-            states[point] = _State(reading.mean_friction[k], reading.harmonics[:2, k], logs[:, k])
+            states[point] = _State(reading.mean_friction[k], reading.harmonics[:, k], logs[:, k])
     return states
 
 
@@ -147,7 +147,7 @@ def _compare(
         if error[k] > ACCEPTED:
             found.outcome[rows[k]], found.detail[rows[k]] = Outcome.NOT_RESOLVED, np.inf
             continue
-        state = _State(reading.mean_friction[k], reading.harmonics[:2, k], logs[:, k])
+        state = _State(reading.mean_friction[k], reading.harmonics[:, k], logs[:, k])
         before, previous[point] = previous.get(point), state
         orbit_gap, multiplier_gap = _gaps(before, state)
         if orbit_gap <= agreement and reading.growth[k] < _DEAD:
@@ -228,7 +228,10 @@ def _gaps(before: _State | None, now: _State) -> tuple[float, float]:
     mean = abs(now.mean - before.mean) / abs(now.mean)
     # Round-off bounds what a harmonic that vanishes beside the first, or beside the mean, can mean.
     floor = (1e-14 * abs(now.harmonics[0]) + 1e-17 * abs(now.mean)) / AGREEMENT
-    harmonics = np.abs(now.harmonics - before.harmonics) / (np.abs(now.harmonics) + floor)
+    scale = np.abs(now.harmonics) + floor
+    # Beyond the second they count beside the first.
+    scale[2:] = np.abs(now.harmonics[0]) + floor
+    harmonics = np.abs(now.harmonics - before.harmonics) / scale
     return float(max(mean, harmonics.max())), _multiplier_gap(before.logs, now.logs)
 
 
