@@ -2,12 +2,51 @@
 
 from __future__ import annotations
 
+import gc
+import math
 import os
 import tempfile
 from functools import cache
 from pathlib import Path
 
 import jax
+
+#: Programs after whose loading the memory mappings of the process are counted.
+_OFTEN = 8
+_loaded = 0
+
+
+def _count(event: str, duration_secs: float, **_: str | int) -> None:
+    global _loaded  # JAX tells of its programs in no other way
+    if event.endswith("backend_compile_duration"):
+        _loaded += 1
+
+
+def spare_mappings() -> None:
+    """Drop the loaded programs where the system is about to refuse more of them.
+
+    A compiled program takes a thousand memory mappings and more, of which Linux allows a process
+    65,530 by default; beyond that XLA crashes. Dropped programs come back from the cache on
+    disk when they are called again. To be called between programs, not within one.
+    """
+    global _loaded
+    if _loaded < _OFTEN:
+        return
+    _loaded = 0
+    used, most = _mappings()
+    if used > most / 3:
+        jax.clear_caches()
+        gc.collect()
+
+
+def _mappings() -> tuple[int, float]:
+    """Memory mappings of this process and how many it may have; no limit on other systems."""
+    try:
+        most = int(Path("/proc/sys/vm/max_map_count").read_text())
+        with Path("/proc/self/maps").open("rb") as maps:
+            return sum(1 for _ in maps), most
+    except (OSError, ValueError):
+        return 0, math.inf
 
 
 @cache
@@ -23,6 +62,7 @@ def configure() -> Path | None:
         The folder of the cache, None without one.
     """
     jax.config.update("jax_enable_x64", True)
+    jax.monitoring.register_event_duration_secs_listener(_count)
     folder = _cache_folder()
     if folder is None or not _writable(folder):
         return None

@@ -14,6 +14,8 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity._jax import spare_mappings
+
 Indices = NDArray[np.intp]
 
 
@@ -59,4 +61,5 @@ def run_chunks(
         return part, jax.tree.map(lambda a: np.asarray(a)[..., : len(part)], outputs)
 
     for start in range(0, len(index), chunk):
+        spare_mappings()
         yield work(index[start : start + chunk])

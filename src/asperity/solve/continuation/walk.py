@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from asperity._jax import spare_mappings
 from asperity.solve.collocation import refined
 from asperity.solve.continuation.arclength import (
     Point,
@@ -76,6 +77,7 @@ class Walker(NamedTuple):
 
     def step(self, point: Point, length: float) -> tuple[Station | None, Step]:
         """The station at the distance `length` from `point`, None where Newton's method fails."""
+        spare_mappings()
         inputs = (self.line, point, np.array([length]))
         step = _on_host(arclength_step(inputs, max_steps=_NEWTON_STEPS))
         if not step.error[0] < _CONVERGED:

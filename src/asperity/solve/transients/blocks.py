@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity._jax import spare_mappings
 from asperity.loads import Programme
 from asperity.slider import Slider
 from asperity.solve.transients.equations import read
@@ -58,6 +59,7 @@ def integrate_blocks(
     InputError
         If a value breaks its rule; before the first block.
     """
+    spare_mappings()
     march = march_of(slider, programme, **options)
     times = sampler(sampling, programme.duration)
     if resume is None:
