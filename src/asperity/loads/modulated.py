@@ -37,7 +37,7 @@ def modulated(
     ----------
     epsilon : array or str
         Relative amplitude of the load at the modulation frequency, its phase being zero.
-    load : mapping of int to (amplitude, phase), optional
+    load : mapping of int to pair, optional
         Further harmonics of the load: n -> (e_n, p_n), phases in rad.
     velocity : array or str
         Relative amplitude of the pulling velocity.
