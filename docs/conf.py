@@ -57,6 +57,6 @@ html_css_files = ["pages.css"]
 pygments_style = "friendly"
 pygments_dark_style = "monokai"
 
-# Attributes of one name in several records, such as mu1: napoleon links types by their bare name, and
-# there is nothing to choose between.
+# Attributes of one name in several records, such as mu1: napoleon links types by their bare name,
+# and there is nothing to choose between.
 suppress_warnings = ["ref.python"]
