@@ -56,6 +56,11 @@ class Case:
     def w(self, theta):
         return self.load(theta) if self.load else 1 + self.epsilon * np.cos(theta)
 
+    @staticmethod
+    def slope(wave, theta):
+        """Derivative of an analytic function of a real phase, exact by a complex step."""
+        return wave(theta + 1e-30j).imag / 1e-30
+
 
 CASES = {
     "inertial": Case(True, 1e-6, 120.0, inertia=True),
@@ -142,12 +147,10 @@ def equations(case):
     def relaxed(t, Y):
         mu, age = carried(t, Y), Y[1]
         plastic = plastic_velocity(mu, age)
-        # Complex steps in t: an exact derivative of what W(t) does to the force of the spring.
-        mu_rate = carried(t + 1e-30j, Y).imag / 1e-30 if np.isrealobj(Y) else None
-        step = 1e-7 / case.f
-        if mu_rate is None:
-            mu_rate = (carried(t + step, Y) - carried(t - step, Y)) / (2 * step)
-        mu_rate = mu_rate + K * (pull(t) - plastic) / (W(t) + K * LAMBDA)
+        # The asperities' elongation mu lambda is stretched by the pull as well as by the load.
+        phase, rate = omega * t, omega * W0
+        stretch = rate * (case.slope(case.shear, phase) - mu * case.slope(case.w, phase))
+        mu_rate = (stretch + K * (pull(t) - plastic)) / (W(t) + K * LAMBDA)
         return np.array([pull(t) - plastic, renewal(plastic + LAMBDA * mu_rate, age)])
 
     def series(t, Y):
@@ -166,13 +169,12 @@ def equations(case):
 
 def first_states(case, start):
     """The package's states at theta = 0 as those of `equations`."""
-    mechanical = {"inertial": (W0 / K, case.V, 1.0), "radiation-damped": (W0 / K, 1.0)}
-    if case.inertia and not case.elastic:
-        return np.array([start[0] * W0 / K, start[1] + np.log(case.V), start[2]])
-    scales = mechanical["inertial"] if case.inertia else (W0 / K,)
-    if case.eta and not case.inertia and case.elastic:
-        scales = mechanical["radiation-damped"]
-    return start * np.array([*scales, 1.0])
+    elongation = start[0] * W0 / K
+    if not case.inertia:
+        return np.array([elongation, *start[1:]])
+    if case.elastic:
+        return np.array([elongation, start[1] * case.V, *start[2:]])
+    return np.array([elongation, start[1] + np.log(case.V), start[2]])
 
 
 @pytest.fixture(scope="module", params=CASES)
@@ -302,3 +304,28 @@ def test_inertia_needs_a_mass_and_damping_a_value():
         asp.periodic_response(slider(True), radiation_damping=0.0, **drive)
     with pytest.raises(InputError, match="exactly one of epsilon and modulation"):
         asp.periodic_response(slider(True), velocity=1e-6, frequency=120.0)
+
+
+@pytest.mark.parametrize("more", [{"inertia": True}, {"radiation_damping": 500.0}])
+def test_a_law_without_rate_has_no_dynamics_to_add_inertia_to(more):
+    null = asp.Slider(get_law("amontons")(mu0=0.5), spring=K, load=W0, mass=M)
+    with pytest.raises(InputError, match="law must depend on the velocity where inertia"):
+        asp.periodic_response(null, velocity=1e-6, epsilon=0.1, frequency=120.0, **more)
+
+
+def test_a_law_without_rate_balances_the_shear_force():
+    """F = mu W - T: what the tilted exciter pushes the spring need not pull."""
+    null = asp.Slider(get_law("amontons")(mu0=0.5), spring=K, load=W0)
+    tilted = modulated(0.2, load={2: (0.0, 0.0)}, tilt=TILT)
+    response = asp.periodic_response(null, velocity=1e-6, frequency=120.0, modulation=tilted)
+    assert response.mu1 == pytest.approx(0.2 * (0.5 - np.tan(TILT)), rel=1e-12)
+
+
+def test_provenance_writes_the_modulation_out():
+    programme = modulated(0.2, load={2: (0.1, 0.0)}, velocity=0.5)
+    response = asp.periodic_response(
+        slider(False), velocity=1e-5, frequency=120.0, modulation=programme
+    )
+    assert response.provenance["modulation"] == (
+        "w(t) = 1 + (0.2) cos(1 w t) + (0.1) cos(2 w t), V(t)/V = 1 + (0.5) cos(1 w t)"
+    )

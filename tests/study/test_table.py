@@ -367,6 +367,17 @@ def test_the_command_runs_a_table(tmp_path: Path) -> None:
     assert float(read(tmp_path / "out.csv")[0]["mu1"]) == pytest.approx(float(expected.mu1))
 
 
+@pytest.mark.parametrize("column", ["inertia", "eta"])
+def test_a_law_without_dynamics_costs_its_own_row(tmp_path: Path, column: str) -> None:
+    rows = [POINT | {"law": law, column: 1} for law in ("amontons", "rice-ruina")]
+    source = write(tmp_path / "in.csv", rows, [*COLUMNS, column])
+    run_table(source, tmp_path / "out.csv")
+    null, sliding = read(tmp_path / "out.csv")
+    assert null["result"].startswith("law must depend on the velocity where inertia or eta counts")
+    assert null["mu1"] == ""
+    assert sliding["result"] == "converged"
+
+
 # --- Names and rules, which stand in the laws and in the slider --------------------------------
 
 

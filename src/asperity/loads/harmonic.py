@@ -32,6 +32,11 @@ class Harmonic(Modulation):
         """Epsilon."""
         return self.epsilon
 
+    @property
+    def formula(self) -> str:
+        """What is modulated and how, as a text for provenance."""
+        return "w(t) = 1 + eps cos(w t)"
+
     def scaled(self, share: ArrayLike) -> Harmonic:
         """The modulation with `share` of its amplitude: 0 is steady sliding."""
         return Harmonic(self.epsilon * share)

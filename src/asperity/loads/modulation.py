@@ -26,3 +26,8 @@ class Modulation(eqx.Module):
     @abstractmethod
     def scaled(self, share: ArrayLike) -> Self:
         """The modulation with `share` of its amplitude: 0 is steady sliding."""
+
+    @property
+    @abstractmethod
+    def formula(self) -> str:
+        """What is modulated and how, as a text for provenance."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import TypeAlias
 
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
@@ -46,6 +47,14 @@ class Periodic(Modulation):
         """Amplitude of the first harmonic of the load; 0 where the load is constant."""
         return jnp.hypot(*self.load[0]) if self.load else 0.0
 
+    @property
+    def formula(self) -> str:
+        """What is modulated and how, as a text for provenance."""
+        parts = {"w(t)": ("1", self.load), "shear/W0": ("", self.shear), "V(t)/V": ("1", self.pull)}
+        return ", ".join(
+            f"{name} = {_written(mean, series)}" for name, (mean, series) in parts.items() if series
+        )
+
     def scaled(self, share: ArrayLike) -> Periodic:
         """The modulation with `share` of its amplitude: 0 is steady sliding."""
         parts = (self.load, self.shear, self.pull)
@@ -60,3 +69,15 @@ def _sum(series: Series, theta: ArrayLike) -> tuple[Array, Array]:
         value = value + a * cos + b * sin
         slope = slope + k * (b * cos - a * sin)
     return value, slope
+
+
+def _written(mean: str, series: Series) -> str:
+    terms = [mean] if mean else []
+    for k, pair in enumerate(series, start=1):
+        for value, function in zip(pair, ("cos", "sin"), strict=True):
+            low, high = float(np.min(value)), float(np.max(value))
+            if low == high == 0:
+                continue
+            number = f"({low!r})" if low == high else f"({low!r} to {high!r})"
+            terms.append(f"{number} {function}({k} w t)")
+    return " + ".join(terms) or "0"

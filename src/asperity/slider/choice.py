@@ -41,10 +41,16 @@ def equation_of_motion(
     ------
     InputError
         If inertia is asked for without a mass, damping is not positive where nothing else
-        would be left of it, or a batch mixes points with and without elastic asperities.
+        would be left of it, a batch mixes points with and without elastic asperities, or either is
+        asked of a law that does not depend on the velocity.
     """
     if not inertia and eta is None:
         return QuasiStatic(slider, V, omega)
+    if not slider.law.rate_dependent:
+        raise InputError(
+            f"law must depend on the velocity where inertia or radiation damping counts, got "
+            f"{slider.law.name}; leave both out or choose another law"
+        )
     if inertia:
         _require_positive("slider.M", slider.M, "kg", "give the mass, as mass='1.6 kg'")
     else:

@@ -86,16 +86,17 @@ def periodic_response(
     to 1e-20 absolute; with inertia or several states of the law, those below 1e-6 to 1e-14, and
     those below 1e-7 of the largest to 1e-15 of that).
     """
-    V = checked_positive(velocity, "velocity", "velocity")
-    f = checked_positive(frequency, "frequency", "frequency")
-    load = checked_modulation(epsilon, modulation)
-    eta = None
-    if radiation_damping is not None:
-        eta = checked_positive(radiation_damping, "damping", "radiation_damping")
     if harmonics < 2:
         raise InputError(f"harmonics must be at least 2, got {harmonics}; ask for 2 or more")
-    motion = equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta)
-    problem = Problem(motion, load)
+    problem = checked_problem(
+        slider,
+        velocity=velocity,
+        epsilon=epsilon,
+        frequency=frequency,
+        modulation=modulation,
+        inertia=inertia,
+        radiation_damping=radiation_damping,
+    )
     flat, shape = flatten(problem)
     points = int(np.prod(shape, dtype=int))
     report = progress or (lambda _: None)
@@ -110,8 +111,34 @@ def periodic_response(
     else:
         found = _proportional(flat, points, harmonics, waveform)
         report(points)
-    mu_ss = np.asarray(slider.law.mu_ss(V)) * np.ones(shape)
-    return PeriodicResponse.from_search(found, shape, mu_ss, motion, load, f)
+    mu_ss = np.asarray(slider.law.mu_ss(problem.system.V)) * np.ones(shape)
+    return PeriodicResponse.from_search(found, shape, mu_ss, *problem)
+
+
+def checked_problem(
+    slider: Slider,
+    *,
+    velocity: Any,
+    epsilon: Any,
+    frequency: Any,
+    modulation: Modulation | None = None,
+    inertia: bool = False,
+    radiation_damping: Any = None,
+) -> Problem:
+    """Equations and load of what is asked, parameters of any shapes.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule; as `equation_of_motion`.
+    """
+    V = checked_positive(velocity, "velocity", "velocity")
+    f = checked_positive(frequency, "frequency", "frequency")
+    load = checked_modulation(epsilon, modulation)
+    eta = None
+    if radiation_damping is not None:
+        eta = checked_positive(radiation_damping, "damping", "radiation_damping")
+    return Problem(equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta), load)
 
 
 def checked_positive(value: Any, kind: str, name: str) -> np.ndarray:
@@ -185,15 +212,15 @@ def flatten(problem: Problem) -> tuple[Problem, tuple[int, ...]]:
 
 
 def _proportional(problem: Problem, points: int, harmonics: int, phases: int) -> Found:
-    """A law without rate dependence: the force follows the load, without dynamics."""
+    """A law without rate dependence: the force follows load and shear force, without dynamics."""
     system, load = problem
     count = max(phases, 4 * harmonics)
 
     def force(samples: int) -> np.ndarray:
         theta = 2 * np.pi * np.arange(samples)[:, None] / max(samples, 1)
-        w = load.at(theta).w
-        state = system.slider.law.steady_state(system.V)
-        return np.asarray(w * system.slider.law.friction(system.V, state, w))
+        at, law = load.at(theta), system.slider.law
+        friction = law.friction(system.V, law.steady_state(system.V), at.w)
+        return np.asarray(at.w * friction - at.shear)
 
     spectrum = np.fft.rfft(force(count), axis=0) / count
     wave = np.stack([force(phases), np.zeros((phases, points))])

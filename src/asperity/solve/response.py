@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity._version import __version__
 from asperity.loads import Modulation
-from asperity.slider import Motion, QuasiStatic, Slider
+from asperity.slider import Motion, Slider
 from asperity.solve.floquet import from_logs, kind_of_crossing, without_lost_arguments
 from asperity.solve.outcome import Outcome, sentences
+from asperity.solve.provenance import provenance_of
 
 if TYPE_CHECKING:
     import xarray
@@ -62,6 +61,8 @@ class PeriodicResponse:
     theta : array, shape (samples,)
     motion : Motion
         Equation of motion, with the slider.
+    load : Modulation
+        What is modulated.
     slider, velocity, epsilon, frequency
         What was asked, in SI; epsilon is the amplitude of the load's first harmonic.
     """
@@ -76,8 +77,7 @@ class PeriodicResponse:
     outcome: NDArray[np.int64]
     detail: Float
     motion: Motion
-    epsilon: Float
-    frequency: Float
+    load: Modulation
 
     @classmethod
     def from_search(
@@ -87,7 +87,6 @@ class PeriodicResponse:
         mu_ss: Float,
         motion: Motion,
         load: Modulation,
-        frequency: Float,
     ) -> PeriodicResponse:
         """Lay the results of a search out in the shape of the question."""
 
@@ -105,8 +104,7 @@ class PeriodicResponse:
             outcome=shaped(found.outcome),
             detail=shaped(found.detail),
             motion=motion,
-            epsilon=np.asarray(load.amplitude),
-            frequency=frequency,
+            load=load,
         )
 
     @property
@@ -118,6 +116,16 @@ class PeriodicResponse:
     def velocity(self) -> Float:
         """Pulling velocity (m/s)."""
         return np.asarray(self.motion.V)
+
+    @property
+    def epsilon(self) -> Float:
+        """Amplitude of the first harmonic of the load."""
+        return np.asarray(self.load.amplitude)
+
+    @property
+    def frequency(self) -> Float:
+        """Modulation frequency (Hz)."""
+        return np.asarray(self.motion.omega) / (2 * np.pi)
 
     @property
     def delta_mu(self) -> Float:
@@ -264,34 +272,4 @@ class PeriodicResponse:
     @property
     def provenance(self) -> dict[str, Any]:
         """Version, law, conventions, tolerance and source of the numbers."""
-        law = type(self.slider.law)
-        return {
-            "asperity_version": __version__,
-            "law": law.name,
-            "source": law.source,
-            "equation_of_motion": self.motion.name,
-            "parameters": self._parameters(),
-            "relative_tolerance": 1e-8,
-            "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), w(t) = 1 + eps cos(w t)",
-        }
-
-    def _parameters(self) -> str:
-        """All parameters with their units; a range where they are arrays."""
-        law = self.slider.law
-        values = {
-            field.name.rstrip("_"): (getattr(law, field.name), field.metadata.get("unit", ""))
-            for field in dataclasses.fields(law)
-        }
-        values |= {"K": (self.slider.K, "N/m"), "W0": (self.slider.W0, "N")}
-        if not isinstance(self.motion, QuasiStatic):
-            eta = self.motion.damping * self.slider.W0 / self.velocity
-            values |= {"M": (self.slider.M, "kg"), "eta": (eta, "N s/m")}
-        values |= {"V": (self.velocity, "m/s"), "epsilon": (self.epsilon, "")}
-        values["frequency"] = (self.frequency, "Hz")
-        return "; ".join(f"{name} = {_shown(*value)}" for name, value in values.items())
-
-
-def _shown(value: Any, unit: str) -> str:
-    low, high = float(np.min(value)), float(np.max(value))
-    text = f"{low!r}" if low == high else f"{low!r} to {high!r}"
-    return f"{text} {unit}".rstrip()
+        return provenance_of(self)

@@ -21,8 +21,7 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity.laws import law_parameters
-from asperity.loads import Harmonic
-from asperity.slider import QuasiStatic, Slider, equation_of_motion
+from asperity.slider import QuasiStatic, Slider
 from asperity.solve.batch import run_chunks, take
 from asperity.solve.collocation import (
     CollocationResponse,
@@ -31,7 +30,7 @@ from asperity.solve.collocation import (
 )
 from asperity.solve.kernels import ACCEPTED, Problem, refine_orbit
 from asperity.solve.mesh import Orbit
-from asperity.solve.periodic import checked_epsilon, checked_positive, flatten
+from asperity.solve.periodic import checked_problem, flatten
 from asperity.solve.refinement import chunk_size
 from asperity.solve.starts import starting_orbits
 
@@ -95,17 +94,18 @@ def sensitivities(
     InputError
         As `periodic_response`.
     """
-    V = checked_positive(velocity, "velocity", "velocity")
-    f = checked_positive(frequency, "frequency", "frequency")
-    eps = checked_epsilon(epsilon)
-    eta = None
-    if radiation_damping is not None:
-        eta = checked_positive(radiation_damping, "damping", "radiation_damping")
-    motion = equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta)
-    problem, shape = flatten(Problem(motion, Harmonic(eps)))
+    asked = checked_problem(
+        slider,
+        velocity=velocity,
+        epsilon=epsilon,
+        frequency=frequency,
+        inertia=inertia,
+        radiation_damping=radiation_damping,
+    )
+    problem, shape = flatten(asked)
     points = int(np.prod(shape, dtype=int))
     start = starting_orbits(problem, points)
-    damping = () if isinstance(motion, QuasiStatic) else ("eta",)
+    damping = () if isinstance(problem.system, QuasiStatic) else ("eta",)
     drive = ("K", "W0", "M", "V", "frequency", *damping, "epsilon")
     names = (*law_parameters(type(slider.law)), *drive)
     size = problem.system.size

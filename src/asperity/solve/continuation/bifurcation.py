@@ -15,7 +15,6 @@ from collections.abc import Callable, Iterator
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from asperity.solve.continuation.walk import Station, Walker
 
@@ -105,6 +104,9 @@ def _root(
     walker: Walker, start: Station, length: float, function: Callable[[Station], float]
 ) -> Station | None:
     """The station between 0 and `length` at which `function` vanishes."""
+    # Loading SciPy's optimisation would slow the start of a process that continues nothing.
+    from scipy.optimize import brentq
+
     seen: dict[float, Station] = {}
 
     def value(distance: float) -> float:

@@ -53,6 +53,11 @@ class Repeated(Modulation):
         """That of the modulation."""
         return self.load.amplitude
 
+    @property
+    def formula(self) -> str:
+        """That of the modulation."""
+        return self.load.formula
+
     def scaled(self, share: ArrayLike) -> Repeated:
         """The modulation with `share` of its amplitude."""
         return Repeated(self.load.scaled(share))

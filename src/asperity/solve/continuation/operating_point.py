@@ -10,11 +10,11 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.loads import Harmonic, Modulation
-from asperity.slider import Slider, equation_of_motion
+from asperity.slider import Slider
 from asperity.solve.continuation.parameters import known_name, pair_of
 from asperity.solve.kernels import Problem
 from asperity.solve.mesh import Orbit
-from asperity.solve.periodic import checked_modulation, checked_positive, flatten
+from asperity.solve.periodic import checked_problem, flatten
 from asperity.solve.starts import orbits_along_branches, starting_orbits
 
 
@@ -56,20 +56,21 @@ def one_problem(
     for name, value in given.items():
         if value is None:
             raise InputError(f"{name} must be given, got None; or continue in it")
-    V = checked_positive(given["velocity"], "velocity", "velocity")
-    f = checked_positive(given["frequency"], "frequency", "frequency")
-    amplitude = moving.get("epsilon", epsilon)
-    load = checked_modulation(amplitude if modulation is None else epsilon, modulation)
-    damping = moving.get("radiation_damping", radiation_damping)
-    if damping is not None:
-        damping = checked_positive(damping, "damping", "radiation_damping")
-    motion = equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=damping)
     if not slider.law.rate_dependent:
         raise InputError(
             f"law must depend on the velocity to have a branch with bifurcations, got "
             f"{slider.law.name}; its force is mu W, whatever the parameters"
         )
-    flat, shape = flatten(Problem(motion, load))
+    amplitude = moving.get("epsilon", epsilon)
+    asked = checked_problem(
+        slider,
+        **given,
+        epsilon=amplitude if modulation is None else epsilon,
+        modulation=modulation,
+        inertia=inertia,
+        radiation_damping=moving.get("radiation_damping", radiation_damping),
+    )
+    flat, shape = flatten(asked)
     if shape not in ((), (1,)):
         raise InputError(
             f"parameters must be numbers for a continuation, got arrays of shape {shape}; "

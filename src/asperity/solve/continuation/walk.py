@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from asperity._jax import spare_mappings
 from asperity.solve.collocation import refined
@@ -99,14 +98,15 @@ class Walker(NamedTuple):
 
     def reaching(self, here: Station, length: float, t: float) -> tuple[Station, float] | None:
         """The station at the coordinate `t` passed within `length` of `here`, and its distance."""
-        low, high = 0.0, length
+        # Loading SciPy's optimisation would slow the start of a process that continues nothing.
+        from scipy.optimize import brentq
 
         def beyond(distance: float) -> float:
             station, _ = self.step(here.point, distance)
             return np.nan if station is None else station.t - t
 
         try:
-            distance = float(brentq(beyond, low, high, xtol=1e-14, rtol=1e-14))
+            distance = float(brentq(beyond, 0.0, length, xtol=1e-14, rtol=1e-14))
         except ValueError:
             return None
         station, _ = self.step(here.point, distance)

@@ -70,6 +70,12 @@ def read_numbers(
         reasons[i] = reasons[i] or (
             "M must be positive where inertia is 1, got 0; fill it in or name a material with it"
         )
+    if not law.rate_dependent:
+        for i in np.flatnonzero((values["inertia"] > 0) | (values["eta"] > 0)):
+            reasons[i] = reasons[i] or (
+                f"law must depend on the velocity where inertia or eta counts, got {law.name}; "
+                "leave both cells empty or choose another law"
+            )
     return values, reasons
 
 
