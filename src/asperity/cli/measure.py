@@ -51,6 +51,11 @@ Exit code 0: measured; 1: measured, but a check says bad; 2: bad input.
     help="Unit of a column that the file leaves open, like Fn=N; repeatable.",
 )
 @click.option(
+    "--rate", metavar="VALUE", help='Samples per second, like "10 kHz", in place of times.'
+)
+@click.option("--group", metavar="NAME", help="Group of an HDF5, MATLAB or TDMS file of several.")
+@click.option("--area", metavar="VALUE", help='Makes stresses forces, like "25 cm^2".')
+@click.option(
     "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
     help='Where to look for the modulation, like "120 Hz"; it is fitted.',
 )  # fmt: skip
@@ -82,6 +87,9 @@ def measure(
     time_column: str | None,
     columns: tuple[str, ...],
     units: tuple[str, ...],
+    rate: str | None,
+    group: str | None,
+    area: str | None,
     frequency: str,
     exact_frequency: bool,
     harmonics: int,
@@ -104,7 +112,12 @@ def measure(
         _check_picture(plot)
     roles = {"W": load, "F": force, "time": time_column} | dict(_pairs(columns, "--column"))
     chosen = {role: _place(name) for role, name in roles.items() if name is not None}
-    trace = read(recording, columns=chosen or None, units=dict(_pairs(units, "--unit")) or None)
+    named = dict(_pairs(units, "--unit")) or None
+    trace = read(recording, columns=chosen or None, units=named, rate=rate, group=group)
+    if area is not None:
+        from asperity.instrument.conversions import stress_to_force
+
+        trace = stress_to_force(trace, area)
     found: Measurement | StaticMeasurement
     if no_modulation:
         from asperity.instrument.measure_static import measure_static

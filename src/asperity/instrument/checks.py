@@ -9,6 +9,7 @@ import numpy as np
 from asperity.instrument.finding import Finding
 from asperity.instrument.sampling import check_sampling, even_rate
 from asperity.instrument.saturation import check_saturation
+from asperity.instrument.spikes import check_spikes
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -27,6 +28,7 @@ CHECKED = frozenset(
         "nan",
         "repeated time",
         "saturation",
+        "spike",
         "uneven sampling",
     }
 )
@@ -44,14 +46,15 @@ def check(trace: Trace) -> tuple[Finding, ...]:
     -------
     tuple of Finding
         ``"backward time"``, ``"repeated time"``, ``"gap"``, ``"uneven sampling"``, ``"nan"``,
-        ``"infinite"``, ``"constant"`` and ``"saturation"``; at most one of a name for time and for
-        each channel. Empty when nothing was found.
+        ``"infinite"``, ``"constant"``, ``"spike"`` and ``"saturation"``; at most one of a name for
+        time and for each channel. Empty when nothing was found.
 
     Notes
     -----
-    A gap is a step of time longer than 1.5 times the median of the ten steps before it, and of
+    A gap is a step of time longer than 1.5 times the median of the 24 steps before it, and of
     those after it, and outside their scatter: a change of the sampling rate is uneven, and no gap.
-    Saturation is a crowd of samples at exactly the largest or smallest value.
+    Saturation is a crowd of samples at exactly the largest or smallest value. A spike stands out of
+    the samples on both sides of it by ten usual differences, for three samples at most.
     """
     # Sums and differences of a damaged file may overflow, which is no news here.
     with np.errstate(over="ignore", invalid="ignore"):
@@ -59,6 +62,7 @@ def check(trace: Trace) -> tuple[Finding, ...]:
         for name, channel in trace.channels.items():
             found += _missing(channel.values, trace.time, name)
             found += check_saturation(channel.values, trace.time, name)
+            found += check_spikes(channel.values, trace.time, name)
     return tuple(found)
 
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.instrument.lock_in_basis import Basis
+from asperity.instrument.lock_in_uneven import uneven_sums
 
 Array = NDArray[np.float64]
 
@@ -146,29 +147,15 @@ def _turned(
 
 def _uneven(basis: Basis, time: Array, channels: list[Array], length: int) -> Blocks:
     blocks = -(-time.size // length)
-    gram = np.zeros((blocks, basis.size, basis.size))
-    moments = np.zeros((blocks, basis.size, len(channels)))
     if length >= _BUFFER // 8:
-        _long_blocks(basis, time, channels, length, gram, moments)
+        gram, moments = uneven_sums(basis, time, channels, length)
     else:
+        gram = np.zeros((blocks, basis.size, basis.size))
+        moments = np.zeros((blocks, basis.size, len(channels)))
         _short_blocks(basis, time, channels, length, gram, moments)
     edges = np.arange(0, time.size, length)
     count = np.diff(np.append(edges, time.size)).astype(float)
     return Blocks(basis, gram, moments, count, np.add.reduceat(time, edges) / count)
-
-
-def _long_blocks(
-    basis: Basis, time: Array, channels: list[Array], length: int, gram: Array, moments: Array
-) -> None:
-    buffer = np.empty((basis.size, _BUFFER))
-    for b in range(gram.shape[0]):
-        end = min((b + 1) * length, time.size)
-        for at in range(b * length, end, _BUFFER):
-            stop = min(at + _BUFFER, end)
-            columns = basis.columns(time[at:stop], buffer[:, : stop - at])
-            gram[b] += columns @ columns.T
-            for c, channel in enumerate(channels):
-                moments[b, :, c] += columns @ channel[at:stop]
 
 
 def _short_blocks(

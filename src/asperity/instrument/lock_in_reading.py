@@ -127,6 +127,8 @@ class Reading:
     def half_width(self, name: str, level: float = 0.95) -> float:
         """Half width of the confidence interval of a number, by Student's t.
 
+        That of a phase is pi, so that it may be any, where its harmonic may be zero.
+
         Parameters
         ----------
         name : str
@@ -136,6 +138,8 @@ class Reading:
         """
         from scipy.special import stdtrit
 
+        if name.startswith("phase") and not self.phasor(int(name[5:])).excludes(0, level):
+            return math.pi
         digits = "".join(filter(str.isdigit, name.removeprefix("W0")))
         at = {"W0": 0, "mean_force": 0, "mean_friction": 0}.get(name, int(digits or 1))
         quantile = stdtrit(min(self.dof[at], self.dof[min(at, 1)]), 0.5 + level / 2)

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.instrument import quality_checks as checks
+from asperity.instrument import quality_plausible as plausible
+from asperity.instrument import quality_steadiness as steadiness
 from asperity.instrument.lock_in import DRIFTS, lock_in
 from asperity.instrument.lock_in_reading import Reading
 from asperity.instrument.measure_samples import Samples, about_window, usable
@@ -134,11 +136,13 @@ def measure(
         )
     start = frequency if frequency is not None and not refine else line.frequency
     parts = _parts(samples, line, start)
-    chosen = _longest(parts)
     if window is None:
+        chosen = max((p for p in parts if p.modulated), key=lambda part: part.stop - part.first)
         first, stop = _chosen(samples, chosen, start, DRIFTS[detrend])
     else:
         first, stop = _given(samples.time, window)
+        # F(0) is that beside the stretch that is read, and not beside a longer one.
+        chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
     if only_whole_periods:
         stop = first + whole_periods(samples.time[first:stop], start)
     cut = slice(first, stop)
@@ -154,15 +158,8 @@ def measure(
     )
     before, after = _around(samples, parts, chosen)
     answers = (
-        checks.modulation(reading),
-        checks.periods(reading),
-        checks.signal(reading),
-        checks.leakage(reading),
+        *_asked(reading, time, samples.load[cut], force_values),
         checks.drift(reading, *(b[0] if b else None for b in (before, after))),
-        checks.transient(reading),
-        checks.stick_slip(reading, time, force_values),
-        checks.load_harmonics(reading),
-        checks.resolution(reading, force_values),
         *checks.findings(
             about_window(samples, float(time[0]), float(time[-1])),
             time.size,
@@ -182,6 +179,28 @@ def measure(
         samples=samples,
         window=(first, stop),
         chosen_by="program" if window is None else "user",
+    )
+
+
+def _asked(reading: Reading, time: Array, load: Array, force: Array) -> tuple[Check, ...]:
+    """What is asked of every window."""
+    rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
+    return (
+        checks.modulation(reading),
+        checks.periods(reading),
+        checks.signal(reading),
+        plausible.contact(reading),
+        plausible.friction(reading),
+        plausible.response(reading),
+        plausible.aliasing(reading, rate),
+        steadiness.leakage(reading),
+        steadiness.steady_load(reading, time, load),
+        steadiness.steady_force(reading, time, force),
+        steadiness.steady_response(reading),
+        checks.transient(reading),
+        checks.stick_slip(reading, time, force),
+        checks.load_harmonics(reading),
+        checks.resolution(reading, load, force),
     )
 
 
@@ -210,10 +229,6 @@ def _parts(samples: Samples, line: Line, frequency: float) -> list[Stretch]:
         return [whole]
     found = stretches(samples.time, samples.load, frequency)
     return found if any(part.modulated for part in found) else [whole]
-
-
-def _longest(parts: list[Stretch]) -> Stretch:
-    return max((p for p in parts if p.modulated), key=lambda part: part.stop - part.first)
 
 
 def _chosen(samples: Samples, part: Stretch, frequency: float, degree: int) -> tuple[int, int]:
@@ -246,13 +261,15 @@ def _around(
             sides.append(None)
             continue
         first, stop = beside.first, beside.stop
+        # What is much later, or much earlier, says little.
         if step > 0:
-            # The force has to find back; what follows much later says little.
             stop = min(stop, first + 2 * most)
-            means = block_means(samples.force[first:stop], 100)
-            first += steady_from(means, 1) * max(1, (stop - first) // 100)
         else:
             first = max(first, stop - most)
+        if step > 0 or any(part.modulated for part in parts[: at - 1]):
+            # The force has to find back from the modulation before.
+            means = block_means(samples.force[first:stop], 100)
+            first += steady_from(means, 1) * max(1, (stop - first) // 100)
         cut = slice(first, stop)
         sides.append(
             (

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.instrument.checks import check
+from asperity.instrument.spikes import spikes
 
 if TYPE_CHECKING:
     from asperity.instrument.finding import Finding
@@ -33,7 +34,7 @@ class Samples:
     names : (str, str)
         Of the channels.
     defects : int array
-        Samples that are saturated or follow a gap or a missing one, in rising order.
+        Samples that are saturated, stand out, or follow a gap or a missing one, in rising order.
     findings : tuple of Finding
         About time and these two channels.
     dropped : int
@@ -86,7 +87,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
             "the one that is the shear force"
         )
     two = replace(trace, channels={names[0]: W, names[1]: F}, findings=())
-    findings = _about(trace.findings, names) or check(two)
+    findings = _about(trace, names) or check(two)
     two = replace(two, findings=findings)
     time, values = trace.time, (W.values, F.values)
     told = {finding.name for finding in findings}
@@ -128,13 +129,13 @@ def _force(trace: Trace, name: str, load: Channel) -> tuple[Channel, str]:
     return product, f"{recorded} x load"
 
 
-def _about(findings: tuple[Finding, ...], names: tuple[str, str]) -> tuple[Finding, ...]:
-    """Without those on channels that are not read."""
-    # A finding that names no channel of the trace is about the file.
+def _about(trace: Trace, names: tuple[str, str]) -> tuple[Finding, ...]:
+    """Without those on channels that are not read; what names no channel is about the file."""
+    others = [name for name in trace.channels if name not in names]
     return tuple(
         f
-        for f in findings
-        if f.where.split(", ")[0] in ("time", *names) or not f.where or "," not in f.where
+        for f in trace.findings
+        if not any(f.where == name or f.where.startswith(f"{name}, ") for name in others)
     )
 
 
@@ -158,6 +159,8 @@ def _defects(
     if "gap" in told:
         steps = np.diff(time)
         found.append(np.flatnonzero(steps > _GAP * np.median(steps)) + 1)
+    if "spike" in told:
+        found += [spikes(channel) for channel in values]
     if "saturation" in told:
         for channel in values:
             for extreme in (channel.max(), channel.min()):

@@ -197,7 +197,9 @@ def _friction(trace: Trace, load: str, force: str) -> tuple[Array, Array | None,
             f"measure.force must have the dimension of the load, got '{F.unit}' for '{force}' and "
             f"'{unit}' for '{load}'; name the units when reading"
         )
-    return F.values / np.where(weight == 0, np.nan, weight), weight, unit
+    # What comes out as no number is left out by who asks.
+    with np.errstate(invalid="ignore", over="ignore"):
+        return F.values / np.where(weight == 0, np.nan, weight), weight, unit
 
 
 def _motion(trace: Trace) -> tuple[Array | None, str, bool]:

@@ -23,6 +23,8 @@ Complex = NDArray[np.complex128]
 #: Lines averaged around a harmonic and next to zero; more are steadier, fewer are more local.
 _AROUND_HARMONIC = 20
 _NEXT_TO_ZERO = 6
+#: Lines above zero that tell a power law.
+_ABOVE_ZERO = 48
 #: Fewer lines than this say nothing: then noise is taken for white.
 _FEWEST = 4
 
@@ -80,15 +82,38 @@ def local_noise(blocks: Blocks, residual: Complex, white: Array) -> LocalNoise:
     spectra = np.empty((basis.harmonics + 1, white.shape[0], white.shape[0]), dtype=complex)
     dof = np.empty(basis.harmonics + 1)
     for k in range(basis.harmonics + 1):
-        nearest = free_lines(k, periods, basis, samples, blocks.count.size) - k * periods
-        if nearest.size < _FEWEST:
+        lines = free_lines(k, periods, basis, samples, blocks.count.size)
+        if lines.size < 2 * _FEWEST:
             spectra[k], dof[k] = white, max(samples - basis.linear - 1, 1.0)
             continue
-        angle = 2 * np.pi * nearest[:, None] * at
+        angle = 2 * np.pi * (lines[:, None] - k * periods) * at
         turned = (np.cos(angle) - 1j * np.sin(angle)) @ residual[:, k]
-        spectra[k] = turned.T @ turned.conj() / (nearest.size * samples)
-        dof[k] = 2 * nearest.size
+        near = turned if k else turned[: 2 * _NEXT_TO_ZERO]
+        spectra[k] = near.T @ near.conj() / (near.shape[0] * samples)
+        # Two numbers a line; the halves between lines repeat what their neighbours say.
+        dof[k] = near.shape[0]
+        if not k:
+            grown = np.sqrt(_growth(lines, turned))
+            spectra[k] *= grown[:, None] * grown
     return LocalNoise(spectra, dof)
+
+
+def _growth(lines: Array, turned: Complex) -> Array:
+    """How much stronger noise is below the lowest lines than in them; (channels,).
+
+    Noise that grows towards zero, as 1/f noise does, moves the mean more than any line that can be
+    seen: its power law is followed down to a third of a line, where a mean has what 1/f noise has
+    brought since it began a few windows ago.
+    """
+    away = np.log(lines) - np.log(lines).mean()
+    lever = max(float(away @ away), 1e-300)
+    exponent = -(away @ np.log(np.maximum(np.abs(turned) ** 2, 1e-300))) / lever
+    # The log of a periodogram's line scatters by 1.28, and only half of the lines are new.
+    scatter = 1.28 * np.sqrt(2.0 / lever)
+    # White noise has no exponent but by chance; what is steeper than 1/f is no noise but motion.
+    exponent = np.where(exponent > 2.5 * scatter, np.minimum(exponent, 1.0), 0.0)
+    lowest = lines[: 2 * _NEXT_TO_ZERO, None]
+    return np.asarray((1 / 3.0) ** -exponent / np.mean(lowest**-exponent, axis=0))
 
 
 def free_lines(k: int, periods: float, basis: Basis, samples: float, blocks: int) -> Array:
@@ -106,17 +131,20 @@ def free_lines(k: int, periods: float, basis: Basis, samples: float, blocks: int
     blocks : int
         Lines farther from their harmonic than an eighth of them are smoothed away in the blocks.
     """
-    wanted = _AROUND_HARMONIC if k else _NEXT_TO_ZERO
+    wanted = _AROUND_HARMONIC if k else _ABOVE_ZERO
     # Of lines between harmonics most are free, unless there are hardly any between them.
     reach = min(blocks / 8, 3.0 * wanted + (2.0 * basis.harmonics * periods if periods < 64 else 0))
-    first = max(1.0 + (basis.degree > 0), np.ceil(k * periods - reach))
+    first = max(1.0 + (basis.degree > 0), k * periods - reach)
     last = min(samples / 2 - 1, k * periods + reach)
-    lines = np.arange(first, last + 0.5)
+    # Halves of lines, counted from the harmonic: what is far off, such as hum, reaches wholes or
+    # halves, as it reaches the harmonic or its derivative; whole periods of it would hide it.
+    away = np.arange(np.ceil(2 * (first - k * periods)), 2 * (last - k * periods) + 1e-9) / 2
+    lines = k * periods + away
     nearest = np.clip(np.rint(lines / periods), 0, basis.harmonics)
     near = 0.9 if periods < 8 else 1.2
     free = (np.abs(lines - periods * nearest) > near) | (lines < periods / 2)
     lines = lines[free]
-    return lines[np.argsort(np.abs(lines - k * periods), kind="stable")[:wanted]]
+    return lines[np.argsort(np.abs(lines - k * periods), kind="stable")[: 2 * wanted]]
 
 
 def column_harmonics(basis: Basis) -> NDArray[np.intp]:

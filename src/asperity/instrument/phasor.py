@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Standard deviation (rad) of an angle that can be anything, pi/sqrt(3).
+_UNKNOWN_PHASE = math.pi / math.sqrt(3)
+
 
 @dataclass(frozen=True)
 class Phasor:
@@ -47,17 +50,20 @@ class Phasor:
 
     @property
     def phase_uncertainty(self) -> float:
-        """Standard uncertainty (rad) of the phase; infinite for an amplitude of zero."""
-        if not self.amplitude:
-            return math.inf
+        """Standard uncertainty (rad) of the phase; at most pi/sqrt(3), when it may be any."""
         along = self._direction
-        return self._along(np.array([-along[1], along[0]])) / self.amplitude
+        across = self._along(np.array([-along[1], along[0]]))
+        return min(across / self.amplitude if self.amplitude else math.inf, _UNKNOWN_PHASE)
 
     def excludes(self, value: complex, level: float = 0.95) -> bool:
         """Whether the confidence ellipse of so much probability leaves a value out."""
         from scipy.special import fdtri
 
         away = np.array([value.real - self.value.real, value.imag - self.value.imag])
+        # A reading without any noise has no ellipse, and excludes all but itself.
+        spread = np.linalg.eigvalsh(self.covariance)
+        if not spread[0] > 1e-14 * spread[1]:
+            return bool(away.any())
         distance = float(away @ np.linalg.solve(self.covariance, away)) / 2
         return bool(distance > fdtri(2, self.dof, level))
 

@@ -18,21 +18,20 @@ LIMITS: dict[str, tuple[float, float]] = {
     "modulation": (20.0, 5.0),
     "periods": (5.0, 2.0),
     "signal": (10.0, 3.0),
-    "leakage": (0.01, 0.1),
     "drift": (0.005, 0.02),
     "transient": (0.001, 0.01),
     "stick-slip": (0.0005, 0.005),
     "load harmonics": (0.05, 0.3),
     "resolution": (0.1, 1.0),
     "saturation": (0.0, 0.01),
+    "spike": (0.0, 0.001),
+    "repeated time": (0.0, 0.05),
     "nan": (0.0, 0.25),
     "infinite": (0.0, 0.25),
     "gap": (0.0, 0.25),
     "uneven sampling": (20.0, 1000.0),
 }
 
-#: Spectral lines on each side of the load's own that belong to it if it is not pure.
-_SIDEBANDS = 16
 #: Decay times of transients that are tried, in windows.
 _DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
 #: A line this often above its background is no accident of a spectrum of 1e5 lines.
@@ -76,32 +75,6 @@ def signal(reading: Reading) -> Check:
     )
 
 
-def leakage(reading: Reading) -> Check:
-    """Whether the load is one line, as the reading takes it to be."""
-    blocks, basis = reading.blocks, reading.blocks.basis
-    at = (blocks.middle - basis.centre) / (2 * basis.half_width)
-    most = min(3 * _SIDEBANDS, int(reading.periods / 2), at.size // 4)
-    offsets = np.arange(2, most + 1)
-    number, beyond = 0.0, np.inf
-    if offsets.size:
-        angle = 2 * np.pi * np.concatenate([-offsets, offsets])[:, None] * at
-        turned = (np.cos(angle) - 1j * np.sin(angle)) @ reading.residual[:, 1, 0]
-        carrier = abs(reading.epsilon * reading.W0) * reading.samples / 2
-        power = (np.abs(turned / carrier) ** 2).reshape(2, -1).sum(0)
-        near = offsets <= _SIDEBANDS
-        number = float(np.sqrt(power[near].sum()))
-        far = power[~near].mean() if (~near).any() else 0.0
-        beyond = power[near].mean() / max(far, 1e-300)
-    return judged(
-        "leakage",
-        number,
-        LIMITS["leakage"],
-        f"sidebands of the load hold {_percent(number)} of its amplitude; the rest of the load is "
-        "no steady line of one frequency if that is much",
-        significant=beyond > 3.0,
-    )
-
-
 def load_harmonics(reading: Reading) -> Check:
     """How much of mu2 can come from a second harmonic of the load."""
     if reading.harmonics.size < 2:
@@ -126,21 +99,18 @@ def drift(reading: Reading, before: Level | None, after: Level | None) -> Check:
     if before is not None and after is not None:
         change = after.value - before.value
         doubt = float(np.hypot(before.uncertainty, after.uncertainty))
-        number = abs(change / before.value) if before.value else np.inf
-        told = (
-            f"F(0) after the modulation differs by {_percent(change / before.value)} from F(0) "
-            "before it"
-        )
+        share = change / _nonzero(before.value)
+        told = f"F(0) after the modulation differs by {_percent(share)} from F(0) before it"
         significant = abs(change) > 3 * doubt
     else:
         change = float(reading.drift[1].sum())
-        number = abs(change / reading.mean_force) if reading.mean_force else np.inf
+        share = change / _nonzero(reading.mean_force)
         told = (
-            f"the force drifts by {_percent(change / reading.mean_force)} over the window; F(0) "
-            "before and after is not in the recording"
+            f"the force drifts by {_percent(share)} over the window; F(0) before and after is not "
+            "in the recording"
         )
         significant = abs(change) > 10 * reading.uncertainty("mean_force")
-    return judged("drift", number, LIMITS["drift"], told, significant=significant)
+    return judged("drift", abs(share), LIMITS["drift"], told, significant=significant)
 
 
 def transient(reading: Reading) -> Check:
@@ -178,37 +148,41 @@ def transient(reading: Reading) -> Check:
 
 
 def stick_slip(reading: Reading, time: Array, force: Array) -> Check:
-    """Whether there is a slow oscillation below the frequency of the modulation."""
+    """Whether the force oscillates slowly, by itself."""
     line = slow_line(reading, time, force)
-    number, told, seen = 0.0, "no oscillation below the modulation's frequency stands out", False
+    number, told, seen = 0.0, "no slow oscillation stands out", False
     if line is not None:
         number = line.amplitude / max(abs(reading.mean_force), 1e-300)
         seen = line.amplitude > _LINE * line.background
         if seen:
             told = (
-                f"the force oscillates at {line.frequency:.4g} Hz, below the modulation, by "
+                f"the force oscillates at {line.frequency:.4g} Hz, no harmonic, by "
                 f"{_percent(number)} of its mean"
             )
     return judged("stick-slip", number, LIMITS["stick-slip"], told, significant=seen)
 
 
-def resolution(reading: Reading, force: Array) -> Check:
-    """Whether the steps of the recorder are small against the first harmonic.
+def resolution(reading: Reading, load: Array, force: Array) -> Check:
+    """Whether the steps of the recorder are small against the first harmonics.
 
     Noise of half a step smooths them; without it a harmonic below a step is no harmonic.
     """
-    piece = force[: 1 << 14]
-    steps = np.diff(np.unique(piece))
-    step = float(steps.min()) if steps.size else 0.0
-    noise = float(np.sqrt(reading.noise.spectra[1:, 1, 1].real.mean()))
-    number = step / max(reading.phasor(1).amplitude * abs(reading.W0), 1e-300)
+    heights = (reading.epsilon, reading.phasor(1).amplitude)
+    found = []
+    for c, (name, values) in enumerate((("load", load), ("force", force))):
+        steps = np.diff(np.unique(values[: 1 << 14]))
+        step = float(steps.min()) if steps.size else 0.0
+        noise = float(np.sqrt(reading.noise.spectra[1:, c, c].real.mean()))
+        number = step / max(heights[c] * abs(reading.W0), 1e-300)
+        found.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))
+    seen, number, name, noisy = max(found)
     return judged(
         "resolution",
         number,
         LIMITS["resolution"],
-        f"the force is recorded in steps of {number:.2g} of its first harmonic, with noise of "
-        f"{noise / step if step else np.inf:.2g} steps",
-        significant=noise < 0.5 * step,
+        f"the {name} is recorded in steps of {number:.2g} of its first harmonic, with noise of "
+        f"{noisy:.2g} steps",
+        significant=seen,
     )
 
 
@@ -229,7 +203,11 @@ def findings(found: list[Finding], samples: int, span: float) -> list[Check]:
 def _finding(found: Finding, samples: int, span: float) -> Check:
     told = found.sentence.rstrip(".") + (f" ({found.where})" if found.where else "")
     # Shares of the window, where the number of the finding can be made one.
-    shares = {"saturation": 1.0, "nan": 1 / samples, "infinite": 1 / samples, "gap": 1 / span}
+    shares = {
+        "saturation": 1.0,
+        **dict.fromkeys(("spike", "repeated time", "nan", "infinite"), 1 / samples),
+        "gap": 1 / span,
+    }
     if found.name in shares:
         return judged(found.name, found.number * shares[found.name], LIMITS[found.name], told)
     if found.name in LIMITS:
@@ -244,6 +222,10 @@ def _correlation(series: Array) -> float:
     neighbour = float(series[1:] @ series[:-1]) / power if power else 0.0
     neighbour = min(max(neighbour, 0.0), 0.95)
     return (1 + neighbour) / (1 - neighbour)
+
+
+def _nonzero(value: float) -> float:
+    return value or 1e-300
 
 
 def _percent(share: float) -> str:

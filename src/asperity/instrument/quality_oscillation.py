@@ -1,4 +1,4 @@
-"""Oscillations that are slower than the modulation, in what a reading leaves of the force."""
+"""Oscillations that are no harmonics, in what a reading leaves of the force."""
 
 from __future__ import annotations
 
@@ -15,10 +15,12 @@ Array = NDArray[np.float64]
 
 #: Samples of the piece in the middle that is searched for what is nearly as fast as the modulation.
 _PIECE = 1 << 16
+#: Stick-slip of laboratory sliders is slower than this (Hz).
+_STICK_SLIP = 20.0
 
 
 def slow_line(reading: Reading, time: Array, force: Array) -> Line | None:
-    """The strongest line of the force's residual below the modulation.
+    """The strongest line of the force's residual below the modulation, or below 20 Hz.
 
     Parameters
     ----------
@@ -26,20 +28,38 @@ def slow_line(reading: Reading, time: Array, force: Array) -> Line | None:
     time, force : array, (n,)
         Of the window.
     """
-    basis, f = reading.blocks.basis, reading.frequency
-    at = max(0, (time.size - _PIECE) // 2)
-    piece = slice(at, at + _PIECE)
-    left = _residual(basis, time[piece], force[piece])
-    # Means over a third of a period keep what is slower than the modulation.
+    f = reading.frequency
+    piece, left = left_of_piece(reading, time, force)
+    # Stick-slip may be faster than a slow modulation.
+    highest = max(0.9 * f, _STICK_SLIP)
+    # Means over a third of a period keep what is slower.
     span = float(time[piece][-1] - time[piece][0])
-    blocks = int(min(left.size, max(64, 3 * f * span)))
-    found = [_below(block_means(time[piece], blocks), block_means(left, blocks), 0.9 * f)]
+    blocks = int(min(left.size, max(64, 3.3 * highest * span)))
+    found = [_below(block_means(time[piece], blocks), block_means(left, blocks), highest)]
     if time.size > _PIECE:
         count = reading.blocks.count
         slow = reading.residual[:-1, 0, 1].real / count[:-1]
         found.append(_below(reading.blocks.middle[:-1], slow, 0.9 * f))
-    lines = [line for line in found if line is not None]
-    return max(lines, key=lambda line: line.amplitude / line.background, default=None)
+    # Above the modulation, harmonics beyond those that are fitted are no oscillations of their own.
+    width = 2 / span
+    lines = [
+        line
+        for line in found
+        if line is not None
+        and (
+            line.frequency < 0.9 * f
+            or abs(line.frequency / f - round(line.frequency / f)) * f > width
+        )
+    ]
+    # A background of nothing, as of a force that stands still, is divided by all the same.
+    return max(lines, key=lambda line: line.amplitude / max(line.background, 1e-300), default=None)
+
+
+def left_of_piece(reading: Reading, time: Array, values: Array) -> tuple[slice, Array]:
+    """What a fit of its own leaves of a channel in the middle of a window, and where that is."""
+    at = max(0, (time.size - _PIECE) // 2)
+    piece = slice(at, at + _PIECE)
+    return piece, _residual(reading.blocks.basis, time[piece], values[piece])
 
 
 def _below(time: Array, values: Array, highest: float) -> Line | None:

@@ -69,7 +69,7 @@ ROLES: Mapping[str, Role] = {
         "load,normal load,normal force,normal stress",
         "w fn ns n fz load sigma sigman signorm normalkraft",
         "nor norm normal normale sigman",
-        weak="load loadcell pressure",
+        weak="load loadcell pressure axialforce axialload axialstress",
         without=_MOTION + " shear shr",
         kinds="force pressure",
     ),

@@ -20,7 +20,7 @@ _GAP = 1.5
 #: ...and lies this many robust standard deviations outside them.
 _OUTSIDE = 6.0
 #: Steps on each side of a gap that say what is usual there.
-_SIDE = 10
+_SIDE = 24
 _CHUNK = 100_000
 
 

@@ -48,6 +48,41 @@ def test_sums_of_blocks_are_the_sums_of_all(blocks, tables) -> None:
     assert found.middle @ found.count / TIME.size == pytest.approx(TIME.mean(), rel=1e-12)
 
 
+def jittering(time):
+    return time + 2e-4 * np.random.default_rng(1).uniform(-1, 1, time.size)
+
+
+def with_gaps(time):
+    return jittering(np.where(time > 9, time + 0.7004, time))
+
+
+def at_random(time):
+    return np.sort(np.random.default_rng(2).uniform(time[0], time[-1], time.size))
+
+
+@pytest.mark.parametrize("clock", [jittering, with_gaps, at_random])
+@pytest.mark.parametrize("harmonics", [1, 4, 40])
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_uneven_clocks_are_summed_as_written_down(clock, harmonics, degree) -> None:
+    time = clock(TIME)
+    half = float(time[-1] - time[0]) / 2
+    basis = Basis(2 * np.pi * 6.3, harmonics, degree, float(time[0]) + half, half)
+    columns, values = plain(basis, time), channels(time)
+    found = sums(basis, time, values, blocks=3)
+    cuts = np.cumsum(found.count[:-1]).astype(int)
+    # A thousand roundings of a phase of 400 rad times the harmonic, in units of the samples.
+    allowed = 1e-12 * harmonics * found.count[0]
+    for gram, moments, part, *parts in zip(
+        found.gram,
+        found.moments,
+        np.split(columns, cuts, axis=1),
+        *(np.split(v, cuts) for v in values),
+        strict=True,
+    ):
+        assert abs(gram - part @ part.T).max() < allowed
+        assert abs(moments - part @ np.stack(parts, axis=1)).max() < allowed
+
+
 def test_merged_blocks_are_fewer_and_the_same() -> None:
     found = sums(BASIS, TIME, channels(TIME), blocks=900)
     fewer = merged(found, 50)

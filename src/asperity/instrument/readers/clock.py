@@ -11,6 +11,7 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.instrument.finding import Finding
+from asperity.instrument.readers.stamps import elapsed
 from asperity.instrument.roles import candidates
 from asperity.units import to_si
 
@@ -133,18 +134,11 @@ def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[s
 
 
 def _from_dates(name: str, raw: NDArray[Any]) -> Clock:
-    """Seconds since the first stamp, of dates (ISO 8601) or of hours:minutes:seconds."""
-    import pandas as pd
-
-    texts = pd.Series(raw)
-    stamps = pd.to_datetime(texts, errors="coerce", format="ISO8601")
-    if stamps.isna().all():
-        stamps = pd.to_timedelta(texts, errors="coerce")
-    if stamps.isna().all():
+    """Seconds since the first stamp, of dates or of hours:minutes:seconds."""
+    found = elapsed(raw)
+    if found is None:
         raise InputError(
             f"columns['time'] must hold numbers, dates or hours:minutes:seconds, got "
-            f"'{texts.iloc[0]}' in '{name}'; choose another column, or give rate='10 kHz'"
+            f"'{raw[0]}' in '{name}'; choose another column, or give rate='10 kHz'"
         )
-    origin = stamps[stamps.first_valid_index()]
-    seconds = (stamps - origin).dt.total_seconds().to_numpy(dtype=np.float64)
-    return Clock(seconds, f"column '{name}', since {origin}", name)
+    return Clock(found[0], f"column '{name}', since {found[1]}", name)

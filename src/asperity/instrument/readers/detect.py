@@ -6,6 +6,7 @@ from pathlib import Path
 
 from asperity.errors import InputError
 from asperity.instrument.readers.look_header import looks_like_look
+from asperity.instrument.readers.packed import GZIP, refuse_archive
 
 #: Formats, with the module that reads each.
 FORMATS = {
@@ -33,9 +34,12 @@ def format_of(path: Path) -> str:
     # HDF5 may begin with a block of the user's, of 512 bytes or a power of two times that.
     if any(head[at : at + 8] == _HDF5 for at in (0, 512, 1024, 2048)):
         return "hdf5"
+    if head.startswith(GZIP):
+        return "text"
+    refuse_archive(head, path)
     if looks_like_look(path):
         return "look"
-    if _is_text(head):
+    if is_text(head):
         return "text"
     # Version 4 of MATLAB has no signature.
     if path.suffix.lower() == ".mat":
@@ -46,8 +50,20 @@ def format_of(path: Path) -> str:
     )
 
 
-def _is_text(head: bytes) -> bool:
-    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+def wide_order(head: bytes) -> str:
+    """Byte order of UTF-16 without its mark, ``"le"`` or ``"be"``; empty if it is none.
+
+    Of a table in it, every other byte is zero.
+    """
+    for order, zeros, letters in (("le", head[1::2], head[::2]), ("be", head[::2], head[1::2])):
+        if len(zeros) > 8 and zeros.count(0) > 0.9 * len(zeros) and letters.count(0) == 0:
+            return order
+    return ""
+
+
+def is_text(head: bytes) -> bool:
+    """Whether the beginning of a file is one of a text, in any encoding that is read."""
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")) or wide_order(head):
         return True
     control = sum(byte < 32 and byte not in b"\t\n\r\f\x1a" for byte in head)
     return control == 0

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.instrument.finding import Finding
+from asperity.instrument.readers.matlab_elements import is_sound
 from asperity.instrument.readers.named_arrays import group_columns
 from asperity.instrument.readers.recorded import (
     Column,
@@ -64,9 +65,10 @@ def _visit(
 
 def _whole_variables(path: Path, raw: bytes) -> tuple[bytes, list[Finding]]:
     """The file up to the last variable that is whole: each begins with its type and its size."""
-    if not raw.startswith(b"MATLAB 5.0"):
+    # Version 4 has no header; the library goes by these two bytes.
+    order = {b"IM": "<", b"MI": ">"}.get(raw[126:128])
+    if order is None or 0 in raw[:4]:
         return raw, []
-    order = "<" if raw[126:128] == b"IM" else ">"
     position = _HEADER
     count = 0
     while position + 8 <= len(raw):
@@ -76,10 +78,12 @@ def _whole_variables(path: Path, raw: bytes) -> tuple[bytes, list[Finding]]:
         position += 8 + size
         count += 1
     missing = len(raw) - position
-    if not missing and count:
-        return raw, []
     if not count:
         raise refuse_truncated(path, "which is cut within its first variable")
+    if not is_sound(raw[:position], _HEADER, order):
+        raise refuse_truncated(path, "which is damaged")
+    if not missing:
+        return raw, []
     where = f"byte {position}"
     sentence = f"variables behind the first {count} are not whole, and were left out."
     return raw[:position], [truncated(path, missing, where, sentence)]

@@ -139,7 +139,7 @@ def one_table(
         )
     longest = {name: max(c.values.size for c in columns) for name, columns in filled.items()}
     if len(set(longest.values())) > 1:
-        listed = ", ".join(f"'{name}' ({rows} rows)" for name, rows in longest.items())
+        listed = ", ".join(f"{name!r} ({rows} rows)" for name, rows in longest.items())
         raise InputError(
             f"read.group must be chosen in a file of several recordings, got none for {listed}; "
             f"choose one, like group='{max(longest, key=longest.__getitem__)}'"

@@ -13,15 +13,21 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.instrument.finding import Finding
-from asperity.instrument.readers.recorded import Column, Recorded, truncated
+from asperity.instrument.readers.detect import is_text, wide_order
+from asperity.instrument.readers.packed import GZIP, unpacked
+from asperity.instrument.readers.recorded import Column, Recorded, refuse_truncated, truncated
+from asperity.instrument.readers.text_columns import malformed, numbers_of, without_text_rows
 from asperity.instrument.readers.text_end import ending_of
 from asperity.instrument.readers.text_layout import Layout, layout_of
 from asperity.instrument.readers.text_lines import MISSING, lines_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import pandas as pd
 
-_HEAD = 1 << 16
+#: Where the table is looked for; farther only if it is not found: headers of some megabytes exist.
+_HEADS = (1 << 16, 1 << 22)
 _BUFFER = 1 << 20
 _SKIPPED = re.compile(r"line (\d+)")
 
@@ -32,42 +38,67 @@ def load(path: Path, delimiter: str | None = None, decimal: str | None = None) -
     Parameters
     ----------
     path : Path
-        The file; UTF-8, UTF-16 with its mark, or a Western code page.
+        The file; UTF-8, UTF-16, or a Western code page; packed by gzip or not.
     delimiter, decimal : str or None
         Where the user knows better than the file shows.
     """
     with path.open("rb") as file:
-        mark = file.read(3)
-        if mark.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-            file.seek(0)
-            text = file.read().decode("utf-16", errors="replace").encode("utf-8")
-            return _load(io.BytesIO(text), 0, path, delimiter, decimal)
-        return _load(file, 3 if mark == codecs.BOM_UTF8 else 0, path, delimiter, decimal)
+        if file.read(2) == GZIP:
+            text, why = unpacked(path)
+            if not text:
+                raise refuse_truncated(path, f"of which nothing can be unpacked: {why.rstrip('.')}")
+            if not is_text(text[: 1 << 12]):
+                raise InputError(
+                    f"recording.path must hold a text if it is packed, got '{path.name}' with "
+                    "something else; unpack it"
+                )
+            recorded = _of_any_encoding(io.BytesIO(text), path, delimiter, decimal)
+            if why:
+                recorded.findings.insert(0, truncated(path, 1, "the end", why))
+            return recorded
+        return _of_any_encoding(file, path, delimiter, decimal)
+
+
+def _of_any_encoding(
+    file: BinaryIO, path: Path, delimiter: str | None, decimal: str | None
+) -> Recorded:
+    file.seek(0)
+    mark = file.read(1 << 10)
+    order = wide_order(mark)
+    if order or mark.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        file.seek(0)
+        wide = file.read().decode(f"utf-16-{order}" if order else "utf-16", errors="replace")
+        return _load(io.BytesIO(wide.encode("utf-8")), 0, path, delimiter, decimal)
+    start = 3 if mark.startswith(codecs.BOM_UTF8) else 0
+    return _load(file, start, path, delimiter, decimal)
 
 
 def _load(
     file: BinaryIO, start: int, path: Path, delimiter: str | None, decimal: str | None
 ) -> Recorded:
     size = file.seek(0, io.SEEK_END)
-    file.seek(start)
-    head = file.read(_HEAD).rstrip(b"\0\x1a")
-    lines = lines_of(head, start)
-    if start + _HEAD < size and len(lines) > 1:
-        lines = lines[:-1]
-    layout = layout_of(lines, path, delimiter, decimal)
+    layout = _layout(file, start, size, path, delimiter, decimal)
     ending = ending_of(file, size, layout)
-    frame, findings = _parse(file, layout, ending.stop)
+    frame, findings = _parse(file, layout, ending.stop, path)
     if not len(frame):
         raise InputError(
             f"recording.path must hold rows of numbers, got '{path.name}' with a heading only; "
             "give a recording"
         )
+    frame, left_out = without_text_rows(frame, layout.width)
+    findings += left_out
     columns = []
     for i in range(layout.width):
-        values, found = _numbers(frame[i], layout.headings.names[i] or f"column {i}")
+        values, found = numbers_of(frame[i], layout.headings.names[i] or f"column {i}")
         unit = layout.headings.units[i] if layout.headings.units else None
         columns.append(Column(layout.headings.names[i], values, unit))
         findings += found
+    step = layout.headings.step
+    if step is not None and len(columns) > 1 and _is_empty(columns[0].values):
+        # LabVIEW may write the interval in the header, and no times.
+        del columns[0]
+    else:
+        step = None
     if ending.sentence:
         where = f"row {len(frame)}, the last"
         findings.insert(0, truncated(path, ending.rows, where, ending.sentence, ending.sure))
@@ -76,7 +107,27 @@ def _load(
         "delimiter": layout.delimiter or "blank",
         "decimal": layout.decimal,
     }
-    return Recorded(columns, findings, provenance)
+    return Recorded(columns, findings, provenance, step=step)
+
+
+def _layout(
+    file: BinaryIO, start: int, size: int, path: Path, delimiter: str | None, decimal: str | None
+) -> Layout:
+    for head in _HEADS:
+        file.seek(start)
+        lines = lines_of(file.read(head).rstrip(b"\0\x1a"), start)
+        if start + head < size and len(lines) > 1:
+            lines = lines[:-1]
+        try:
+            return layout_of(lines, path, delimiter, decimal)
+        except InputError:
+            if start + head >= size or head == _HEADS[-1]:
+                raise
+    raise AssertionError
+
+
+def _is_empty(values: np.ndarray[Any, Any]) -> bool:
+    return values.dtype.kind == "f" and bool(np.isnan(values).all())
 
 
 class _Part(io.RawIOBase):
@@ -96,7 +147,21 @@ class _Part(io.RawIOBase):
         return len(got)
 
 
-def _parse(file: BinaryIO, layout: Layout, stop: int) -> tuple[pd.DataFrame, list[Finding]]:
+def _parsed_with_texts(parsed: Callable[..., pd.DataFrame], path: Path) -> pd.DataFrame:
+    import pandas as pd
+
+    try:
+        return parsed(low_memory=False)
+    except (pd.errors.ParserError, pd.errors.EmptyDataError):
+        raise InputError(
+            f"recording.path must hold a table that can be parsed, got '{path.name}', in which a "
+            "quote is opened and never closed, or a row goes on without end; correct the file"
+        ) from None
+
+
+def _parse(
+    file: BinaryIO, layout: Layout, stop: int, path: Path
+) -> tuple[pd.DataFrame, list[Finding]]:
     """The table, as numbers if all of it is numbers; and the rows that are none."""
     import pandas as pd
 
@@ -111,6 +176,7 @@ def _parse(file: BinaryIO, layout: Layout, stop: int) -> tuple[pd.DataFrame, lis
         "engine": "c",
         "sep": r"\s+" if layout.delimiter is None else layout.delimiter,
         "comment": layout.comment if len(layout.comment) == 1 else None,
+        "thousands": {".": ",", ",": "."}[layout.decimal] if layout.grouped else None,
     }
 
     def parsed(**more: Any) -> pd.DataFrame:
@@ -123,42 +189,6 @@ def _parse(file: BinaryIO, layout: Layout, stop: int) -> tuple[pd.DataFrame, lis
             frame = parsed(dtype=np.float64)
         except ValueError:
             caught.clear()
-            frame = parsed(low_memory=False)
+            frame = _parsed_with_texts(parsed, path)
     rows = [int(n) for w in caught for n in _SKIPPED.findall(str(w.message))]
-    return frame, [_malformed(rows)] if rows else []
-
-
-def _malformed(lines: list[int]) -> Finding:
-    return Finding(
-        "malformed row",
-        "error",
-        len(lines),
-        f"line {lines[0]} of the table",
-        f"{len(lines)} {'row has' if len(lines) == 1 else 'rows have'} more cells than the table "
-        "has columns, and could not be read.",
-    )
-
-
-def _numbers(column: pd.Series[Any], name: str) -> tuple[np.ndarray[Any, Any], list[Finding]]:
-    """Numbers of a column, NaN where a text stands among them; a column of texts as it is."""
-    if column.dtype.kind in "iuf":
-        return column.to_numpy(dtype=np.float64), []
-    import pandas as pd
-
-    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
-    texts = np.flatnonzero(np.isnan(numbers) & column.notna().to_numpy())
-    if 2 * texts.size > numbers.size:
-        return column.to_numpy(dtype=object), []
-    if not texts.size:
-        return numbers, []
-    first = int(texts[0])
-    return numbers, [
-        Finding(
-            "text in numbers",
-            "warning",
-            texts.size,
-            f"{name}, row {first}",
-            f"{texts.size} of {numbers.size} cells of '{name}' hold text, the first '"
-            f"{column.iloc[first]}' in row {first}; they were read as missing.",
-        )
-    ]
+    return frame, [malformed(rows)] if rows else []

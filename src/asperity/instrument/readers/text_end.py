@@ -50,12 +50,18 @@ def ending_of(file: BinaryIO, size: int, layout: Layout) -> Ending:
     padded = len(tail) - len(tail.rstrip(b"\0"))
     tail = tail.rstrip(b"\0\x1a")
     stop = begin + len(tail)
-    lines = [line for line in lines_of(tail, begin) if not line.blank]
+    every = lines_of(tail, begin)
+    lines = [line for line in every if not line.blank]
     if not lines or (lines[-1].ended and not padded):
+        indented = bool(lines) and lines[-1].text[:1] == " "
+        if indented and every[-1].blank and not every[-1].ended:
+            return Ending(stop, 0, "it ends with the blanks that its rows begin with.", sure=False)
         return Ending(stop)
     last = lines[-1]
     if padded and last.ended:
         return Ending(stop, 0, f"it ends with {padded} empty bytes where rows should be.")
+    if last.text.count('"') % 2:
+        return Ending(last.start, 1, "its last row has an open quote, and was left out.")
     cells = cells_of(last.text, layout.delimiter)
     width = layout.width + layout.closed
     if last.comment:

@@ -14,6 +14,7 @@ _WIDE = re.compile(r"\s{2,}|\t")
 #: Cells that name nothing: numbers, and the counts of records that xlook writes.
 _COUNT = re.compile(r"[-+\d.,eE]*\d[-+\d.,eE]*(\s*recs?)?")
 _LONGEST_UNIT = 14
+_TYPES = frozenset({"float", "float32", "float64", "double", "single", "real", "number", "int"})
 
 
 @dataclass(frozen=True)
@@ -26,10 +27,13 @@ class Headings:
         One a column, as written, unit included; empty where the file has none.
     units : list of str or None
         The row of units, where there is one.
+    step : float or None
+        Interval (s) of LabVIEW's text, which may leave its column of times empty.
     """
 
     names: list[str]
     units: list[str] | None
+    step: float | None = None
 
 
 def headings(above: Sequence[Line], delimiter: str | None, width: int) -> Headings:
@@ -43,16 +47,35 @@ def headings(above: Sequence[Line], delimiter: str | None, width: int) -> Headin
     if not rows:
         bare = [line.text.strip().strip('"').lstrip("#%!/ ") for line in above if line.comment]
         rows = _fitting(bare, (delimiter, *_DELIMITERS), width)
-    rows = [row for row in rows if 2 * sum(bool(_COUNT.fullmatch(c)) for c in row) <= len(row)]
+    step = next((_interval(row) for row in rows if row[0] == "Delta_X"), None)
+    rows = [row for row in rows if not _names_nothing(row)]
     if not rows:
         return Headings([""] * width, None)
     if len(rows) > 1 and _are_units(rows[-1], rows[-2]):
         return Headings(
-            rows[-2], [c if _bracketed(c) is None else str(_bracketed(c)) for c in rows[-1]]
+            _bare(rows[-2]), [c if _bracketed(c) is None else str(_bracketed(c)) for c in rows[-1]]
         )
     # LabVIEW's text has the units above the names, and time in seconds.
     labview = next((row[1:] for row in rows[:-1] if row[0] == "Y_Unit_Label"), None)
-    return Headings(rows[-1], ["s", *labview] if labview else None)
+    return Headings(_bare(rows[-1]), ["s", *labview] if labview else None, step)
+
+
+def _names_nothing(row: Sequence[str]) -> bool:
+    """Whether a row is of numbers, or of the types of the columns."""
+    numbers = sum(bool(_COUNT.fullmatch(cell)) for cell in row)
+    return 2 * numbers > len(row) or all(cell.lower() in _TYPES for cell in row)
+
+
+def _bare(row: Sequence[str]) -> list[str]:
+    return [cell[1:-1] if re.fullmatch("'.*'", cell) else cell for cell in row]
+
+
+def _interval(row: Sequence[str]) -> float | None:
+    try:
+        step = float(row[1].replace(",", "."))
+    except ValueError:
+        return None
+    return step if step > 0 else None
 
 
 def _fitting(texts: Sequence[str], delimiters: Sequence[str | None], width: int) -> list[list[str]]:

@@ -15,6 +15,7 @@ from asperity.instrument.readers.text_lines import (
     Line,
     cells_of,
     has_words,
+    is_grouped,
     is_number,
     is_value,
 )
@@ -55,6 +56,8 @@ class Layout:
         Sign of comments, empty where none was seen.
     sample : list of list of str
         Cells of some rows that have their line end; of the last if none has.
+    grouped : bool
+        Whether thousands are set apart.
     """
 
     delimiter: str | None
@@ -65,6 +68,7 @@ class Layout:
     start: int
     comment: str
     sample: list[list[str]]
+    grouped: bool
 
 
 def layout_of(
@@ -109,10 +113,9 @@ def layout_of(
         # A named column may be empty; one that the delimiter at the end makes has no name.
         wide = headings(above, way[0], width)
         closed, found = (False, wide) if any(wide.names) and wide.names[-1] else (closed, found)
-    signs = [line.comment for line in lines if line.comment]
-    return Layout(
-        *way, width - closed, closed, found, lines[first].start, signs[0] if signs else "", rows
-    )
+    sign = next((line.comment for line in lines if line.comment), "")
+    grouped = any(is_grouped(cell, way[1]) for row in rows for cell in row)
+    return Layout(*way, width - closed, closed, found, lines[first].start, sign, rows, grouped)
 
 
 def _ways(delimiter: str | None, decimal: str | None) -> list[tuple[str | None, str]]:

@@ -30,6 +30,11 @@ _NUMBER = {
     )
     for mark in (".", ",")
 }
+#: Thousands set apart count only before decimals: without them nothing tells the marks apart.
+_GROUPED = {
+    mark: re.compile(rf"[+-]?\d{{1,3}}(?:{re.escape(other)}\d{{3}})+{re.escape(mark)}\d*")
+    for mark, other in ((".", ","), (",", "."))
+}
 _ENDLESS = re.compile(r"[+-]?inf(?:inity)?", re.I)
 _STAMP = re.compile(r"\d{1,4}[-/:.]\d{1,2}[-/:.]\d{1,4}(?:[T ]\d{1,2}:\d{2}.*|[.,]\d+)?")
 _WORD = re.compile(
@@ -99,7 +104,13 @@ def cells_of(text: str, delimiter: str | None) -> list[str]:
 
 def is_number(cell: str, decimal: str) -> bool:
     """Whether a cell holds a number written with this decimal mark."""
-    return bool(_NUMBER[decimal].fullmatch(cell) or _ENDLESS.fullmatch(cell))
+    found = _NUMBER[decimal].fullmatch(cell) or _ENDLESS.fullmatch(cell)
+    return bool(found) or is_grouped(cell, decimal)
+
+
+def is_grouped(cell: str, decimal: str) -> bool:
+    """Whether a number has its thousands set apart by the other mark."""
+    return bool(_GROUPED[decimal].fullmatch(cell))
 
 
 def is_value(cell: str, decimal: str) -> bool:
