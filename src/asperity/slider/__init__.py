@@ -5,6 +5,7 @@ from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertia
 from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic
 from asperity.slider.radiating import Radiating
+from asperity.slider.reversing import ReversingInertial, reversing
 from asperity.slider.slider import Slider
 
 __all__ = [
@@ -13,7 +14,9 @@ __all__ = [
     "QuasiStatic",
     "Radiating",
     "RadiatingAsperities",
+    "ReversingInertial",
     "Slider",
     "StiffInertial",
     "equation_of_motion",
+    "reversing",
 ]

@@ -122,6 +122,14 @@ class Motion(eqx.Module):
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta, same shape as Y, (size, ...)."""
 
+    def inertness(self, Y: Array, at: Excitation) -> ArrayLike:
+        """Factors, shape as Y, by which rates are multiplied to depend on Y as evenly as they can.
+
+        Newton's method for a stiff step needs it where a rate relaxes faster by orders of
+        magnitude at one end of the step than at the other.
+        """
+        return 1.0
+
     def _steady_states(self, *mechanical: ArrayLike) -> Array:
         law = self.slider.law
         return jnp.stack(jnp.broadcast_arrays(*mechanical, *law.steady_state(self.V)))

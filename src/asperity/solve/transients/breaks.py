@@ -17,7 +17,7 @@ import numpy as np
 from jax import Array
 
 from asperity.loads import Excitation
-from asperity.slider import Motion, QuasiStatic
+from asperity.slider import Motion, QuasiStatic, ReversingInertial
 from asperity.solve.transients.equations import System
 
 
@@ -41,6 +41,8 @@ def _between_segments(before: System, t: Array, after: System, Y: Array) -> Arra
 
 def jumped(motion: Motion, before: Excitation, after: Excitation, Y: Array) -> Array:
     """States after a jump of the excitation."""
+    if isinstance(motion, ReversingInertial):
+        return Y.at[1].add(motion.friction_jump(Y, before, after))
     if not isinstance(motion, QuasiStatic):
         return Y
     states, law = Y[:-1], motion.slider.law

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from types import ModuleType
 
-from asperity.slider import Motion, RadiatingAsperities, StiffInertial
+from asperity.slider import Motion, RadiatingAsperities, ReversingInertial, StiffInertial
 from asperity.solve.transients import explicit, implicit
 from asperity.solve.transients.pieces import STEPS, Chunk
 
@@ -33,7 +33,7 @@ class Choice:
     """
 
     def __init__(self, motion: Motion, method: str) -> None:
-        stiff = isinstance(motion, StiffInertial | RadiatingAsperities)
+        stiff = isinstance(motion, StiffInertial | ReversingInertial | RadiatingAsperities)
         self._free = method == "auto"
         self._implicit = stiff if self._free else method == "implicit"
         self._explicit_length = 0.0  # mean step before a trial; 0 where none is under way

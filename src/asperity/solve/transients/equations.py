@@ -13,9 +13,10 @@ from jax import Array
 from asperity.loads import Excitation
 from asperity.loads.programme_segments import Segment
 from asperity.slider import Motion, QuasiStatic
+from asperity.solve.transients.pieces import PARTS, Chunk
 
-#: Instants that one call of a compiled program reads.
-READ = 4100
+#: Instants that one call of a compiled program reads: as many as there are, or a few more.
+ROOMS = (64, 1024, 4096)
 
 
 class System(eqx.Module):
@@ -93,7 +94,6 @@ class Reading(NamedTuple):
     unrest: np.ndarray
 
 
-@jax.jit
 def _read(system: System, t: Array, Y: Array) -> Array:
     motion, at, states = system.motion, system.at(t), Y[:-1]
     law = motion.slider.law
@@ -115,13 +115,35 @@ def _read(system: System, t: Array, Y: Array) -> Array:
     return jnp.stack([jnp.broadcast_to(a, t.shape) for a in columns])
 
 
+_read_points = jax.jit(_read)
+
+
 def read(system: System, t: np.ndarray, Y: np.ndarray) -> Reading:
     """Read the states `Y`, shape (size + 1, n), at the times `t` of the segment, shape (n,)."""
     parts = []
-    for i in range(0, max(len(t), 1), READ):
-        part = slice(i, i + READ)
-        room = (0, READ - len(t[part]))
+    most = next((room for room in ROOMS if len(t) <= room), ROOMS[-1])
+    for i in range(0, max(len(t), 1), most):
+        part = slice(i, i + most)
+        room = (0, most - len(t[part]))
         # The last instant again, where there are none left: one program for any number.
         whole = np.pad(t[part], room, mode="edge"), np.pad(Y[:, part], ((0, 0), room), mode="edge")
-        parts.append(np.asarray(_read(system, *whole))[:, : len(t[part])])
+        parts.append(np.asarray(_read_points(system, *whole))[:, : len(t[part])])
     return Reading(*np.concatenate(parts, axis=1))
+
+
+def read_steps(system: System, chunk: Chunk) -> Reading:
+    """Read the steps of a chunk at `Pieces.refined`."""
+    inner, end = jax.device_get(_read_steps(system, chunk))
+    return Reading(*np.concatenate([inner[:, : PARTS * int(chunk.taken)], end], axis=1))
+
+
+@jax.jit
+def _read_steps(system: System, chunk: Chunk) -> tuple[Array, Array]:
+    shares = jnp.arange(PARTS) / PARTS
+    t = chunk.begin[:, None] + chunk.length[:, None] * shares
+    powers = jnp.moveaxis(chunk.coefficients, 0, -1)[..., None]
+    Y = powers[-1]
+    for coefficient in powers[-2::-1]:
+        Y = Y * shares + coefficient
+    Y = jnp.broadcast_to(Y, (Y.shape[0], *t.shape)).reshape(Y.shape[0], -1)
+    return _read(system, t.ravel(), Y), _read(system, chunk.t[None], chunk.Y[:, None])

@@ -12,9 +12,6 @@ from asperity.solve.transients.equations import Reading, System, read
 from asperity.solve.transients.pieces import Pieces
 from asperity.solve.transients.stops import Stop
 
-#: Instants of every step at which is looked for a change of sign.
-_PARTS = 4
-
 _ROOT_STEPS = 60
 
 #: v/V below which a slider whose velocity is about to vanish counts as at rest.
@@ -101,12 +98,14 @@ class Watch:
             kind = "rest"
         return Stop(kind, self._start + t)
 
-    def look(self, pieces: Pieces) -> tuple[list[Event], Stop | None]:
-        """Events on the pieces, in the order of time, and the first one that ends it all."""
+    def look(self, pieces: Pieces, reading: Reading) -> tuple[list[Event], Stop | None]:
+        """Events on the pieces, in the order of time, and the first one that ends it all.
+
+        `reading` is that at the times `pieces.refined`.
+        """
         if len(pieces.begin) == 0:
             return [], None
-        times = pieces.refined(_PARTS)
-        reading = read(self._system, times, pieces.evaluate(times))
+        times = pieces.refined()
         found = [
             Event(t, "slip start" if up else "slip end")
             for t, up in self._crossings("slip", self._slip, times, reading, pieces)

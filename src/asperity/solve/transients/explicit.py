@@ -20,9 +20,12 @@ from jax import Array
 from numpy.polynomial import Polynomial
 
 from asperity.solve.transients.equations import System
-from asperity.solve.transients.pieces import GOING_ON, STEPS, UNDERFLOW, Chunk
+from asperity.solve.transients.one_kernel import one_kernel
+from asperity.solve.transients.pieces import Chunk
+from asperity.solve.transients.steps import Limits, Run, Trial, run_steps
 
-_SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
+_SAFETY = 0.9
+_LIMITS = Limits(shrink=0.2, grow=6.0)
 
 #: Product of step and eigenvalue near which the method becomes unstable is 6.1; below it, steps
 #: that are limited by stability are seen before they fail.
@@ -68,42 +71,22 @@ def _power_basis() -> np.ndarray:
 _POWERS = _power_basis()
 
 
-class _Carry(NamedTuple):
-    t: Array
-    Y: Array
-    h: Array
-    slope: Array
-    taken: Array
-    rejected: Array
-    stiff: Array
-    status: Array
-    begin: Array
-    length: Array
-    states: Array
-    stages: Array
-
-
 def advance(
     system: System, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
 ) -> Chunk:
-    """March from `t` towards `end`, at most `STEPS` accepted steps.
+    """March from `t` towards `end`, at most `STEPS` accepted steps; as `run_steps`.
 
     Parameters
     ----------
-    system : System
-    t, end : array
-        Times of the segment (s).
-    Y : array, shape (size + 1,)
-    h : array
-        Length of the first step to try (s), 0 for a guess.
     rtol, atol : array
         Tolerances of `System.scale`.
     """
-    return _advance(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    run = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    return run.chunk(_dense(system, run.begin, run.length, *run.records))
 
 
-@jax.jit
-def _advance(
+@one_kernel
+def _run(
     system: System,
     t: Array,
     Y: Array,
@@ -112,87 +95,57 @@ def _advance(
     longest: Array,
     rtol: Array,
     atol: Array,
-) -> Chunk:
-    size = Y.shape[0]
-    table = _tableau()
-    A, C = jnp.asarray(table.A), jnp.asarray(table.C)
+) -> Run:
+    def attempt(t: Array, Y: Array, h: Array, slope: Array) -> Trial:
+        return _attempt(system, t, Y, h, slope, rtol, atol)
 
-    def unfinished(carry: _Carry) -> Array:
-        return (carry.t < end) & (carry.taken < STEPS) & (carry.status == GOING_ON)
-
-    def body(carry: _Carry) -> _Carry:
-        t, Y, i = carry.t, carry.Y, carry.taken
-        h = jnp.minimum(carry.h, longest)
-        target = jnp.minimum(end, system.segment.next_kink(t))
-        cut = t + h >= target
-        h = jnp.where(cut, target - t, h)
-
-        # All stages at once: what drives them does not depend on the states.
-        drive = jax.tree.map(lambda a: jnp.broadcast_to(a, C.shape), system.at(t + C * h))
-
-        def stage(k: Array, stages: Array) -> Array:
-            at = jax.tree.map(lambda a: a[k], drive)
-            return stages.at[k].set(system.rates(at, Y + h * (A[k] @ stages[:12])))
-
-        stages = jnp.zeros((13, size)).at[0].set(carry.slope)
-        stages = jax.lax.fori_loop(1, 13, stage, stages)
-        new = Y + h * (A[12] @ stages[:12])
-        scale = system.scale(jnp.maximum(jnp.abs(Y), jnp.abs(new)), rtol, atol)
-        fifth = (jnp.square(table.E5 @ stages / scale)).sum()
-        third = (jnp.square(table.E3 @ stages / scale)).sum()
-        error = h * fifth / jnp.sqrt((fifth + 0.01 * third + 1e-300) * size)
-        good = error < 1
-        factor = jnp.clip(_SAFETY * error ** (-1 / 8), _SHRINK, _GROW)
-        factor = jnp.where(jnp.isfinite(error), factor, _SHRINK)
-        # The last stage lies at the end of the step too: two slopes, and two states.
-        before = Y + h * (A[11] @ stages[:12])
-        steep = jnp.square(h * (stages[12] - stages[11]) / scale).sum()
-        at_limit = steep > _STIFF**2 * jnp.square((new - before) / scale).sum()
-        h_next = h * factor
-        lost = ~good & (t + h_next <= t)
-        return _Carry(
-            jnp.where(good, jnp.where(cut, target, t + h), t),
-            jnp.where(good, new, Y),
-            jnp.where(good & cut, jnp.maximum(h_next, carry.h), h_next),
-            jnp.where(good, stages[12], carry.slope),
-            i + good,
-            carry.rejected + ~good,
-            carry.stiff + (good & at_limit),
-            jnp.where(lost, UNDERFLOW, GOING_ON),
-            carry.begin.at[i].set(t),
-            carry.length.at[i].set(h),
-            carry.states.at[i].set(Y),
-            carry.stages.at[i].set(stages),
-        )
-
-    none = jnp.asarray(0)
-    empty = jnp.zeros(STEPS)
-    h = jnp.where(h > 0, h, system.first_length(t, Y))
-    first = _Carry(
-        t, Y, h, system.rates(system.at(t), Y), none, none, none,
-        jnp.asarray(GOING_ON), empty, empty, jnp.zeros((STEPS, size)), jnp.zeros((STEPS, 13, size)),
-    )  # fmt: skip
-    run = jax.lax.while_loop(unfinished, body, first)
-    coefficients = _dense(system, run)
-    return Chunk(
-        run.begin, run.length, coefficients, run.taken, run.t, run.Y, run.h,
-        run.rejected, run.status, run.stiff,
-    )  # fmt: skip
+    slope = system.rates(system.at(t), Y)
+    return run_steps(system, t, Y, h, end, longest, attempt, slope, _LIMITS)
 
 
-def _dense(system: System, run: _Carry) -> Array:
+def _attempt(
+    system: System, t: Array, Y: Array, h: Array, slope: Array, rtol: Array, atol: Array
+) -> Trial:
+    table, size = _tableau(), Y.shape[0]
+    # All stages at once: what drives them does not depend on the states. The last two coincide.
+    C = jnp.asarray(table.C[1:12])
+    drive = jax.tree.map(lambda a: jnp.broadcast_to(a, C.shape), system.at(t + C * h))
+    stages = jnp.zeros((13, size)).at[0].set(slope)
+    new = Y
+    # One by one, not in a loop: each knows how many there are before it.
+    for k in range(1, 13):
+        before, new = new, Y + h * _combined(table.A[k, :k], stages)
+        at = jax.tree.map(lambda a, k=k: a[min(k, 11) - 1], drive)
+        slope = system.rates(at, new)
+        stages = stages.at[k].set(slope)
+    scale = system.scale(jnp.maximum(jnp.abs(Y), jnp.abs(new)), rtol, atol)
+    fifth = jnp.square(_combined(table.E5, stages) / scale).sum()
+    third = jnp.square(_combined(table.E3, stages) / scale).sum()
+    error = h * fifth / jnp.sqrt((fifth + 0.01 * third + 1e-300) * size)
+    # The last two stages lie at the end of the step: two slopes, and two states.
+    steep = jnp.square(h * (stages[12] - stages[11]) / scale).sum()
+    at_limit = steep > _STIFF**2 * jnp.square((new - before) / scale).sum()
+    return Trial(new, error, _SAFETY * error ** (-1 / 8), slope, at_limit, (Y, stages))
+
+
+def _combined(weights: np.ndarray, stages: Array) -> Array:
+    """Sum of the first stages, weighted, shape (size,)."""
+    return (weights[:, None] * stages[: len(weights)]).sum(0)
+
+
+@jax.jit
+def _dense(system: System, begin: Array, length: Array, states: Array, stages: Array) -> Array:
     """Polynomials of all steps at once, shape (STEPS, 8, size)."""
     table = _tableau()
-    h = run.length[:, None]
-    stages = run.stages
+    h = length[:, None]
     for row, c in zip(table.extra_A, table.extra_C, strict=True):
         reached = stages.shape[1]
-        inner = run.states + h * jnp.einsum("k,skn->sn", row[:reached], stages)
-        slope = system.rates(system.at(run.begin + c * run.length), inner.T).T
+        inner = states + h * jnp.einsum("k,skn->sn", row[:reached], stages)
+        slope = system.rates(system.at(begin + c * length), inner.T).T
         stages = jnp.concatenate([stages, slope[:, None]], axis=1)
     change = h * jnp.einsum("k,skn->sn", table.A[12], stages[:, :12])
     first, last = h * stages[:, 0], h * stages[:, 12]
     high = h[:, None] * jnp.einsum("ik,skn->sin", table.D, stages)
     F = jnp.stack([change, first - change, 2 * change - last - first], axis=1)
     powers = jnp.einsum("pi,sin->spn", _POWERS, jnp.concatenate([F, high], axis=1))
-    return powers.at[:, 0].add(run.states)
+    return powers.at[:, 0].add(states)

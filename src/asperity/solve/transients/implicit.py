@@ -25,10 +25,13 @@ from numpy.polynomial import Legendre
 from asperity.loads import Excitation
 from asperity.solve.linear import jacobian_columns, product, solve_columns
 from asperity.solve.transients.equations import System
-from asperity.solve.transients.pieces import GOING_ON, STEPS, UNDERFLOW, Chunk
+from asperity.solve.transients.one_kernel import one_kernel
+from asperity.solve.transients.pieces import Chunk
+from asperity.solve.transients.steps import Limits, Run, Trial, run_steps
 
 STAGES = 5
-_SAFETY, _SHRINK, _GROW = 0.9, 0.1, 8.0
+_SAFETY = 0.9
+_LIMITS = Limits(shrink=0.1, grow=8.0)
 
 _NEWTON_STEPS = 10
 #: Newton's method stops where what is left is this share of the tolerated error.
@@ -79,30 +82,23 @@ def _tableau() -> _Tableau:
     )  # fmt: skip
 
 
-class _Carry(NamedTuple):
-    t: Array
-    Y: Array
-    h: Array
-    taken: Array
-    rejected: Array
-    mild: Array
-    status: Array
-    guess: Array  # polynomial of the last accepted step, (s + 1, size)
-    guess_length: Array
-    begin: Array
-    length: Array
-    coefficients: Array
+class _Last(NamedTuple):
+    """The last accepted step, for what it foretells of the next."""
+
+    polynomial: Array  # (s + 1, size)
+    length: Array  # 0 before the first
 
 
 def advance(
     system: System, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
 ) -> Chunk:
     """March from `t` towards `end`, at most `STEPS` accepted steps; as `explicit.advance`."""
-    return _advance(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    run = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    return run.chunk(run.records[0])
 
 
-@jax.jit
-def _advance(
+@one_kernel
+def _run(
     system: System,
     t: Array,
     Y: Array,
@@ -111,67 +107,29 @@ def _advance(
     longest: Array,
     rtol: Array,
     atol: Array,
-) -> Chunk:
-    table = _tableau()
-    powers = jnp.asarray(table.powers)
+) -> Run:
+    powers = jnp.asarray(_tableau().powers)
 
-    def unfinished(carry: _Carry) -> Array:
-        return (carry.t < end) & (carry.taken < STEPS) & (carry.status == GOING_ON)
-
-    def body(carry: _Carry) -> _Carry:
-        t, Y, i = carry.t, carry.Y, carry.taken
-        h = jnp.minimum(carry.h, longest)
-        target = jnp.minimum(end, system.segment.next_kink(t))
-        cut = t + h >= target
-        h = jnp.where(cut, target - t, h)
+    def attempt(t: Array, Y: Array, h: Array, last: _Last) -> Trial:
         scale = system.scale(Y, rtol, atol)
-        Z, error, steps, slope = _step(system, t, Y, h, _extrapolated(carry, h), scale)
-        good = error < 1
+        Z, error, steps, slope = _step(system, t, Y, h, _extrapolated(last, Y, h), scale)
         # Steps on which Newton's method laboured should not grow.
         safety = _SAFETY * (2 * _NEWTON_STEPS + 1) / (2 * _NEWTON_STEPS + steps)
-        factor = jnp.clip(safety * error ** (-1 / (STAGES + 1)), _SHRINK, _GROW)
-        factor = jnp.where(jnp.isfinite(error), factor, _SHRINK)
-        factor = jnp.where(good, factor, jnp.minimum(factor, _SAFETY))
-        h_next = h * factor
-        lost = ~good & (t + h_next <= t)
+        factor = safety * error ** (-1 / (STAGES + 1))
         piece = (powers @ Z.T).at[0].set(Y)
-        return _Carry(
-            jnp.where(good, jnp.where(cut, target, t + h), t),
-            jnp.where(good, Y + Z[:, -1], Y),
-            jnp.where(good & cut, jnp.maximum(h_next, carry.h), h_next),
-            i + good,
-            carry.rejected + ~good,
-            carry.mild + (good & (h * slope < _MILD)),
-            jnp.where(lost, UNDERFLOW, GOING_ON),
-            jnp.where(good, piece, carry.guess),
-            jnp.where(good, h, carry.guess_length),
-            carry.begin.at[i].set(t),
-            carry.length.at[i].set(h),
-            carry.coefficients.at[i].set(piece),
-        )
+        return Trial(Y + Z[:, -1], error, factor, _Last(piece, h), h * slope < _MILD, (piece,))
 
-    size = Y.shape[0]
-    none, empty = jnp.asarray(0), jnp.zeros(STEPS)
-    h = jnp.where(h > 0, h, system.first_length(t, Y))
-    first = _Carry(
-        t, Y, h, none, none, none, jnp.asarray(GOING_ON),
-        jnp.zeros((STAGES + 1, size)).at[0].set(Y), jnp.ones(()), empty, empty,
-        jnp.zeros((STEPS, STAGES + 1, size)),
-    )  # fmt: skip
-    run = jax.lax.while_loop(unfinished, body, first)
-    return Chunk(
-        run.begin, run.length, run.coefficients, run.taken, run.t, run.Y, run.h,
-        run.rejected, run.status, run.mild,
-    )  # fmt: skip
+    none = _Last(jnp.zeros((STAGES + 1, Y.shape[0])), jnp.zeros(()))
+    return run_steps(system, t, Y, h, end, longest, attempt, none, _LIMITS)
 
 
-def _extrapolated(carry: _Carry, h: Array) -> Array:
+def _extrapolated(last: _Last, Y: Array, h: Array) -> Array:
     """Where the last polynomial leads to, less the state, shape (size, stages)."""
-    share = 1 + h / carry.guess_length * jnp.asarray(_tableau().c)
-    ahead = (share[:, None] ** np.arange(STAGES + 1)) @ carry.guess
-    # Far beyond its step a polynomial tells nothing.
-    near = (h < 3 * carry.guess_length) & (carry.taken > 0)
-    return jnp.where(near, ahead.T - carry.Y[:, None], 0.0)
+    # Far beyond its step a polynomial tells nothing; before the first there is none.
+    near = h < 3 * last.length
+    share = 1 + h / jnp.where(near, last.length, h) * jnp.asarray(_tableau().c)
+    ahead = (share[:, None] ** np.arange(STAGES + 1)) @ last.polynomial
+    return jnp.where(near, ahead.T - Y[:, None], 0.0)
 
 
 def _step(
@@ -188,10 +146,13 @@ def _step(
     matrices = identity * values / h - jacobian[:, :, None]
     inverses = solve_columns(matrices, jnp.broadcast_to(identity + 0j, matrices.shape))
 
+    inertness_now = jnp.reshape(system.motion.inertness(Y[:n], now), (-1, 1))
+
     def newton(carry: tuple) -> tuple:
         Z, steps, change, _ = carry
         rates, _ = system.motion_rates(at, Y[:n, None] + Z)
-        residual = rates - Z @ table.inverse.T / h
+        inertness = system.motion.inertness(Y[:n, None] + Z, at)
+        residual = (rates - Z @ table.inverse.T / h) * (inertness / inertness_now)
         modes = residual @ table.to_modes.T
         correction = (jnp.einsum("ijk,jk->ik", inverses, modes) @ table.from_modes.T).real
         size = jnp.sqrt(jnp.mean(jnp.square(correction / scale[:n, None])))

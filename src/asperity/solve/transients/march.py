@@ -15,7 +15,7 @@ from asperity.loads.programme_segments import Segment
 from asperity.slider import Motion
 from asperity.solve.transients.breaks import across
 from asperity.solve.transients.choice import Choice
-from asperity.solve.transients.equations import System
+from asperity.solve.transients.equations import Reading, System, read_steps
 from asperity.solve.transients.events import Event, Thresholds, Watch
 from asperity.solve.transients.pieces import UNDERFLOW, Chunk, Pieces
 from asperity.solve.transients.stops import Stop
@@ -161,10 +161,10 @@ class March:
         t, Y = here.t, here.states
         length = here.length
         while t < end:
-            chunk = self._advance(system, t, Y, length, end)
+            chunk, reading = self._advance(system, t, Y, length, end)
             pieces = Pieces.of(chunk)
             reached = float(chunk.t)
-            events, stop = self._watch.look(pieces)
+            events, stop = self._watch.look(pieces, reading)
             if stop is None and lost is not None and reached >= end:
                 stop = Stop("loss of contact", start + lost)
             if stop is None and int(chunk.status) == UNDERFLOW:
@@ -191,14 +191,17 @@ class March:
         events = [Event(stop.time, stop.kind)]
         return Stretch(system, start, nothing, here.t, events, stop, False, here)
 
-    def _advance(self, system: System, t: float, Y: np.ndarray, length: float, end: float) -> Chunk:
+    def _advance(
+        self, system: System, t: float, Y: np.ndarray, length: float, end: float
+    ) -> tuple[Chunk, Reading]:
         choice = self._choice
-        chunk = jax.device_get(choice.method.advance(system, t, Y, length, end, *self.tolerances))
+        chunk = choice.method.advance(system, t, Y, length, end, *self.tolerances)
+        reading, chunk = read_steps(system, chunk), jax.device_get(chunk)
         self.steps += int(chunk.taken)
         self.rejected += int(chunk.rejected)
         self.methods.add(choice.name)
         choice.learn(chunk)
-        return chunk
+        return chunk, reading
 
 
 def _contact(segment: Segment, W0: float) -> tuple[float, float | None]:

@@ -10,6 +10,9 @@ from jax import Array
 #: Steps that a compiled program takes before it hands over what it has.
 STEPS = 1024
 
+#: Parts of every step at whose ends is looked for what happens.
+PARTS = 4
+
 #: What a program that advances the states may report.
 GOING_ON, UNDERFLOW = 0, 1
 
@@ -77,8 +80,8 @@ class Pieces(NamedTuple):
             value = value * share[:, None] + self.coefficients[i, k]
         return value.T
 
-    def refined(self, parts: int) -> np.ndarray:
-        """Times that divide every step in `parts`, with the end, shape (parts count + 1,)."""
-        shares = np.arange(parts) / parts
+    def refined(self) -> np.ndarray:
+        """Times that divide every step in `PARTS`, with the end, shape (PARTS count + 1,)."""
+        shares = np.arange(PARTS) / PARTS
         inner = (self.begin[:, None] + self.length[:, None] * shares).ravel()
         return np.append(inner, self.end)

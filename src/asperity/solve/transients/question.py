@@ -10,11 +10,11 @@ import numpy as np
 
 from asperity.errors import InputError, closest
 from asperity.loads import Programme
-from asperity.slider import Slider, equation_of_motion
+from asperity.slider import Slider, equation_of_motion, reversing
+from asperity.solve.periodic import checked_positive
 from asperity.solve.transients.choice import METHODS
 from asperity.solve.transients.events import Thresholds
 from asperity.solve.transients.march import Checkpoint, March, Tolerances
-from asperity.units import KINDS, to_si
 
 #: A slider slips when it is so many times faster than the fastest drive.
 _SLIPS = 30.0
@@ -66,6 +66,7 @@ def march_of(
         scalar, jnp.asarray(V), jnp.asarray(1.0), inertia=inertia,
         eta=None if eta is None else jnp.asarray(eta),
     )  # fmt: skip
+    motion = reversing(motion)
     fastest = fastest or V
     slips, runs = _SLIPS * fastest, max(_RUNAWAY, _RUNAWAY_RATIO * fastest)
     if slip_velocity is not None:
@@ -89,11 +90,4 @@ def _scalar(value: Any) -> jnp.ndarray:
 
 
 def _positive(value: Any, kind: str, name: str) -> float:
-    number = to_si(value, kind, name)
-    if not number > 0:
-        unit = KINDS[kind].si
-        raise InputError(
-            f"{name} must be positive, got {number:g}{' ' + unit if unit else ''}; "
-            "give a value above zero"
-        )
-    return float(number)
+    return float(checked_positive(value, kind, name))

@@ -1,0 +1,108 @@
+"""Inertia on rigid asperities through rest and reversal, for laws that are smooth there.
+
+    M dv/dt = F + S - F_i - eta v,      dF/dt = K (V p - v),      v = v(F_i/W, state, W)
+
+with the velocity that the law yields. It has a sign, and a logarithm on one side of rest only; the
+friction F_i/W has a value everywhere, and takes the place of v among the states:
+
+    d(F_i/W)/dt = [dv/dt - dv/dstate dstate/dt - dv/dw dw/dt] / [dv/d(F_i/W)].
+
+For the regularised law F_i/(A W) = asinh[v / (2 V*)], V* = V0 exp[-(mu0 + B phi) / A]: the state
+goes with v near rest and with ln v in sliding. A slider at rest creeps at the velocity at which
+friction balances the spring, to which it relaxes within M V* / (A W).
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.laws import Law
+from asperity.loads import Excitation
+from asperity.slider.inertial import StiffInertial, _Damped
+from asperity.slider.motion import Motion
+
+
+class ReversingInertial(_Damped):
+    """Inertia without asperities, signed; states Y = (F/W0, F_i/W, *law states)."""
+
+    name: ClassVar[str] = "inertial"
+    mechanical: ClassVar[tuple[str, ...]] = ("force", "friction")
+    logarithmic: ClassVar[tuple[bool, ...]] = (False, False)
+
+    def steady(self) -> Array:
+        """Steady sliding."""
+        mu = self.slider.law.mu_ss(self.V)
+        return self._steady_states(mu + self.damping, mu)
+
+    def force(self, Y: Array, at: Excitation) -> Array:
+        """F/W0."""
+        return Y[0]
+
+    def log_slip(self, Y: Array, at: Excitation) -> Array:
+        """ln(v / V), forwards."""
+        law = self.slider.law
+        return law.log_velocity(Y[1], self.law_state(Y), at.w) - jnp.log(self.V)
+
+    def slider_velocity(self, Y: Array, at: Excitation) -> Array:
+        """dx/dt over V."""
+        return self.slip_velocity(Y[1], Y, at)
+
+    def mechanical_states(
+        self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
+    ) -> tuple[Array, ...]:
+        """Force, friction."""
+        return self._balance(friction, velocity, at), friction
+
+    def friction_jump(self, Y: Array, before: Excitation, after: Excitation) -> Array:
+        """Change of F_i/W where the load steps: the velocity is continuous."""
+        law, state = self.slider.law, self.law_state(Y)
+        v = self.V * self.slider_velocity(Y, before)
+        return law.friction(v, state, after.w) - law.friction(v, state, before.w)
+
+    def rates(self, Y: Array, at: Excitation) -> Array:
+        """dY/dtheta."""
+        friction, state = Y[1], self.law_state(Y)
+        v = self.slider_velocity(Y, at)
+        state_rates = self._law_rates(v, v, Y, at)
+        _, drift = jax.jvp(
+            lambda *a: self.slider.law.velocity(friction, *a) / self.V,
+            (state, at.w),
+            (tuple(r * jnp.ones_like(v) for r in state_rates), at.w_slope * jnp.ones_like(at.w)),
+        )
+        excess = Y[0] + at.shear - at.w * friction - self.damping * v
+        change = (self.mobility * excess - drift) / self._steepness(friction, state, at.w)
+        rates = [self.kappa * (at.pull - v), change, *state_rates]
+        return jnp.stack(jnp.broadcast_arrays(*rates))
+
+    def inertness(self, Y: Array, at: Excitation) -> Array:
+        """Of friction, which relaxes the faster the less the velocity changes with it."""
+        one, steepness = jnp.ones_like(Y[0]), self._steepness(Y[1], self.law_state(Y), at.w)
+        return jnp.stack([one, steepness, *(one for _ in Y[2:])])
+
+    def _steepness(self, friction: Array, state: tuple[Array, ...], w: Array) -> Array:
+        """D(v/V) / d(F_i/W)."""
+        return _steepness(self.slider.law, friction, state, w) / self.V
+
+
+def _steepness(law: Law, friction: Array, state: tuple[Array, ...], w: ArrayLike) -> Array:
+    one = jnp.ones_like(friction)
+    return jax.jvp(lambda g: law.velocity(g, state, w), (friction,), (one,))[1]
+
+
+def reversing(motion: Motion) -> Motion:
+    """The motion in states that pass through rest, where it has others and its law allows it.
+
+    That is, where the law yields a velocity that rises with the force at rest too.
+    """
+    if not (isinstance(motion, StiffInertial) and motion.signed):
+        return motion
+    law, V = motion.slider.law, motion.V
+    rest = _steepness(law, jnp.zeros(()), law.steady_state(V), jnp.ones(()))
+    if not bool(jnp.all(rest > 0)):
+        return motion
+    return ReversingInertial(motion.slider, V, motion.omega, motion.eta)
