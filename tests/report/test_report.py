@@ -24,9 +24,11 @@ from asperity.report.headlines import headlines
 from asperity.report.markup import rich
 from asperity.study import paper as study
 from asperity.study.claims import Claim
+from asperity.study.paper import virtual
 
 FIGURES = [f"figure-{n:02}" for n in range(1, 13)]
 DRAWN = [name for name in FIGURES if name not in ("figure-01", "figure-10")]
+VIRTUAL = [f"virtual-{n:02}" for n in (2, 3, 4, 5)]
 
 
 def claim(key, verdict, **fields):
@@ -90,8 +92,9 @@ def page(report):
 def test_all_files_are_there_and_no_others(report):
     out, _, _ = report
     written = sorted(str(p.relative_to(out)) for p in out.rglob("*") if p.is_file())
-    pictures = [f"figures/{name}.{kind}" for name in FIGURES for kind in ("pdf", "png")]
+    pictures = [f"figures/{n}.{kind}" for n in FIGURES + VIRTUAL for kind in ("pdf", "png")]
     tables = [f"data/{name}.csv" for name in DRAWN]
+    tables += [f"data/{name}{part}.csv" for name in VIRTUAL for part in ("", "-model")]
     assert written == sorted(["claims.csv", "claims.json", "index.html", *pictures, *tables])
     assert [p.name for p in out.parent.iterdir()] == ["report"]
 
@@ -104,7 +107,7 @@ def test_files_can_be_read_by_others(report):
 
 
 def test_pictures_are_pictures(report):
-    for name in FIGURES:
+    for name in FIGURES + VIRTUAL:
         assert (report[0] / "figures" / f"{name}.png").read_bytes()[1:4] == b"PNG"
         pdf = (report[0] / "figures" / f"{name}.pdf").read_bytes()
         assert pdf.startswith(b"%PDF")
@@ -123,6 +126,35 @@ def test_a_table_says_where_its_numbers_come_from(report, name):
     assert data["converged"].all()
 
 
+@pytest.mark.parametrize("name", VIRTUAL)
+def test_tables_of_the_virtual_experiment_say_that_it_is_simulated(report, name):
+    for part, columns in (("", virtual.POINT_COLUMNS), ("-model", study.COLUMNS)):
+        path = report[0] / "data" / f"{name}{part}.csv"
+        text = path.read_text(encoding="utf-8")
+        assert text.startswith("# SIMULATED")
+        assert "no measured points" in text.splitlines()[0]
+        head = [line for line in text.splitlines() if line.startswith("#")]
+        for series in virtual.all_series():
+            if series.name in set(pd.read_csv(path, comment="#").get("series", [])):
+                seeds = ", ".join(map(str, series.seeds))
+                assert any(f"{series.name}, " in x and f"seeds {seeds};" in x for x in head)
+        assert any("B = 0.02 (stated 0.026 +- 0.01)" in line for line in head)
+        assert list(pd.read_csv(path, comment="#").columns) == list(columns)
+        assert all(any(line.startswith(f"#   {c}: ") for line in head) for c in columns)
+
+
+def test_the_virtual_experiment_on_the_page(page, report):
+    text = "".join(page.text)
+    section = text[text.index("A virtual experiment", text.index("Figures")) :]
+    assert "Simulated." in section
+    assert "nothing here stands for them" in section
+    assert "Factor on ε that makes air and vacuum collapse" in section
+    alts = [image["alt"] for image in page.all("img")]
+    assert sum(alt.startswith("Simulated: ") for alt in alts) == len(VIRTUAL)
+    for name in VIRTUAL:
+        assert name in [a.get("id") for _, a in page.elements]
+
+
 def test_claims_as_json_and_csv(report):
     record = json.loads((report[0] / "claims.json").read_text(encoding="utf-8"))
     assert record["counts"] == {"reproduced": 1, "misprint": 1, "differs": 1}
@@ -137,7 +169,7 @@ def test_claims_as_json_and_csv(report):
 def test_summary(report):
     out, summary, _ = report
     assert (summary.folder, summary.page) == (out, out / "index.html")
-    assert (summary.figures, summary.failed) == (12, 0)
+    assert (summary.figures, summary.failed) == (16, 0)
     assert summary.points > 2000
     text = "\n".join(summary.lines())
     assert "3: 1 reproduced, 1 misprint, 1 differs" in text
@@ -159,13 +191,13 @@ def test_the_page_is_sound(page):
     assert len(names) == len(set(names))
     assert page.all("html")[0]["lang"] == "en"
     assert all(h["scope"] == "col" for h in page.all("th"))
-    assert [name for name in FIGURES if name not in names] == []
+    assert [name for name in FIGURES + VIRTUAL if name not in names] == []
 
 
 def test_the_page_needs_nothing_else(page, report):
     assert page.all("script") == page.all("link") == page.all("iframe") == []
     assert all(image["src"].startswith("data:image/png;base64,") for image in page.all("img"))
-    assert len(page.all("img")) == 12
+    assert len(page.all("img")) == 16
     style_text = files("asperity.report").joinpath("page.css").read_text(encoding="utf-8")
     assert "url(" not in style_text
     assert "@import" not in style_text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
@@ -13,12 +13,14 @@ from typing import TYPE_CHECKING
 from asperity._version import __version__
 from asperity.materials import citation
 from asperity.report import claims as ledger
+from asperity.report import virtual
 from asperity.report.headlines import Headline
 from asperity.report.markup import cell, embedded_png, rich
 from asperity.report.parameters import table as parameter_table
 
 if TYPE_CHECKING:
     from asperity.study.claims import Claim
+    from asperity.study.paper.virtual import VirtualNumbers
 
 _TITLE = "Shear response of a frictional interface to a normal load modulation"
 _AUTHORS = "L. Bureau, T. Baumberger and C. Caroli, Phys. Rev. E 62, 6810 (2000)"
@@ -38,20 +40,31 @@ class Plate:
 
 
 def build_page(
-    plates: Sequence[Plate], claims: Sequence[Claim], headlines: Sequence[Headline]
+    plates: Sequence[Plate],
+    claims: Sequence[Claim],
+    headlines: Sequence[Headline],
+    experiment: Sequence[VirtualNumbers],
 ) -> str:
     """The page as text.
 
     Parameters
     ----------
     plates : sequence of Plate
-        In the order of the paper.
+        In the order of the paper; those of the experiment among them.
     claims : sequence of Claim
     headlines : sequence of Headline
+    experiment : sequence of VirtualNumbers
     """
+    simulated = {figure.name for figure in experiment}
     parts = {
         "In brief": ("brief", _brief(headlines)),
-        "Figures": ("figures", "\n".join(_figure(plate) for plate in plates)),
+        "Figures": ("figures", _figures(p for p in plates if p.name not in simulated)),
+        "A virtual experiment": (
+            "experiment",
+            virtual.introduction(experiment)
+            + _figures(p for p in plates if p.name in simulated)
+            + virtual.findings_table(experiment),
+        ),
         "Claims": ("claims", _ledger(claims)),
         "Parameters": ("parameters", parameter_table()),
         "Sources": ("sources", _sources()),
@@ -113,15 +126,22 @@ def _holds(*, holds: bool) -> str:
     return f'<span class="chip {kind}"><span aria-hidden="true">{sign}</span> {word}</span>'
 
 
+def _figures(plates: Iterable[Plate]) -> str:
+    return "\n".join(map(_figure, plates))
+
+
 def _figure(plate: Plate) -> str:
-    links = " ".join(
-        f'<a href="{escape(name)}">{name.rsplit(".", 1)[1].upper()}</a>' for name in plate.files
-    )
+    links = " ".join(f'<a href="{escape(name)}">{_kind(name)}</a>' for name in plate.files)
     return (
         f'<figure id="{plate.name}">{embedded_png(plate.png, plate.alt)}'
         f'<figcaption><p class="kicker">{plate.place}</p><h3>{rich(plate.title)}</h3>'
         f'<p>{rich(plate.caption)}</p><p class="files">{links}</p></figcaption></figure>'
     )
+
+
+def _kind(name: str) -> str:
+    kind = name.rsplit(".", 1)[1].upper()
+    return f"{kind} of the model" if "-model." in name else kind
 
 
 def _ledger(claims: Sequence[Claim]) -> str:

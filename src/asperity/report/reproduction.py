@@ -10,14 +10,23 @@ from typing import TYPE_CHECKING
 from asperity._version import __version__
 from asperity.figures.files import save_picture, save_table
 from asperity.figures.paper import DRAWN, SCHEMATICS, Schematic
+from asperity.figures.paper.virtual import VIRTUAL_DRAWN
 from asperity.figures.style import style
 from asperity.report import claims as ledger
+from asperity.report import virtual
 from asperity.report.folder import written_whole
 from asperity.report.headlines import headlines
 from asperity.report.page import Plate, build_page
 from asperity.report.parameters import provenance_lines
 from asperity.report.summary import ReproductionSummary
 from asperity.study.paper import COLUMNS, FIGURES, FigureNumbers
+from asperity.study.paper.virtual import (
+    POINT_COLUMNS,
+    VIRTUAL,
+    Experiment,
+    VirtualNumbers,
+    experiment_beside,
+)
 
 if TYPE_CHECKING:
     from asperity.study.claims import Claim
@@ -25,7 +34,7 @@ if TYPE_CHECKING:
 #: Called with what is being done, the steps done and all steps.
 Progress = Callable[[str, int, int], None]
 
-_STEPS = 2 * len(FIGURES) + len(SCHEMATICS) + 2
+_STEPS = 2 * len(FIGURES) + 2 * len(VIRTUAL) + len(SCHEMATICS) + 3
 
 
 class _Counter:
@@ -66,22 +75,25 @@ def reproduce(out: Path, progress: Progress | None = None) -> ReproductionSummar
     start = time.perf_counter()
     out = Path(out)
     steps = _Counter(progress)
-    with written_whole(out) as folder:
+    with written_whole(out) as folder, experiment_beside() as readings:
         figures = _compute(steps)
         plates = _draw(figures, folder, steps)
         steps.begin("claims")
         claims = _ledger()
+        simulated = _simulate(readings, steps)
+        plates += _draw_simulated(simulated, folder, steps)
         steps.begin("page")
         ledger.write_json(claims, folder / "claims.json")
         ledger.write_csv(claims, folder / "claims.csv")
-        page = build_page(plates, claims, headlines(figures))
+        page = build_page(plates, claims, headlines(figures), simulated)
         (folder / "index.html").write_text(page, encoding="utf-8", newline="\n")
     steps.end()
+    solved = [*figures.values(), *simulated]
     return ReproductionSummary(
         folder=out,
         figures=len(plates),
-        points=sum(len(figure.data) for figure in figures.values()),
-        failed=sum(figure.failed for figure in figures.values()),
+        points=sum(len(figure.data) for figure in solved),
+        failed=sum(figure.failed for figure in solved),
         verdicts=ledger.counts(claims),
         exceptions=tuple(
             (c.verdict, c.place, c.statement) for c in claims if c.verdict != "reproduced"
@@ -105,6 +117,16 @@ def _compute(steps: _Counter) -> Mapping[str, FigureNumbers]:
     return found
 
 
+def _simulate(readings: Callable[[], Experiment], steps: _Counter) -> list[VirtualNumbers]:
+    steps.begin("simulated recordings")
+    experiment = readings()
+    found = []
+    for compute in VIRTUAL:
+        steps.begin(f"numbers of {compute.__name__.replace('_', ' ')}")
+        found.append(compute(experiment))
+    return found
+
+
 def _draw(figures: Mapping[str, FigureNumbers], folder: Path, steps: _Counter) -> list[Plate]:
     """Draw all figures and write their numbers; returns them in the order of the paper."""
     pictures, tables = folder / "figures", folder / "data"
@@ -124,6 +146,25 @@ def _draw(figures: Mapping[str, FigureNumbers], folder: Path, steps: _Counter) -
             save_table(figure.data, path, header=_provenance(figure), columns=COLUMNS)
             plates.append(_plate(figure, png, (f"data/{name}.csv",)))
     return sorted(plates, key=lambda plate: plate.name)
+
+
+def _draw_simulated(
+    figures: Sequence[VirtualNumbers], folder: Path, steps: _Counter
+) -> list[Plate]:
+    """Draw the virtual experiment, and write its points and the model's lines."""
+    pictures, tables = folder / "figures", folder / "data"
+    plates = []
+    with style():
+        for figure in figures:
+            steps.begin(figure.place)
+            name = figure.name
+            png, _ = save_picture(VIRTUAL_DRAWN[name](figure), pictures / name)
+            head = virtual.provenance(figure, "points")
+            save_table(figure.points, tables / f"{name}.csv", header=head, columns=POINT_COLUMNS)
+            head = virtual.provenance(figure, "the model's lines")
+            save_table(figure.data, tables / f"{name}-model.csv", header=head, columns=COLUMNS)
+            plates.append(_plate(figure, png, (f"data/{name}.csv", f"data/{name}-model.csv")))
+    return plates
 
 
 def _plate(figure: FigureNumbers | Schematic, png: Path, tables: tuple[str, ...]) -> Plate:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import pandas as pd
 
@@ -48,7 +49,7 @@ class FigureNumbers:
         """The end of a curve, at its largest amplitude."""
         return float(self.curve(curve)[column].iloc[-1])
 
-    def told(self, *, scalars: Mapping[str, float], caption: str, alt: str) -> FigureNumbers:
+    def told(self, *, scalars: Mapping[str, float], caption: str, alt: str) -> Self:
         """The same with what was read off the curves."""
         return replace(self, scalars=scalars, caption=_minus(caption), alt=_minus(alt))
 
