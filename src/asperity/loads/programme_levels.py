@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity.loads.excitation import Excitation
 from asperity.loads.programme_segments import Scalar, Segment, number
 
 
@@ -49,44 +50,58 @@ class Levels(Segment):
     epsilon_v: Scalar = number(0.0)
     shear_ratio: Scalar = number(0.0)
 
-    def _angle(self, t: ArrayLike) -> Array:
-        return 2 * jnp.pi * self.frequency * t + self.phase
+    def _turn(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Cosine and sine of psi."""
+        angle = 2 * jnp.pi * self.frequency * jnp.asarray(t)
+        cos, sin = jnp.cos(self.phase), jnp.sin(self.phase)
+        rotation = jnp.stack([cos, -sin, sin, cos]).reshape(2, 2, *[1] * angle.ndim)
+        # XLA computes a sum over an axis once, but a cosine anew for every number that is made of
+        # it, which would take as long as all the rest of a step.
+        turned = (rotation * jnp.stack([jnp.cos(angle), jnp.sin(angle)])).sum(axis=1)
+        return turned[0], turned[1]
 
-    def _modulated(self, t: ArrayLike) -> tuple[Array, Array]:
-        """Part of the load that the modulation adds (N), and its rate (N/s)."""
+    def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
+        """Everything from one cosine and one sine."""
+        cos, sin = self._turn(t)
         slow = self.rise > 0
         x = jnp.where(slow, jnp.clip(t / jnp.where(slow, self.rise, 1.0), 0.0, 1.0), 1.0)
         change = self.epsilon2 - self.epsilon1
         epsilon = self.epsilon1 + change * x**3 * (10 - 15 * x + 6 * x**2)
         growth = 30 * (x * (1 - x)) ** 2 * change / jnp.where(slow, self.rise, 1.0)
-        cos, sin = jnp.cos(self._angle(t)), jnp.sin(self._angle(t))
         level = self.load1 + self.load_rate * t
+        part = level * epsilon * cos
         turning = 2 * jnp.pi * self.frequency * sin
         rate = self.load_rate * epsilon * cos + level * (growth * cos - epsilon * turning)
-        return level * epsilon * cos, rate
+        pull = (self.pull1 + self.pull_rate * t) * (1 + self.epsilon_v * cos)
+        return Excitation(
+            (level + part) / W0,
+            (self.load_rate + rate) / W0,
+            self.shear_ratio * part / W0,
+            self.shear_ratio * rate / W0,
+            pull / V,
+        )
 
     def load(self, t: ArrayLike) -> tuple[Array, Array]:
         """W and dW/dt."""
-        part, rate = self._modulated(t)
-        return self.load1 + self.load_rate * t + part, self.load_rate + rate
+        at = self.at(t, 1.0, 1.0)
+        return at.w, at.w_slope
 
     def shear(self, t: ArrayLike) -> tuple[Array, Array]:
         """S and dS/dt."""
-        part, rate = self._modulated(t)
-        return self.shear_ratio * part, self.shear_ratio * rate
+        at = self.at(t, 1.0, 1.0)
+        return at.shear, at.shear_slope
 
     def pull(self, t: ArrayLike) -> Array:
         """V."""
-        level = self.pull1 + self.pull_rate * t
-        return level * (1 + self.epsilon_v * jnp.cos(self._angle(t)))
+        return self.at(t, 1.0, 1.0).pull
 
     def position(self, t: ArrayLike) -> Array:
         """Integral of V, in closed form."""
         smooth = self.pull1 * t + 0.5 * self.pull_rate * t**2
         turns = self.frequency > 0
         omega = 2 * jnp.pi * jnp.where(turns, self.frequency, 1.0)
-        sin, cos = jnp.sin(self._angle(t)), jnp.cos(self._angle(t))
-        sin0, cos0 = jnp.sin(self.phase), jnp.cos(self.phase)
+        cos, sin = self._turn(t)
+        cos0, sin0 = self._turn(0.0)
         swing = self.pull1 * (sin - sin0) / omega
         swing = swing + self.pull_rate * (t * sin / omega + (cos - cos0) / omega**2)
         return smooth + self.epsilon_v * jnp.where(turns, swing, smooth * cos0)

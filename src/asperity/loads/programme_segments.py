@@ -15,7 +15,10 @@ import jax.numpy as jnp
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity._jax import configure
 from asperity.loads.excitation import Excitation
+
+configure()  # double precision, before any segment makes an array
 
 #: What a number of a segment is: an array of shape ().
 Scalar: TypeAlias = Any

@@ -207,11 +207,13 @@ def _where(condition: Array, yes: Orbit, no: Orbit) -> Orbit:
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), yes, no)
 
 
-@partial(jax.jit, static_argnames=("harmonics",))
-def read_orbit(problem_and_orbit: tuple[Problem, Orbit], *, harmonics: int) -> Reading:
+@partial(jax.jit, static_argnames=("harmonics", "phases"))
+def read_orbit(
+    problem_and_orbit: tuple[Problem, Orbit], *, harmonics: int, phases: int = 0
+) -> Reading:
     """The reading of an orbit as it is."""
     problem, orbit = problem_and_orbit
-    return _read(problem, orbit, harmonics, 0)
+    return _read(problem, orbit, harmonics, phases)
 
 
 @partial(jax.jit, static_argnames=("parts",))

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 class Outcome(IntEnum):
     """Outcome of a periodic solve.
 
-    FOLDED and RUNAWAY are answers: the branch of orbits that begins with steady sliding does not
-    reach the amplitude asked for. Other orbits, not connected to it, may exist.
+    FOLDED, RUNAWAY and SENSITIVE are answers: the branch of orbits that begins with steady sliding
+    does not reach the amplitude asked for, or not in a way that anything could hold. Other orbits,
+    not connected to it, may exist.
     """
 
     CONVERGED = 0
@@ -22,6 +23,7 @@ class Outcome(IntEnum):
     MULTIPLIERS_NOT_RESOLVED = 3
     FOLDED = 4
     RUNAWAY = 5
+    SENSITIVE = 6
 
 
 _SENTENCES = {
@@ -43,9 +45,14 @@ _SENTENCES = {
         "asked for; lower epsilon or stiffen the spring"
     ),
     Outcome.RUNAWAY: (
-        "on the branch from steady sliding slip runs away: at epsilon = {detail:.3g} its pulses "
-        "are faster than e^13 V already, without inertia nothing bounds them; "
-        "lower epsilon or let inertia or radiation damping count"
+        "on the branch from steady sliding slip runs away: before epsilon = {detail:.3g} its "
+        "pulses become faster than e^13 V, without inertia nothing bounds them; lower epsilon or "
+        "let inertia or radiation damping count"
+    ),
+    Outcome.SENSITIVE: (
+        "the branch from steady sliding is lost at epsilon = {detail:.3g}: sliding is so unstable "
+        "for part of the period that a disturbance grows by more than e^36, which neither double "
+        "precision nor an experiment can hold; lower epsilon or stiffen the spring"
     ),
 }
 

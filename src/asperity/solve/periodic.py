@@ -17,7 +17,7 @@ from asperity.solve.kernels import Problem
 from asperity.solve.outcome import Outcome
 from asperity.solve.parallel import WORTHWHILE, available_cores, find_orbits_on_cores
 from asperity.solve.response import PeriodicResponse
-from asperity.solve.search import find_orbits
+from asperity.solve.search import METHODS, find_orbits
 from asperity.units import KINDS, to_si
 
 
@@ -33,7 +33,7 @@ def periodic_response(
     harmonics: int = 8,
     waveform: int = 0,
     progress: Callable[[int], None] | None = None,
-    methods: tuple[str, ...] = ("fourier", "collocation"),
+    methods: tuple[str, ...] = METHODS,
     workers: int | None = None,
 ) -> PeriodicResponse:
     """Periodic response to W = W0 (1 + eps cos wt), stable or not.
@@ -64,8 +64,9 @@ def periodic_response(
     progress : callable, optional
         Called with the number of points finished since the last call.
     methods : tuple of str
-        Subset of ("fourier", "collocation"): the fast and the robust method. Both, unless they are
-        to be checked against each other.
+        Which to use of "fourier", the fast method (shooting with inertia on elastic asperities),
+        "smooth", series for slow modulation, and "collocation", the robust method. All, in this
+        order, unless they are to be held against each other.
     workers : int, optional
         Processes to use; by default one per core for 200,000 points or more, else this one alone.
 
@@ -88,6 +89,10 @@ def periodic_response(
     """
     if harmonics < 2:
         raise InputError(f"harmonics must be at least 2, got {harmonics}; ask for 2 or more")
+    for unknown in set(methods) - set(METHODS):
+        raise InputError(
+            f"methods must be among {', '.join(METHODS)}, got '{unknown}'; leave it out for all"
+        )
     problem = checked_problem(
         slider,
         velocity=velocity,
@@ -152,10 +157,8 @@ def checked_positive(value: Any, kind: str, name: str) -> np.ndarray:
     array = np.asarray(to_si(value, kind, name), dtype=float)
     bad = array[~(array > 0)]
     if bad.size:
-        unit = KINDS[kind].si
-        raise InputError(
-            f"{name} must be positive, got {bad.flat[0]:g} {unit}; give a value above zero"
-        )
+        got = f"{bad.flat[0]:g} {KINDS[kind].si}".rstrip()
+        raise InputError(f"{name} must be positive, got {got}; give a value above zero")
     return array
 
 

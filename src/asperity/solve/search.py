@@ -2,10 +2,11 @@
 
 1. Fourier collocation, on a grid as fine as the slip pulse needs, for points whose orbit moves
    little within a period.
-2. Collocation with Newton's method from the averaged limit.
-3. Collocation along a path in amplitude; along the branch from steady sliding, by its arclength;
+2. Fourier series solved directly, for smooth orbits however stiff their equations: slow modulation.
+3. Collocation with Newton's method from the averaged limit.
+4. Collocation along a path in amplitude; along the branch from steady sliding, by its arclength;
    along a path in frequency.
-4. Whatever stages 2 and 3 found is solved on finer and finer meshes, until mean, first and second
+5. Whatever stages 3 and 4 found is solved on finer and finer meshes, until mean, first and second
    harmonic and multipliers agree between two meshes to `refinement.AGREEMENT`.
 """
 
@@ -29,13 +30,19 @@ from asperity.solve.kernels import (
     stiffness_of_steady_sliding,
 )
 from asperity.solve.outcome import Outcome
-from asperity.solve.refinement import MESHES, refine
+from asperity.solve.refinement import MESHES, accept, refine
+from asperity.solve.shooting_search import is_shootable, shooting_stages
+from asperity.solve.smooth import smooth_orbits
 from asperity.solve.starts import (
     Start,
     near_orbits,
     orbits_along_branches,
     orbits_from_high_frequency,
 )
+
+#: All methods, by the names that a user may choose among: the fast one, Fourier collocation or,
+#: with inertia on elastic asperities, shooting; series for smooth orbits; and the robust one.
+METHODS = ("fourier", "smooth", "collocation")
 
 #: Fourier grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for:
 #: the nodes that a pulse needs grow with the root of it. Sharper ones are left to collocation.
@@ -58,7 +65,7 @@ def find_orbits(
     harmonics: int,
     phases: int,
     progress: Callable[[int], None],
-    methods: tuple[str, ...] = ("fourier", "collocation"),
+    methods: tuple[str, ...] = METHODS,
 ) -> Found:
     """Find the periodic orbit of every operating point.
 
@@ -79,9 +86,14 @@ def find_orbits(
     left = np.arange(points)
     if "fourier" in methods and _is_fast(problem):
         left = _fourier_stages(problem, found, left, options)
-    if "collocation" in methods:
-        for start in range(0, len(left), _BLOCK):
-            _collocate(problem, found, left[start : start + _BLOCK], options)
+    elif "fourier" in methods and is_shootable(problem):
+        left = shooting_stages(problem, found, left, options)
+    for start in range(0, len(left), _BLOCK):
+        block = left[start : start + _BLOCK]
+        if "smooth" in methods:
+            block = _smooth(problem, found, block, options)
+        if "collocation" in methods and len(block):
+            _collocate(problem, found, block, options)
     return found
 
 
@@ -124,8 +136,18 @@ def _measured(measure: Callable[[Problem], Any], problem: Problem, index: Indice
     return values
 
 
+def _smooth(problem: Problem, found: Found, block: Indices, options: Options) -> Indices:
+    """Solve what is smooth of a block; returns the points that are left."""
+    part = take(problem, block)
+    smooth = smooth_orbits(part, np.arange(len(block)))
+    kept = np.flatnonzero(smooth.found)
+    if len(kept):
+        accept(take(part, kept), found, block[kept], take(smooth.orbit, kept), options)
+    return block[found.outcome[block] != Outcome.CONVERGED]
+
+
 #: What the branch from steady sliding may have come to; another branch may have an orbit.
-_WITHOUT_ORBIT = (Outcome.NO_ORBIT, Outcome.FOLDED, Outcome.RUNAWAY)
+_WITHOUT_ORBIT = (Outcome.NO_ORBIT, Outcome.FOLDED, Outcome.RUNAWAY, Outcome.SENSITIVE)
 
 
 def _collocate(problem: Problem, found: Found, block: Indices, options: Options) -> None:

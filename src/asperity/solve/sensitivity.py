@@ -30,8 +30,8 @@ from asperity.solve.collocation import (
 )
 from asperity.solve.kernels import ACCEPTED, Problem, refine_orbit
 from asperity.solve.mesh import Orbit
+from asperity.solve.multipliers import chunk_size
 from asperity.solve.periodic import checked_problem, flatten
-from asperity.solve.refinement import chunk_size
 from asperity.solve.starts import starting_orbits
 
 #: Orbits are differentiated on this mesh.

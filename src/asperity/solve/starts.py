@@ -20,8 +20,9 @@ from asperity.solve.kernels import (
     stiffness_of_steady_sliding,
 )
 from asperity.solve.mesh import Orbit
+from asperity.solve.multipliers import chunk_size
 from asperity.solve.outcome import Outcome
-from asperity.solve.refinement import FIRST_MESH, chunk_size
+from asperity.solve.refinement import FIRST_MESH
 from asperity.solve.scheme import scheme_for
 
 Float = NDArray[np.float64]
@@ -106,7 +107,8 @@ def orbits_along_branches(problem: Problem, points: int, index: Indices) -> Star
     amplitude = np.broadcast_to(problem.load.amplitude, (points,))
     for which, outcome, share in (
         (branch.folded, Outcome.FOLDED, branch.fold),
-        (branch.ran_away, Outcome.RUNAWAY, branch.share),
+        (branch.ran_away, Outcome.RUNAWAY, branch.end),
+        (branch.sensitive, Outcome.SENSITIVE, branch.farthest),
     ):
         rows = index[(which & (amplitude > 0))[index]]
         start.outcome[rows] = outcome

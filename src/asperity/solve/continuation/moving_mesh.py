@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from asperity.solve.collocation import localise
 from asperity.solve.continuation.arclength import (
     Point,
     along,
@@ -27,6 +28,7 @@ from asperity.solve.continuation.arclength import (
 )
 from asperity.solve.continuation.line import Line
 from asperity.solve.kernels import ACCEPTED
+from asperity.solve.linear import spectral_abscissa
 from asperity.solve.mesh import Orbit, on_mesh
 from asperity.solve.scheme import STAGES
 
@@ -98,6 +100,18 @@ def fastest_slip(line: Line, orbit: Orbit, t: Array) -> Array:
     system, load = line.at(t)
     states = orbit.centre[:, None, None] + orbit.stage_deviations
     return system.log_slip(states, load.at(orbit.stage_phases)).max((0, 1))
+
+
+@jax.jit
+def growth_within(inputs: tuple[Line, Orbit, Array]) -> Array:
+    """Integral of the growth rate of disturbances over the part of the period where they grow.
+
+    From the eigenvalues of the Jacobian along the orbit: what it is where the orbit changes slowly.
+    """
+    line, orbit, t = inputs
+    local = localise(*line.at(t), orbit)
+    weights = jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths
+    return (weights * jnp.maximum(spectral_abscissa(local.jacobian), 0.0)).sum((0, 1))
 
 
 def relaid(orbit: Orbit, units: Array) -> Orbit:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -11,23 +12,32 @@ from numpy.typing import NDArray
 from asperity.solve.batch import Indices, put, run_chunks, take
 from asperity.solve.continuation.arclength import Point, Tangent, first_tangent
 from asperity.solve.continuation.line import Line, amplitude_line
-from asperity.solve.continuation.moving_mesh import Advance, Pair, moving_step, straight
+from asperity.solve.continuation.moving_mesh import (
+    Advance,
+    Pair,
+    growth_within,
+    moving_step,
+    straight,
+)
 from asperity.solve.kernels import Problem
-from asperity.solve.mesh import Orbit
+from asperity.solve.mesh import Orbit, split
 from asperity.solve.scheme import scheme_for
 
 Float = NDArray[np.float64]
 
-#: Intervals of the moving mesh: enough for a jump of e^20 in the slip rate.
-INTERVALS = 96
+#: Intervals of the moving mesh, and parts that they are cut into for what it cannot settle.
+_INTERVALS, _PARTS = 96, 3
+INTERVALS = _PARTS * _INTERVALS
 #: Exponent of the slip rate beyond which a pulse is so narrow, below 1e-7 of the period, that
 #: round-off in the phase limits it.
 RUNAWAY = 13.0
 
-_CHUNK = 16
-_MOST_STEPS = 600
+#: Points in a call, and in one where few are left.
+_CHUNK, _SMALL_CHUNK = 16, 4
+#: Steps on each mesh.
+_MOST_STEPS = (250, 350)
 #: Distance from the amplitude asked for below which steps aim at it, and at which it is reached.
-_NEAR, _ARRIVED = 1e-2, 1e-3
+_NEAR, _ARRIVED = 1e-2, 1e-6
 #: A branch this far back from a fold, as a share of the amplitude, is on its way back.
 _BACK = 1e-3
 _NEWTON_STEPS = 10
@@ -40,6 +50,11 @@ _LONGEST, _GROWTH, _SHRINKAGE = 1.0, 1.4, 0.4
 _EASY, _HARD = 4, 6
 #: Failures after which the last step is no guide any more, and those after which all ends.
 _RESTART, _GIVE_UP = 4, 10
+#: Exponent from which pulses grow steadily if they do, its rise over which the share is watched,
+#: and how many times farther the share may get than where that leads.
+_RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
+#: Growth that makes round-off as large as the orbit.
+_ROUND_OFF = 36.0
 
 
 class Pursuit(NamedTuple):
@@ -48,7 +63,7 @@ class Pursuit(NamedTuple):
     Attributes
     ----------
     orbit : Orbit
-        Orbits at the share reached, on `INTERVALS` intervals.
+        Orbits at the share reached.
     share : array, shape (points,)
         Share of the amplitude reached; about 1 where it succeeded.
     fold : array, shape (points,)
@@ -57,6 +72,12 @@ class Pursuit(NamedTuple):
         Largest share on the branch.
     fastest : array, shape (points,)
         Largest exponent of the slip rate of the last orbit.
+    limit : array, shape (points,)
+        Share at which, as they grew at last, pulses are to reach e^`RUNAWAY`; inf where they
+        do not grow.
+    growth : array, shape (points,)
+        Exponent by which a disturbance of the last orbit grows while it does; 0 where it was
+        not asked for.
     """
 
     orbit: Orbit
@@ -64,6 +85,8 @@ class Pursuit(NamedTuple):
     fold: Float
     farthest: Float
     fastest: Float
+    limit: Float
+    growth: Float
 
     @property
     def arrived(self) -> NDArray[np.bool_]:
@@ -71,98 +94,182 @@ class Pursuit(NamedTuple):
         return np.abs(self.share - 1) <= _ARRIVED
 
     @property
-    def ran_away(self) -> NDArray[np.bool_]:
-        """Whether slip became too fast to be followed."""
-        return ~self.arrived & (self.fastest >= RUNAWAY)
-
-    @property
     def folded(self) -> NDArray[np.bool_]:
         """Whether the branch was left on its way back from its farthest fold."""
-        with np.errstate(invalid="ignore"):
-            back = (self.fold >= self.farthest - _BACK) & (self.share < self.farthest - _BACK)
-        return ~self.arrived & ~self.ran_away & back
+        back = _returned(self.fold, self.farthest, self.share)
+        return ~self.arrived & (self.fastest < RUNAWAY) & back
+
+    @property
+    def ran_away(self) -> NDArray[np.bool_]:
+        """Whether slip becomes too fast to be followed before the amplitude asked for."""
+        return ~self.arrived & ~self.folded & (self.end < 1)
+
+    @property
+    def sensitive(self) -> NDArray[np.bool_]:
+        """Whether the branch was lost where double precision cannot hold its orbits."""
+        return ~(self.arrived | self.folded | self.ran_away) & (self.growth > _ROUND_OFF)
+
+    @property
+    def end(self) -> Float:
+        """Share before which pulses pass e^`RUNAWAY`; inf where they are not known to."""
+        return np.where(self.fastest >= RUNAWAY, self.share, self.limit)
+
+
+def _returned(fold: Float, farthest: Float, share: Float) -> NDArray[np.bool_]:
+    """Whether a branch is on its way back from its farthest fold."""
+    with np.errstate(invalid="ignore"):
+        return (fold >= farthest - _BACK) & (share < farthest - _BACK)
 
 
 def pursue(problem: Problem, index: Indices) -> Pursuit:
-    """Follow the points `index` of `problem` (NumPy arrays) from steady sliding."""
-    points = len(problem.system.V)
-    line = amplitude_line(problem)
-    pair = _steady_pair(line, points, index)
-    result = Pursuit(
-        pair.point.orbit,
-        np.zeros(points),
-        np.full(points, np.nan),
-        np.zeros(points),
-        np.zeros(points),
-    )
-    for start in range(0, len(index), _CHUNK):
-        part = index[start : start + _CHUNK]
-        put(result, part, _pursue_chunk(*take((line, pair), part)))
+    """Follow the points `index` of `problem` (NumPy arrays) from steady sliding.
+
+    The orbits lie on `INTERVALS` intervals. What the first mesh does not settle is followed again
+    from the beginning on a finer one: where it is lost it has long been poorly resolved.
+    """
+    coarse = _pursue(problem, index, _INTERVALS, _MOST_STEPS[0])
+    orbit = Orbit.empty(coarse.orbit.scheme, problem.system.size, INTERVALS, len(coarse.share))
+    cut = jax.jit(partial(split, parts=_PARTS))
+    for part, finer in run_chunks(cut, coarse.orbit, index, _CHUNK):
+        put(orbit, part, finer)
+    result = coarse._replace(orbit=orbit)
+    settled = coarse.arrived | coarse.folded | (coarse.fastest >= RUNAWAY)
+    left = index[~settled[index]]
+    if len(left):
+        put(result, left, take(_pursue(problem, left, INTERVALS, _MOST_STEPS[1]), left))
+        inputs = (amplitude_line(problem), result.orbit, result.share)
+        for part, growth in run_chunks(growth_within, inputs, left, _CHUNK):
+            result.growth[part] = growth
     return result
 
 
-def _steady_pair(line: Line, points: int, index: Indices) -> Pair:
+def _pursue(problem: Problem, index: Indices, intervals: int, most_steps: int) -> Pursuit:
+    """Follow the points `index` on a moving mesh of `intervals`."""
+    line = amplitude_line(problem)
+    pair = _steady_pair(line, len(problem.system.V), index, intervals)
+    walked = _Walked.from_steady(len(problem.system.V))
+    _follow(line, pair, walked, index, most_steps)
+    orbit, share, _ = pair.point
+    known = (walked.fold, walked.farthest, walked.fastest, walked.limit)
+    return Pursuit(orbit, share, *known, np.zeros_like(share))
+
+
+class _Walked(NamedTuple):
+    """What is known of each branch so far, and how to go on.
+
+    Attributes
+    ----------
+    fold, farthest, fastest, limit : array, shape (points,)
+        As in `Pursuit`.
+    watched_share, watched_exponent : array, shape (points,)
+        Share and exponent from which the present rise of the exponent is counted.
+    last, ratio : array, shape (points,)
+        Length of the last step, and of the next one in parts of it.
+    failures : int array, shape (points,)
+        Failed steps since the last good one.
+    """
+
+    fold: Float
+    farthest: Float
+    fastest: Float
+    limit: Float
+    watched_share: Float
+    watched_exponent: Float
+    last: Float
+    ratio: Float
+    failures: NDArray[np.int_]
+
+    @classmethod
+    def from_steady(cls, points: int) -> _Walked:
+        def full(value: float) -> Float:
+            return np.full(points, value)
+
+        return cls(
+            fold=full(np.nan),
+            farthest=full(0.0),
+            fastest=full(0.0),
+            limit=full(np.inf),
+            watched_share=full(0.0),
+            watched_exponent=full(0.0),
+            last=full(_FIRST),
+            ratio=full(1.0),
+            failures=np.zeros(points, int),
+        )
+
+    def walking(self, share: Float) -> NDArray[np.bool_]:
+        """Which of the branches neither arrived nor ran away; what returns may turn again."""
+        going = (np.abs(share - 1) > _ARRIVED) & (share > -0.01)
+        return going & (self.fastest < RUNAWAY)
+
+    def watch(self, rows: Indices, share: Float) -> None:
+        """Extrapolate the share to where pulses run away, once they have grown enough."""
+        exponent = self.fastest[rows]
+        rise = exponent - self.watched_exponent[rows]
+        gain = share - self.watched_share[rows]
+        grown = (exponent > _RUNNING) & (rise > _RISE) & (gain > 0)
+        left = np.maximum(RUNAWAY - exponent, 0.0)
+        ahead = share + _CAUTION * left * gain / np.where(grown, rise, 1.0)
+        self.limit[rows] = np.where(grown, ahead, self.limit[rows])
+        restart = (rise > _RISE) | (rise < 0)
+        self.watched_share[rows] = np.where(restart, share, self.watched_share[rows])
+        self.watched_exponent[rows] = np.where(restart, exponent, self.watched_exponent[rows])
+
+
+def _steady_pair(line: Line, points: int, index: Indices, intervals: int) -> Pair:
     system = line.origin.system
-    orbit = Orbit.empty(scheme_for(system), system.size, INTERVALS, points)
-    orbit.mesh[:] = np.linspace(0, 2 * np.pi, INTERVALS + 1)[:, None]
+    orbit = Orbit.empty(scheme_for(system), system.size, intervals, points)
+    orbit.mesh[:] = np.linspace(0, 2 * np.pi, intervals + 1)[:, None]
     steady = jax.jit(lambda s: s.steady())(system)
     orbit.centre[:] = np.broadcast_to(np.asarray(steady), orbit.centre.shape)
     t = np.zeros(points)
     tangent = Tangent(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.zeros(points))
     for part, found in run_chunks(first_tangent, (line, orbit, t), index, _CHUNK):
         put(tangent, part, found)
-    pair = Pair(orbit, np.zeros(points), Point(orbit, t, tangent))
-    lengths = np.full(points, _FIRST)
-    pair = jax.tree.map(np.array, pair)
-    for part, found in run_chunks(straight, (line, pair.point, lengths), index, _CHUNK):
+    pair = jax.tree.map(np.array, Pair(orbit, t, Point(orbit, t, tangent)))
+    inputs = (line, pair.point, np.full(points, _FIRST))
+    for part, found in run_chunks(straight, inputs, index, _CHUNK):
         put(pair, part, found)
     return pair
 
 
-def _pursue_chunk(line: Line, pair: Pair) -> Pursuit:
-    """Follow the points of a chunk, each with its own steps."""
-    points = len(pair.t_before)
-    everyone = np.arange(points)
-    ratio, last = np.ones(points), np.full(points, _FIRST)
-    failures, active = np.zeros(points, int), np.ones(points, bool)
-    fold, farthest = np.full(points, np.nan), np.zeros(points)
-    fastest = np.zeros(points)
-    advance = jax.tree_util.Partial(moving_step, max_steps=_NEWTON_STEPS)
-    for _ in range(_MOST_STEPS):
-        at = np.flatnonzero(active)
+def _follow(line: Line, pair: Pair, walked: _Walked, index: Indices, most_steps: int) -> None:
+    """Follow the points `index` in place, each with its own steps."""
+    advance = partial(moving_step, max_steps=_NEWTON_STEPS)
+    for _ in range(most_steps):
+        at = index[(walked.walking(pair.point.t) & (walked.failures < _GIVE_UP))[index]]
         if not len(at):
             break
-        ratio = _towards_the_end(pair, ratio)
-        for part, step in run_chunks(advance, (line, pair, ratio), at, _CHUNK):
+        walked.ratio[:] = _towards_the_end(pair, walked.ratio, walked.failures)
+        chunk = _SMALL_CHUNK if len(at) <= _SMALL_CHUNK else _CHUNK
+        for part, step in run_chunks(advance, (line, pair, walked.ratio), at, chunk):
             good = (step.error < _ACCEPTED) & (step.miss < _MISS)
             kept, chosen = part[good], np.flatnonzero(good)
             turned = pair.point.tangent.t[kept] * step.next.point.tangent.t[chosen] < 0
             extremum = np.where(turned, _extremum(pair, step, kept, chosen), np.nan)
-            fold[kept] = np.fmax(fold[kept], extremum)
+            walked.fold[kept] = np.fmax(walked.fold[kept], extremum)
             put(pair, kept, take(step.next, chosen))
-            farthest[kept] = np.maximum(farthest[kept], pair.point.t[kept])
-            last[kept], fastest[kept] = step.length[chosen], step.fastest[chosen]
-            failures[part] = np.where(good, 0, failures[part] + 1)
-            ratio[part] = _next_ratio(ratio[part], good, step.iterations, step.length)
-        stuck = active & (failures >= _RESTART)
-        if stuck.any():
-            lengths = last * 0.1 * _SHRINKAGE ** (failures - _RESTART)
-            fresh = jax.tree.map(np.array, straight((line, pair.point, lengths)))
-            put(pair, everyone[stuck], take(fresh, np.flatnonzero(stuck)))
-            ratio[stuck] = 1.0
-        here = pair.point.t
-        active &= (np.abs(here - 1) > _ARRIVED) & (here > -0.01) & (fastest < RUNAWAY)
-        active &= failures < _GIVE_UP
-    return Pursuit(pair.point.orbit, pair.point.t, fold, farthest, fastest)
+            share = pair.point.t[kept]
+            walked.farthest[kept] = np.maximum(walked.farthest[kept], share)
+            walked.last[kept], walked.fastest[kept] = step.length[chosen], step.fastest[chosen]
+            walked.watch(kept, share)
+            walked.failures[part] = np.where(good, 0, walked.failures[part] + 1)
+            walked.ratio[part] = _next_ratio(walked.ratio[part], good, step.iterations, step.length)
+        stuck = at[walked.failures[at] >= _RESTART]
+        lengths = walked.last * 0.1 * _SHRINKAGE ** (walked.failures - float(_RESTART))
+        for part, fresh in run_chunks(straight, (line, pair.point, lengths), stuck, _CHUNK):
+            put(pair, part, fresh)
+        walked.ratio[stuck] = 1.0
 
 
-def _towards_the_end(pair: Pair, ratio: Float) -> Float:
+def _towards_the_end(pair: Pair, ratio: Float, failures: NDArray[np.int_]) -> Float:
     """Steps that are not predicted to pass the amplitude asked for; back where one passed it."""
     last, left = pair.point.t - pair.t_before, 1 - pair.point.t
     near = (last != 0) & (np.abs(left) < _NEAR)
     near |= (last > 0) & ((ratio * last > left) | (left < 0))
     secant = left / np.where(near, last, 1.0)
-    return np.where(near, np.clip(secant, -1.0, 2.0), ratio)
+    # What has just failed is not tried again.
+    longest = np.where(failures > 0, np.abs(ratio), 2.0)
+    return np.where(near, np.clip(secant, -np.minimum(longest, 1.0), longest), ratio)
 
 
 def _next_ratio(ratio: Float, good: NDArray[np.bool_], iterations: Float, length: Float) -> Float:
