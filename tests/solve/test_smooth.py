@@ -9,6 +9,11 @@ from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity.laws import ElastoPlastic, RiceRuina
+from asperity.solve.floquet import log_multipliers
+from asperity.solve.kernels import Problem
+from asperity.solve.multipliers import _map_by_pieces
+from asperity.solve.periodic import flatten
+from asperity.solve.smooth import smooth_orbits
 
 MU0, A, B, D0, V0, W0 = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0
 Kc = (B - A) * W0 / D0
@@ -114,3 +119,19 @@ def test_pulses_are_left_to_other_methods():
     left = respond(10.0, 0.5, [0.3, 0.6, 0.9])
     assert not left.converged.any()
     assert np.isnan(left.mean_friction).all()
+
+
+def test_multipliers_piece_by_piece_are_those_of_the_whole():
+    """A product of maps is the same in whatever order neighbours are multiplied."""
+    found = respond(40.0, 1.4, 0.4)
+    assert found.converged
+    problem, _ = flatten(Problem(found.motion, found.load))
+    orbit = smooth_orbits(problem, np.arange(1)).orbit
+    matrix, log_scale, log_determinant = _map_by_pieces((problem, orbit), parts=9)
+    # The determinant knows nothing of the maps.
+    sign, by_maps = np.linalg.slogdet(matrix[..., 0])
+    assert sign == 1
+    assert by_maps + 2 * log_scale == pytest.approx(log_determinant, rel=1e-9)
+    logs = log_multipliers(matrix, log_scale, log_determinant)
+    # Of multipliers below 1e-12 no more was asked than that they vanish.
+    np.testing.assert_allclose(logs[:, 0], found.log_multipliers, atol=1e-6)

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import (
-    add_setting,
-    json_option,
-    material_named,
-    material_option,
-    set_option,
-    settings_of,
-)
+from asperity.cli.options import json_option, law_named, material_named, point_options
 from asperity.errors import InputError, closest
 
 if TYPE_CHECKING:
@@ -39,18 +32,7 @@ stability boundary with the bifurcation and the frequency of its mode.
 @click.option("--y", "y", metavar="AXIS", help='Number along y, like "K=0.05:0.5:200 N/um".')
 @click.option("--log-x", is_flag=True, help="Points along x at equal ratios.")
 @click.option("--log-y", is_flag=True, help="Points along y at equal ratios.")
-@click.option("--law", metavar="NAME", help="Friction law, such as elasto-plastic.")
-@material_option()
-@click.option("-V", "--velocity", metavar="VALUE", help='Pulling velocity, like "1 um/s".')
-@click.option("-e", "--epsilon", metavar="VALUE", help="Relative amplitude of the load, 0 to < 1.")
-@click.option("-f", "--frequency", metavar="VALUE", help='Modulation frequency, like "120 Hz".')
-@click.option("--inertia", is_flag=True, help="Let the mass of the slider count.")
-@click.option(
-    "--radiation-damping",
-    metavar="VALUE",
-    help='Force of radiated waves per velocity, like "500 N*s/m".',
-)
-@set_option('--set A=0.013 --set "K=0.3 N/um"')
+@point_options
 @click.option("--out", type=Path, metavar="NC", help="Where the map goes, as NetCDF.")
 @click.option("--plot", type=Path, metavar="PNG", help="Where a picture goes.")
 @click.option(
@@ -69,12 +51,7 @@ def map(
     log_y: bool,
     law: str | None,
     material: str | None,
-    velocity: str | None,
-    epsilon: str | None,
-    frequency: str | None,
-    inertia: bool,
-    radiation_damping: str | None,
-    settings: tuple[str, ...],
+    given: dict[str, str],
     out: Path | None,
     plot: Path | None,
     show: str,
@@ -86,16 +63,6 @@ def map(
     The boundary is located to 1e-4 of the axes or better, with the bifurcation and the frequency
     of the mode at each of its points.
     """
-    given = settings_of(settings)
-    options = {
-        "V": velocity,
-        "epsilon": epsilon,
-        "frequency": frequency,
-        "inertia": "1" if inertia else None,
-        "eta": radiation_damping,
-    }
-    for name, value in options.items():
-        add_setting(given, name, value)
     _check_outputs(out, plot, show)
     found = _solve(law, material, given, (x, log_x), (y, log_y), out, resume)
     if plot is not None:
@@ -128,14 +95,10 @@ def _solve(
     resume: bool,
 ) -> xarray.Dataset:
     from asperity.cli.progress import bar
-    from asperity.laws import registered
     from asperity.study.map import Axis, write_map
     from asperity.study.operating_point import refuse_foreign, sourced_numbers
 
-    if law is None:
-        raise InputError(
-            f"--law must be given, got nothing; choose one of {', '.join(sorted(registered()))}"
-        )
+    law = law_named(law)
     axes = []
     for option, (text, log) in (("--x", x), ("--y", y)):
         if text is None:

@@ -7,14 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import (
-    add_setting,
-    json_option,
-    material_named,
-    material_option,
-    set_option,
-    settings_of,
-)
+from asperity.cli.options import json_option, law_named, material_named, point_options
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
@@ -40,18 +33,7 @@ are kept. A row that cannot be solved says why in the column 'result'.
 
 
 @click.command(epilog=_EPILOG)
-@click.option("--law", metavar="NAME", help="Friction law, such as elasto-plastic.")
-@material_option()
-@click.option("-V", "--velocity", metavar="VALUE", help='Pulling velocity, like "1 um/s".')
-@click.option("-e", "--epsilon", metavar="VALUE", help="Relative amplitude of the load, 0 to < 1.")
-@click.option("-f", "--frequency", metavar="VALUE", help='Modulation frequency, like "120 Hz".')
-@click.option("--inertia", is_flag=True, help="Let the mass of the slider count.")
-@click.option(
-    "--radiation-damping",
-    metavar="VALUE",
-    help='Force of radiated waves per velocity, like "500 N*s/m".',
-)
-@set_option('--set A=0.013 --set "K=0.3 N/um"')
+@point_options
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
 @click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
@@ -59,12 +41,7 @@ are kept. A row that cannot be solved says why in the column 'result'.
 def response(
     law: str | None,
     material: str | None,
-    velocity: str | None,
-    epsilon: str | None,
-    frequency: str | None,
-    inertia: bool,
-    radiation_damping: str | None,
-    settings: tuple[str, ...],
+    given: dict[str, str],
     table: Path | None,
     out: Path | None,
     resume: bool,
@@ -75,16 +52,6 @@ def response(
     Mean friction, harmonics of the force and Floquet multipliers of the periodic orbit, be it
     stable or not; without inertia unless it is asked for.
     """
-    given = settings_of(settings)
-    options = {
-        "V": velocity,
-        "epsilon": epsilon,
-        "frequency": frequency,
-        "inertia": "1" if inertia else None,
-        "eta": radiation_damping,
-    }
-    for name, value in options.items():
-        add_setting(given, name, value)
     if table is not None:
         if out is None:
             raise InputError("--out must be given with --table, got nothing; name the output file")
@@ -98,7 +65,7 @@ def response(
 
 def _point(law: str | None, material: str | None, given: dict[str, str], as_json: bool) -> int:
     from asperity.cli.report import response_record, to_json
-    from asperity.laws import get_law, registered
+    from asperity.laws import get_law
     from asperity.study.operating_point import (
         numbers_for,
         quantities,
@@ -107,10 +74,7 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
         sourced_numbers,
     )
 
-    if law is None:
-        raise InputError(
-            f"--law must be given, got nothing; choose one of {', '.join(sorted(registered()))}"
-        )
+    law = law_named(law)
     refuse_foreign(law, given)
     numbers = numbers_for(law, sourced_numbers(given, material_named(material), "command line"))
     found = respond(get_law(law), {name: number.value for name, number in numbers.items()})

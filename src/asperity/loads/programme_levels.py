@@ -109,15 +109,16 @@ class Levels(Segment):
     @property
     def lowest_load(self) -> float:
         """Of either end of the level, at the larger amplitude."""
-        end = self.load1 + self.load_rate * self.duration
+        begin, rate = float(self.load1), float(self.load_rate)
         epsilon = max(abs(float(self.epsilon1)), abs(float(self.epsilon2)))
-        return min(float(level) * (1 - epsilon) for level in (self.load1, end))
+        return min(begin, begin + rate * float(self.duration)) * (1 - epsilon)
 
     @property
     def fastest_pull(self) -> float:
         """Of either end."""
-        end = self.pull1 + self.pull_rate * self.duration
-        return max(abs(float(v)) for v in (self.pull1, end)) * (1 + abs(float(self.epsilon_v)))
+        begin, rate = float(self.pull1), float(self.pull_rate)
+        fastest = max(abs(begin), abs(begin + rate * float(self.duration)))
+        return fastest * (1 + abs(float(self.epsilon_v)))
 
     @property
     def longest_step(self) -> float:

@@ -17,13 +17,16 @@ from asperity.solve.collocation import (
     NewtonResult,
     averaged_orbit,
     collocation_response,
+    condense,
+    localise,
     newton_orbit,
     refined,
+    transfer_maps,
 )
 from asperity.solve.fourier import fourier_orbit
 from asperity.solve.fourier_reading import fourier_response, fourier_start, fourier_waveform
 from asperity.solve.lift import lifted
-from asperity.solve.linear import jacobian_columns, spectral_radius
+from asperity.solve.linear import jacobian_columns, product, spectral_radius
 from asperity.solve.mesh import Orbit, evaluate, split
 
 #: Bounds on an exponent's change per Newton step: bold from a rough guess, since the change of
@@ -221,6 +224,28 @@ def split_reading(problem_and_orbit: tuple[Problem, Orbit], *, parts: int) -> Re
     """Multipliers by transfer maps over parts of the intervals, for stiff but smooth orbits."""
     problem, orbit = problem_and_orbit
     return _read(problem, split(orbit, parts), 1, 0)
+
+
+@partial(jax.jit, static_argnames=("parts",))
+def piece_map(problem_and_piece: tuple[Problem, Orbit], *, parts: int) -> tuple[Array, Array]:
+    """Transfer map (n, n, points) over a piece of an orbit, and the logarithm of its scale.
+
+    From maps over the parts that each interval of the piece is cut into.
+    """
+    problem, piece = problem_and_piece
+    fine = split(piece, parts)
+    (response,) = condense(localise(*problem, fine), fine)
+    maps, log_scale = transfer_maps(response, fine), jnp.zeros(_points(problem))
+    while maps.shape[2] > 1:  # neighbours first: much is done side by side
+        if maps.shape[2] % 2:
+            identity = jnp.broadcast_to(jnp.eye(len(maps))[..., None, None], maps[:, :, :1].shape)
+            maps = jnp.concatenate([maps, identity], axis=2)
+        maps = product(maps[:, :, 1::2], maps[:, :, ::2])
+        size = jnp.abs(maps).max((0, 1))
+        size = jnp.where(size > 0, size, 1.0)
+        maps = maps / size
+        log_scale = log_scale + jnp.log(size).sum(0)
+    return maps[:, :, 0], log_scale
 
 
 def _newton(problem: Problem, guess: Orbit, max_steps: int) -> NewtonResult:

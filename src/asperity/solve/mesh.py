@@ -51,6 +51,15 @@ class Orbit(eqx.Module):
             scheme,
         )
 
+    def piece(self, start: int, stop: int) -> Orbit:
+        """Its intervals from `start` to before `stop`."""
+        return dataclasses.replace(
+            self,
+            mesh=self.mesh[start : stop + 1],
+            nodes=self.nodes[:, start:stop],
+            slopes=self.slopes[:, :, start:stop],
+        )
+
     def moved(self, **parts: Array) -> Orbit:
         """The same with other arrays."""
         return dataclasses.replace(self, **parts)

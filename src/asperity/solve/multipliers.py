@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.solve.batch import Indices, run_chunks
-from asperity.solve.floquet import LARGEST_LOG, from_logs
+from asperity.solve.floquet import LARGEST_LOG, from_logs, log_multipliers
 from asperity.solve.found import Found, logs_of
-from asperity.solve.kernels import Problem, Reading, split_reading
+from asperity.solve.kernels import Problem, Reading, piece_map, read_orbit, split_reading
 from asperity.solve.mesh import Orbit
 from asperity.solve.outcome import Outcome
 
@@ -19,12 +19,16 @@ from asperity.solve.outcome import Outcome
 #: times the intervals its own error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
 AGREEMENT = 2e-7
 
-#: Each interval is cut into 3, 9, 27... parts for finer transfer maps, up to this number in all.
-_MOST_INTERVALS = 35_000
+#: Each interval is cut into 3, 9, 27... parts for finer transfer maps, up to these numbers in all:
+#: of all intervals at once, and of one after the other.
+_MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 5_000_000
 
 #: Interval-points in a chunk, for up to two states and for more: keeps the working set of
 #: collocation within a core's cache.
 _CHUNK_INTERVALS = (1536, 384)
+
+#: Points in a call for which each interval is cut into many parts.
+_FEW = 4
 
 #: Multipliers below this modulus are compared absolutely: no experiment sees them. Two have their
 #: product from Liouville's formula; of more the small ones drown in the round-off of the large.
@@ -61,7 +65,7 @@ def resolve_by_splitting(
 ) -> None:
     """Settle the multipliers of resolved orbits on ever finer transfer maps."""
     intervals = orbit.mesh.shape[0] - 1
-    splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_INTERVALS]
+    splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_AT_ONCE]
     for parts in splits:
         solve = partial(split_reading, parts=parts)
         chunk = max(1, chunk_size(intervals * parts, problem.system.size))
@@ -87,6 +91,50 @@ def resolve_by_splitting(
         index = index[found.outcome[block[index]] != Outcome.CONVERGED]
         if not len(index):
             return
+
+
+def resolve_piece_by_piece(
+    problem: Problem, found: Found, block: Indices, orbit: Orbit, index: Indices
+) -> None:
+    """Settle what is left by products of transfer maps so fine that they are never all kept.
+
+    For slow modulation, under which a disturbance turns or grows by many thousand radians or
+    factors of e in a period, and yet is about as large at its end as in the beginning.
+    """
+    intervals = orbit.mesh.shape[0] - 1
+    parts = next(3**k for k in range(20) if intervals * 3**k > _MOST_AT_ONCE)
+    while len(index) and intervals * parts <= _MOST_INTERVALS:
+        solve = partial(_map_by_pieces, parts=parts)
+        for part, monodromy in run_chunks(solve, (problem, orbit), index, _FEW):
+            logs, rows = log_multipliers(*monodromy), block[part]
+            gaps = [
+                multiplier_gap(found.log_multipliers[:, row], logs[:, k])
+                for k, row in enumerate(rows)
+            ]
+            found.log_multipliers[:, rows], found.detail[rows] = logs, gaps
+            found.outcome[rows[np.array(gaps) <= AGREEMENT]] = Outcome.CONVERGED
+        index = index[found.outcome[block[index]] != Outcome.CONVERGED]
+        parts *= 3
+
+
+def _map_by_pieces(
+    inputs: tuple[Problem, Orbit], *, parts: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Monodromy matrix, logarithm of its scale, and logarithm of the determinant."""
+    problem, orbit = inputs
+    size, points = orbit.centre.shape
+    whole = np.repeat(np.eye(size)[..., None], points, axis=2)
+    log_scale = np.zeros(points)
+    for k in range(orbit.mesh.shape[0] - 1):
+        step, log_step = piece_map((problem, orbit.piece(k, k + 1)), parts=parts)
+        # On maps that miss growth within a part the product may be lost; then no two agree.
+        with np.errstate(all="ignore"):
+            whole = np.einsum("ijb,jkb->ikb", step, whole)
+            largest = np.abs(whole).max((0, 1))
+            whole = whole / largest
+            log_scale = log_scale + np.asarray(log_step) + np.log(largest)
+    reading = read_orbit(inputs, harmonics=1)
+    return whole, log_scale, np.asarray(reading.log_determinant)
 
 
 def _overflowing_logs(size: int, log_determinant: Any) -> NDArray[np.complex128]:

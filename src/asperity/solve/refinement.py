@@ -23,6 +23,7 @@ from asperity.solve.multipliers import (
     chunk_size,
     multiplier_gap,
     resolve_by_splitting,
+    resolve_piece_by_piece,
     settle_beyond_doubles,
 )
 from asperity.solve.outcome import Outcome
@@ -125,6 +126,8 @@ def accept(problem: Problem, found: Found, rows: Indices, orbit: Orbit, options:
     found.outcome[rows[index]] = Outcome.MULTIPLIERS_NOT_RESOLVED
     if len(index):
         resolve_by_splitting(problem, found, rows, orbit, index)
+        index = index[found.outcome[rows[index]] != Outcome.CONVERGED]
+        resolve_piece_by_piece(problem, found, rows, orbit, index)
     lost = rows[found.outcome[rows] != Outcome.CONVERGED]
     found.discard(lost)
     options.progress(len(rows) - len(lost))

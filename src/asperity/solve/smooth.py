@@ -125,8 +125,11 @@ def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices
     for _ in range(most_steps):
         if not len(at):
             break
-        rates, jacobian, felt = (np.asarray(a)[..., at] for a in _linearised(problem, Y))
-        gap = rates - np.einsum("kl,nlb->nkb", derivative, Y[..., at])
+        rates, jacobian, felt = (np.asarray(a) for a in _linearised(problem, Y))
+        finite = np.isfinite(rates).all((0, 1)) & np.isfinite(jacobian).all((0, 1, 2))
+        at = at[finite[at]]
+        jacobian, felt = jacobian[..., at], felt[..., at]
+        gap = rates[..., at] - np.einsum("kl,nlb->nkb", derivative, Y[..., at])
         try:
             step = _solved(jacobian, derivative, gap)
         except np.linalg.LinAlgError:

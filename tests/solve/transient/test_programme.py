@@ -1,5 +1,8 @@
 """Programmes of load and drive: what the steps amount to."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from scipy.integrate import quad
@@ -35,6 +38,19 @@ def test_steps_follow_each_other() -> None:
     # 1 + 0 + 1 + 3 + 6 + 8 micrometres.
     assert p.position(11.0) == pytest.approx(19e-6, rel=1e-14)
     assert p.last == (5.0, 1e-6)
+
+
+def test_a_programme_laid_out_before_anything_else_is_in_double_precision() -> None:
+    lines = (
+        "from asperity.loads import Modulate, Programme",
+        "p = Programme(Modulate('1 s', 0.24, '120 Hz'), load=7.1, velocity=1.1e-6)",
+        "print(float(p.velocity(0.5)), float(p.segments[0].epsilon1))",
+    )
+    # In a process of its own: here other modules have switched double precision on.
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(lines)], check=True, capture_output=True, text=True
+    )
+    assert done.stdout.split() == ["1.1e-06", "0.24"]
 
 
 def test_at_a_break_point_the_value_after_it_counts_however_times_are_rounded() -> None:

@@ -97,6 +97,8 @@ class _Writer:
 
     def __init__(self, march: March, rows: int) -> None:
         self._march, self._rows = march, rows
+        motion = march.motion
+        self._scales = float(motion.slider.W0), float(motion.slider.K), float(motion.V)
         self.events: list[Event] = []
         self.reached = march.checkpoint
         self._sampled = march.checkpoint.sampled
@@ -116,8 +118,7 @@ class _Writer:
         # Contact lost at a break point itself leaves nothing to read.
         if len(times) == 0 or len(stretch.pieces.begin) == 0:
             return
-        motion, checkpoint = self._march.motion, stretch.checkpoint
-        W0, K, V = (float(a) for a in (motion.slider.W0, motion.slider.K, motion.V))
+        checkpoint, (W0, K, V) = stretch.checkpoint, self._scales
         t = np.clip(times - stretch.start, 0.0, stretch.end)
         Y = stretch.pieces.evaluate(t)
         now = read(stretch.system, t, Y)

@@ -123,11 +123,9 @@ def read(system: System, t: np.ndarray, Y: np.ndarray) -> Reading:
     parts = []
     most = next((room for room in ROOMS if len(t) <= room), ROOMS[-1])
     for i in range(0, max(len(t), 1), most):
-        part = slice(i, i + most)
-        room = (0, most - len(t[part]))
         # The last instant again, where there are none left: one program for any number.
-        whole = np.pad(t[part], room, mode="edge"), np.pad(Y[:, part], ((0, 0), room), mode="edge")
-        parts.append(np.asarray(_read_points(system, *whole))[:, : len(t[part])])
+        part = np.minimum(np.arange(i, i + most), len(t) - 1)
+        parts.append(np.asarray(_read_points(system, t[part], Y[:, part]))[:, : len(t) - i])
     return Reading(*np.concatenate(parts, axis=1))
 
 

@@ -39,7 +39,7 @@ class _Tableau(NamedTuple):
     E3: np.ndarray
     extra_A: np.ndarray  # (3, 16)
     extra_C: np.ndarray  # (3,)
-    D: np.ndarray  # (4, 16)
+    powers: np.ndarray  # (8, 16): dense output in rising powers, of all stages
 
 
 @cache
@@ -47,6 +47,8 @@ def _tableau() -> _Tableau:
     # SciPy's integrators take a while to load, and only transients need them.
     from scipy.integrate import DOP853 as METHOD
 
+    change, first, last = np.append(METHOD.B, np.zeros(4)), np.eye(16)[0], np.eye(16)[12]
+    F = np.vstack([change, first - change, 2 * change - last - first, METHOD.D])
     return _Tableau(
         A=np.vstack([METHOD.A[:12, :12], METHOD.B[:12]]),
         C=np.append(METHOD.C[:12], 1.0),
@@ -54,7 +56,7 @@ def _tableau() -> _Tableau:
         E3=np.asarray(METHOD.E3),
         extra_A=np.asarray(METHOD.A_EXTRA),
         extra_C=np.asarray(METHOD.C_EXTRA),
-        D=np.asarray(METHOD.D),
+        powers=_power_basis() @ F,
     )
 
 
@@ -66,9 +68,6 @@ def _power_basis() -> np.ndarray:
         factor = factor * (x if i % 2 == 0 else rest)
         matrix[: len(factor.coef), i] = factor.coef
     return matrix
-
-
-_POWERS = _power_basis()
 
 
 def advance(
@@ -137,15 +136,11 @@ def _combined(weights: np.ndarray, stages: Array) -> Array:
 def _dense(system: System, begin: Array, length: Array, states: Array, stages: Array) -> Array:
     """Polynomials of all steps at once, shape (STEPS, 8, size)."""
     table = _tableau()
-    h = length[:, None]
+    # Steps last: what is done to all of them runs along memory.
+    states, stages = states.T, jnp.moveaxis(stages, 0, -1)
     for row, c in zip(table.extra_A, table.extra_C, strict=True):
-        reached = stages.shape[1]
-        inner = states + h * jnp.einsum("k,skn->sn", row[:reached], stages)
-        slope = system.rates(system.at(begin + c * length), inner.T).T
-        stages = jnp.concatenate([stages, slope[:, None]], axis=1)
-    change = h * jnp.einsum("k,skn->sn", table.A[12], stages[:, :12])
-    first, last = h * stages[:, 0], h * stages[:, 12]
-    high = h[:, None] * jnp.einsum("ik,skn->sin", table.D, stages)
-    F = jnp.stack([change, first - change, 2 * change - last - first], axis=1)
-    powers = jnp.einsum("pi,sin->spn", _POWERS, jnp.concatenate([F, high], axis=1))
-    return powers.at[:, 0].add(states)
+        inner = states + length * jnp.tensordot(row[: len(stages)], stages, 1)
+        slope = system.rates(system.at(begin + c * length), inner)
+        stages = jnp.concatenate([stages, slope[None]])
+    powers = length * jnp.tensordot(table.powers, stages, 1)
+    return jnp.moveaxis(powers.at[0].add(states), -1, 0)

@@ -128,8 +128,10 @@ def _extrapolated(last: _Last, Y: Array, h: Array) -> Array:
     # Far beyond its step a polynomial tells nothing; before the first there is none.
     near = h < 3 * last.length
     share = 1 + h / jnp.where(near, last.length, h) * jnp.asarray(_tableau().c)
-    ahead = (share[:, None] ** np.arange(STAGES + 1)) @ last.polynomial
-    return jnp.where(near, ahead.T - Y[:, None], 0.0)
+    ahead = last.polynomial[STAGES][:, None]
+    for power in range(STAGES - 1, -1, -1):
+        ahead = ahead * share + last.polynomial[power][:, None]
+    return jnp.where(near, ahead - Y[:, None], 0.0)
 
 
 def _step(
@@ -179,12 +181,14 @@ def _step(
 
 def _largest_eigenvalue(matrix: Array) -> Array:
     """Modulus, from above: limit of |matrix^k|^(1/k)."""
-    log = jnp.zeros(())
-    for i in range(_SQUARINGS):
-        size = jnp.abs(matrix).max() + 1e-300
-        log = log + jnp.log(size) / 2**i
-        matrix = product(matrix / size, matrix / size)
-    return jnp.exp(log + jnp.log(jnp.abs(matrix).max() + 1e-300) / 2**_SQUARINGS)
+    sizes = []
+    for _ in range(_SQUARINGS):
+        sizes.append(jnp.abs(matrix).max() + 1e-300)
+        matrix = product(matrix / sizes[-1], matrix / sizes[-1])
+    root = jnp.abs(matrix).max()
+    for size in reversed(sizes):
+        root = size * jnp.sqrt(root)
+    return root
 
 
 def _left(size: Array, rate: Array) -> Array:

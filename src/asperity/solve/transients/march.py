@@ -186,7 +186,7 @@ class March:
     def _standstill(self, system: System, start: float, stop: Stop) -> Stretch:
         """A stop before the first step of a segment."""
         size = self.motion.size + 1
-        nothing = Pieces(np.empty(0), np.empty(0), np.empty((0, 2, size)))
+        nothing = Pieces(np.empty(0), np.empty(0), np.empty((2, size, 0)))
         here = self.checkpoint
         events = [Event(stop.time, stop.kind)]
         return Stretch(system, start, nothing, here.t, events, stop, False, here)

@@ -32,8 +32,9 @@ _ALLOWED = frozenset((
     "abs", "add", "add_any", "and", "asinh", "broadcast_in_dim", "clamp", "concatenate",
     "convert_element_type", "copy", "cos", "cosh", "div", "eq", "exp", "exp2", "expm1", "floor",
     "ge", "gt", "integer_pow", "is_finite", "le", "log", "log1p", "lt", "max", "min", "mul", "ne",
-    "neg", "not", "or", "pow", "reduce_sum", "rem", "reshape", "round", "select_n", "sign", "sin", "sinh",
-    "slice", "sqrt", "square", "squeeze", "stack", "stop_gradient", "sub", "tan", "tanh", "xor",
+    "neg", "not", "or", "pow", "reduce_sum", "rem", "reshape", "round", "select_n", "sign", "sin",
+    "sinh", "slice", "sqrt", "square", "squeeze", "stack", "stop_gradient", "sub", "tan", "tanh",
+    "xor",
 ))
 # fmt: on
 

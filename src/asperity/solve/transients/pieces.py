@@ -8,7 +8,7 @@ import numpy as np
 from jax import Array
 
 #: Steps that a compiled program takes before it hands over what it has.
-STEPS = 1024
+STEPS = 2048
 
 #: Parts of every step at whose ends is looked for what happens.
 PARTS = 4
@@ -54,7 +54,14 @@ class Chunk(NamedTuple):
 
 
 class Pieces(NamedTuple):
-    """Steps one after the other; arrays as in `Chunk`, without what is meaningless."""
+    """Steps one after the other, as in `Chunk`, without what is meaningless.
+
+    Attributes
+    ----------
+    begin, length : array, shape (steps,)
+    coefficients : array, shape (degree + 1, size, steps)
+        Steps last, so that many instants are evaluated along memory.
+    """
 
     begin: np.ndarray
     length: np.ndarray
@@ -63,8 +70,8 @@ class Pieces(NamedTuple):
     @classmethod
     def of(cls, chunk: Chunk) -> Pieces:
         """The steps of a chunk."""
-        kept = slice(int(chunk.taken))
-        return cls(*(np.asarray(a)[kept] for a in chunk[:3]))
+        begin, length, coefficients = (np.asarray(a)[: int(chunk.taken)] for a in chunk[:3])
+        return cls(begin, length, np.ascontiguousarray(np.moveaxis(coefficients, 0, -1)))
 
     @property
     def end(self) -> float:
@@ -75,10 +82,10 @@ class Pieces(NamedTuple):
         """States at the times `t`, shape (size, n), within the pieces."""
         i = np.clip(np.searchsorted(self.begin, t, side="right") - 1, 0, len(self.begin) - 1)
         share = (t - self.begin[i]) / self.length[i]
-        value = self.coefficients[i, -1]
-        for k in range(self.coefficients.shape[1] - 2, -1, -1):
-            value = value * share[:, None] + self.coefficients[i, k]
-        return value.T
+        value = self.coefficients[-1].take(i, axis=1)
+        for coefficient in self.coefficients[-2::-1]:
+            value = value * share + coefficient.take(i, axis=1)
+        return value
 
     def refined(self) -> np.ndarray:
         """Times that divide every step in `PARTS`, with the end, shape (PARTS count + 1,)."""

@@ -86,7 +86,8 @@ def _scalar(value: Any) -> jnp.ndarray:
             f"slider must be a single one for a transient, got parameters of shape "
             f"{np.shape(value)}; call it once for each"
         )
-    return jnp.reshape(jnp.asarray(value, float), ())
+    number = jnp.asarray(value, float)
+    return number if number.ndim == 0 else number.reshape(())
 
 
 def _positive(value: Any, kind: str, name: str) -> float:
