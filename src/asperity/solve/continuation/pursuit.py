@@ -35,7 +35,7 @@ RUNAWAY = 13.0
 #: Points in a call, and in one where few are left.
 _CHUNK, _SMALL_CHUNK = 16, 4
 #: Steps on each mesh.
-_MOST_STEPS = (250, 350)
+_MOST_STEPS = (250, 1000)
 #: Distance from the amplitude asked for below which steps aim at it, and at which it is reached.
 _NEAR, _ARRIVED = 1e-2, 1e-6
 #: A branch this far back from a fold, as a share of the amplitude, is on its way back.
@@ -53,8 +53,8 @@ _RESTART, _GIVE_UP = 4, 10
 #: Exponent from which pulses grow steadily if they do, its rise over which the share is watched,
 #: and how many times farther the share may get than where that leads.
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
-#: Growth that makes round-off as large as the orbit.
-_ROUND_OFF = 36.0
+#: Growth by which the error of a mesh becomes as large as the orbit.
+_HELD = 20.0
 
 
 class Pursuit(NamedTuple):
@@ -106,8 +106,8 @@ class Pursuit(NamedTuple):
 
     @property
     def sensitive(self) -> NDArray[np.bool_]:
-        """Whether the branch was lost where double precision cannot hold its orbits."""
-        return ~(self.arrived | self.folded | self.ran_away) & (self.growth > _ROUND_OFF)
+        """Whether the branch was lost where neither mesh nor experiment can hold its orbits."""
+        return ~(self.arrived | self.folded | self.ran_away) & (self.growth > _HELD)
 
     @property
     def end(self) -> Float:
