@@ -51,7 +51,8 @@ _GRIDS = ((5.0, 24, 0.3), (9.5, 28, 0.3), (18.0, 32, 0.3), (300.0, 128, 0.5))
 _FOURIER_CHUNK = 4 * FAST_BLOCK
 #: Error that the fast method must reach.
 _FOURIER_ERROR = 1e-9
-#: Rate per radian above which Fourier collocation cannot contract, from experience.
+#: Rate per radian above which Fourier collocation cannot contract, from experience, and from which
+#: modulation counts as slow.
 _FOURIER_STIFFNESS = 1.0
 
 #: Points whose orbits are kept in memory at a time.
@@ -138,11 +139,18 @@ def _measured(measure: Callable[[Problem], Any], problem: Problem, index: Indice
 
 def _smooth(problem: Problem, found: Found, block: Indices, options: Options) -> Indices:
     """Solve what is smooth of a block; returns the points that are left."""
-    part = take(problem, block)
-    smooth = smooth_orbits(part, np.arange(len(block)))
-    kept = np.flatnonzero(smooth.found)
-    if len(kept):
-        accept(take(part, kept), found, block[kept], take(smooth.orbit, kept), options)
+    system, load = take(problem, block)
+    # Mass and damping make equations stiff too, but not their orbits smooth.
+    sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
+    stiffness = _measured(stiffness_of_steady_sliding, sliding, np.arange(len(block)))
+    slow = np.flatnonzero(stiffness >= _FOURIER_STIFFNESS)
+    if len(slow):
+        part = take(Problem(system, load), slow)
+        smooth = smooth_orbits(part, np.arange(len(slow)))
+        kept = np.flatnonzero(smooth.found)
+        if len(kept):
+            rows = block[slow[kept]]
+            accept(take(part, kept), found, rows, take(smooth.orbit, kept), options)
     return block[found.outcome[block] != Outcome.CONVERGED]
 
 

@@ -13,6 +13,7 @@ that differ by round-off from those asked for.
 from __future__ import annotations
 
 from functools import cache, partial
+from itertools import pairwise
 from typing import NamedTuple
 
 import jax
@@ -43,9 +44,13 @@ _FIRST_STEPS, _NEXT_STEPS = 14, 4
 _LARGEST_CHANGE = 1.5
 #: A Newton change below this was the last that mattered: the next one is its square.
 _CONVERGED = 1e-9
+#: Steps after which a point is given up whose last change was larger.
+_PATIENCE, _FAR = 7, 0.5
 #: Largest change of a state from one series to the next at which the latter is exact: errors fall
 #: exponentially with the nodes.
 _AGREED = 1e-10
+#: The same, as expected of the longest series, from which it is worth a try.
+_HOPEFUL = 1e-8
 
 
 class Smooth(NamedTuple):
@@ -82,11 +87,16 @@ def _solve(problem: Problem, points: int) -> tuple[NDArray[np.complex128], NDArr
     at, exact = np.arange(points), np.zeros(points, bool)
     harmonics = np.zeros((len(Y), NODES[-1] // 2 + 1, points), complex)
     at = _newton(problem, Y, at, _FIRST_STEPS)
-    for nodes in NODES[1:]:
+    error = _last_harmonics(Y)
+    for before, nodes in pairwise(NODES):
+        # Errors fall by equal factors for equal numbers of nodes.
+        at = at[error[at] ** (NODES[-2] / before) < _HOPEFUL]
         guess = _resampled(Y, nodes)
         Y = guess.copy()
         at = _newton(problem, Y, at, _NEXT_STEPS)
-        agreed = np.abs(Y - guess).max((0, 1))[at] < _AGREED
+        gap = np.abs(Y - guess).max((0, 1))
+        error = gap ** (nodes / before)
+        agreed = gap[at] < _AGREED
         kept, at = at[agreed], at[~agreed]
         exact[kept] = True
         harmonics[:, : nodes // 2 + 1, kept] = np.fft.rfft(Y[..., kept], axis=1) / nodes
@@ -122,7 +132,7 @@ def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices
     derivative = _derivative(Y.shape[1])
     logarithmic = [i for i in range(len(Y)) if i not in problem.system.linear]
     done = []
-    for _ in range(most_steps):
+    for count in range(1, most_steps + 1):
         if not len(at):
             break
         rates, jacobian, felt = (np.asarray(a) for a in _linearised(problem, Y))
@@ -140,7 +150,7 @@ def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices
         at, step, change = at[usable], step[..., usable], change[usable]
         Y[..., at] += step * np.minimum(1.0, _LARGEST_CHANGE / np.maximum(change, 1e-300))
         done.append(at[change < _CONVERGED])
-        at = at[change >= _CONVERGED]
+        at = at[(change >= _CONVERGED) & ((count < _PATIENCE) | (change < _FAR))]
     return np.sort(np.concatenate(done)) if done else at[:0]
 
 
@@ -173,6 +183,13 @@ def _derivative(nodes: int) -> Float:
     apart = np.arange(nodes)[:, None] - np.arange(nodes)
     sine = np.sin(np.pi * apart / nodes)
     return np.where(apart == 0, 0.0, 0.5 * (-1.0) ** apart / np.where(apart == 0, 1.0, sine))
+
+
+def _last_harmonics(Y: Float) -> Float:
+    """Size of the last harmonics, about the error of the series."""
+    with np.errstate(invalid="ignore"):
+        harmonics = np.abs(np.fft.rfft(Y, axis=1)) / Y.shape[1]
+        return np.nan_to_num(harmonics[:, -3:].max((0, 1)), nan=1.0, posinf=1.0)
 
 
 def _resampled(Y: Float, nodes: int) -> Float:
