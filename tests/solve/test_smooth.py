@@ -126,7 +126,7 @@ def test_multipliers_piece_by_piece_are_those_of_the_whole():
     found = respond(40.0, 1.4, 0.4)
     assert found.converged
     problem, _ = flatten(Problem(found.motion, found.load))
-    orbit = smooth_orbits(problem, np.arange(1)).orbit
+    orbit = smooth_orbits(problem, 1).orbit
     matrix, log_scale, log_determinant = _map_by_pieces((problem, orbit), parts=9)
     # The determinant knows nothing of the maps.
     sign, by_maps = np.linalg.slogdet(matrix[..., 0])

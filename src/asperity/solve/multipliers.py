@@ -71,15 +71,7 @@ def resolve_by_splitting(
         chunk = max(1, chunk_size(intervals * parts, problem.system.size))
         for part, reading in run_chunks(solve, (problem, orbit), index, chunk):
             logs, rows = logs_of(reading), block[part]
-            gap = np.array(
-                [
-                    multiplier_gap(found.log_multipliers[:, r], logs[:, k])
-                    for k, r in enumerate(rows)
-                ]
-            )
-            found.log_multipliers[:, rows] = logs
-            found.detail[rows] = gap
-            found.outcome[rows[gap <= AGREEMENT]] = Outcome.CONVERGED
+            gap = _hold_against_before(found, rows, logs)
             over = np.flatnonzero(
                 (gap > AGREEMENT) & (reading.log_determinant > _OVERFLOW * len(logs))
             )
@@ -106,15 +98,20 @@ def resolve_piece_by_piece(
     while len(index) and intervals * parts <= _MOST_INTERVALS:
         solve = partial(_map_by_pieces, parts=parts)
         for part, monodromy in run_chunks(solve, (problem, orbit), index, _FEW):
-            logs, rows = log_multipliers(*monodromy), block[part]
-            gaps = [
-                multiplier_gap(found.log_multipliers[:, row], logs[:, k])
-                for k, row in enumerate(rows)
-            ]
-            found.log_multipliers[:, rows], found.detail[rows] = logs, gaps
-            found.outcome[rows[np.array(gaps) <= AGREEMENT]] = Outcome.CONVERGED
+            _hold_against_before(found, block[part], log_multipliers(*monodromy))
         index = index[found.outcome[block[index]] != Outcome.CONVERGED]
         parts *= 3
+
+
+def _hold_against_before(
+    found: Found, rows: Indices, logs: NDArray[np.complex128]
+) -> NDArray[np.float64]:
+    """Write logarithms of multipliers over those of coarser maps; returns how far they differ."""
+    before = found.log_multipliers[:, rows]
+    gap = np.array([multiplier_gap(before[:, k], logs[:, k]) for k in range(len(rows))])
+    found.log_multipliers[:, rows], found.detail[rows] = logs, gap
+    found.outcome[rows[gap <= AGREEMENT]] = Outcome.CONVERGED
+    return gap
 
 
 def _map_by_pieces(

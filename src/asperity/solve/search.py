@@ -1,8 +1,8 @@
 """The search for periodic orbits: from the fast method to the robust one, each where it is needed.
 
 1. Fourier collocation, on a grid as fine as the slip pulse needs, for points whose orbit moves
-   little within a period.
-2. Fourier series solved directly, for smooth orbits however stiff their equations: slow modulation.
+   little within a period; with inertia on elastic asperities shooting takes its place.
+2. Fourier series solved directly, for slow modulation: smooth orbits, however stiff the equations.
 3. Collocation with Newton's method from the averaged limit.
 4. Collocation along a path in amplitude; along the branch from steady sliding, by its arclength;
    along a path in frequency.
@@ -146,7 +146,7 @@ def _smooth(problem: Problem, found: Found, block: Indices, options: Options) ->
     slow = np.flatnonzero(stiffness >= _FOURIER_STIFFNESS)
     if len(slow):
         part = take(Problem(system, load), slow)
-        smooth = smooth_orbits(part, np.arange(len(slow)))
+        smooth = smooth_orbits(part, len(slow))
         kept = np.flatnonzero(smooth.found)
         if len(kept):
             rows = block[slow[kept]]

@@ -68,15 +68,15 @@ class Smooth(NamedTuple):
     found: NDArray[np.bool_]
 
 
-def smooth_orbits(problem: Problem, index: Indices) -> Smooth:
-    """Orbits of the points `index` of `problem` (NumPy arrays), in their order."""
+def smooth_orbits(problem: Problem, points: int) -> Smooth:
+    """Orbits of all points of `problem` (NumPy arrays)."""
     scheme, size = scheme_for(problem.system), problem.system.size
-    result = Smooth(Orbit.empty(scheme, size, INTERVALS, len(index)), np.zeros(len(index), bool))
-    for start in range(0, len(index), _CHUNK):
-        rows = np.arange(start, min(start + _CHUNK, len(index)))
-        # One shape, one compilation: the last chunk is filled up with its last point.
+    result = Smooth(Orbit.empty(scheme, size, INTERVALS, points), np.zeros(points, bool))
+    for start in range(0, points, _CHUNK):
+        rows = np.arange(start, min(start + _CHUNK, points))
+        # One shape, one compilation; but what fills up the last chunk is not solved.
         filled = np.concatenate([rows, np.full(_CHUNK - len(rows), rows[-1])])
-        harmonics, found = _solve(take(problem, index[filled]), len(rows))
+        harmonics, found = _solve(take(problem, filled), len(rows))
         put(result, rows, Smooth(_on_even_mesh(harmonics, scheme), found))
     return result
 
