@@ -32,7 +32,10 @@ from asperity.solve.mesh import (
     equidistributed,
     graded_mesh,
 )
-from asperity.solve.scheme import STAGES, scheme_for
+from asperity.solve.scheme import STAGES, Scheme, scheme_for
+
+#: Entries of small matrices that are eliminated at a time: they fit into a core's cache.
+_CACHED = 20_000
 
 
 def averaged_orbit(
@@ -82,16 +85,39 @@ def condense(local: Local, orbit: Orbit, *right: Array) -> list[Array]:
     Returns the matrix (n, STAGES, n, intervals, points) and for each right-hand side, of shape
     (n, STAGES, intervals, points), the constant part of the change of the slopes.
     """
-    n = local.rates.shape[0]
-    per_stage = jnp.transpose(local.jacobian, (2, 0, 1, 3, 4))  # (stage, row, column, ...)
-    constants = [jnp.swapaxes(r, 0, 1)[:, :, None] for r in right]
-    # Row blocks (I - h a_jk J_j | J_j, F_j - K_j), one per stage j, columns (k, state).
-    coupling = per_stage[:, :, None] * (orbit.widths * orbit.scheme.a[:, None, :, None, None, None])
-    identity = jnp.eye(STAGES)[:, None, :, None] * jnp.eye(n)[:, None, :]
-    left = (identity[..., None, None] - coupling).reshape(STAGES, n, -1, *orbit.widths.shape)
-    solution = _eliminate_stages(jnp.concatenate([left, per_stage, *constants], axis=2))
-    solution = jnp.swapaxes(solution, 0, 1)
+    constants = jnp.stack(right) if right else jnp.zeros((0, *local.rates.shape))
+    whole = (local.jacobian, constants, orbit.widths)
+    n, (intervals, points) = local.rates.shape[0], orbit.widths.shape
+    entries = STAGES * n * ((STAGES + 1) * n + len(right)) * points
+    divisors = (k for k in range(1, intervals) if _fits(intervals, k, entries))
+    blocks = next(divisors, intervals)
+    if blocks == 1:
+        solution = _condense(*whole, orbit.scheme)
+    else:
+        # Block by block, so that what the elimination works on stays within a core's cache.
+        parts = [a.reshape(*a.shape[:-2], blocks, intervals // blocks, points) for a in whole]
+        parts = [jnp.moveaxis(a, -3, 0) for a in parts]
+        solved = jax.lax.map(lambda part: _condense(*part, orbit.scheme), parts)
+        solution = jnp.moveaxis(solved, 0, -3).reshape(n, STAGES, -1, intervals, points)
     return [solution[:, :, :n], *(solution[:, :, n + i] for i in range(len(right)))]
+
+
+def _fits(intervals: int, blocks: int, entries: int) -> bool:
+    """Whether an equal share of the intervals, of so many entries each, fits into the cache."""
+    return intervals % blocks == 0 and intervals // blocks * entries <= _CACHED
+
+
+def _condense(jacobian: Array, constants: Array, widths: Array, scheme: Scheme) -> Array:
+    """The same of some intervals; (n, STAGES, n + right-hand sides, intervals, points)."""
+    n = jacobian.shape[0]
+    per_stage = jnp.transpose(jacobian, (2, 0, 1, 3, 4))  # (stage, row, column, ...)
+    right = jnp.transpose(constants, (2, 1, 0, 3, 4))
+    # Row blocks (I - h a_jk J_j | J_j, F_j - K_j), one per stage j, columns (k, state).
+    coupling = per_stage[:, :, None] * (widths * scheme.a[:, None, :, None, None, None])
+    identity = jnp.eye(STAGES)[:, None, :, None] * jnp.eye(n)[:, None, :]
+    left = (identity[..., None, None] - coupling).reshape(STAGES, n, -1, *widths.shape)
+    solution = _eliminate_stages(jnp.concatenate([left, per_stage, right], axis=2))
+    return jnp.swapaxes(solution, 0, 1)
 
 
 def _eliminate_stages(rows: Array) -> Array:

@@ -51,7 +51,7 @@ _SENTENCES = {
     ),
     Outcome.SENSITIVE: (
         "the branch from steady sliding is lost at epsilon = {detail:.3g}: sliding is so unstable "
-        "for part of the period that a disturbance grows by more than e^20, which neither a mesh "
+        "for part of the period that a disturbance grows by more than e^15, which neither a mesh "
         "nor an experiment can hold; lower epsilon or stiffen the spring"
     ),
 }

@@ -21,6 +21,7 @@ import numpy as np
 from asperity.loads import Harmonic
 from asperity.slider import QuasiStatic
 from asperity.solve.batch import Indices, run_chunks, take
+from asperity.solve.continuation.pursuit import MESHES as PURSUIT_MESHES
 from asperity.solve.found import Float, Found, Options, logs_of, store
 from asperity.solve.kernels import (
     FAST_BLOCK,
@@ -165,15 +166,22 @@ def _collocate(problem: Problem, found: Found, block: Indices, options: Options)
     start = near_orbits(part, points)
     _settle(part, found, block, start, np.arange(points), silent)
     told = _told(found, block, options, 0)
-    for search, again in ((orbits_along_branches, True), (orbits_from_high_frequency, False)):
+    settled = np.zeros(points, dtype=bool)
+    for mesh in PURSUIT_MESHES:
+        asked = (Outcome.NO_ORBIT,) if mesh == PURSUIT_MESHES[-1] else _WITHOUT_ORBIT
+        lost = np.isin(found.outcome[block], asked) & ~settled
         # Also what was found on a coarse mesh and lost on every finer one is sought again.
-        outcome, detail = found.outcome[block], found.detail[block]
-        lost = np.isin(outcome, _WITHOUT_ORBIT)
-        lost |= again & (outcome == Outcome.NOT_RESOLVED) & np.isinf(detail)
+        lost |= (found.outcome[block] == Outcome.NOT_RESOLVED) & np.isinf(found.detail[block])
         index = np.flatnonzero(lost)
         if len(index):
-            _settle(part, found, block, search(part, points, index), index, silent)
+            start, definite = orbits_along_branches(part, points, index, mesh)
+            settled |= definite
+            _settle(part, found, block, start, index, silent)
             told = _told(found, block, options, told)
+    index = np.flatnonzero(np.isin(found.outcome[block], _WITHOUT_ORBIT))
+    if len(index):
+        _settle(part, found, block, orbits_from_high_frequency(part, points, index), index, silent)
+        told = _told(found, block, options, told)
     options.progress(points - told)
 
 

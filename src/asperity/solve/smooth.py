@@ -12,7 +12,7 @@ that differ by round-off from those asked for.
 
 from __future__ import annotations
 
-from functools import cache, partial
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -22,6 +22,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from asperity.solve.adiabatic import adiabatic_states, even_phases
 from asperity.solve.batch import Indices, put, take
 from asperity.solve.kernels import Problem
 from asperity.solve.linear import jacobian_columns
@@ -83,7 +84,7 @@ def smooth_orbits(problem: Problem, points: int) -> Smooth:
 
 def _solve(problem: Problem, points: int) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
     """Harmonics (size, count, points) of the first `points`, and which of them are exact."""
-    Y = np.array(_steady_states(problem, nodes=NODES[0]))
+    Y = np.array(adiabatic_states(problem, nodes=NODES[0]))
     at, exact = np.arange(points), np.zeros(points, bool)
     harmonics = np.zeros((len(Y), NODES[-1] // 2 + 1, points), complex)
     at = _newton(problem, Y, at, _FIRST_STEPS)
@@ -105,23 +106,11 @@ def _solve(problem: Problem, points: int) -> tuple[NDArray[np.complex128], NDArr
     return harmonics, exact
 
 
-@partial(jax.jit, static_argnames=("nodes",))
-def _steady_states(problem: Problem, *, nodes: int) -> Array:
-    """At every node the steady state under its load, at its pulling velocity."""
-    system, load = problem
-    ones = jnp.ones((nodes, jnp.shape(system.V)[-1]))
-    at = load.at(_phases(nodes) * ones)
-    law, pull = system.slider.law, at.pull * ones
-    friction = law.mu_ss(system.V) * ones
-    mechanical = system.mechanical_states(friction, pull, jnp.log(pull), at)
-    return jnp.stack([state * ones for state in (*mechanical, *law.steady_state(system.V * pull))])
-
-
 @jax.jit
 def _linearised(problem: Problem, Y: Array) -> tuple[Array, Array, Array]:
     """Rates (size, nodes, points), their Jacobian (row, column, ...), and how slip feels Y."""
     system, load = problem
-    at = load.at(_phases(Y.shape[1]) * jnp.ones(Y.shape[2]))
+    at = load.at(even_phases(Y.shape[1]) * jnp.ones(Y.shape[2]))
     rates, columns = jacobian_columns(lambda y: system.rates(y, at), Y)
     _, felt = jacobian_columns(lambda y: system.log_slip(y, at)[None], Y)
     return rates, jnp.stack(columns, axis=1), jnp.concatenate(felt)
@@ -170,11 +159,6 @@ def _solved(jacobian: Float, derivative: Float, gap: Float) -> Float:
     rank = size * nodes
     flat = np.linalg.solve(matrix.reshape(points, rank, rank), right.reshape(points, rank, 1))
     return np.moveaxis(flat.reshape(points, size, nodes), 0, -1)
-
-
-def _phases(nodes: int) -> Float:
-    """Even nodes, as a column."""
-    return 2 * np.pi * np.arange(nodes)[:, None] / nodes
 
 
 @cache

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.solve.batch import Indices, put, run_chunks, take
-from asperity.solve.continuation.pursuit import INTERVALS as PURSUIT_INTERVALS
-from asperity.solve.continuation.pursuit import pursue
+from asperity.solve.continuation.pursuit import PursuitMesh, pursue
 from asperity.solve.homotopy import LONG, along_amplitude, along_frequency, along_rest, follow
 from asperity.solve.kernels import (
     ACCEPTED,
@@ -96,13 +95,16 @@ def orbits_from_high_frequency(problem: Problem, points: int, index: Indices) ->
     return start
 
 
-def orbits_along_branches(problem: Problem, points: int, index: Indices) -> Start:
+def orbits_along_branches(
+    problem: Problem, points: int, index: Indices, mesh: PursuitMesh
+) -> tuple[Start, NDArray[np.bool_]]:
     """Orbits of the points `index` at the end of their branch from steady sliding.
 
-    Where the branch does not get there, `outcome` says what becomes of it.
+    Where the branch does not get there, `outcome` says what becomes of it. Returned beside it is
+    whether a finer mesh would say the same.
     """
-    branch = pursue(problem, index)
-    start = Start.none(problem, points, PURSUIT_INTERVALS)._replace(orbit=branch.orbit)
+    branch = pursue(problem, index, mesh)
+    start = Start.none(problem, points, mesh.intervals)._replace(orbit=branch.orbit)
     start.detail[:] = branch.farthest
     amplitude = np.broadcast_to(problem.load.amplitude, (points,))
     for which, outcome, share in (
@@ -117,7 +119,7 @@ def orbits_along_branches(problem: Problem, points: int, index: Indices) -> Star
     if len(arrived):
         reached = follow(problem, along_rest(branch.share), start.orbit, arrived, first_step=0.5)
         start.found[arrived] = reached[arrived] >= 1
-    return start
+    return start, branch.settled
 
 
 def _from_averaged(problem: Problem, start: Start, index: Indices) -> None:

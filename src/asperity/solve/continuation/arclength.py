@@ -161,11 +161,19 @@ def first_tangent(line_and_point: tuple[Line, Orbit, Array]) -> Tangent:
 
 
 def correct(
-    line: Line, guess: Orbit, t: Array, row: Array, corner: Array, max_steps: int
+    line: Line,
+    guess: Orbit,
+    t: Array,
+    row: Array,
+    corner: Array,
+    *,
+    max_steps: int,
+    tolerance: float = _NEWTON_TOLERANCE,
 ) -> tuple[Orbit, Array, Array, Array]:
     """Newton's method on the plane through (guess, t) across (row, corner).
 
-    Returns orbit, t, the last change (inf where it is not finite) and the number of steps.
+    It ends with a change below `tolerance`, of which about the square is left. Returns orbit, t,
+    the last change (inf where it is not finite) and the number of steps.
     """
 
     def body(carry: tuple) -> tuple:
@@ -175,15 +183,15 @@ def correct(
         system = line.at(t).system
         largest, error_now = _sizes(system, local, orbit, change)
         damping = jnp.minimum(1.0, _LARGEST_CHANGE / jnp.where(largest > 0, largest, 1.0))
-        damping = jnp.where(error > _NEWTON_TOLERANCE, damping, 0.0)
+        damping = jnp.where(error > tolerance, damping, 0.0)
         orbit_now, t_now = along(orbit, t, change, damping)
-        count = count + (error > _NEWTON_TOLERANCE)
+        count = count + (error > tolerance)
         error_now = jnp.where(jnp.isfinite(error_now), error_now, jnp.inf)
-        return orbit_now, t_now, jnp.where(error > _NEWTON_TOLERANCE, error_now, error), count
+        return orbit_now, t_now, jnp.where(error > tolerance, error_now, error), count
 
     def unfinished(carry: tuple) -> Array:
         _, _, error, count = carry
-        return jnp.any((error > _NEWTON_TOLERANCE) & (count < max_steps))
+        return jnp.any((error > tolerance) & (count < max_steps))
 
     start = (guess, t, jnp.full(t.shape, jnp.inf), jnp.zeros(t.shape, int))
     return jax.lax.while_loop(unfinished, body, start)
@@ -220,7 +228,7 @@ def arclength_step(inputs: tuple[Line, Point, Array], *, max_steps: int) -> Step
     line, point, length = inputs
     guess, t = along(point.orbit, point.t, point.tangent, length)
     row = weighted_row(point.orbit, point.tangent.nodes, slip_units(line, point.orbit, point.t))
-    orbit, t, error, iterations = correct(line, guess, t, row, point.tangent.t, max_steps)
+    orbit, t, error, iterations = correct(line, guess, t, row, point.tangent.t, max_steps=max_steps)
     intervals = orbit.mesh.shape[0] - 1
     there = refined(*line.at(t), orbit, intervals)
     before = _interpolated(point.tangent.nodes, orbit.mesh, there.mesh)

@@ -27,11 +27,12 @@ from asperity.solve.continuation.arclength import (
     weighted_row,
 )
 from asperity.solve.continuation.line import Line
-from asperity.solve.kernels import ACCEPTED
 from asperity.solve.linear import spectral_abscissa
 from asperity.solve.mesh import Orbit, on_mesh
 from asperity.solve.scheme import STAGES
 
+#: A last change in Newton's method up to which a step counts, and ends: its square is left.
+ACCEPTED = 1e-5
 #: Cosine of the turn of the tangent below which the direction of the branch is not known.
 _SHARPEST_TURN = 0.3
 #: Narrowest an interval may be predicted, in parts of what it is.
@@ -154,7 +155,9 @@ def moving_step(inputs: tuple[Line, Pair, Array], *, max_steps: int) -> Advance:
     guess, t_guess = _predicted(pair, ratio)
     units = slip_units(line, point.orbit, point.t)
     row = weighted_row(guess, point.tangent.nodes, units)
-    orbit, t, error, iterations = correct(line, guess, t_guess, row, point.tangent.t, max_steps)
+    orbit, t, error, iterations = correct(
+        line, guess, t_guess, row, point.tangent.t, max_steps=max_steps, tolerance=ACCEPTED
+    )
     there = relaid(orbit, units)
     tangent, turn = turned_tangent(line, there, t, point.tangent.nodes, point.tangent.t)
     step = _distance(units, guess, t_guess, point.orbit, point.t)
@@ -163,6 +166,6 @@ def moving_step(inputs: tuple[Line, Pair, Array], *, max_steps: int) -> Advance:
     miss = _distance(units, orbit, t, guess, t_guess) / step
     length = _distance(units, there, t, point.orbit, point.t)
     fine = usable(there, turn) & (turn > _SHARPEST_TURN) & ~backward
-    error = jnp.where(fine & (error < ACCEPTED), error, jnp.inf)
+    error = jnp.where(fine & (error <= ACCEPTED), error, jnp.inf)
     following = Pair(point.orbit, point.t, Point(there, t, tangent))
     return Advance(following, error, iterations, miss, length, fastest_slip(line, there, t))

@@ -12,6 +12,7 @@ from asperity.errors import InputError
 from asperity.loads import Harmonic, Modulation
 from asperity.slider import Slider
 from asperity.solve.continuation.parameters import known_name, pair_of
+from asperity.solve.continuation.pursuit import MESHES
 from asperity.solve.kernels import Problem
 from asperity.solve.mesh import Orbit
 from asperity.solve.periodic import checked_problem, flatten
@@ -83,8 +84,9 @@ def starting_orbit(problem: Problem) -> Orbit | None:
     """An orbit of the one point of `problem`, however far it has to be fetched."""
     on_host = jax.tree.map(np.asarray, problem)
     start = starting_orbits(on_host, 1)
-    if not start.found[0]:
-        start = orbits_along_branches(on_host, 1, np.arange(1))
+    for mesh in MESHES:
+        if not start.found[0]:
+            start, _ = orbits_along_branches(on_host, 1, np.arange(1), mesh)
     return start.orbit if start.found[0] else None
 
 

@@ -9,6 +9,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.solve.adiabatic import adiabatic_growth
 from asperity.solve.batch import Indices, put, run_chunks, take
 from asperity.solve.continuation.arclength import Point, Tangent, first_tangent
 from asperity.solve.continuation.line import Line, amplitude_line
@@ -20,41 +21,45 @@ from asperity.solve.continuation.moving_mesh import (
     straight,
 )
 from asperity.solve.kernels import Problem
-from asperity.solve.mesh import Orbit, split
+from asperity.solve.mesh import Orbit
 from asperity.solve.scheme import scheme_for
 
 Float = NDArray[np.float64]
 
-#: Intervals of the moving mesh, and parts that they are cut into for what it cannot settle.
-_INTERVALS, _PARTS = 96, 3
-INTERVALS = _PARTS * _INTERVALS
+
+class PursuitMesh(NamedTuple):
+    """Intervals of a moving mesh, and most steps along a branch on it."""
+
+    intervals: int
+    most_steps: int
+
+
+#: For all; for what the first does not settle; and for what even the second has nothing to say of.
+MESHES = (PursuitMesh(144, 200), PursuitMesh(288, 400), PursuitMesh(864, 600))
 #: Exponent of the slip rate beyond which a pulse is so narrow, below 1e-7 of the period, that
 #: round-off in the phase limits it.
 RUNAWAY = 13.0
 
-#: Points in a call, and in one where few are left.
-_CHUNK, _SMALL_CHUNK = 16, 4
-#: Steps on each mesh.
-_MOST_STEPS = (250, 1000)
+#: Points in a call.
+_CHUNK = 8
 #: Distance from the amplitude asked for below which steps aim at it, and at which it is reached.
 _NEAR, _ARRIVED = 1e-2, 1e-6
 #: A branch this far back from a fold, as a share of the amplitude, is on its way back.
 _BACK = 1e-3
 _NEWTON_STEPS = 10
-_ACCEPTED = 1e-5
 #: Distance from the prediction, in steps, above which a step is not trusted.
-_MISS = 0.5
+_MISS = 0.8
 _FIRST = 0.02
 #: Longest step in the space of states, phase and share, and its change by what Newton needed.
-_LONGEST, _GROWTH, _SHRINKAGE = 1.0, 1.4, 0.4
-_EASY, _HARD = 4, 6
+_LONGEST, _GROWTH, _SHRINKAGE = 3.0, 2.0, 0.4
+_EASY, _HARD = 4, 7
 #: Failures after which the last step is no guide any more, and those after which all ends.
 _RESTART, _GIVE_UP = 4, 10
 #: Exponent from which pulses grow steadily if they do, its rise over which the share is watched,
 #: and how many times farther the share may get than where that leads.
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
-#: Growth by which the error of a mesh becomes as large as the orbit.
-_HELD = 20.0
+#: Growth by which the error of a mesh, 1e-6 or less, becomes as large as the orbit.
+_HELD = 15.0
 
 
 class Pursuit(NamedTuple):
@@ -76,8 +81,8 @@ class Pursuit(NamedTuple):
         Share at which, as they grew at last, pulses are to reach e^`RUNAWAY`; inf where they
         do not grow.
     growth : array, shape (points,)
-        Exponent by which a disturbance of the last orbit grows while it does; 0 where it was
-        not asked for.
+        Exponent by which a disturbance grows while it does, of the last orbit or of steady
+        sliding at the amplitude asked for, whichever is larger; 0 where the branch is settled.
     """
 
     orbit: Orbit
@@ -96,8 +101,9 @@ class Pursuit(NamedTuple):
     @property
     def folded(self) -> NDArray[np.bool_]:
         """Whether the branch was left on its way back from its farthest fold."""
-        back = _returned(self.fold, self.farthest, self.share)
-        return ~self.arrived & (self.fastest < RUNAWAY) & back
+        with np.errstate(invalid="ignore"):
+            back = (self.fold >= self.farthest - _BACK) & (self.share < self.farthest - _BACK)
+        return ~self.arrived & back
 
     @property
     def ran_away(self) -> NDArray[np.bool_]:
@@ -110,48 +116,34 @@ class Pursuit(NamedTuple):
         return ~(self.arrived | self.folded | self.ran_away) & (self.growth > _HELD)
 
     @property
+    def settled(self) -> NDArray[np.bool_]:
+        """Whether a finer mesh would say the same."""
+        return self.arrived | self.folded | (self.fastest >= RUNAWAY)
+
+    @property
     def end(self) -> Float:
         """Share before which pulses pass e^`RUNAWAY`; inf where they are not known to."""
         return np.where(self.fastest >= RUNAWAY, self.share, self.limit)
 
 
-def _returned(fold: Float, farthest: Float, share: Float) -> NDArray[np.bool_]:
-    """Whether a branch is on its way back from its farthest fold."""
-    with np.errstate(invalid="ignore"):
-        return (fold >= farthest - _BACK) & (share < farthest - _BACK)
-
-
-def pursue(problem: Problem, index: Indices) -> Pursuit:
+def pursue(problem: Problem, index: Indices, mesh: PursuitMesh) -> Pursuit:
     """Follow the points `index` of `problem` (NumPy arrays) from steady sliding.
 
-    The orbits lie on `INTERVALS` intervals. What the first mesh does not settle is followed again
-    from the beginning on a finer one: where it is lost it has long been poorly resolved.
+    Always from the beginning: where a coarser mesh lost a branch it had long resolved it poorly.
     """
-    coarse = _pursue(problem, index, _INTERVALS, _MOST_STEPS[0])
-    orbit = Orbit.empty(coarse.orbit.scheme, problem.system.size, INTERVALS, len(coarse.share))
-    cut = jax.jit(partial(split, parts=_PARTS))
-    for part, finer in run_chunks(cut, coarse.orbit, index, _CHUNK):
-        put(orbit, part, finer)
-    result = coarse._replace(orbit=orbit)
-    settled = coarse.arrived | coarse.folded | (coarse.fastest >= RUNAWAY)
-    left = index[~settled[index]]
-    if len(left):
-        put(result, left, take(_pursue(problem, left, INTERVALS, _MOST_STEPS[1]), left))
-        inputs = (amplitude_line(problem), result.orbit, result.share)
-        for part, growth in run_chunks(growth_within, inputs, left, _CHUNK):
-            result.growth[part] = growth
-    return result
-
-
-def _pursue(problem: Problem, index: Indices, intervals: int, most_steps: int) -> Pursuit:
-    """Follow the points `index` on a moving mesh of `intervals`."""
     line = amplitude_line(problem)
-    pair = _steady_pair(line, len(problem.system.V), index, intervals)
+    pair = _steady_pair(line, len(problem.system.V), index, mesh.intervals)
     walked = _Walked.from_steady(len(problem.system.V))
-    _follow(line, pair, walked, index, most_steps)
+    _follow(line, pair, walked, index, mesh.most_steps)
     orbit, share, _ = pair.point
     known = (walked.fold, walked.farthest, walked.fastest, walked.limit)
-    return Pursuit(orbit, share, *known, np.zeros_like(share))
+    result = Pursuit(orbit, share, *known, np.zeros_like(share))
+    left = index[~result.settled[index]]
+    for part, growth in run_chunks(growth_within, (line, orbit, share), left, _CHUNK):
+        result.growth[part] = growth
+    for part, growth in run_chunks(adiabatic_growth, problem, left, _CHUNK):
+        result.growth[part] = np.fmax(growth, result.growth[part])
+    return result
 
 
 class _Walked(NamedTuple):
@@ -241,9 +233,8 @@ def _follow(line: Line, pair: Pair, walked: _Walked, index: Indices, most_steps:
         if not len(at):
             break
         walked.ratio[:] = _towards_the_end(pair, walked.ratio, walked.failures)
-        chunk = _SMALL_CHUNK if len(at) <= _SMALL_CHUNK else _CHUNK
-        for part, step in run_chunks(advance, (line, pair, walked.ratio), at, chunk):
-            good = (step.error < _ACCEPTED) & (step.miss < _MISS)
+        for part, step in run_chunks(advance, (line, pair, walked.ratio), at, _CHUNK):
+            good = np.isfinite(step.error) & (step.miss < _MISS)
             kept, chosen = part[good], np.flatnonzero(good)
             turned = pair.point.tangent.t[kept] * step.next.point.tangent.t[chosen] < 0
             extremum = np.where(turned, _extremum(pair, step, kept, chosen), np.nan)

@@ -1,0 +1,136 @@
+"""Answers put back into the equations of motion, which are written here once more.
+
+The waveform (F/W0, slip rate) that the package returns is differentiated spectrally and must obey
+spring, age law and friction law; its harmonics must be those of the answer. An answer that claims
+convergence and is no solution shows up whichever method found it.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from asperity import Slider, periodic_response
+from asperity.laws import ElastoPlastic, RiceRuina
+from asperity.solve import PeriodicResponse
+
+#: Residual of either equation over its largest term. The waveform is good to 3e-5 of its swing,
+#: more in its steepest parts, and is differentiated once.
+RESIDUAL = 1e-3
+#: Mean slip rate over V: not differentiated, and what the mean of F hangs on.
+SLIP = 1e-6
+#: Harmonics of the waveform over its swing.
+HARMONICS = 3e-5
+#: A spectrum whose last 16th is below this, relative, is resolved by its samples.
+RESOLVED = 1e-6
+
+LAWS = {"rice-ruina": RiceRuina, "elasto-plastic": ElastoPlastic}
+Numbers = dict[str, np.ndarray]
+
+
+def draw(law: str, count: int, seed: int) -> Numbers:
+    """Operating points (SI) over the whole range that the package answers for, each (count,)."""
+    random = np.random.default_rng(seed)
+
+    def spread(low: float, high: float) -> np.ndarray:
+        return np.exp(random.uniform(np.log(low), np.log(high), count))
+
+    numbers = {"mu0": random.uniform(0.4, 0.8, count), "A": spread(0.002, 0.05)}
+    numbers |= {"D0": spread(1e-7, 2e-6), "W0": spread(3.0, 16.0), "V0": np.full(count, 1e-6)}
+    numbers["B"] = numbers["A"] * spread(1.15, 4.0)
+    critical = (numbers["B"] - numbers["A"]) * numbers["W0"] / numbers["D0"]
+    numbers |= {"K": critical * spread(0.1, 100.0), "V": spread(1e-9, 1e-3)}
+    numbers |= {"epsilon": random.uniform(0, 0.9, count), "f": spread(1e-5, 1e4)}
+    if law == "elasto-plastic":
+        numbers["lambda_"] = spread(5e-8, 2e-6)
+    return numbers
+
+
+def answer(law: str, numbers: Numbers, samples: int) -> PeriodicResponse:
+    """What the package says of these points, with waveforms."""
+    kind = LAWS[law]
+    return periodic_response(
+        Slider(
+            kind(**{f.name: numbers[f.name] for f in dataclasses.fields(kind)}),
+            spring=numbers["K"],
+            load=numbers["W0"],
+        ),
+        velocity=numbers["V"],
+        epsilon=numbers["epsilon"],
+        frequency=numbers["f"],
+        waveform=samples,
+        workers=1,
+    )
+
+
+def faults(
+    numbers: Numbers, waveform: np.ndarray, harmonics: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which points contradict the equations, and which are resolved by their samples.
+
+    Parameters
+    ----------
+    numbers : dict
+        As `draw` returns them.
+    waveform : array, shape (2, points, samples)
+        F/W0 and ln(slip rate/V).
+    harmonics : array, shape (points, count), complex
+
+    Returns
+    -------
+    wrong, resolved : bool array, shape (points,)
+        What is not resolved is not wrong.
+    """
+    n = {name: a[:, None] for name, a in numbers.items()}
+    wrong, resolved = np.zeros((2, waveform.shape[1]), dtype=bool)
+    for step in (8, 4, 2, 1):  # as few samples as resolve: more of them amplify round-off
+        friction, log_slip = waveform[..., ::step]
+        residual, end = _residuals(n, friction, log_slip)
+        swing = np.ptp(friction, axis=1)
+        spectrum = 2 * np.fft.rfft(friction)[:, 1 : 1 + harmonics.shape[1]] / friction.shape[1]
+        fault = residual > RESIDUAL
+        fault |= np.abs(np.exp(log_slip).mean(1) - 1) > SLIP
+        fault |= np.abs(spectrum - harmonics).max(1) > HARMONICS * swing
+        now = ~resolved & (end < RESOLVED)
+        wrong[now], resolved[now] = fault[now], True
+    return wrong, resolved
+
+
+def _derivative(y: np.ndarray) -> np.ndarray:
+    """d/dtheta of periodic samples."""
+    k = np.arange(y.shape[-1] // 2 + 1)
+    return np.fft.irfft(1j * k * np.fft.rfft(y), y.shape[-1])
+
+
+def _age(n: Numbers, w: np.ndarray, friction: np.ndarray, log_slip: np.ndarray) -> np.ndarray:
+    """ln(V0 Phi/D0) from the friction law."""
+    rate = n["A"] * (log_slip + np.log(n["V"] / n["V0"]))
+    return (friction / w - n["mu0"] - rate) / n["B"]
+
+
+def _residuals(
+    n: Numbers, friction: np.ndarray, log_slip: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of spring equation and age law, over their largest terms; ends of spectra."""
+    samples = friction.shape[1]
+    theta = 2 * np.pi * np.arange(samples) / samples
+    w, dw = 1 + n["epsilon"] * np.cos(theta), -n["epsilon"] * np.sin(theta)
+    omega, slip = 2 * np.pi * n["f"], np.exp(log_slip)
+    gain = n["V"] * n["K"] / (omega * n["W0"])
+    d_friction = _derivative(friction)
+    v = 1 - d_friction / gain  # velocity of the slider over V
+    # v_pl = d/dt (x - F lambda/W), over V
+    elastic = n["lambda_"] * n["K"] / n["W0"] if "lambda_" in n else 0.0
+    strained = elastic / gain * (d_friction / w - friction * dw / w**2)
+    spring = np.abs(v - strained - slip).max(1) / slip.max(1)
+    phi = _age(n, w, friction, log_slip)
+    terms = np.stack(
+        [n["V0"] / n["D0"] * np.exp(-phi), -n["V"] / n["D0"] * v, -omega * _derivative(phi)]
+    )
+    ageing = np.abs(terms.sum(0)).max(1) / np.abs(terms).max((0, 2))
+    ends = []
+    for term in (slip, np.exp(-phi)):
+        spectrum = np.abs(np.fft.rfft(term))
+        ends.append(spectrum[:, -samples // 32 :].max(1) / spectrum.max(1))
+    return np.maximum(spring, ageing), np.max(ends, axis=0)

@@ -1,0 +1,108 @@
+"""Random points over the whole range: what becomes of each, and whether the answers are right.
+
+    python -m benchmarks.whole_range --points 100000 --out whole_range
+
+Every answer that claims convergence is put back into the equations (`benchmarks.residual`).
+Works in slices that are written as they are done; called again it goes on where it was. Two calls
+with `--part 1/2` and `--part 2/2` share the work between two cores.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+
+from asperity.solve import Outcome
+from benchmarks.residual import LAWS, Numbers, answer, draw, faults
+
+SLICE = 2000
+#: Samples of the waveform, and those for what the first do not resolve: narrow pulses.
+SAMPLES = (2**12, 2**20)
+#: Most samples of all points of a call.
+_MOST = 2**25
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.whole_range", description=__doc__)
+    parser.add_argument("--law", choices=LAWS, default="rice-ruina")
+    parser.add_argument("--points", type=int, default=100_000)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, required=True, help="folder for finished slices")
+    parser.add_argument("--part", default="1/1", help="every n-th slice, from the k-th: k/n")
+    return parser.parse_args()
+
+
+def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
+    """Outcome, detail and verdict of the points of a slice, and the processor time."""
+    begun = time.process_time()
+    points = len(numbers["V"])
+    outcome, detail, seconds = np.zeros(points, int), np.zeros(points), 0.0
+    wrong, resolved = np.zeros((2, points), dtype=bool)
+    left = np.arange(points)
+    for samples in SAMPLES:
+        size = max(1, _MOST // samples)
+        for start in range(0, len(left), size):
+            rows = left[start : start + size]
+            part = {name: a[rows] for name, a in numbers.items()}
+            response = answer(law, part, samples)
+            if samples == SAMPLES[0]:
+                outcome[rows], detail[rows] = response.outcome, response.detail
+                seconds += time.process_time() - begun
+            done = np.flatnonzero(response.converged)
+            wrong[rows[done]], resolved[rows[done]] = faults(
+                {name: a[done] for name, a in part.items()},
+                response.waveform[:, done],
+                response.harmonics[done],
+            )
+        left = np.flatnonzero((outcome == Outcome.CONVERGED) & ~resolved)
+    return {
+        "outcome": outcome,
+        "detail": detail,
+        "wrong": wrong,
+        "resolved": resolved,
+        "seconds": np.array(seconds),
+    }
+
+
+def _report(files: list[Path], of: int) -> str:
+    slices = [dict(np.load(file)) for file in files]
+    whole = {name: np.hstack([s[name] for s in slices]) for name in slices[0]}
+    counts = Counter(Outcome(k).name for k in whole["outcome"])
+    lines = [f"{len(whole['outcome'])} points in {len(files)} of {of} slices"]
+    lines += [f"  {name:26s} {count:7d}" for name, count in counts.most_common()]
+    converged = whole["outcome"] == Outcome.CONVERGED
+    lines += [
+        f"obey the equations         {(converged & whole['resolved'] & ~whole['wrong']).sum():9d}",
+        f"contradict them            {whole['wrong'].sum():9d}",
+        f"not resolved by {SAMPLES[-1]} samples {(converged & ~whole['resolved']).sum():d}",
+        f"processor time             {whole['seconds'].sum():9.0f} s",
+    ]
+    return "\n".join(lines)
+
+
+def main() -> None:
+    arguments = _arguments()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    numbers = draw(arguments.law, arguments.points, arguments.seed)
+    slices = range(0, arguments.points, SLICE)
+    first, step = (int(k) for k in arguments.part.split("/"))
+    name = f"{arguments.law}-{arguments.seed}-{arguments.points}-{{}}.npz".format
+    for start in slices[first - 1 :: step]:
+        file = arguments.out / name(start)
+        if not file.exists():
+            part = {key: a[start : start + SLICE] for key, a in numbers.items()}
+            unfinished = file.with_suffix(".part")
+            with unfinished.open("wb") as stream:
+                np.savez(stream, **_solved(arguments.law, part))
+            unfinished.replace(file)
+            print(f"{start} done", flush=True)
+    done = [file for start in slices if (file := arguments.out / name(start)).exists()]
+    print(_report(done, len(slices)))
+
+
+if __name__ == "__main__":
+    main()
