@@ -17,12 +17,10 @@ from asperity.solve.collocation import (
     NewtonResult,
     averaged_orbit,
     collocation_response,
-    condense,
-    localise,
     newton_orbit,
     refined,
-    transfer_maps,
 )
+from asperity.solve.condensation import condense, localise, transfer_maps
 from asperity.solve.fourier import fourier_orbit
 from asperity.solve.fourier_reading import fourier_response, fourier_start, fourier_waveform
 from asperity.solve.lift import lifted

@@ -23,11 +23,7 @@ from numpy.typing import NDArray
 from asperity.laws import law_parameters
 from asperity.slider import QuasiStatic, Slider
 from asperity.solve.batch import run_chunks, take
-from asperity.solve.collocation import (
-    CollocationResponse,
-    collocation_response,
-    newton_update,
-)
+from asperity.solve.collocation import CollocationResponse, collocation_response, newton_update
 from asperity.solve.kernels import ACCEPTED, Problem, refine_orbit
 from asperity.solve.mesh import Orbit
 from asperity.solve.multipliers import chunk_size

@@ -26,15 +26,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from asperity.slider import Motion
-from asperity.solve.collocation import (
-    CollocationResponse,
-    Local,
-    collocation_response,
-    condense,
-    localise,
-    refined,
-    transfer_maps,
-)
+from asperity.solve.collocation import CollocationResponse, collocation_response, refined
+from asperity.solve.condensation import Local, condense, localise, transfer_maps
 from asperity.solve.continuation.line import Line
 from asperity.solve.cyclic import Border, solve_bordered
 from asperity.solve.kernels import ACCEPTED

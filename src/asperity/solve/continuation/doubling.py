@@ -20,7 +20,7 @@ from jax.typing import ArrayLike
 
 from asperity.errors import InputError
 from asperity.loads import Excitation, Modulation
-from asperity.solve.collocation import condense, localise, transfer_maps
+from asperity.solve.condensation import condense, localise, transfer_maps
 from asperity.solve.continuation.arclength import Point, Tangent, slip_units, weighted_row
 from asperity.solve.continuation.branch import Bifurcation, Branch
 from asperity.solve.continuation.line import Line

@@ -16,7 +16,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.solve.collocation import localise
+from asperity.solve.condensation import localise
 from asperity.solve.continuation.arclength import (
     Point,
     along,
