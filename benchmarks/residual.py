@@ -14,6 +14,7 @@ import numpy as np
 from asperity import Slider, periodic_response
 from asperity.laws import ElastoPlastic, RiceRuina
 from asperity.solve import PeriodicResponse
+from asperity.solve.search import METHODS
 
 #: Residual of either equation over its largest term. The waveform is good to 3e-5 of its swing,
 #: more in its steepest parts, and is differentiated once.
@@ -47,7 +48,9 @@ def draw(law: str, count: int, seed: int) -> Numbers:
     return numbers
 
 
-def answer(law: str, numbers: Numbers, samples: int) -> PeriodicResponse:
+def answer(
+    law: str, numbers: Numbers, samples: int, methods: tuple[str, ...] = METHODS
+) -> PeriodicResponse:
     """What the package says of these points, with waveforms."""
     kind = LAWS[law]
     return periodic_response(
@@ -61,6 +64,7 @@ def answer(law: str, numbers: Numbers, samples: int) -> PeriodicResponse:
         frequency=numbers["f"],
         waveform=samples,
         workers=1,
+        methods=methods,
     )
 
 

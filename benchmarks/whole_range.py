@@ -20,10 +20,9 @@ from asperity.solve import Outcome
 from benchmarks.residual import LAWS, Numbers, answer, draw, faults
 
 SLICE = 2000
-#: Samples of the waveform, and those for what the first do not resolve: narrow pulses.
-SAMPLES = (2**12, 2**20)
-#: Most samples of all points of a call.
-_MOST = 2**25
+#: Samples of the waveform, and those for what the first do not resolve, narrow pulses, of which so
+#: many points are solved again at a time.
+_SAMPLES, _FINE_SAMPLES, _FEW = 2**12, 2**20, 32
 
 
 def _arguments() -> argparse.Namespace:
@@ -39,33 +38,30 @@ def _arguments() -> argparse.Namespace:
 def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
     """Outcome, detail and verdict of the points of a slice, and the processor time."""
     begun = time.process_time()
-    points = len(numbers["V"])
-    outcome, detail, seconds = np.zeros(points, int), np.zeros(points), 0.0
-    wrong, resolved = np.zeros((2, points), dtype=bool)
-    left = np.arange(points)
-    for samples in SAMPLES:
-        size = max(1, _MOST // samples)
-        for start in range(0, len(left), size):
-            rows = left[start : start + size]
-            part = {name: a[rows] for name, a in numbers.items()}
-            response = answer(law, part, samples)
-            if samples == SAMPLES[0]:
-                outcome[rows], detail[rows] = response.outcome, response.detail
-                seconds += time.process_time() - begun
-            done = np.flatnonzero(response.converged)
-            wrong[rows[done]], resolved[rows[done]] = faults(
-                {name: a[done] for name, a in part.items()},
-                response.waveform[:, done],
-                response.harmonics[done],
-            )
-        left = np.flatnonzero((outcome == Outcome.CONVERGED) & ~resolved)
+    response = answer(law, numbers, _SAMPLES)
+    seconds = time.process_time() - begun
+    converged = np.flatnonzero(response.converged)
+    wrong, resolved = np.zeros((2, len(response.outcome)), dtype=bool)
+    wrong[converged], resolved[converged] = faults(
+        _rows(numbers, converged), response.waveform[:, converged], response.harmonics[converged]
+    )
+    left = converged[~resolved[converged]]
+    for rows in np.array_split(left, -(-len(left) // _FEW)) if len(left) else ():
+        # The harmonics are those of the answer, the waveform that of the methods for such orbits.
+        part = _rows(numbers, rows)
+        again = answer(law, part, _FINE_SAMPLES, ("smooth", "collocation"))
+        wrong[rows], resolved[rows] = faults(part, again.waveform, response.harmonics[rows])
     return {
-        "outcome": outcome,
-        "detail": detail,
+        "outcome": response.outcome,
+        "detail": response.detail,
         "wrong": wrong,
         "resolved": resolved,
         "seconds": np.array(seconds),
     }
+
+
+def _rows(numbers: Numbers, rows: np.ndarray) -> Numbers:
+    return {name: a[rows] for name, a in numbers.items()}
 
 
 def _report(files: list[Path], of: int) -> str:
@@ -78,7 +74,7 @@ def _report(files: list[Path], of: int) -> str:
     lines += [
         f"obey the equations         {(converged & whole['resolved'] & ~whole['wrong']).sum():9d}",
         f"contradict them            {whole['wrong'].sum():9d}",
-        f"not resolved by {SAMPLES[-1]} samples {(converged & ~whole['resolved']).sum():d}",
+        f"not resolved by {_FINE_SAMPLES} samples {(converged & ~whole['resolved']).sum():d}",
         f"processor time             {whole['seconds'].sum():9.0f} s",
     ]
     return "\n".join(lines)
@@ -94,10 +90,10 @@ def main() -> None:
     for start in slices[first - 1 :: step]:
         file = arguments.out / name(start)
         if not file.exists():
-            part = {key: a[start : start + SLICE] for key, a in numbers.items()}
+            rows = np.arange(start, min(start + SLICE, arguments.points))
             unfinished = file.with_suffix(".part")
             with unfinished.open("wb") as stream:
-                np.savez(stream, **_solved(arguments.law, part))
+                np.savez(stream, **_solved(arguments.law, _rows(numbers, rows)))
             unfinished.replace(file)
             print(f"{start} done", flush=True)
     done = [file for start in slices if (file := arguments.out / name(start)).exists()]

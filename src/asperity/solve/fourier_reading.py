@@ -115,8 +115,8 @@ def fourier_waveform(
     tau = theta.copy()
     for _ in range(60):  # Newton's method for Kepler's equation
         tau = tau - (tau + grading * np.sin(tau) - theta) / (1 + grading * np.cos(tau))
-    k = np.arange(1, nodes // 2)[:, None, None]
-    interpolate = (2 / nodes) * np.cos(k * (tau[:, None] - grid(nodes)[0])).sum(0)
+    apart = tau[:, None] - grid(nodes)[0]
+    interpolate = (2 / nodes) * sum(np.cos(k * apart) for k in range(1, nodes // 2))
     Y = jnp.stack([m + interpolate @ y for m, y in zip(orbit.mean, orbit.rest, strict=True)])
     at = load.at(jnp.asarray(theta)[:, None])
     return jnp.stack([system.force(Y, at), system.log_slip(Y, at)])
