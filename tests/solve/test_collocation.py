@@ -11,6 +11,7 @@ from scipy.linalg import expm
 from asperity.laws import RiceRuina
 from asperity.loads import Harmonic
 from asperity.slider import QuasiStatic, Slider
+from asperity.solve import condensation
 from asperity.solve.collocation import averaged_orbit, collocation_response, newton_orbit
 from asperity.solve.cyclic import solve_cyclic
 from asperity.solve.linear import (
@@ -260,3 +261,31 @@ def test_scales_choose_the_state_that_matters():
         mesh = np.asarray(equidistributed(both, scales, 60).mesh)[:, 0]
         finest = mesh[np.argmin(np.diff(mesh))]
         assert finest == pytest.approx(at, abs=0.15)
+
+
+def test_condensation_is_that_of_each_interval(monkeypatch):
+    """Against the stage equations solved as one dense system, whether in blocks or at once."""
+    n, intervals, points = 3, 12, 5
+    jacobian = 0.3 * normal(n, n, STAGES, intervals, points)
+    right = normal(2, n, STAGES, intervals, points, seed=8)
+    mesh = graded_mesh(intervals, points, 0.4)
+    orbit = Orbit.empty(GAUSS, n, intervals, points).moved(mesh=mesh)
+    local = condensation.Local(None, right[0], right[0], jnp.asarray(jacobian))
+    entries = STAGES * n * ((STAGES + 1) * n + 2) * points
+    blocks = {}
+    for name, at_a_time in (("whole", intervals), ("blocks", 4)):
+        monkeypatch.setattr(condensation, "_CACHED", at_a_time * entries)
+        blocks[name] = condensation.condense(local, orbit, *jnp.asarray(right))
+    for m, b in ((0, 0), (7, 3), (11, 4)):
+        J, h = np.moveaxis(jacobian[..., m, b], 2, 0), float(orbit.widths[m, b])
+        # Slopes k_j = J_j (y + h sum_l a_jl k_l) + r_j, ordered by stage and state.
+        matrix = np.eye(STAGES * n) - h * np.einsum("jl,jnc->jnlc", GAUSS.a, J).reshape(
+            STAGES * n, -1
+        )
+        known = [J.reshape(STAGES * n, n), *(r[..., m, b].T.reshape(-1, 1) for r in right)]
+        exact = np.linalg.solve(matrix, np.hstack(known)).reshape(STAGES, n, -1)
+        for response, *constants in blocks.values():
+            found = np.concatenate(
+                [response[..., m, b], *(c[:, :, None, m, b] for c in constants)], axis=2
+            )
+            np.testing.assert_allclose(np.swapaxes(found, 0, 1), exact, rtol=1e-10, atol=1e-12)

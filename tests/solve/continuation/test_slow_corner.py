@@ -24,6 +24,7 @@ def corner(shooting):
             [4.45, 0.43, 0.23],
             [17.0, 0.28, 0.42],
             [4.62, 0.88, 0.30],
+            [69.0, 0.67, 0.64],
         ]
     )
     q, stiffness, epsilon = rows.T
@@ -63,8 +64,8 @@ def test_found_orbits_obey_the_equations(corner, reference):
 
 def test_what_does_not_arrive_says_why(corner):
     *_, epsilon, response = corner
-    assert list(response.outcome[1:]) == [Outcome.RUNAWAY, Outcome.FOLDED]
-    for row in (1, 2):
+    assert list(response.outcome[1:]) == [Outcome.RUNAWAY, Outcome.FOLDED, Outcome.SENSITIVE]
+    for row in (1, 2, 3):
         assert np.isnan(response.mean_friction[row])
         assert 0 < response.detail[row] < epsilon[row]
         assert f"{response.detail[row]:.3g}" in response.result[row]
