@@ -8,8 +8,10 @@ convergence and is no solution shows up whichever method found it.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from asperity import Slider, periodic_response
 from asperity.laws import ElastoPlastic, RiceRuina
@@ -25,6 +27,11 @@ SLIP = 1e-6
 HARMONICS = 3e-5
 #: A spectrum whose last 16th is below this, relative, is resolved by its samples.
 RESOLVED = 1e-6
+
+#: Change of the exponents between the samples that are marched from, and the fewest of these.
+_CHANGE, _LEAST = 0.25, 100
+#: Evaluations after which an integration has run away.
+_MOST_CALLS = 300_000
 
 LAWS = {"rice-ruina": RiceRuina, "elasto-plastic": ElastoPlastic}
 Numbers = dict[str, np.ndarray]
@@ -99,6 +106,84 @@ def faults(
         now = ~resolved & (end < RESOLVED)
         wrong[now], resolved[now] = fault[now], True
     return wrong, resolved
+
+
+def faults_marched(
+    numbers: Numbers, waveform: np.ndarray, mean: np.ndarray, harmonics: np.ndarray
+) -> np.ndarray:
+    """Which points contradict the equations, by SciPy from sample to sample.
+
+    For pulses too narrow for `faults`. From samples between which states change little the printed
+    equations are integrated to the next of them, where they must arrive at its slip rate and age;
+    mean and harmonics are integrated along. Arguments as there.
+    """
+    return np.array(
+        [
+            _is_wrong({k: float(a[i]) for k, a in numbers.items()}, *waveform[:, i], *answer)
+            for i, answer in enumerate(zip(mean, harmonics, strict=True))
+        ],
+        dtype=bool,
+    )
+
+
+def _is_wrong(
+    n: dict[str, float],
+    friction: np.ndarray,
+    log_slip: np.ndarray,
+    mean: float,
+    harmonics: np.ndarray,
+) -> bool:
+    omega, samples = 2 * np.pi * n["f"], len(friction)
+    gain = n["V"] * n["K"] / (omega * n["W0"])
+    elastic = n.get("lambda_", 0.0) * n["K"] / n["W0"]
+    orders, calls = np.arange(1, len(harmonics) + 1), itertools.count()
+
+    def slip_of(w: float, force: float, phi: float) -> float:
+        rate = (force / w - n["mu0"] - n["B"] * phi) / n["A"]
+        return np.exp(rate) * n["V0"] / n["V"]
+
+    def rates(theta: float, y: np.ndarray) -> np.ndarray:
+        force, phi = base + y[0], y[1]
+        w, dw = 1 + n["epsilon"] * np.cos(theta), -n["epsilon"] * np.sin(theta)
+        slip = slip_of(w, force, phi)
+        pull = gain * (1 - slip) + elastic * force * dw / w**2
+        d_force = pull / (1 + elastic / w)
+        v = 1 - d_force / gain
+        ageing = (n["V0"] * np.exp(-phi) - n["V"] * v) / (n["D0"] * omega)
+        if (count := next(calls)) > _MOST_CALLS:
+            raise RuntimeError(f"no end after {count} calls")
+        waves = y[0] * np.exp(-1j * orders * theta)
+        return np.hstack([d_force, ageing, slip - 1, y[0], waves.real, waves.imag])
+
+    theta = 2 * np.pi * np.arange(samples + 1) / samples
+    load = 1 + n["epsilon"] * np.cos(theta)
+    phi = _age(n, load[:-1], friction, log_slip)
+    base, gap, integrals = friction.mean(), 0.0, np.zeros(2 + 2 * len(orders))
+    path = np.abs(np.diff(np.stack([log_slip, phi]), append=np.stack([log_slip, phi])[:, :1])).sum(
+        0
+    )
+    # At least a hundredth of the period apart, at most a change of the states by a quarter.
+    passed = np.floor(np.cumsum(path) / _CHANGE + np.arange(samples) * _LEAST / samples)
+    nodes = np.flatnonzero(np.diff(passed, prepend=-1.0))
+    for k, after in zip(nodes, [*nodes[1:], samples], strict=True):
+        start = np.hstack([friction[k] - base, phi[k], np.zeros_like(integrals)])
+        span = theta[k], theta[after]
+        try:
+            run = solve_ivp(rates, span, start, "LSODA", rtol=1e-9, atol=1e-12)
+        except RuntimeError:
+            return True
+        if not run.success:
+            return True
+        end, following = run.y[:, -1], after % samples
+        arrived = np.log(slip_of(load[after], base + end[0], end[1]))
+        # All of them together: what is wrong everywhere is hardly so from one sample to the next.
+        gap += abs(arrived - log_slip[following]) + abs(end[1] - phi[following])
+        integrals += end[2:] / (2 * np.pi)
+    cosines, sines = np.split(integrals[2:], 2)
+    swing = np.ptp(friction)
+    off = np.abs(2 * (cosines + 1j * sines) - harmonics).max()
+    off = max(off, abs(base + integrals[1] - mean))
+    return bool(gap > RESIDUAL or abs(integrals[0]) > SLIP or off > HARMONICS * swing)
 
 
 def _derivative(y: np.ndarray) -> np.ndarray:

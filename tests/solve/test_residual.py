@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from benchmarks.residual import HARMONICS, LAWS, answer, draw, faults
+from benchmarks.residual import HARMONICS, LAWS, answer, draw, faults, faults_marched
 
 SAMPLES = 4096
 POINTS = 75
@@ -101,3 +101,20 @@ def test_planted_wrong_answers_are_caught(batch, planted):
     if planted is conjugated:
         caught = wrong[resolved & ~in_phase].mean()
     assert caught == 1.0
+
+
+def marched(batch, rows, waveform, mean, harmonics):
+    return faults_marched(batch.part(rows), waveform, mean, harmonics)
+
+
+def test_integration_from_sample_to_sample_agrees(batch):
+    rows, waveform, harmonics = (a[..., :6, :] if a.ndim > 1 else a[:6] for a in answers(batch))
+    mean = batch.response.mean_friction[rows]
+    assert not marched(batch, rows, waveform, mean, harmonics).any()
+    swing = np.ptp(waveform[0], axis=1)
+    for wrong in (
+        (waveform, mean + 1e-4 * swing, harmonics),
+        (waveform, mean, harmonics + 1e-4 * swing[:, None]),
+        (np.stack([waveform[0], waveform[1] + 0.1]), mean, harmonics),
+    ):
+        assert marched(batch, rows, *wrong).all()

@@ -21,14 +21,11 @@ AGREEMENT = 2e-7
 
 #: Each interval is cut into 3, 9, 27... parts for finer transfer maps, up to these numbers in all:
 #: of all intervals at once, and of one after the other.
-_MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 5_000_000
+_MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 15_000_000
 
 #: Interval-points in a chunk, for up to two states and for more: keeps the working set of
 #: collocation within a core's cache.
 _CHUNK_INTERVALS = (1536, 384)
-
-#: Points in a call for which each interval is cut into many parts.
-_FEW = 4
 
 #: Multipliers below this modulus are compared absolutely: no experiment sees them. Two have their
 #: product from Liouville's formula; of more the small ones drown in the round-off of the large.
@@ -97,7 +94,7 @@ def resolve_piece_by_piece(
     parts = next(3**k for k in range(20) if intervals * 3**k > _MOST_AT_ONCE)
     while len(index) and intervals * parts <= _MOST_INTERVALS:
         solve = partial(_map_by_pieces, parts=parts)
-        for part, monodromy in run_chunks(solve, (problem, orbit), index, _FEW):
+        for part, monodromy in run_chunks(solve, (problem, orbit), index, 1):
             _hold_against_before(found, block[part], log_multipliers(*monodromy))
         index = index[found.outcome[block[index]] != Outcome.CONVERGED]
         parts *= 3
