@@ -178,7 +178,7 @@ def _compare(law: str, count: int, peer_count: int, peers: dict[str, tuple]) -> 
 
 def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.inertial", description=__doc__)
-    parser.add_argument("--points", type=int, default=2000)
+    parser.add_argument("--points", type=int, default=12_000)
     arguments = parser.parse_args()
     pin_to_one_core()
     print("| law | asperity us/point | peer | us/point | ratio | difference |")
