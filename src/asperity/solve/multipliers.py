@@ -21,7 +21,7 @@ AGREEMENT = 2e-7
 
 #: Each interval is cut into 3, 9, 27... parts for finer transfer maps, up to these numbers in all:
 #: of all intervals at once, and of one after the other.
-_MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 15_000_000
+_MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 40_000_000
 
 #: Interval-points in a chunk, for up to two states and for more: keeps the working set of
 #: collocation within a core's cache.
