@@ -133,6 +133,9 @@ def _is_wrong(
     mean: float,
     harmonics: np.ndarray,
 ) -> bool:
+    numbers = (friction, log_slip, mean, harmonics)
+    if not all(np.isfinite(a).all() for a in numbers):
+        return True
     omega, samples = 2 * np.pi * n["f"], len(friction)
     gain = n["V"] * n["K"] / (omega * n["W0"])
     elastic = n.get("lambda_", 0.0) * n["K"] / n["W0"]
@@ -159,10 +162,9 @@ def _is_wrong(
     load = 1 + n["epsilon"] * np.cos(theta)
     phi = _age(n, load[:-1], friction, log_slip)
     base, gap, integrals = friction.mean(), 0.0, np.zeros(2 + 2 * len(orders))
-    path = np.abs(np.diff(np.stack([log_slip, phi]), append=np.stack([log_slip, phi])[:, :1])).sum(
-        0
-    )
-    # At least a hundredth of the period apart, at most a change of the states by a quarter.
+    states = np.stack([log_slip, phi])
+    path = np.abs(np.diff(states, append=states[:, :1])).sum(0)
+    # At most a hundredth of the period apart, and a change of the states by about a quarter.
     passed = np.floor(np.cumsum(path) / _CHANGE + np.arange(samples) * _LEAST / samples)
     nodes = np.flatnonzero(np.diff(passed, prepend=-1.0))
     for k, after in zip(nodes, [*nodes[1:], samples], strict=True):
