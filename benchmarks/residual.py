@@ -76,7 +76,7 @@ def answer(
 
 
 def faults(
-    numbers: Numbers, waveform: np.ndarray, harmonics: np.ndarray
+    numbers: Numbers, waveform: np.ndarray, mean: np.ndarray, harmonics: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which points contradict the equations, and which are resolved by their samples.
 
@@ -86,7 +86,10 @@ def faults(
         As `draw` returns them.
     waveform : array, shape (2, points, samples)
         F/W0 and ln(slip rate/V).
+    mean : array, shape (points,)
+        Of F/W0.
     harmonics : array, shape (points, count), complex
+        Of F/W0.
 
     Returns
     -------
@@ -103,6 +106,7 @@ def faults(
         fault = residual > RESIDUAL
         fault |= np.abs(np.exp(log_slip).mean(1) - 1) > SLIP
         fault |= np.abs(spectrum - harmonics).max(1) > HARMONICS * swing
+        fault |= np.abs(friction.mean(1) - mean) > HARMONICS * swing + 1e-14
         now = ~resolved & (end < RESOLVED)
         wrong[now], resolved[now] = fault[now], True
     return wrong, resolved

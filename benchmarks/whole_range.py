@@ -30,8 +30,18 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--points", type=int, default=100_000)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--out", type=Path, required=True, help="folder for finished slices")
-    parser.add_argument("--part", default="1/1", help="every n-th slice, from the k-th: k/n")
+    parser.add_argument("--part", type=_part, default="1/1", help="k/n: every n-th slice from k")
     return parser.parse_args()
+
+
+def _part(text: str) -> tuple[int, int]:
+    try:
+        k, n = (int(number) for number in text.split("/"))
+    except ValueError:
+        k, n = 0, 0
+    if not 1 <= k <= n:
+        raise argparse.ArgumentTypeError(f"must be k/n with 1 <= k <= n, such as 1/2, got {text!r}")
+    return k, n
 
 
 def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
@@ -42,7 +52,10 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
     converged = np.flatnonzero(response.converged)
     wrong, resolved = np.zeros((2, len(response.outcome)), dtype=bool)
     wrong[converged], resolved[converged] = faults(
-        _rows(numbers, converged), response.waveform[:, converged], response.harmonics[converged]
+        _rows(numbers, converged),
+        response.waveform[:, converged],
+        response.mean_friction[converged],
+        response.harmonics[converged],
     )
     left = converged[~resolved[converged]]
     marched = np.zeros_like(resolved)
@@ -50,15 +63,16 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
         # Mean and harmonics of the answer, the waveform of the methods for such orbits.
         again = answer(law, _rows(numbers, rows), _FINE_SAMPLES, ("smooth", "collocation"))
         rows, waveform = rows[again.converged], again.waveform[:, again.converged]
-        part, harmonics = _rows(numbers, rows), response.harmonics[rows]
-        wrong[rows], resolved[rows] = faults(part, waveform, harmonics)
+        part, mean, harmonics = (
+            _rows(numbers, rows),
+            response.mean_friction[rows],
+            response.harmonics[rows],
+        )
+        wrong[rows], resolved[rows] = faults(part, waveform, mean, harmonics)
         late = ~resolved[rows]
         marched[rows] = late
         wrong[rows[late]] = faults_marched(
-            _rows(part, late),
-            waveform[:, late],
-            response.mean_friction[rows[late]],
-            harmonics[late],
+            _rows(part, late), waveform[:, late], mean[late], harmonics[late]
         )
     resolved |= marched
     return {
@@ -98,7 +112,7 @@ def main() -> None:
     arguments.out.mkdir(parents=True, exist_ok=True)
     numbers = draw(arguments.law, arguments.points, arguments.seed)
     slices = range(0, arguments.points, SLICE)
-    first, step = (int(k) for k in arguments.part.split("/"))
+    first, step = arguments.part
     name = f"{arguments.law}-{arguments.seed}-{arguments.points}-{{}}.npz".format
     for start in slices[first - 1 :: step]:
         file = arguments.out / name(start)

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.loads import Excitation
 from asperity.slider import QuasiStatic
 from asperity.solve.averaged import slip_pulse
@@ -146,7 +147,7 @@ def _read(problem: Problem, orbit: Orbit, harmonics: int, phases: int) -> Readin
     return Reading(*response, orbit.centre, waveform)
 
 
-@partial(jax.jit, static_argnames=("intervals",))
+@partial(jit_large, static_argnames=("intervals",))
 def first_orbit(problem: Problem, *, intervals: int) -> tuple[Orbit, Array]:
     """Collocation from the averaged limit, of which only the quasi-static equations are sure."""
     system, load = problem
@@ -158,7 +159,7 @@ def first_orbit(problem: Problem, *, intervals: int) -> tuple[Orbit, Array]:
     return result.orbit, result.error
 
 
-@partial(jax.jit, static_argnames=("intervals", "max_steps"))
+@partial(jit_large, static_argnames=("intervals", "max_steps"))
 def follow_orbit(
     problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, max_steps: int
 ) -> tuple[Orbit, Array]:
@@ -168,7 +169,7 @@ def follow_orbit(
     return refined(*problem, result.orbit, intervals), result.error
 
 
-@partial(jax.jit, static_argnames=("intervals", "harmonics", "phases"))
+@partial(jit_large, static_argnames=("intervals", "harmonics", "phases"))
 def refine_orbit(
     problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, harmonics: int, phases: int
 ) -> tuple[Orbit, Reading, Array]:
@@ -208,7 +209,7 @@ def _where(condition: Array, yes: Orbit, no: Orbit) -> Orbit:
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), yes, no)
 
 
-@partial(jax.jit, static_argnames=("harmonics", "phases"))
+@partial(jit_large, static_argnames=("harmonics", "phases"))
 def read_orbit(
     problem_and_orbit: tuple[Problem, Orbit], *, harmonics: int, phases: int = 0
 ) -> Reading:
@@ -217,14 +218,14 @@ def read_orbit(
     return _read(problem, orbit, harmonics, phases)
 
 
-@partial(jax.jit, static_argnames=("parts",))
+@partial(jit_large, static_argnames=("parts",))
 def split_reading(problem_and_orbit: tuple[Problem, Orbit], *, parts: int) -> Reading:
     """Multipliers by transfer maps over parts of the intervals, for stiff but smooth orbits."""
     problem, orbit = problem_and_orbit
     return _read(problem, split(orbit, parts), 1, 0)
 
 
-@partial(jax.jit, static_argnames=("parts",))
+@partial(jit_large, static_argnames=("parts",))
 def piece_map(problem_and_piece: tuple[Problem, Orbit], *, parts: int) -> tuple[Array, Array]:
     """Transfer map (n, n, points) over a piece of an orbit, and the logarithm of its scale.
 

@@ -25,6 +25,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.slider import Motion
 from asperity.solve.collocation import CollocationResponse, collocation_response, refined
 from asperity.solve.condensation import Local, condense, localise, transfer_maps
@@ -145,7 +146,7 @@ def _unit_tangent(
     return Tangent(*(a / jnp.sqrt(square) for a in raw))
 
 
-@jax.jit
+@jit_large
 def first_tangent(line_and_point: tuple[Line, Orbit, Array]) -> Tangent:
     """Direction of rising t at a regular point of a branch."""
     line, orbit, t = line_and_point
@@ -215,7 +216,7 @@ def _interpolated(nodes: Array, old: Array, new: Array) -> Array:
     return jax.vmap(over_points, (None, None, 0))(new[:-1], old, closed)
 
 
-@partial(jax.jit, static_argnames=("max_steps",))
+@partial(jit_large, static_argnames=("max_steps",))
 def arclength_step(inputs: tuple[Line, Point, Array], *, max_steps: int) -> Step:
     """One step of the given length along each branch; it counts where `error` is small."""
     line, point, length = inputs
@@ -246,7 +247,7 @@ def usable(orbit: Orbit, turn: Array) -> Array:
     return jnp.isfinite(orbit.slopes).all((0, 1, 2)) & jnp.isfinite(turn)
 
 
-@partial(jax.jit, static_argnames=("harmonics",))
+@partial(jit_large, static_argnames=("harmonics",))
 def read_orbit(inputs: tuple[Line, Orbit, Array], *, harmonics: int) -> CollocationResponse:
     """What is read off the orbit at the coordinate t."""
     line, orbit, t = inputs

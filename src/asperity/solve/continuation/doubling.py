@@ -12,12 +12,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
+from asperity._jax import jit_large
 from asperity.errors import InputError
 from asperity.loads import Excitation, Modulation
 from asperity.solve.condensation import condense, localise, transfer_maps
@@ -138,7 +138,7 @@ def _beside(walker: Walker, twice: Walker, simple: Station) -> Station | None:
     return None
 
 
-@jax.jit
+@jit_large
 def _maps(line: Line, orbit: Orbit, t: Array) -> tuple[Array, Array, Array]:
     """Transfer maps, response of the slopes, and units of the states."""
     (response,) = condense(localise(*line.at(t), orbit), orbit)

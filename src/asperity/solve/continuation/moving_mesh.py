@@ -16,6 +16,7 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.solve.condensation import localise
 from asperity.solve.continuation.arclength import (
     Point,
@@ -103,7 +104,7 @@ def fastest_slip(line: Line, orbit: Orbit, t: Array) -> Array:
     return system.log_slip(states, load.at(orbit.stage_phases)).max((0, 1))
 
 
-@jax.jit
+@jit_large
 def growth_within(inputs: tuple[Line, Orbit, Array]) -> Array:
     """Integral of the growth rate of disturbances over the part of the period where they grow.
 
@@ -147,7 +148,7 @@ def straight(inputs: tuple[Line, Point, Array]) -> Pair:
     return Pair(before, t, point)
 
 
-@partial(jax.jit, static_argnames=("max_steps",))
+@partial(jit_large, static_argnames=("max_steps",))
 def moving_step(inputs: tuple[Line, Pair, Array], *, max_steps: int) -> Advance:
     """One step of `ratio` times the last one along each branch."""
     line, pair, ratio = inputs
