@@ -20,7 +20,10 @@ import numpy as np
 
 from asperity.loads import Harmonic
 from asperity.slider import QuasiStatic
+from asperity.solve.adiabatic import adiabatic_growth
 from asperity.solve.batch import Indices, run_chunks, take
+from asperity.solve.continuation.pursuit import CHUNK as PURSUIT_CHUNK
+from asperity.solve.continuation.pursuit import HELD
 from asperity.solve.continuation.pursuit import MESHES as PURSUIT_MESHES
 from asperity.solve.found import Float, Found, Options, logs_of, store
 from asperity.solve.kernels import (
@@ -180,9 +183,27 @@ def _collocate(problem: Problem, found: Found, block: Indices, options: Options)
             told = _told(found, block, options, told)
     index = np.flatnonzero(np.isin(found.outcome[block], _WITHOUT_ORBIT))
     if len(index):
+        rows = block[index]
+        said = found.outcome[rows], found.detail[rows]
         _settle(part, found, block, orbits_from_high_frequency(part, points, index), index, silent)
         told = _told(found, block, options, told)
+        # An orbit of another branch that is not confirmed leaves what was said of this one.
+        lost = found.outcome[rows] == Outcome.NOT_RESOLVED
+        found.outcome[rows[lost]], found.detail[rows[lost]] = (a[lost] for a in said)
+    _tell_sensitive(part, found, block)
     options.progress(points - told)
+
+
+def _tell_sensitive(problem: Problem, found: Found, block: Indices) -> None:
+    """Say of what is left without an answer where it is too unstable for any."""
+    lost = np.flatnonzero(np.isin(found.outcome[block], (Outcome.NO_ORBIT, Outcome.NOT_RESOLVED)))
+    amplitude = np.broadcast_to(problem.load.amplitude, block.shape)
+    for part, growth in run_chunks(adiabatic_growth, problem, lost, PURSUIT_CHUNK):
+        part = part[growth > HELD]
+        rows = block[part]
+        share = np.where(found.outcome[rows] == Outcome.NO_ORBIT, found.detail[rows], 1.0)
+        found.detail[rows] = np.minimum(share, 1.0) * amplitude[part]
+        found.outcome[rows] = Outcome.SENSITIVE
 
 
 def _told(found: Found, block: Indices, options: Options, before: int) -> int:

@@ -35,20 +35,24 @@ class PursuitMesh(NamedTuple):
 
 
 #: For all; for what the first does not settle; and for what even the second has nothing to say of.
-MESHES = (PursuitMesh(144, 200), PursuitMesh(288, 400), PursuitMesh(864, 600))
+MESHES = (PursuitMesh(144, 200), PursuitMesh(288, 400), PursuitMesh(864, 2000))
 #: Exponent of the slip rate beyond which a pulse is so narrow, below 1e-7 of the period, that
 #: round-off in the phase limits it.
 RUNAWAY = 13.0
 
 #: Points in a call.
-_CHUNK = 8
+CHUNK = 8
 #: Distance from the amplitude asked for below which steps aim at it, and at which it is reached.
 _NEAR, _ARRIVED = 1e-2, 1e-6
+#: Rise of the exponent beyond `RUNAWAY` for which a branch is still followed there.
+_AHEAD = 0.5
 #: A branch this far back from a fold, as a share of the amplitude, is on its way back.
 _BACK = 1e-3
 _NEWTON_STEPS = 10
 #: Distance from the prediction, in steps, above which a step is not trusted.
 _MISS = 0.8
+#: Distance that the moving of the mesh may account for: shorter steps would miss by as much.
+_NOISE = 0.15
 _FIRST = 0.02
 #: Longest step in the space of states, phase and share, and its change by what Newton needed.
 _LONGEST, _GROWTH, _SHRINKAGE = 3.0, 2.0, 0.4
@@ -59,7 +63,7 @@ _RESTART, _GIVE_UP = 4, 10
 #: and how many times farther the share may get than where that leads.
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
 #: Growth by which the error of a mesh, 1e-6 or less, becomes as large as the orbit.
-_HELD = 15.0
+HELD = 15.0
 
 
 class Pursuit(NamedTuple):
@@ -113,7 +117,7 @@ class Pursuit(NamedTuple):
     @property
     def sensitive(self) -> NDArray[np.bool_]:
         """Whether the branch was lost where neither mesh nor experiment can hold its orbits."""
-        return ~(self.arrived | self.folded | self.ran_away) & (self.growth > _HELD)
+        return ~(self.arrived | self.folded | self.ran_away) & (self.growth > HELD)
 
     @property
     def settled(self) -> NDArray[np.bool_]:
@@ -139,9 +143,9 @@ def pursue(problem: Problem, index: Indices, mesh: PursuitMesh) -> Pursuit:
     known = (walked.fold, walked.farthest, walked.fastest, walked.limit)
     result = Pursuit(orbit, share, *known, np.zeros_like(share))
     left = index[~result.settled[index]]
-    for part, growth in run_chunks(growth_within, (line, orbit, share), left, _CHUNK):
+    for part, growth in run_chunks(growth_within, (line, orbit, share), left, CHUNK):
         result.growth[part] = growth
-    for part, growth in run_chunks(adiabatic_growth, problem, left, _CHUNK):
+    for part, growth in run_chunks(adiabatic_growth, problem, left, CHUNK):
         result.growth[part] = np.fmax(growth, result.growth[part])
     return result
 
@@ -190,8 +194,10 @@ class _Walked(NamedTuple):
 
     def walking(self, share: Float) -> NDArray[np.bool_]:
         """Which of the branches neither arrived nor ran away; what returns may turn again."""
-        going = (np.abs(share - 1) > _ARRIVED) & (share > -0.01)
-        return going & (self.fastest < RUNAWAY)
+        left = np.abs(share - 1)
+        # What is about to arrive may run ahead of it a little.
+        fastest = np.where(left < _NEAR, self.fastest - _AHEAD, self.fastest)
+        return (left > _ARRIVED) & (share > -0.01) & (fastest < RUNAWAY)
 
     def watch(self, rows: Indices, share: Float) -> None:
         """Extrapolate the share to where pulses run away, once they have grown enough."""
@@ -216,11 +222,11 @@ def _steady_pair(line: Line, points: int, index: Indices, intervals: int) -> Pai
     orbit.centre[:] = np.broadcast_to(np.asarray(steady), orbit.centre.shape)
     t = np.zeros(points)
     tangent = Tangent(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.zeros(points))
-    for part, found in run_chunks(first_tangent, (line, orbit, t), index, _CHUNK):
+    for part, found in run_chunks(first_tangent, (line, orbit, t), index, CHUNK):
         put(tangent, part, found)
     pair = jax.tree.map(np.array, Pair(orbit, t, Point(orbit, t, tangent)))
     inputs = (line, pair.point, np.full(points, _FIRST))
-    for part, found in run_chunks(straight, inputs, index, _CHUNK):
+    for part, found in run_chunks(straight, inputs, index, CHUNK):
         put(pair, part, found)
     return pair
 
@@ -233,8 +239,9 @@ def _follow(line: Line, pair: Pair, walked: _Walked, index: Indices, most_steps:
         if not len(at):
             break
         walked.ratio[:] = _towards_the_end(pair, walked.ratio, walked.failures)
-        for part, step in run_chunks(advance, (line, pair, walked.ratio), at, _CHUNK):
-            good = np.isfinite(step.error) & (step.miss < _MISS)
+        for part, step in run_chunks(advance, (line, pair, walked.ratio), at, CHUNK):
+            near = (step.miss < _MISS) | (step.miss * step.length < _NOISE)
+            good = np.isfinite(step.error) & near
             kept, chosen = part[good], np.flatnonzero(good)
             turned = pair.point.tangent.t[kept] * step.next.point.tangent.t[chosen] < 0
             extremum = np.where(turned, _extremum(pair, step, kept, chosen), np.nan)
@@ -248,7 +255,7 @@ def _follow(line: Line, pair: Pair, walked: _Walked, index: Indices, most_steps:
             walked.ratio[part] = _next_ratio(walked.ratio[part], good, step.iterations, step.length)
         stuck = at[walked.failures[at] >= _RESTART]
         lengths = walked.last * 0.1 * _SHRINKAGE ** (walked.failures - float(_RESTART))
-        for part, fresh in run_chunks(straight, (line, pair.point, lengths), stuck, _CHUNK):
+        for part, fresh in run_chunks(straight, (line, pair.point, lengths), stuck, CHUNK):
             put(pair, part, fresh)
         walked.ratio[stuck] = 1.0
 
