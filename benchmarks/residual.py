@@ -30,6 +30,8 @@ RESOLVED = 1e-6
 
 #: Change of the exponents between the samples that are marched from, and the fewest of these.
 _CHANGE, _LEAST = 0.25, 100
+#: Gap from one sample to the next that only a pulse between them explains.
+_AT_PULSE = RESIDUAL / 10
 #: Evaluations after which an integration has run away.
 _MOST_CALLS = 300_000
 
@@ -165,7 +167,8 @@ def _is_wrong(
     theta = 2 * np.pi * np.arange(samples + 1) / samples
     load = 1 + n["epsilon"] * np.cos(theta)
     phi = _age(n, load[:-1], friction, log_slip)
-    base, gap, integrals = friction.mean(), 0.0, np.zeros(2 + 2 * len(orders))
+    base, integrals = friction.mean(), np.zeros(2 + 2 * len(orders))
+    gaps, slips = [], []
     states = np.stack([log_slip, phi])
     path = np.abs(np.diff(states, append=states[:, :1])).sum(0)
     # At most a hundredth of the period apart, and a change of the states by about a quarter.
@@ -182,14 +185,19 @@ def _is_wrong(
             return True
         end, following = run.y[:, -1], after % samples
         arrived = np.log(slip_of(load[after], base + end[0], end[1]))
-        # All of them together: what is wrong everywhere is hardly so from one sample to the next.
-        gap += abs(arrived - log_slip[following]) + abs(end[1] - phi[following])
+        gaps.append(abs(arrived - log_slip[following]) + abs(end[1] - phi[following]))
+        slips.append((end[2] + span[1] - span[0]) / (2 * np.pi))
         integrals += end[2:] / (2 * np.pi)
     cosines, sines = np.split(integrals[2:], 2)
     swing = np.ptp(friction)
     off = np.abs(2 * (cosines + 1j * sines) - harmonics).max()
     off = max(off, abs(base + integrals[1] - mean))
-    return bool(gap > RESIDUAL or abs(integrals[0]) > SLIP or off > HARMONICS * swing)
+    # Where a pulse passes from one sample to the next the slip of that interval is as far off as
+    # its ends. What is off everywhere adds up to more than `RESIDUAL`.
+    at_pulse = np.where(np.array(gaps) > _AT_PULSE, gaps, 0.0)
+    slip = SLIP + np.dot(at_pulse + np.roll(at_pulse, 1), slips)
+    # All gaps together: what is wrong everywhere is hardly so from one sample to the next.
+    return bool(sum(gaps) > RESIDUAL or abs(integrals[0]) > slip or off > HARMONICS * swing)
 
 
 def _derivative(y: np.ndarray) -> np.ndarray:

@@ -119,6 +119,7 @@ def test_integration_from_sample_to_sample_agrees(batch):
         (waveform, mean + 1e-4 * swing, harmonics),
         (waveform, mean, harmonics + 1e-4 * swing[:, None]),
         (np.stack([waveform[0], waveform[1] + 0.1]), mean, harmonics),
+        (np.stack([waveform[0], waveform[1] + 1e-5]), mean, harmonics),
         (waveform, mean * np.nan, harmonics),
     ):
         assert marched(batch, rows, *wrong).all()
