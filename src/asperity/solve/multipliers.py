@@ -57,10 +57,20 @@ def settle_beyond_doubles(reading: Reading, logs: NDArray[np.complex128], k: int
     return True
 
 
-def resolve_by_splitting(
+def resolve_multipliers(
     problem: Problem, found: Found, block: Indices, orbit: Orbit, index: Indices
 ) -> None:
     """Settle the multipliers of resolved orbits on ever finer transfer maps."""
+    if len(index):
+        _resolve_by_splitting(problem, found, block, orbit, index)
+        index = index[found.outcome[block[index]] != Outcome.CONVERGED]
+        _resolve_piece_by_piece(problem, found, block, orbit, index)
+
+
+def _resolve_by_splitting(
+    problem: Problem, found: Found, block: Indices, orbit: Orbit, index: Indices
+) -> None:
+    """All intervals at once, as long as their maps can all be kept."""
     intervals = orbit.mesh.shape[0] - 1
     splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_AT_ONCE]
     for parts in splits:
@@ -82,7 +92,7 @@ def resolve_by_splitting(
             return
 
 
-def resolve_piece_by_piece(
+def _resolve_piece_by_piece(
     problem: Problem, found: Found, block: Indices, orbit: Orbit, index: Indices
 ) -> None:
     """Settle what is left by products of transfer maps so fine that they are never all kept.

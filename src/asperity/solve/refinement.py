@@ -22,8 +22,7 @@ from asperity.solve.multipliers import (
     AGREEMENT,
     chunk_size,
     multiplier_gap,
-    resolve_by_splitting,
-    resolve_piece_by_piece,
+    resolve_multipliers,
     settle_beyond_doubles,
 )
 from asperity.solve.outcome import Outcome
@@ -93,7 +92,7 @@ def refine(
         if not len(index):
             return
     stiff = index[found.outcome[block[index]] == Outcome.MULTIPLIERS_NOT_RESOLVED]
-    resolve_by_splitting(problem, found, block, orbit, stiff)
+    resolve_multipliers(problem, found, block, orbit, stiff)
     found.discard(block[index[found.outcome[block[index]] != Outcome.CONVERGED]])
     options.progress(len(index))
 
@@ -124,10 +123,7 @@ def accept(problem: Problem, found: Found, rows: Indices, orbit: Orbit, options:
         unsettled.append(part[~np.array(settled)])
     index = np.concatenate(unsettled)
     found.outcome[rows[index]] = Outcome.MULTIPLIERS_NOT_RESOLVED
-    if len(index):
-        resolve_by_splitting(problem, found, rows, orbit, index)
-        index = index[found.outcome[rows[index]] != Outcome.CONVERGED]
-        resolve_piece_by_piece(problem, found, rows, orbit, index)
+    resolve_multipliers(problem, found, rows, orbit, index)
     lost = rows[found.outcome[rows] != Outcome.CONVERGED]
     found.discard(lost)
     options.progress(len(rows) - len(lost))
