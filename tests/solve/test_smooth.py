@@ -9,9 +9,11 @@ from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity.laws import ElastoPlastic, RiceRuina
+from asperity.solve import Outcome, multipliers
 from asperity.solve.floquet import log_multipliers
+from asperity.solve.found import Found
 from asperity.solve.kernels import Problem
-from asperity.solve.multipliers import _map_by_pieces
+from asperity.solve.multipliers import _map_by_pieces, resolve_multipliers
 from asperity.solve.periodic import flatten
 from asperity.solve.smooth import smooth_orbits
 
@@ -135,3 +137,21 @@ def test_multipliers_piece_by_piece_are_those_of_the_whole():
     logs = log_multipliers(matrix, log_scale, log_determinant)
     # Of multipliers below 1e-12 no more was asked than that they vanish.
     np.testing.assert_allclose(logs[:, 0], found.log_multipliers, atol=1e-6)
+
+
+def test_what_maps_kept_at_once_leave_unsettled_is_settled_piece_by_piece(monkeypatch):
+    whole = respond(40.0, 1.4, 0.4)
+    problem, _ = flatten(Problem(whole.motion, whole.load))
+    orbit = smooth_orbits(problem, 1).orbit
+    intervals = orbit.mesh.shape[0] - 1
+    monkeypatch.setattr(multipliers, "_MOST_AT_ONCE", 3 * intervals)  # too coarse for this orbit
+    found, only = Found.empty(2, 1, 8, 0), np.array([0])
+    found.outcome[:] = Outcome.MULTIPLIERS_NOT_RESOLVED
+    monkeypatch.setattr(multipliers, "_MOST_INTERVALS", 0)
+    resolve_multipliers(problem, found, only, orbit, only)
+    assert found.outcome[0] == Outcome.MULTIPLIERS_NOT_RESOLVED
+    monkeypatch.undo()
+    monkeypatch.setattr(multipliers, "_MOST_AT_ONCE", 3 * intervals)
+    resolve_multipliers(problem, found, only, orbit, only)
+    assert found.outcome[0] == Outcome.CONVERGED
+    np.testing.assert_allclose(found.log_multipliers[:, 0], whole.log_multipliers, atol=1e-6)
