@@ -16,12 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.solve import Outcome
+from asperity.solve import Outcome, PeriodicResponse
 from benchmarks.residual import LAWS, Numbers, answer, draw, faults, faults_marched
 
 SLICE = 2000
-#: Samples of the waveform; for narrow pulses more of them, and so many points at a time.
-_SAMPLES, _FINE_SAMPLES, _FEW = 2**12, 2**20, 32
+#: Samples of the waveform; for narrow pulses more of them, and so many points at a time; and for
+#: pulses that pass between two of those, within which round-off grows a thousandfold.
+_SAMPLES, _FINE_SAMPLES, _FEW, _FINEST_SAMPLES = 2**12, 2**20, 32, 2**24
 
 
 def _arguments() -> argparse.Namespace:
@@ -60,20 +61,9 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
     left = converged[~resolved[converged]]
     marched = np.zeros_like(resolved)
     for rows in np.array_split(left, -(-len(left) // _FEW)) if len(left) else ():
-        # Mean and harmonics of the answer, the waveform of the methods for such orbits.
-        again = answer(law, _rows(numbers, rows), _FINE_SAMPLES, ("smooth", "collocation"))
-        rows, waveform = rows[again.converged], again.waveform[:, again.converged]
-        part, mean, harmonics = (
-            _rows(numbers, rows),
-            response.mean_friction[rows],
-            response.harmonics[rows],
-        )
-        wrong[rows], resolved[rows] = faults(part, waveform, mean, harmonics)
-        late = ~resolved[rows]
-        marched[rows] = late
-        wrong[rows[late]] = faults_marched(
-            _rows(part, late), waveform[:, late], mean[late], harmonics[late]
-        )
+        _march(law, numbers, response, rows, _FINE_SAMPLES, (wrong, resolved, marched))
+    for row in np.flatnonzero(wrong & marched):
+        _march(law, numbers, response, np.array([row]), _FINEST_SAMPLES, (wrong, resolved, marched))
     resolved |= marched
     return {
         "outcome": response.outcome,
@@ -83,6 +73,34 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
         "marched": marched,
         "seconds": np.array(seconds),
     }
+
+
+def _march(
+    law: str,
+    numbers: Numbers,
+    response: PeriodicResponse,
+    rows: np.ndarray,
+    samples: int,
+    verdict: tuple[np.ndarray, np.ndarray, np.ndarray],
+) -> None:
+    """Look at points again with more samples, by integration where these do not resolve either.
+
+    Mean and harmonics are those of the answer, the waveform that of the methods for such orbits.
+    """
+    wrong, resolved, marched = verdict
+    again = answer(law, _rows(numbers, rows), samples, ("smooth", "collocation"))
+    rows, waveform = rows[again.converged], again.waveform[:, again.converged]
+    part, mean, harmonics = (
+        _rows(numbers, rows),
+        response.mean_friction[rows],
+        response.harmonics[rows],
+    )
+    wrong[rows], resolved[rows] = faults(part, waveform, mean, harmonics)
+    late = ~resolved[rows]
+    marched[rows] = late
+    wrong[rows[late]] = faults_marched(
+        _rows(part, late), waveform[:, late], mean[late], harmonics[late]
+    )
 
 
 def _rows(numbers: Numbers, rows: np.ndarray) -> Numbers:
