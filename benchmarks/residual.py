@@ -175,7 +175,7 @@ def _is_wrong(
     nodes = np.flatnonzero(np.diff(passed, prepend=-1.0))
     for k, after in zip(nodes, [*nodes[1:], samples], strict=True):
         start = np.hstack([friction[k] - base, phi[k], np.zeros_like(integrals)])
-        span = theta[k], theta[after]
+        span, calls = (theta[k], theta[after]), itertools.count()
         try:
             run = solve_ivp(rates, span, start, "LSODA", rtol=1e-9, atol=1e-12)
         except RuntimeError:

@@ -112,7 +112,10 @@ def marched(batch, rows, waveform, mean, harmonics):
 
 def test_integration_from_sample_to_sample_agrees(batch):
     rows, waveform, mean, harmonics = answers(batch)
-    rows, waveform, mean, harmonics = rows[:6], waveform[:, :6], mean[:6], harmonics[:6]
+    n = batch.part(rows)
+    # Slow modulation takes steps by the thousand.
+    few = np.flatnonzero(n["V"] / (n["D0"] * n["f"]) < 50)[:4]
+    rows, waveform, mean, harmonics = rows[few], waveform[:, few], mean[few], harmonics[few]
     assert not marched(batch, rows, waveform, mean, harmonics).any()
     swing = np.ptp(waveform[0], axis=1)
     for wrong in (
