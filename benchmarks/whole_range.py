@@ -61,9 +61,11 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
     left = converged[~resolved[converged]]
     marched = np.zeros_like(resolved)
     for rows in np.array_split(left, -(-len(left) // _FEW)) if len(left) else ():
-        _march(law, numbers, response, rows, _FINE_SAMPLES, (wrong, resolved, marched))
+        _look_again(law, numbers, response, rows, _FINE_SAMPLES, (wrong, resolved, marched))
     for row in np.flatnonzero(wrong & marched):
-        _march(law, numbers, response, np.array([row]), _FINEST_SAMPLES, (wrong, resolved, marched))
+        _look_again(
+            law, numbers, response, np.array([row]), _FINEST_SAMPLES, (wrong, resolved, marched)
+        )
     resolved |= marched
     return {
         "outcome": response.outcome,
@@ -75,7 +77,7 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
     }
 
 
-def _march(
+def _look_again(
     law: str,
     numbers: Numbers,
     response: PeriodicResponse,
