@@ -1,6 +1,7 @@
 # Needs python3 (3.11 or later) with venv, pip, git and make; everything else goes into .venv.
 #
 #   make demo    the paper, reproduced: report/index.html
+#   make app     the page in a browser: sliders, maps, recordings
 #   make test    the whole test suite
 #   make check   style, types, import directions, documentation
 #   make bench   speed and accuracy against other integrators
@@ -16,11 +17,15 @@ LOCKED := $(PIP) --require-hashes
 LOCK := requirements
 UPGRADE ?=
 
-.PHONY: demo test check bench docs lock clean
+.PHONY: demo app test check bench docs lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/run.stamp
 	$(BIN)/asperity reproduce --out report
+	@echo "The page with sliders and figures: make app" >&2
+
+app: $(VENV)/app.stamp
+	$(BIN)/asperity serve --open
 
 test: $(VENV)/test.stamp
 	$(BIN)/python -m pytest -n 2
@@ -67,6 +72,7 @@ lock: | $(VENV)/venv.stamp
 	$(COMPILE) pyproject.toml -o $(LOCK)/run.txt
 	$(COMPILE) $(LOCK)/build.in -c $(LOCK)/run.txt -o $(LOCK)/build.txt
 	$(COMPILE) pyproject.toml --extra test -c $(LOCK)/run.txt -c $(LOCK)/build.txt -o $(LOCK)/test.txt
+	$(COMPILE) pyproject.toml --extra app -c $(LOCK)/test.txt -c $(LOCK)/build.txt -o $(LOCK)/app.txt
 	$(COMPILE) pyproject.toml --extra docs -c $(LOCK)/test.txt -c $(LOCK)/build.txt -o $(LOCK)/docs.txt
 	$(COMPILE) pyproject.toml --extra bench -c $(LOCK)/docs.txt -c $(LOCK)/test.txt -c $(LOCK)/build.txt -o $(LOCK)/bench.txt
 	$(COMPILE) $(LOCK)/lock.in -o $(LOCK)/lock.txt

@@ -19,30 +19,33 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--repeats", type=int, default=5, help="the median of so many is shown")
     parser.add_argument("--million", type=int, default=1_000_000, help="points of the largest call")
     parser.add_argument("--out", type=Path, help="also write the rows to this JSON file")
+    parser.add_argument("--law", choices=LAWS, help="this one only")
     return parser.parse_args()
 
 
-def _rows(points: int, repeats: int, million: int, cores: set[int]) -> Iterator:
+def _rows(
+    laws: tuple[str, ...], points: int, repeats: int, million: int, cores: set[int]
+) -> Iterator:
     # Only now: libraries count the cores when they are imported.
     from benchmarks import ours, peers, processes, transient
 
     def at_most(most: int) -> int:
         return min(points, most)
 
-    for law in LAWS:
+    for law in laws:
         yield ours.response_row(law, points, repeats, "asperity")
         yield peers.heyoka_row(law, at_most(8192), repeats)
         yield ours.response_row(
             law, at_most(512), 1, "asperity, collocation only", methods=("collocation",)
         )
         yield peers.scipy_shooting_row(law, at_most(64))
-        yield peers.scipy_marching_row(law, at_most(2))
+        yield peers.scipy_marching_row(law, min(2, -(-points // 8)))
         yield peers.diffrax_marching_row(law, at_most(4))
         yield ours.rates_row(law, points, repeats)
-        yield from ours.gradient_rows(law, at_most(20_000), repeats)
+        yield from ours.gradient_rows(law, at_most(60), 20 * repeats)
         yield ours.sensitivities_row(law, at_most(64))
         yield from processes.whole_batch_rows(law, points, repeats, cores)
-    yield from processes.whole_batch_rows(LAWS[-1], million, 0, cores)
+    yield from processes.whole_batch_rows(laws[-1], million, 0, cores)
     yield from processes.start_up_rows(repeats)
     yield from transient.transient_rows(min(8.0, max(0.05, points / 1000)), repeats)
 
@@ -70,7 +73,8 @@ def main() -> None:
     from benchmarks import table
 
     rows = []
-    for row in _rows(arguments.points, arguments.repeats, arguments.million, cores):
+    laws = (arguments.law,) if arguments.law else LAWS
+    for row in _rows(laws, arguments.points, arguments.repeats, arguments.million, cores):
         if row is None:
             print("A peer is not installed and left out.", file=sys.stderr)
             continue

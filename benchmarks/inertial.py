@@ -13,8 +13,8 @@ import argparse
 import numpy as np
 
 import asperity as asp
-from asperity.solve.periodic import checked_problem, flatten
-from asperity.solve.shooting_start import averaged_start
+from asperity.orbit.methods.shooting.initial_guess import averaged_start
+from asperity.slider.problem import checked_problem, flatten
 from benchmarks.cases import FREQUENCY, Batch, batch
 from benchmarks.clock import pin_to_one_core, timed
 
@@ -25,7 +25,7 @@ _TOLERANCE = 1e-10
 _CLOSED, _NEWTON_STEPS, _LARGEST_CHANGE = 1e-8, 20, 3.0
 
 
-def respond(points: Batch) -> asp.solve.PeriodicResponse:
+def respond(points: Batch) -> asp.orbit.PeriodicResponse:
     """Periodic response with inertia."""
     return asp.periodic_response(
         points.slider(),
@@ -143,7 +143,7 @@ def scipy_radau(points: Batch, start: np.ndarray) -> np.ndarray:
     return np.stack(found, axis=1)
 
 
-def _near(answers: asp.solve.PeriodicResponse, points: Batch) -> np.ndarray:
+def _near(answers: asp.orbit.PeriodicResponse, points: Batch) -> np.ndarray:
     """States within 1e-5 of the answers, (size, points), with ln(V Phi/D0) for ln(V0 Phi/D0)."""
     start = answers.start[: len(points)].T.copy()
     start[1:] *= 1 + 1e-5

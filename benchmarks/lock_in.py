@@ -36,7 +36,7 @@ def recording(time: np.ndarray, noise: float) -> tuple[np.ndarray, np.ndarray]:
 
 def row(name: str, time: np.ndarray, noise: float, repeats: int) -> str:
     """A line of the table."""
-    from asperity.instrument.lock_in import lock_in
+    from asperity.lock_in.demodulation import lock_in
 
     arrays = (time, *recording(time, noise))
     summed, _ = timed(lambda: [x.sum() for x in arrays + arrays], repeats)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,7 +11,6 @@ import numpy as np
 import asperity as asp
 from asperity.loads import Harmonic
 from asperity.slider import QuasiStatic
-from asperity.solve import harmonic_response
 from benchmarks.cases import FREQUENCY, Batch, batch
 from benchmarks.clock import timed
 from benchmarks.equations import Answer
@@ -21,7 +22,7 @@ _BLOCK = 240
 _NODES = 32
 
 
-def respond(points: Batch, **options) -> asp.solve.PeriodicResponse:
+def respond(points: Batch, **options) -> asp.orbit.PeriodicResponse:
     """The periodic response of a batch."""
     return asp.periodic_response(
         points.slider(),
@@ -32,7 +33,7 @@ def respond(points: Batch, **options) -> asp.solve.PeriodicResponse:
     )
 
 
-def _answer(found: asp.solve.PeriodicResponse) -> Answer:
+def _answer(found: asp.orbit.PeriodicResponse) -> Answer:
     """The form in which all are compared; every point must have converged."""
     if not found.converged.all():
         raise RuntimeError(f"{(~found.converged).sum()} points of the batch did not converge")
@@ -79,30 +80,61 @@ def rates_row(law: str, points: int, repeats: int) -> Row:
 
 
 def gradient_rows(law: str, points: int, repeats: int) -> list[Row]:
-    """mu1 by the differentiable solve, and its gradient to all parameters in reverse mode."""
-    inputs = _blocks(batch(law, points))
+    """Mean and two harmonics, and their derivatives to all parameters, as a fit asks for them.
 
-    def mu1(block: tuple[QuasiStatic, Harmonic]) -> jax.Array:
-        _, harmonics = harmonic_response(*block)
-        return jnp.abs(harmonics[0]).sum()
+    The errors of the second row are those of the derivatives by the logarithm of A, held against
+    Richardson's extrapolation of differences of `periodic_response`.
+    """
+    part = batch(law, points)
+    slider = part.slider()
+    fields = dataclasses.fields(slider.law)
+    parameters = {f.name.rstrip("_"): float(getattr(slider.law, f.name)) for f in fields}
+    parameters |= {name: float(getattr(slider, name)) for name in ("K", "W0", "M")}
+    parameters |= {"V": part.velocity, "epsilon": part.epsilon, "frequency": FREQUENCY}
+    model = asp.response_function(law)
+    forward = timed(lambda: jax.block_until_ready(model(parameters)), repeats)
+    both = timed(lambda: jax.block_until_ready(model.value_and_jacobian(parameters)), repeats)
+    exact = respond(part)
+    row = Row(f"mean and two harmonics, {law}", points, forward[0])
+    first = _with_errors(row, forward[1], exact.mean_friction, exact.harmonics)
+    slope = jax.tree.map(lambda a: a * parameters["A"], both[1][1]["A"])
+    note = f"{both[0] / forward[0]:.2f} x forward"
+    second = Row(f"the same with all derivatives, {law}", points, both[0], note=note)
+    return [first, _with_errors(second, slope, *_slopes(part))]
 
-    rows = []
-    for what, function in (("mu1 alone", mu1), ("gradient of mu1", jax.grad(mu1))):
-        compiled = jax.jit(lambda inputs, function=function: jax.lax.map(function, inputs))
-        seconds, _ = timed(
-            lambda compiled=compiled: jax.block_until_ready(compiled(inputs)), repeats
+
+def _with_errors(row: Row, found: asp.orbit.ResponseValues, mean, harmonics) -> Row:
+    """Errors relative to the largest of all points."""
+    size = np.abs(harmonics[:, :2]).max(0)
+    mu1, mu2 = np.abs(np.asarray(found.harmonics) - harmonics[:, :2]).max(0) / size
+    error = np.abs(np.asarray(found.mean_friction) - mean).max() / np.abs(mean).max()
+    return dataclasses.replace(row, mean=float(error), mu1=float(mu1), mu2=float(mu2))
+
+
+def _slopes(part: Batch) -> tuple[np.ndarray, np.ndarray]:
+    """Derivatives of mean and harmonics by the logarithm of A, from differences."""
+
+    def at(change: float) -> np.ndarray:
+        slider = part.slider()
+        law = dataclasses.replace(slider.law, A=slider.law.A * (1 + change))
+        found = asp.periodic_response(
+            asp.Slider(law, spring=slider.K, load=slider.W0, mass=slider.M),
+            velocity=part.velocity,
+            epsilon=part.epsilon,
+            frequency=FREQUENCY,
         )
-        rows.append(Row(f"{what}, {law}", inputs[1].epsilon.size, seconds))
-    ratio = rows[1].microseconds / rows[0].microseconds
-    first, second = rows
-    return [first, Row(second.what, second.points, second.seconds, note=f"{ratio:.2f} x forward")]
+        return np.column_stack([found.mean_friction, found.harmonics[:, :2]])
+
+    coarse, fine = ((at(h) - at(-h)) / (2 * h) for h in (2e-3, 1e-3))
+    slopes = (4 * fine - coarse) / 3
+    return slopes[:, 0].real, slopes[:, 1:]
 
 
 def sensitivities_row(law: str, points: int) -> Row:
     """All outputs to all parameters, by the robust method."""
     part = batch(law, points)
 
-    def run() -> asp.solve.Sensitivities:
+    def run() -> asp.orbit.Sensitivities:
         return asp.sensitivities(
             part.slider(), velocity=part.velocity, epsilon=part.epsilon, frequency=FREQUENCY
         )

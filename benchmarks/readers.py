@@ -60,7 +60,7 @@ def _pair(
     plain_name: str,
     repeats: int,
 ) -> Iterator[Row]:
-    from asperity.instrument import read
+    from asperity.recording import read
 
     size = path.stat().st_size
     base, _ = timed(plain, repeats)

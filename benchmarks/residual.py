@@ -15,8 +15,9 @@ from scipy.integrate import solve_ivp
 
 from asperity import Slider, periodic_response
 from asperity.laws import ElastoPlastic, RiceRuina
-from asperity.solve import PeriodicResponse
-from asperity.solve.search import METHODS
+from asperity.orbit import PeriodicResponse
+from asperity.orbit.methods.registry import CHOICES
+from asperity.slider.problem import Problem, checked_problem, flatten
 
 #: Residual of either equation over its largest term. The waveform is good to 3e-5 of its swing,
 #: more in its steepest parts, and is differentiated once.
@@ -55,17 +56,25 @@ def draw(law: str, count: int, seed: int) -> Numbers:
     return numbers
 
 
+def slider_of(law: str, numbers: Numbers) -> Slider:
+    """The sliders of some points."""
+    kind = LAWS[law]
+    parameters = {f.name: numbers[f.name] for f in dataclasses.fields(kind)}
+    return Slider(kind(**parameters), spring=numbers["K"], load=numbers["W0"])
+
+
+def problem_of(law: str, numbers: Numbers) -> Problem:
+    """Equations and load of some points."""
+    drive = {"velocity": numbers["V"], "epsilon": numbers["epsilon"], "frequency": numbers["f"]}
+    return flatten(checked_problem(slider_of(law, numbers), **drive))[0]
+
+
 def answer(
-    law: str, numbers: Numbers, samples: int, methods: tuple[str, ...] = METHODS
+    law: str, numbers: Numbers, samples: int, methods: tuple[str, ...] = CHOICES
 ) -> PeriodicResponse:
     """What the package says of these points, with waveforms."""
-    kind = LAWS[law]
     return periodic_response(
-        Slider(
-            kind(**{f.name: numbers[f.name] for f in dataclasses.fields(kind)}),
-            spring=numbers["K"],
-            load=numbers["W0"],
-        ),
+        slider_of(law, numbers),
         velocity=numbers["V"],
         epsilon=numbers["epsilon"],
         frequency=numbers["f"],

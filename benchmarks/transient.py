@@ -25,7 +25,7 @@ from benchmarks.table import Row
 MU0, A, B, D0, V0, W0, M, LAMBDA = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0, 1.6, 6.2e-7
 _TOLERANCES = (1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12)
 
-#: Trial steps that go astray must not overflow.
+#: TrialStep steps that go astray must not overflow.
 _LARGEST = 300.0
 
 

@@ -16,13 +16,13 @@ from pathlib import Path
 
 import numpy as np
 
-from asperity.solve import Outcome, PeriodicResponse
+from asperity.orbit import Outcome, PeriodicResponse
 from benchmarks.residual import LAWS, Numbers, answer, draw, faults, faults_marched
 
 SLICE = 2000
 #: Samples of the waveform; for narrow pulses more of them, and so many points at a time; and for
 #: pulses that pass between two of those, within which round-off grows a thousandfold.
-_SAMPLES, _FINE_SAMPLES, _FEW, _FINEST_SAMPLES = 2**12, 2**20, 32, 2**24
+SAMPLES, FINE_SAMPLES, _FEW, FINEST_SAMPLES = 2**12, 2**20, 32, 2**24
 
 
 def _arguments() -> argparse.Namespace:
@@ -48,7 +48,7 @@ def _part(text: str) -> tuple[int, int]:
 def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
     """Outcome, detail and verdict of the points of a slice, and the processor time."""
     begun = time.process_time()
-    response = answer(law, numbers, _SAMPLES)
+    response = answer(law, numbers, SAMPLES)
     seconds = time.process_time() - begun
     converged = np.flatnonzero(response.converged)
     wrong, resolved = np.zeros((2, len(response.outcome)), dtype=bool)
@@ -61,10 +61,10 @@ def _solved(law: str, numbers: Numbers) -> dict[str, np.ndarray]:
     left = converged[~resolved[converged]]
     marched = np.zeros_like(resolved)
     for rows in np.array_split(left, -(-len(left) // _FEW)) if len(left) else ():
-        _look_again(law, numbers, response, rows, _FINE_SAMPLES, (wrong, resolved, marched))
+        _look_again(law, numbers, response, rows, FINE_SAMPLES, (wrong, resolved, marched))
     for row in np.flatnonzero(wrong & marched):
         _look_again(
-            law, numbers, response, np.array([row]), _FINEST_SAMPLES, (wrong, resolved, marched)
+            law, numbers, response, np.array([row]), FINEST_SAMPLES, (wrong, resolved, marched)
         )
     resolved |= marched
     return {
@@ -90,7 +90,7 @@ def _look_again(
     Mean and harmonics are those of the answer, the waveform that of the methods for such orbits.
     """
     wrong, resolved, marched = verdict
-    again = answer(law, _rows(numbers, rows), samples, ("smooth", "collocation"))
+    again = answer(law, _rows(numbers, rows), samples, ("series", "collocation"))
     rows, waveform = rows[again.converged], again.waveform[:, again.converged]
     part, mean, harmonics = (
         _rows(numbers, rows),

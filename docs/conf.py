@@ -23,6 +23,7 @@ extensions = [
     "ledger",
     "mathml",
     "offline",
+    "parameter_tables",
 ]
 exclude_patterns = ["_build", "_ext", "images"]
 

@@ -16,16 +16,17 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 if TYPE_CHECKING:
-    from asperity.study.claims import Claim
+    from asperity.papers.ledger import Claim
 
 _WHICH = ("counts", "exceptions", "reproduced")
+_KINDS = {"fit": "fits", "arithmetic": "arithmetic", "identity": "identities"}
 
 
 @cache
 def _claims() -> Sequence[Claim]:
-    from asperity.study.claims import ledger
+    from asperity.papers import find_paper
 
-    return ledger()
+    return find_paper("bureau2000").ledger(sensitivity=True)
 
 
 class Claims(SphinxDirective):
@@ -42,18 +43,38 @@ class Claims(SphinxDirective):
             return [nodes.paragraph(text=_counts())]
         wanted = [c for c in _claims() if (c.verdict == "reproduced") == (which == "reproduced")]
         if which == "reproduced":
-            rows = [(c.place, c.statement, c.stated, c.computed) for c in wanted]
-            return [_table(("Place", "The paper states", "Stated", "Computed"), rows)]
-        rows = [(c.place, c.statement, f"{c.computed}. {c.why}", c.verdict) for c in wanted]
+            rows = [(c.place, c.statement, c.stated, _found(c), c.kind) for c in wanted]
+            return [_table(("Place", "The paper states", "Stated", "Computed", "Kind"), rows)]
+        rows = [
+            (c.place, c.statement, f"{_found(c)}. {c.why}", f"{c.verdict} ({c.kind})")
+            for c in wanted
+        ]
         return [_table(("Place", "The paper states", "Computed, and what to make of it", ""), rows)]
+
+
+def _found(claim: Claim) -> str:
+    """What was computed, and what becomes of it within the uncertainties."""
+    from asperity.papers.report.ledger import sensitivity_text
+
+    text = sensitivity_text(claim)
+    return f"{claim.computed}. Within the uncertainties: {text}" if text else claim.computed
 
 
 def _counts() -> str:
     claims = _claims()
-    found = {v: sum(c.verdict == v for c in claims) for v in ("reproduced", "misprint", "differs")}
+    tests = [c for c in claims if c.is_test]
+    found = {v: sum(c.verdict == v for c in tests) for v in ("reproduced", "misprint", "differs")}
+    beside = []
+    for kind, name in _KINDS.items():
+        own = [c for c in claims if c.kind == kind]
+        others = sum(c.verdict != "reproduced" for c in own)
+        beside.append(
+            f"{len(own)} {name}" + (f" ({others} of them not as stated)" if others else "")
+        )
     return (
-        f"Of {len(claims)} statements, {found['reproduced']} are reproduced, "
-        f"{found['misprint']} are misprints and {found['differs']} differ."
+        f"Of {len(claims)} statements {len(tests)} are tests: {found['reproduced']} are "
+        f"reproduced, {found['misprint']} are misprints and {found['differs']} differ. "
+        f"Counted apart: {', '.join(beside)}."
     )
 
 

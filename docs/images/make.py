@@ -7,9 +7,9 @@ from pathlib import Path
 
 from PIL import Image
 
-from asperity.figures.paper import DRAWN
 from asperity.figures.style import style
-from asperity.study.paper import figure_11
+from asperity.papers.bureau2000.figures import DRAWN
+from asperity.papers.bureau2000.numbers import figure_11
 
 TARGET = Path(__file__).with_name("figure-11.png")
 

@@ -5,54 +5,70 @@ Nothing heavy is loaded here; each name below is imported when first used.
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from asperity._version import __version__
 
 if TYPE_CHECKING:
     from asperity import (
         air,
+        branches,
+        experiment,
         figures,
-        instrument,
+        inference,
         laws,
         loads,
+        lock_in,
         materials,
-        report,
-        solve,
-        study,
+        measurement,
+        orbit,
+        papers,
+        parameters,
+        protocol,
+        recording,
+        slider,
+        sweep,
+        theory,
+        transients,
+        tribometer,
         units,
     )
+    from asperity.app.notebook import explore
+    from asperity.branches import continuation, doubled_branch, stability_boundary
     from asperity.errors import InputError
-    from asperity.slider import Slider
-    from asperity.solve import (
+    from asperity.measurement.from_file import measure_recording as measure
+    from asperity.orbit import (
         averaged_response,
-        continuation,
-        doubled_branch,
         periodic_response,
-        perturbation_response,
+        response_function,
         sensitivities,
-        stability_boundary,
-        transient,
     )
+    from asperity.protocol.from_file import run_experiment as run
+    from asperity.recording.readers import read
+    from asperity.slider import Slider
+    from asperity.sweep.map import response_map as map
+    from asperity.theory import perturbation_response
+    from asperity.transients import transient
 
-#: Public names and the module each is defined in.
+#: Public names that are no rooms: the module that has each, and its name there.
 _HOMES = {
-    "InputError": "asperity.errors",
-    "Slider": "asperity.slider",
-    "averaged_response": "asperity.solve",
-    "continuation": "asperity.solve",
-    "doubled_branch": "asperity.solve",
-    "periodic_response": "asperity.solve",
-    "perturbation_response": "asperity.solve",
-    "sensitivities": "asperity.solve",
-    "stability_boundary": "asperity.solve",
-    "transient": "asperity.solve",
+    "InputError": ("errors", "InputError"),
+    "Slider": ("slider", "Slider"),
+    "averaged_response": ("orbit", "averaged_response"),
+    "continuation": ("branches", "continuation"),
+    "doubled_branch": ("branches", "doubled_branch"),
+    "map": ("sweep.map", "response_map"),
+    "explore": ("app.notebook", "explore"),
+    "measure": ("measurement.from_file", "measure_recording"),
+    "periodic_response": ("orbit", "periodic_response"),
+    "perturbation_response": ("theory", "perturbation_response"),
+    "read": ("recording.readers", "read"),
+    "response_function": ("orbit", "response_function"),
+    "run": ("protocol.from_file", "run_experiment"),
+    "sensitivities": ("orbit", "sensitivities"),
+    "stability_boundary": ("branches", "stability_boundary"),
+    "transient": ("transients", "transient"),
 }
-_MODULES = (
-    *("air", "figures", "instrument", "laws", "loads"),
-    *("materials", "report", "solve", "study", "units"),
-)
 
 __all__ = [
     "InputError",
@@ -60,30 +76,50 @@ __all__ = [
     "__version__",
     "air",
     "averaged_response",
+    "branches",
     "continuation",
     "doubled_branch",
+    "experiment",
+    "explore",
     "figures",
-    "instrument",
+    "inference",
     "laws",
     "loads",
+    "lock_in",
+    "map",
     "materials",
+    "measure",
+    "measurement",
+    "orbit",
+    "papers",
+    "parameters",
     "periodic_response",
     "perturbation_response",
-    "report",
+    "protocol",
+    "read",
+    "recording",
+    "response_function",
+    "run",
     "sensitivities",
-    "solve",
+    "slider",
     "stability_boundary",
-    "study",
+    "sweep",
+    "theory",
     "transient",
+    "transients",
+    "tribometer",
     "units",
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
     if name in _HOMES:
-        value = getattr(importlib.import_module(_HOMES[name]), name)
-    elif name in _MODULES:
-        value = importlib.import_module(f"asperity.{name}")
+        room, there = _HOMES[name]
+        value = getattr(import_module(f"asperity.{room}"), there)
+    elif name in __all__:
+        value = import_module(f"asperity.{name}")
     else:
         raise AttributeError(f"module 'asperity' has no attribute '{name}'")
     globals()[name] = value
@@ -91,4 +127,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

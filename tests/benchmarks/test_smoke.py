@@ -18,6 +18,9 @@ WORST = {
     "SciPy LSODA marching": 1e-7,
     "diffrax marching": 1e-7,
     "asperity transient": 1e-8,
+    "mean and two harmonics": 1e-8,
+    # Held against differences of orbits that are solved to some 1e-10, over steps of a hundredth.
+    "the same with all derivatives": 1e-6,
     "solve_ivp LSODA": 1e-8,
     "odeint LSODA": 1e-8,
 }
@@ -26,7 +29,18 @@ WORST = {
 @pytest.mark.slow
 def test_eight_points(tmp_path):
     out = tmp_path / "rows.json"
-    options = ["--points", "8", "--repeats", "1", "--million", "16", "--out", str(out)]
+    options = [
+        "--law",
+        "elasto-plastic",
+        "--points",
+        "8",
+        "--repeats",
+        "1",
+        "--million",
+        "16",
+        "--out",
+        str(out),
+    ]
     done = subprocess.run(
         [sys.executable, "-m", "benchmarks", *options],
         cwd=ROOT,
@@ -42,4 +56,4 @@ def test_eight_points(tmp_path):
         errors = [row[name] for name in ("mean", "mu1", "mu2", "multipliers")]
         for error in errors:
             assert error is None or error < WORST[method], row
-    assert all(row["mean"] is not None for row in rows if row["what"] == "asperity, rice-ruina")
+    assert all(row["mean"] is not None for row in rows if row["what"] == "asperity, elasto-plastic")

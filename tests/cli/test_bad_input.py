@@ -51,8 +51,8 @@ def refused(result, *parts: str) -> None:
         ("--set", "K=0.2", ["slider.K must carry a unit, got '0.2'"]),
         ("--set", "W0=0 N", ["slider.W0 must be positive, got 0 N;"]),
         ("--set", "W0=7 kg", ["slider.W0 must be a force (N), got '7 kg'"]),
-        ("--set", "M=-1 kg", ["slider.M must be not negative, got -1 kg;"]),
-        ("--set", "B=-0.1", ["law.B must be not negative, got -0.1;"]),
+        ("--set", "M=-1 kg", ["slider.M must not be negative, got -1 kg;"]),
+        ("--set", "B=-0.1", ["law.B must not be negative, got -0.1;"]),
         ("--set", "A=0.01 m", ["law.A must be a pure number, got '0.01 m'"]),
         ("--set", "alpa=0.2", ["parameter must be a known name, got 'alpa'", "'alpha'"]),
         ("--set", "alpha=0.2", ["rice-ruina must be given its own", "'alpha'", "linker-dieterich"]),
@@ -129,8 +129,11 @@ def test_an_output_that_cannot_be_written(asperity, tmp_path: Path) -> None:
     refused(asperity(*call, "--out", tmp_path), "must be the name of a file")
     refused(asperity(*call, "--out", "/dev/null"), "must be the name of a file")
     refused(asperity(*call, "--out", table), "must be another file than the table")
-    refused(asperity(*call, "--out", tmp_path / "no" / "o.csv"), "must be a file that can be")
-    refused(asperity(*call, "--out", table / "o.csv"), "must be a file that can be")
+    refused(asperity(*call, "--out", tmp_path / "no" / "o.csv"), "must lie in a folder that exists")
+    refused(asperity(*call, "--out", table / "o.csv"), "out must")
+    (tmp_path / "o.csv.partial.json").mkdir()
+    refused(asperity(*call, "--out", tmp_path / "o.csv"), "leave room for 'o.csv.partial.json'")
+    (tmp_path / "o.csv.partial.json").rmdir()
     assert list(tmp_path.iterdir()) == [table]
 
 

@@ -62,7 +62,7 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
         (("--x", "K=2:1:5 N/um"), ["from a smaller to a larger"]),
         (("--x", "epsilon=0:1:5"), ["epsilon must be at least 0 and below 1"]),
         (("--x", "epsilon=0:0.4:5", "--log-x"), ["must start above zero to be logarithmic"]),
-        (("--x", "eps=0:0.4:5"), ["got 'eps'; did you mean 'epsilon'?"]),
+        (("--x", "epsilom=0:0.4:5"), ["got 'epsilom'; did you mean 'epsilon'?"]),
         (("--x", "K=0.1:0.3:5 N/um"), ["axes must be two numbers, got 'K' on both"]),
         (("--x", "alpha=0:0.2:5"), ["rice-ruina must be given its own", "linker-dieterich"]),
         (("--x", "V=1:10:5 um/s"), ["V must be given once"]),
@@ -73,8 +73,8 @@ def test_a_map_as_text_on_logarithmic_axes(asperity, tmp_path: Path) -> None:
         (("--law", "rice-runia"), ["did you mean 'rice-ruina'?"]),
         (("--inertia", "--set", "M=0 kg"), ["M must be positive where inertia"]),
         (("--radiation-damping", "5"), ["radiation_damping must carry a unit"]),
-        (("--out", "no/map.nc"), ["out must be a file in a folder that exists"]),
-        (("--out", "."), ["out must be a file in a folder that exists"]),
+        (("--out", "no/map.nc"), ["--out must lie in a folder that exists"]),
+        (("--out", "."), ["--out must be the name of a file, got '.'"]),
     ],
 )
 def test_a_bad_question(asperity, tmp_path, monkeypatch, arguments, parts) -> None:

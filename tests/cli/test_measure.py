@@ -75,7 +75,9 @@ def test_text_says_the_same(asperity, recording) -> None:
     assert "mu2" in told
     assert "mu3" not in told
     assert "quality" in told
-    assert sum(words[0] == "ok" for words in lines if words) == 16
+    checks = record(asperity("measure", recording, "--harmonics", "2", "--json"))["checks"]
+    names = {check["name"] for check in checks if check["verdict"] == "ok"}
+    assert sum(words[0] == "ok" for words in lines if words) == len(names)
 
 
 def test_options_reach_the_reading(asperity, recording) -> None:
@@ -235,3 +237,83 @@ def test_a_file_cut_in_the_middle_is_measured_and_the_cut_is_bad(
     assert "asperity: truncated is bad" in result.stderr
     assert found["verdict"] == "bad"
     assert abs(found["mu1"] - MU1) < 5 * found["uncertainties"]["mu1"]
+
+
+def test_steps_and_holds_of_the_user(asperity, step, tmp_path) -> None:
+    listed = tmp_path / "steps.txt"
+    listed.write_text("# time (s)\n69.5\n", encoding="utf-8")
+    for given in ("69.5", "69.5 s", listed):
+        result = asperity("measure", step, "--no-modulation", "--steps", given, "--json")
+        assert result.exit_code == 0, result.output
+        found = record(result)
+        assert [s["time"] for s in found["steps"]] == [69.5]
+        assert found["chosen_by"] == "user"
+    spans = tmp_path / "holds.txt"
+    spans.write_text("20 30\n40, 45\n", encoding="utf-8")
+    for given in ("20:30,40:45", spans):
+        result = asperity("measure", step, "--no-modulation", "--holds", given, "--json")
+        found = record(result)
+        assert [(h["start"], h["end"]) for h in found["holds"]] == [(20, 30), (40, 45)]
+
+
+def test_the_interval_of_delta_mu_is_in_the_json(asperity, recording) -> None:
+    found = record(asperity("measure", recording, "--json"))
+    half = found["intervals_95"]["delta_mu"]
+    assert 1.9 < half / found["uncertainties"]["delta_mu"] < 13
+
+
+def test_amplitudes_and_a_table(asperity, recording, step, tmp_path) -> None:
+    result = asperity("measure", recording, "--amplitudes", "--json")
+    (row,) = record(result)["amplitudes"]
+    assert row["epsilon"] == pytest.approx(EPSILON, rel=1e-3)
+    assert "delta_mu" in asperity("measure", recording, "--amplitudes").stdout
+    out = tmp_path / "table.csv"
+    result = asperity("measure", recording, step, "--out", out, "--jobs", "1", "--json")
+    assert result.exit_code == 1
+    assert record(result) == {"files": 2, "rows": 2, "failed": 1, "out": str(out)}
+    assert "the column 'reason'" in result.stderr
+    assert out.read_text(encoding="utf-8").count("\n") == 3
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--window", "12:4"], "--window must enclose"),
+        (["--force", "nothing"], "--force must be a column"),
+        (["--detrend", "cubic"], "--detrend must be none, linear or quadratic"),
+        (["--harmonics", "64"], "--harmonics must lie below half the sampling rate"),
+        (["--steps", "3"], "--steps and --holds must go with --no-modulation"),
+        (["--no-modulation", "--steps", "900"], "--steps must lie inside the recording"),
+        (["--no-modulation", "--steps", "no/such/file"], "--steps must be times or a file"),
+        (["--no-modulation", "--holds", "5"], "--holds must be START:END"),
+        (["--no-modulation", "--holds", "5:"], "--holds must have a start and an end"),
+        (["--no-modulation", "--amplitudes"], "--amplitudes must go without"),
+        (["--resume"], "--resume and --jobs must go with --out"),
+        (["--out", "table.txt"], "--out must be a CSV or a NetCDF file"),
+        (["--out", "table.csv", "--plot", "a.png"], "must go with one recording without --out"),
+    ],
+)
+def test_errors_name_the_option(asperity, recording, options, message) -> None:
+    result = asperity("measure", recording, *options)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    for inside in ("measure.", "lock_in.", "columns=", "units=", "columns[", "Trace."):
+        assert inside not in result.stderr
+
+
+def test_several_recordings_need_a_table(asperity, recording, step) -> None:
+    result = asperity("measure", recording, step)
+    assert result.exit_code == 2
+    assert "--out must be given with several recordings, got 2 without" in result.stderr
+
+
+def test_an_ambiguous_column_is_chosen_by_an_option(asperity, tmp_path) -> None:
+    path = tmp_path / "two.csv"
+    rng = np.random.default_rng(0)
+    columns = np.c_[np.arange(100) * 0.1, 7 + rng.random((100, 3))]
+    header = "time (s),normal force (N),shear force 1 (N),shear force 2 (N)"
+    np.savetxt(path, columns, "%.5f", ",", header=header, comments="")
+    result = asperity("measure", path, "--no-modulation")
+    assert result.exit_code == 2
+    assert '--force "shear force 1"' in result.stderr
+    assert "--force must name one column, got several" in result.stderr

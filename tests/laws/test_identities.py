@@ -9,7 +9,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from jax.test_util import check_grads
 
 from asperity.laws import (
     CutOff,
@@ -24,15 +23,14 @@ from asperity.laws import (
     StrengthArea,
     TwoState,
     get_law,
+    identities,
     registered,
     registry,
 )
+from asperity.laws.identities import EXACT, check_law, sample
 from asperity.loads import Excitation
 from asperity.slider import QuasiStatic, Slider
-from asperity.solve.perturbation import perturb
-
-#: Round-off, with room for the cancellation of terms some 1e3 times the result.
-EXACT = 1e-12
+from asperity.theory.perturbation import perturb
 
 RATE_AND_STATE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 3e-6}
 
@@ -163,15 +161,7 @@ EXAMPLES = {
 ALL = sorted(EXAMPLES)
 INVERTIBLE = [name for name in ALL if EXAMPLES[name].invertible]
 
-SPEEDS = jnp.array([1e-9, 1e-6, 2e-5, 1e-3])
-
-
-def sample(law: Law, seed: int = 0) -> tuple[jax.Array, tuple[jax.Array, ...], jax.Array]:
-    """Velocities, states near steady sliding and loads at which an identity is tried."""
-    rng = np.random.default_rng(seed)
-    v = SPEEDS * rng.uniform(0.5, 2.0, SPEEDS.shape)
-    state = tuple(s + rng.normal(0, 0.5, SPEEDS.shape) for s in law.steady_state(v))
-    return v, state, jnp.asarray(rng.uniform(0.3, 1.7, SPEEDS.shape))
+SPEEDS = jnp.array(identities.SPEEDS)
 
 
 def quasi_static(law: Law) -> QuasiStatic:
@@ -191,43 +181,24 @@ def motion(system: QuasiStatic, seed: int = 0) -> tuple[jax.Array, Excitation]:
 
 def check_steady_state(law: Law, example: Example) -> None:
     """Steady sliding is a zero of the rates, at every velocity."""
-    one = jnp.ones_like(SPEEDS)
-    steady = law.steady_state(SPEEDS)
-    assert len(steady) == len(law.state_names)
-    for rest, faster in zip(
-        law.state_rate(SPEEDS, SPEEDS, steady, one),
-        law.state_rate(2 * SPEEDS, 2 * SPEEDS, steady, one),
-        strict=True,
-    ):
-        assert np.all(np.abs(rest) <= EXACT * np.abs(faster))
-    np.testing.assert_allclose(law.friction(SPEEDS, steady, one), law.mu_ss(SPEEDS), rtol=EXACT)
+    identities.steady_sliding(law)
 
 
 def check_slope(law: Law, example: Example) -> None:
     """mu_ss = mu0 at V0, with the published dependence on velocity."""
-    for v in SPEEDS:
-        slope = jax.grad(lambda log_v: law.mu_ss(jnp.exp(log_v)))(jnp.log(v))
-        expected = example.slope(example.parameters, float(v))
-        np.testing.assert_allclose(slope, expected, rtol=1e-10, atol=EXACT)
+    identities.slope_of_steady_friction(law, lambda v: example.slope(example.parameters, v))
     reference = example.parameters.get("V0", 1e-6)
     np.testing.assert_allclose(law.mu_ss(reference), example.parameters["mu0"], rtol=EXACT)
 
 
 def check_inverse(law: Law, example: Example) -> None:
     """log_velocity inverts friction, and agrees with Newton's method on the friction itself."""
-    v, state, w = sample(law)
-    friction = law.friction(v, state, w)
-    for inverse in (law.log_velocity, lambda *a: Law.log_velocity(law, *a)):
-        np.testing.assert_allclose(inverse(friction, state, w), jnp.log(v), rtol=0, atol=1e-11)
-    np.testing.assert_allclose(law.velocity(friction, state, w), v, rtol=1e-11)
+    identities.inverse(law)
 
 
 def check_load_step(law: Law, example: Example) -> None:
     """F/W after a step of the load at constant velocity and continuous state."""
-    v, state, w = sample(law)
-    before, after = law.friction(v, state, w), law.friction(v, state, 1.3 * w)
-    expected = example.load_step(example.parameters, before, w, 1.3)
-    np.testing.assert_allclose(after, expected, rtol=1e-11)
+    identities.step_of_load(law, lambda f, w, k: example.load_step(example.parameters, f, w, k))
 
 
 def check_age_velocity(law: Law, example: Example) -> None:
@@ -269,29 +240,7 @@ def check_no_memory(law: Law, example: Example) -> None:
 
 def check_derivatives(law: Law, example: Example) -> None:
     """First and second derivatives with respect to every argument against finite differences."""
-    v, state, w = (jax.tree.map(lambda x: x[1], part) for part in sample(law))
-
-    def changed(logs: dict[str, jax.Array]) -> Law:
-        """The law with its parameters multiplied: in units of their own."""
-        return type(law)(**{k: p * jnp.exp(logs[k]) for k, p in example.parameters.items()})
-
-    def friction(logs, log_v, state, w):
-        return changed(logs).friction(jnp.exp(log_v), state, w)
-
-    def rates(logs, log_v, state, w):
-        return changed(logs).state_rate(jnp.exp(log_v), jnp.exp(log_v), state, w)
-
-    def inverse(logs, friction, state, w):
-        law, at = changed(logs), (example.parameters["mu0"] + 0.01 * friction, state, w)
-        return law.log_velocity(*at), jnp.log(law.velocity(*at))
-
-    unchanged = dict.fromkeys(example.parameters, 0.0)
-    options = {"order": 2, "modes": ["fwd", "rev"], "rtol": 1e-5, "atol": 1e-6, "eps": 1e-4}
-    check_grads(friction, (unchanged, jnp.log(v), state, w), **options)
-    if law.state_names:
-        check_grads(rates, (unchanged, jnp.log(v), state, w), **options)
-    if example.invertible:
-        check_grads(inverse, (unchanged, 0.0, state, w), **options | {"eps": 1e-5})
+    identities.derivatives(law)
 
 
 def check_units(law: Law, example: Example) -> None:
@@ -354,6 +303,23 @@ def test_every_law(check, name):
 @pytest.mark.parametrize("check", RATE_DEPENDENT)
 def test_every_rate_dependent_law(check, name):
     check(EXAMPLES[name].law(get_law(name)), EXAMPLES[name])
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_every_law_in_other_units_and_element_by_element(name):
+    law = EXAMPLES[name].law(get_law(name))
+    identities.units(law)
+    identities.element_wise(law)
+
+
+def test_one_call_checks_a_law():
+    p = EXAMPLES["linker-dieterich"].parameters
+    held = check_law(
+        get_law("linker-dieterich")(**p),
+        slope=lambda v: p["A"] - p["B"],
+        load_step=lambda f, w, k: f - p["alpha"] * np.log(k),
+    )
+    assert {"steady sliding", "inverse", "derivatives", "units", "slope", "load step"} <= set(held)
 
 
 @pytest.mark.parametrize("name", INVERTIBLE)
@@ -504,6 +470,33 @@ def test_planted_mistake_is_caught(mistake, name, check):
     check(EXAMPLES[name].law(get_law(name)), EXAMPLES[name])
     with pytest.raises(AssertionError):
         check(law, EXAMPLES[name])
+
+
+class OneOfTheArray(RiceRuina):
+    def friction(self, v, state, w):
+        return super().friction(v, state, w) + 1e-6 * jnp.mean(state[0])
+
+
+class Unfinished(RiceRuina):
+    def state_rate(self, v, v_plastic, state, w):
+        raise NotImplementedError("still to be written")
+
+
+@pytest.mark.parametrize(
+    ("mistake", "broken"),
+    [
+        (InverseOfAnotherLaw, {"inverse"}),
+        (NumberWithHiddenUnit, {"units"}),
+        (AgeUpsideDown, {"steady sliding"}),
+        (WrongDerivative, {"derivatives"}),
+        (OneOfTheArray, {"element-wise", "inverse"}),
+        (Unfinished, {"steady sliding", "element-wise", "derivatives", "units"}),
+    ],
+)
+def test_one_call_names_what_a_law_breaks(mistake, broken):
+    with pytest.raises(identities.BrokenIdentityError, match="breaks") as found:
+        check_law(mistake(**RATE_AND_STATE))
+    assert broken <= set(found.value.broken)
 
 
 class LoadRateDropped(QuasiStatic):

@@ -1,6 +1,6 @@
 """The patch radius, or the gap, that gives a measured eps_eff/eps.
 
-Eq. (epseff) of Bureau, Baumberger and Caroli (2000) read backwards. Below the vacuum resonance
+Eq. (40) of Bureau, Baumberger and Caroli (2000) read backwards. Below the vacuum resonance
 the fraction falls with R and rises with h0; above it the layer's stiffness may bring the slider
 back to resonance, and then two radii give one fraction. The bracket is therefore cut at every
 extremum and each monotone piece searched.

@@ -1,6 +1,6 @@
 """The squeezed air layer: linearised Reynolds equation between two parallel discs.
 
-Source: Bureau, Baumberger and Caroli (2000), Appendix, Eqs. (stiffair), (cont)-(force).
+Source: Bureau, Baumberger and Caroli (2000), Appendix, Eqs. (31) to (38).
 Isothermal air of mean pressure P0 leaks radially through a gap h0; the pressure excess vanishes at
 the rim r = R. All amplitudes are complex with the factor e^{+i w t}.
 
@@ -147,7 +147,7 @@ class AirLayer:
 
     @property
     def stiffness(self) -> Real:
-        """Stiffness kappa_air = P0 Sigma0/h0 (N/m) of a layer that cannot leak, Eq. (stiffair)."""
+        """Stiffness kappa_air = P0 Sigma0/h0 (N/m) of a layer that cannot leak, Eq. (31)."""
         return self.P0 * self.area / self.h0
 
     @property
@@ -181,11 +181,11 @@ class AirLayer:
         return s
 
     def gamma(self, omega: ArrayLike) -> Any:
-        """Complex wave number gamma (1/m) of the pressure field, Eq. (defgamma)."""
+        """Complex wave number gamma (1/m) of the pressure field, Eq. (37)."""
         return (1 - 1j) / np.sqrt(2) * (self.squeeze(omega) / self.R)
 
     def dynamic_stiffness(self, omega: ArrayLike) -> Any:
-        """Complex stiffness -F_p/delta h = -kappa_air J2(gamma R)/J0(gamma R) (N/m), Eq. (force).
+        """Complex stiffness -F_p/delta h = -kappa_air J2(gamma R)/J0(gamma R) (N/m), Eq. (38).
 
         The real part is the spring, the imaginary part w times the damping constant (e^{+i w t});
         both are >= 0. Limits: kappa_air for s -> infinity, i w 3 pi eta R^4/(2 h0^3) for s -> 0.

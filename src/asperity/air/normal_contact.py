@@ -1,9 +1,9 @@
 """The multicontact interface in the normal direction: h0 - h = lambda_z ln(W/W0).
 
-Source: Bureau, Baumberger and Caroli (2000), Appendix, first paragraph and Eq. (elastic).
+Source: Bureau, Baumberger and Caroli (2000), Appendix, first paragraph and Eq. (30).
 The closure `h0 - h` (m) is positive when the load rises above W0 and the gap narrows. The
-printed Eq. (elastic), F_el = W0 (h - h0)/lambda_z, carries the opposite sign: it is the elastic
-force on the slider only if F_el is counted downwards. Moduli are unaffected.
+printed Eq. (30), F_el = W0 (h - h0)/lambda_z, counts the elastic force on the slider towards the
+track, as Eq. (39) uses it.
 """
 
 from __future__ import annotations
@@ -111,7 +111,7 @@ class NormalContact:
 
     @property
     def stiffness(self) -> Real:
-        """Linear stiffness kappa_z = W0/lambda_z (N/m), Eq. (elastic)."""
+        """Linear stiffness kappa_z = W0/lambda_z (N/m), Eq. (30)."""
         return self.W0 / self.lambda_z
 
     def omega0(self, M: ArrayLike) -> Real:

@@ -1,13 +1,13 @@
 """The fraction of a normal-load modulation that the micro-contacts bear.
 
-Source: Bureau, Baumberger and Caroli (2000), Appendix, Eqs. (dynamique) and (epseff). The slider
+Source: Bureau, Baumberger and Caroli (2000), Appendix, Eqs. (39) and (40). The slider
 (mass M) moves normally on the contacts' spring kappa_z and the air layer, in parallel:
 
     (-M w^2 + kappa_z + kappa_layer(w)) delta = eps W0,   delta the amplitude of the closure h0 - h,
 
     T = kappa_z delta/(eps W0) = 1/(1 - w^2/w0z^2 + kappa_layer/kappa_z).
 
-The contacts carry W(t) = W0 [1 + eps Re(T e^{+i w t})]. Written for the gap h, Eq. (dynamique)
+The contacts carry W(t) = W0 [1 + eps Re(T e^{+i w t})]. Written for the gap h, Eq. (39)
 needs -eps W0 on its right-hand side, as a heavier load narrows the gap; with the printed +eps W0,
 h is counted as closure. The modulus is the same.
 """
@@ -89,7 +89,7 @@ def effective_modulation(
     lambda_z: ArrayLike,
     layer: AirLayer | None = None,
 ) -> Real:
-    """eps_eff/eps = |T|, Eq. (epseff): the fraction of the modulation that the contacts bear.
+    """eps_eff/eps = |T|, Eq. (40): the fraction of the modulation that the contacts bear.
 
     Independent of eps as long as eps_eff << 1. Parameters, shapes and errors as in
     `transfer_function`; in a vacuum it is 1/|1 - w^2/w0z^2|.

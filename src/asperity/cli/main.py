@@ -21,8 +21,10 @@ Examples:
   asperity run protocol.toml --out run.nc --plot
   asperity map --law elasto-plastic --material bureau2000 -V "1 um/s" -f "120 Hz" \\
       --x "epsilon=0.01:0.5:200" --y "K=0.05:0.5:200 N/um" --out map.nc --plot map.png
+  asperity sweep plan.toml --out results.zarr
   asperity air --material bureau2000 -f "120 Hz" -f "200 Hz"
   asperity materials bureau2000
+  asperity serve --open
 """
 
 
@@ -30,12 +32,18 @@ Examples:
     cls=Shell,
     commands={
         "air": "asperity.cli.air",
+        "compare": "asperity.cli.compare",
+        "design": "asperity.cli.design",
+        "fit": "asperity.cli.fit",
         "map": "asperity.cli.map",
         "materials": "asperity.cli.materials",
-        "measure": "asperity.cli.measure",
+        "measure": "asperity.cli.measure.command",
+        "recipe": "asperity.cli.recipe",
         "reproduce": "asperity.cli.reproduce",
         "response": "asperity.cli.response",
         "run": "asperity.cli.run",
+        "serve": "asperity.cli.serve",
+        "sweep": "asperity.cli.sweep.command",
     },
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},

@@ -22,8 +22,10 @@ Examples:
 
 \b
 An axis is NAME=LOW:HIGH:COUNT UNIT, for any parameter of the law, K, W0, M, eta,
-V, epsilon or frequency. The file holds the response at each point, and the
-stability boundary with the bifurcation and the frequency of its mode.
+V, epsilon or frequency, or a harmonic of the load, the modulated pull or the
+tilt of the exciter (epsilon2, pull, tilt; see asperity response). The file
+holds the response at each point, and the stability boundary with the
+bifurcation and the frequency of its mode.
 """
 
 
@@ -68,11 +70,11 @@ def map(
     if plot is not None:
         _plot(found, plot, show)
     _print(found, out, as_json)
-    loose = int(found.attrs["boundary_loose_chords"])
-    if loose:
+    unresolved = int(found.attrs["boundary_unresolved_chords"])
+    if unresolved:
         click.echo(
-            f"asperity: the boundary bends too much for the grid at {loose} places, where it is "
-            "not known to 1e-4; refine the grid",
+            f"asperity: the boundary bends too much for the grid at {unresolved} places, where "
+            "it is not known to 1e-4; refine the grid",
             err=True,
         )
     failed = int((~found["converged"]).sum())
@@ -95,8 +97,8 @@ def _solve(
     resume: bool,
 ) -> xarray.Dataset:
     from asperity.cli.progress import bar
-    from asperity.study.map import Axis, write_map
-    from asperity.study.operating_point import refuse_foreign, sourced_numbers
+    from asperity.operating_point import refuse_foreign, sourced_numbers
+    from asperity.sweep.map import Axis, write_map
 
     law = law_named(law)
     axes = []
@@ -108,7 +110,7 @@ def _solve(
             )
         axes.append(Axis.parse(text, log))
     refuse_foreign(law, given)
-    numbers = sourced_numbers(given, material_named(material), "command line")
+    numbers = sourced_numbers(given, material_named(material), "command line", law)
     # A material's number gives way to an axis; one that was given for this map does not.
     numbers = {n: s for n, s in numbers.items() if n in given or n not in {a.name for a in axes}}
     assert out is not None
@@ -126,7 +128,8 @@ def _solve(
 
 def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
     """Before anything is solved: a mistake must not cost the work."""
-    from asperity.study.map import SHOWN
+    from asperity.outputs import output_files
+    from asperity.sweep.map import SHOWN
 
     if show not in SHOWN:
         raise InputError(
@@ -136,26 +139,16 @@ def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
         raise InputError("--out must be given, got nothing; name the file, like --out map.nc")
     if plot is not None and plot.suffix.lower() != ".png":
         raise InputError(f"--plot must be a PNG file, got '{plot}'; write it like --plot map.png")
-    if plot is not None and not plot.resolve().parent.is_dir():
-        raise InputError(
-            f"--plot must lie in a folder that exists, got '{plot}'; make the folder or choose "
-            "another"
-        )
+    output_files({"--out": out, "--plot": plot})
 
 
 def _plot(found: xarray.Dataset, path: Path, show: str) -> None:
     from asperity.figures.map import draw_map
     from asperity.figures.style import style
+    from asperity.outputs import written_file
 
-    with style():
-        figure = draw_map(found, show)
-        try:
-            figure.savefig(path, metadata={"Software": None})
-        except OSError as error:
-            raise InputError(
-                f"--plot must be a file that can be written, got '{path}' ({error.strerror}); "
-                "choose another place"
-            ) from None
+    with style(), written_file(path, "--plot") as file:
+        draw_map(found, show).savefig(file, metadata={"Software": None})
 
 
 def _print(found: xarray.Dataset, out: Path | None, as_json: bool) -> None:
@@ -197,6 +190,6 @@ def _record(found: xarray.Dataset, out: Path | None) -> dict[str, Any]:
         "y": sides[1],
         "boundaries": [line(number == k) for k in range(number.max(initial=-1) + 1)],
         "boundary_not_found": int((number < 0).sum()),
-        "boundary_loose_chords": int(found.attrs["boundary_loose_chords"]),
+        "boundary_unresolved_chords": int(found.attrs["boundary_unresolved_chords"]),
         "out": str(out),
     }

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.errors import InputError
+from asperity.parameters import DRIVE, MACHINE, Parameter
 
 if TYPE_CHECKING:
     from asperity.materials import Material
@@ -43,58 +44,63 @@ def json_option() -> Decorator:
     return click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
 
 
-_POINT = (
-    click.option("--law", metavar="NAME", help="Friction law, such as elasto-plastic."),
-    material_option(),
-    click.option("-V", "--velocity", metavar="VALUE", help='Pulling velocity, like "1 um/s".'),
-    click.option(
-        "-e", "--epsilon", metavar="VALUE", help="Relative amplitude of the load, 0 to < 1."
-    ),
-    click.option("-f", "--frequency", metavar="VALUE", help='Modulation frequency, like "120 Hz".'),
-    click.option("--inertia", is_flag=True, help="Let the mass of the slider count."),
-    click.option(
-        "--radiation-damping",
-        metavar="VALUE",
-        help='Force of radiated waves per velocity, like "500 N*s/m".',
-    ),
-    set_option('--set A=0.013 --set "K=0.3 N/um"'),
-)
-
-
 def point_options(command: Command) -> Command:
     """Options of an operating point: law, material, and numbers.
 
     The command is called with `law` and `material` as they were given, and with `given`, the texts
     of the numbers by their names.
     """
+    named = [p for p in (*DRIVE.values(), *MACHINE.values()) if p.options]
 
     @wraps(command)
-    def gathered(
-        *,
-        velocity: str | None,
-        epsilon: str | None,
-        frequency: str | None,
-        inertia: bool,
-        radiation_damping: str | None,
-        settings: tuple[str, ...],
-        **others: Any,
-    ) -> Any:
+    def gathered(*, settings: tuple[str, ...], **others: Any) -> Any:
         given = settings_of(settings)
-        add_setting(given, "V", velocity)
-        add_setting(given, "epsilon", epsilon)
-        add_setting(given, "frequency", frequency)
-        add_setting(given, "inertia", "1" if inertia else None)
-        add_setting(given, "eta", radiation_damping)
+        for parameter in named:
+            value = others.pop(parameter.argument)
+            if parameter.rule == "switch":
+                value = "1" if value else None
+            add_setting(given, parameter.name, value)
         return command(given=given, **others)
 
-    found: Command = gathered
-    for option in reversed(_POINT):
-        found = option(found)
-    return found
+    found: Command = set_option('--set A=0.013 --set "K=0.3 N/um"')(gathered)
+    for parameter in reversed(named):
+        found = _option(parameter)(found)
+    found = material_option()(found)
+    return law_option(
+        "Friction law, such as elasto-plastic, or one of your own as module:Name or file.py:Name."
+    )(found)
 
 
-def settings_of(pairs: Iterable[str]) -> dict[str, str]:
-    """Split ``NAME=VALUE`` texts.
+def law_option(help_text: str) -> Decorator:
+    """``--law``; a law given by its place is imported and registered, and its name passed on."""
+    return click.option("--law", metavar="NAME", callback=_named_law, help=help_text)
+
+
+def _named_law(context: click.Context, option: click.Parameter, text: str | None) -> str | None:
+    if text is None or ":" not in text:
+        return text
+    from asperity.laws import known_law
+
+    return known_law(text)
+
+
+def _option(parameter: Parameter) -> Decorator:
+    """The option of a parameter, which the command gets under the name of its argument."""
+    meaning = parameter.meaning[0].upper() + parameter.meaning[1:]
+    if parameter.rule == "switch":
+        return click.option(
+            *parameter.options, parameter.argument, is_flag=True, help=f"{meaning}."
+        )
+    return click.option(
+        *parameter.options,
+        parameter.argument,
+        metavar="VALUE",
+        help=f'{meaning}, like "{parameter.example}".',
+    )
+
+
+def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
+    """Split ``NAME=VALUE`` texts of an option that may be repeated.
 
     Raises
     ------
@@ -106,7 +112,7 @@ def settings_of(pairs: Iterable[str]) -> dict[str, str]:
         name, _, value = (part.strip() for part in pair.partition("="))
         if not name or not value:
             raise InputError(
-                f"--set must be NAME=VALUE, got '{pair}'; write it like --set \"K=0.2 N/um\""
+                f"{option} must be NAME=VALUE, got '{pair}'; write it like {option} \"K=0.2 N/um\""
             )
         add_setting(found, name, value)
     return found

@@ -7,9 +7,13 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from asperity.parameters import OUTPUTS
+
 if TYPE_CHECKING:
-    from asperity.solve import PeriodicResponse
-    from asperity.study.operating_point import Sourced
+    from asperity.operating_point import SourcedNumber
+    from asperity.orbit import PeriodicResponse
 
 
 def to_json(record: Mapping[str, Any]) -> str:
@@ -27,8 +31,16 @@ def aligned(rows: Iterable[Sequence[str]], indent: str = "") -> str:
     )
 
 
+#: Outputs in the order of the JSON; complex ones are pairs of real and imaginary part.
+_JSON = (
+    *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
+    *("harmonics", "multipliers", "log_multipliers", "floquet_max"),
+    *("stable", "mode", "mode_frequency", "growth_rate", "converged", "result"),
+)
+
+
 def response_record(
-    response: PeriodicResponse, numbers: Mapping[str, Sourced], units: Mapping[str, str]
+    response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]
 ) -> dict[str, Any]:
     """Everything about the response at one point.
 
@@ -36,43 +48,41 @@ def response_record(
     ----------
     response : PeriodicResponse
         Of a single point.
-    numbers : mapping of str to Sourced
+    numbers : mapping of str to SourcedNumber
         What was asked, by name.
-    units : mapping of str to str
-        SI unit of each number.
     """
-    scalars = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2")
     converged = bool(response.converged)
 
-    def shown(value: float) -> float | None:
-        return float(value) if converged else None
+    def shown(value: Any) -> Any:
+        """A number as JSON has it, None without a converged response."""
+        array = np.asarray(value)
+        if array.dtype.kind in "bOU":
+            return array.item()
+        if not converged:
+            return np.full(array.shape, None).tolist()
+        return array.astype(float).tolist()
 
-    return {
-        **{name: shown(getattr(response, name)) for name in scalars},
-        "harmonics": [[shown(c.real), shown(c.imag)] for c in response.harmonics],
-        "floquet": [[shown(m.real), shown(m.imag)] for m in response.multipliers],
-        "log_floquet": [[shown(m.real), shown(m.imag)] for m in response.log_multipliers],
-        "stable": bool(response.stable),
-        "mode": str(response.mode[()]),
-        "mode_frequency": shown(float(response.mode_frequency)),
-        "growth_rate": shown(float(response.growth_rate)),
-        "converged": converged,
-        "result": str(response.result[()]),
-        "provenance": _provenance(response, numbers, units),
-    }
+    record: dict[str, Any] = {}
+    for name in _JSON:
+        value = np.asarray(getattr(response, name))
+        if np.iscomplexobj(value):
+            value = np.stack([value.real, value.imag], axis=-1)
+        for key in (name, *OUTPUTS[name].former):
+            record[key] = shown(value)
+    return {**record, "provenance": _provenance(response, numbers)}
 
 
-def _provenance(
-    response: PeriodicResponse, numbers: Mapping[str, Sourced], units: Mapping[str, str]
-) -> dict[str, Any]:
+def _provenance(response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]) -> dict[str, Any]:
     from asperity.materials import citation
+    from asperity.parameters import point_parameters
 
+    units = point_parameters(type(response.slider.law))
     told = response.provenance
     return {
         "version": told.pop("asperity_version"),
         **told,
         "parameters": {
-            name: {"value": number.value, "unit": units[name], "from": number.origin}
+            name: {"value": number.value, "unit": units[name].unit, "from": number.origin}
             for name, number in numbers.items()
         },
         "citation": {key.strip(): citation(key.strip()) for key in told["source"].split(",")},

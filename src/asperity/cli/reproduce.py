@@ -1,4 +1,4 @@
-"""``asperity reproduce``: every result of the paper as figures, tables and a list of claims."""
+"""``asperity reproduce``: every result of a paper as figures, tables and a list of claims."""
 
 from __future__ import annotations
 
@@ -8,22 +8,36 @@ import click
 
 
 @click.command(epilog="Example: asperity reproduce --out report")
+@click.argument("paper", default="bureau2000")
 @click.option(
     "--out", type=Path, metavar="DIR", required=True, help="Folder for the report; made if absent."
 )
-def reproduce(out: Path) -> int:
-    """Reproduce Bureau, Baumberger and Caroli (2000).
+@click.option(
+    "--data",
+    type=Path,
+    metavar="CSV",
+    help="Measured or digitised points to draw and to compare with the curves; columns figure, "
+    "observable, series, x, y, y_err, source.",
+)
+def reproduce(paper: str, out: Path, data: Path | None) -> int:
+    """Reproduce a PAPER; bureau2000, Bureau, Baumberger and Caroli (2000), if none is named.
 
     Writes the figures (PNG, PDF and CSV), claims.json, claims.csv and index.html, which is the
-    place to start reading.
+    place to start reading; with --data also agreement.json and data/points.csv. Other papers are
+    found as entry points of the group asperity.papers.
     """
     from asperity.cli.progress import bar
-    from asperity.report import reproduce as reproduce_paper
+    from asperity.papers import find_paper
+    from asperity.papers.report import reproduce as reproduce_paper
 
+    found = find_paper(paper)
     try:
         with bar("step") as update:
             summary = reproduce_paper(
-                out, progress=lambda label, done, total: update(done, total, label)
+                found,
+                out,
+                progress=update,
+                data=data,
             )
     except KeyboardInterrupt:
         raise KeyboardInterrupt(

@@ -11,13 +11,15 @@ from asperity.cli.options import json_option, law_named, material_named, point_o
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
-    from asperity.solve import PeriodicResponse
-    from asperity.study.operating_point import Sourced
+    from asperity.operating_point import SourcedNumber
+    from asperity.orbit import PeriodicResponse
 
 _EPILOG = """\b
 Examples:
   asperity response --law elasto-plastic --material bureau2000 \\
       -V "1 um/s" -e 0.24 -f "120 Hz" --set A=0.013 --set "K=0.3 N/um"
+  asperity response --law elasto-plastic --material bureau2000 \\
+      -V "1 um/s" -e 0.24 -f "120 Hz" --set epsilon2=0.02 --set tilt=0.03
   asperity response --table points.csv --out responses.csv --material bureau2000
 
 \b
@@ -29,7 +31,18 @@ Table: columns law, A, B, D0, mu0, V0, K, M, W0, alpha, lambda, V, epsilon,
 frequency, inertia (1 or 0), eta (N s/m), in SI and without units. What a row
 leaves open is taken from --law, --set, -V, -e, -f and --material; other columns
 are kept. A row that cannot be solved says why in the column 'result'.
+
+\b
+Other modulations, as columns or by --set, angles in rad: epsilon2,
+epsilon2_phase, epsilon3, epsilon3_phase (harmonics of the load), pull,
+pull_phase (of the pulling velocity over its mean), tilt (of the exciter).
 """
+
+#: Outputs that the text shows.
+_SHOWN = (
+    *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
+    *("floquet_max", "stable", "mode", "mode_frequency", "growth_rate"),
+)
 
 
 @click.command(epilog=_EPILOG)
@@ -66,9 +79,8 @@ def response(
 def _point(law: str | None, material: str | None, given: dict[str, str], as_json: bool) -> int:
     from asperity.cli.report import response_record, to_json
     from asperity.laws import get_law
-    from asperity.study.operating_point import (
+    from asperity.operating_point import (
         numbers_for,
-        quantities,
         refuse_foreign,
         respond,
         sourced_numbers,
@@ -76,11 +88,12 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
 
     law = law_named(law)
     refuse_foreign(law, given)
-    numbers = numbers_for(law, sourced_numbers(given, material_named(material), "command line"))
+    numbers = numbers_for(
+        law, sourced_numbers(given, material_named(material), "command line", law)
+    )
     found = respond(get_law(law), {name: number.value for name, number in numbers.items()})
     if as_json:
-        units = {name: quantity.unit for name, quantity in quantities(get_law(law)).items()}
-        click.echo(to_json(response_record(found, numbers, units)))
+        click.echo(to_json(response_record(found, numbers)))
     elif found.converged:
         click.echo(_text(law, found, numbers))
     if not found.converged:
@@ -88,28 +101,24 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
     return 0 if found.converged else 1
 
 
-def _text(law: str, found: PeriodicResponse, numbers: dict[str, Sourced]) -> str:
+def _text(law: str, found: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> str:
     from asperity.cli.report import aligned
     from asperity.laws import get_law
-    from asperity.study.operating_point import quantities
+    from asperity.parameters import OUTPUTS, point_parameters
     from asperity.units import format_si
 
-    kinds = quantities(get_law(law))
+    kinds = point_parameters(get_law(law))
     inputs = [
         (name, format_si(number.value, kinds[name].kind, 6), number.origin)
         for name, number in numbers.items()
     ]
-    outputs = [
-        ("mean_friction", f"{found.mean_friction:.9g}", "mean of F/W0"),
-        ("delta_mu", f"{found.delta_mu:.9g}", "mean_friction - mu_ss(V)"),
-        ("mu1", f"{found.mu1:.9g}", "amplitude of F/W0 at f"),
-        ("mu2", f"{found.mu2:.9g}", "amplitude of F/W0 at 2f"),
-        ("phase1", f"{found.phase1:.9g} rad", "against the load"),
-        ("phase2", f"{found.phase2:.9g} rad", "against the load"),
-        ("floquet_max", f"{found.floquet_max:.9g}", "largest modulus of the multipliers"),
-        ("stable", "yes" if found.stable else "no", f"leading mode: {found.mode[()]}"),
-        ("mode_frequency", f"{found.mode_frequency:.6g} Hz", "of the leading mode, modulo f"),
-    ]
+    outputs = []
+    for name in _SHOWN:
+        value = getattr(found, name)[()]
+        text = ("no", "yes")[int(value)] if name == "stable" else str(value)
+        if isinstance(value, float):
+            text = f"{value:.9g} {OUTPUTS[name].unit}".removesuffix(" 1")
+        outputs.append((name, text, OUTPUTS[name].meaning))
     return f"{law}\n{aligned(inputs, '  ')}\nresponse\n{aligned(outputs, '  ')}"
 
 
@@ -125,12 +134,12 @@ def _table(
     from asperity.cli.progress import bar
     from asperity.cli.report import to_json
     from asperity.laws import get_law
-    from asperity.study.operating_point import sourced_numbers
-    from asperity.study.table import run_table
+    from asperity.operating_point import sourced_numbers
+    from asperity.sweep.table import run_table
 
     if law is not None:
         get_law(law)
-    filled = sourced_numbers(given, material_named(material))
+    filled = sourced_numbers(given, material_named(material), law=law)
     with bar("point") as update:
         done = run_table(
             table,

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import json_option
+from asperity.cli.options import json_option, law_option
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
-    from asperity.study.protocol import Protocol, RunSummary, Setup
+    from asperity.protocol import Protocol, RunSummary, Setup
 
 _EPILOG = """\b
 Examples:
@@ -54,6 +56,7 @@ Exit code 0: done; 1: the motion ended before the programme, and why is said;
     metavar="FILE",
     help="Record it with the protocol's tribometer: .csv, .txt, .h5 or .tdms.",
 )
+@law_option("Make a law of your own known to the protocol: module:Name or file.py:Name.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted run.")
 @json_option()
 def run(
@@ -62,6 +65,7 @@ def run(
     as_csv: bool,
     plot: bool,
     record: Path | None,
+    law: str | None,
     resume: bool,
     as_json: bool,
 ) -> int:
@@ -70,51 +74,94 @@ def run(
     PROTOCOL is a TOML file; the motion is written as NetCDF, with all that it depends on.
     """
     from asperity.cli.progress import bar
-    from asperity.instrument.writers import write
-    from asperity.study.protocol import (
+    from asperity.outputs import output_files
+    from asperity.protocol import (
         ProtocolError,
         load_protocol,
         record_run,
         run_protocol,
         write_csv,
     )
+    from asperity.recording.writers import write
 
-    _check_names(protocol, out, as_csv, plot)
+    text = out.with_suffix(".csv") if as_csv else None
+    picture = out.with_suffix(".png") if plot else None
+    output_files(
+        {"--out": out, "--csv": text, "--plot": picture, "--record": record},
+        inputs={"protocol": protocol},
+    )
     try:
         asked = load_protocol(protocol)
+        if law is not None and asked.law != law:
+            raise InputError(
+                f"--law must be the law of the protocol, got '{law}' and law = '{asked.law}'; "
+                "change one of them or leave the option out"
+            )
     except ProtocolError as error:
         return _tell(protocol, error.mistakes)
     setup = None if record is None else _setup_for(asked, record)
-    total = round(1e3 * asked.programme.duration)
+    _check_room(asked, out, text, record)
     with bar("ms") as update:
-        done = run_protocol(
-            asked, out, resume=resume, progress=lambda t: update(round(1e3 * t), total, "")
-        )
+
+        def in_milliseconds(time: float, end: float) -> None:
+            update(round(1e3 * time), round(1e3 * end), "")
+
+        done = run_protocol(asked, out, resume=resume, progress=in_milliseconds)
+    statement = done.unstable_start
     files = [out]
-    if as_csv:
-        files.append(write_csv(out, out.with_suffix(".csv")))
-    if plot:
-        files.append(_draw(out, out.with_suffix(".png")))
-    if record is not None and setup is not None:
-        files.append(write(record_run(setup, out), record))
-    _report(asked, done, files, as_json)
+    with _after_the_motion(files):
+        if text is not None:
+            files.append(write_csv(out, text))
+        if picture is not None:
+            files.append(_draw(out, picture))
+        if record is not None and setup is not None:
+            files.append(write(record_run(setup, out), record))
+    _report(asked, done, files, as_json, statement)
+    if statement:
+        click.echo(f"asperity: {statement}", err=True)
     if done.stopped:
         click.echo(f"asperity: {done.stopped}", err=True)
     return 1 if done.stopped else 0
 
 
-def _check_names(protocol: Path, out: Path, as_csv: bool, plot: bool) -> None:
-    """Before anything is computed: a name must not cost the work."""
-    if out.resolve() == protocol.resolve():
-        raise InputError(
-            f"--out must be another file than the protocol, got '{out}'; name it like run.nc"
-        )
-    for wanted, suffix in ((as_csv, ".csv"), (plot, ".png")):
-        if wanted and out.suffix.lower() == suffix:
-            raise InputError(
-                f"--out must be another file than the {suffix} beside it, got '{out}'; "
-                "name it like run.nc"
-            )
+@contextmanager
+def _after_the_motion(files: list[Path]) -> Iterator[None]:
+    """Say on Ctrl-C that the motion is whole; the files beside it are complete or absent."""
+    from asperity.cli.interrupt import retreating
+
+    try:
+        with retreating():
+            yield
+    except KeyboardInterrupt:
+        written = ", ".join(f"'{file}'" for file in files)
+        raise KeyboardInterrupt(
+            f"interrupted after the motion was finished; {written} "
+            f"{'is' if len(files) == 1 else 'are'} whole, and nothing else was written"
+        ) from None
+
+
+#: Bytes of a number in a text file, with its comma.
+_TEXT_BYTES = 18
+
+
+def _check_room(asked: Protocol, out: Path, text: Path | None, record: Path | None) -> None:
+    """Say how much a run writes, and refuse what disk or memory cannot hold."""
+    from asperity.outputs import require_disk, require_memory, size_text
+
+    if asked.rows is None:
+        click.echo(f"asperity: writing the integrator's steps to {out}", err=True)
+        return
+    way_out = "lower solver.sampling, shorten the steps or leave the option out"
+    rows, size = f"{asked.rows:.6g} rows", asked.rows * asked.row_bytes
+    if text is not None:
+        size += 7 * _TEXT_BYTES * asked.rows
+        require_disk(size, text.resolve().parent, "--csv", rows, way_out)
+    if record is not None:
+        # A recording is made of whole signals: those of the motion and those of its channels.
+        require_memory(2 * asked.rows * asked.row_bytes, "--record", rows, way_out)
+    require_disk(size, out.resolve().parent, "solver.sampling", rows,
+                 "lower the rate, shorten the steps or write to another disk")  # fmt: skip
+    click.echo(f"asperity: writing {rows}, about {size_text(size)}, to {out}", err=True)
 
 
 def _tell(protocol: Path, mistakes: tuple[str, ...]) -> int:
@@ -126,7 +173,7 @@ def _tell(protocol: Path, mistakes: tuple[str, ...]) -> int:
 
 def _setup_for(asked: Protocol, record: Path) -> Setup:
     """The protocol's tribometer, before anything is computed."""
-    from asperity.instrument.writers import check_path
+    from asperity.recording.writers import check_path
 
     if asked.setup is None:
         raise InputError(
@@ -140,21 +187,17 @@ def _setup_for(asked: Protocol, record: Path) -> Setup:
 def _draw(run_file: Path, picture: Path) -> Path:
     from asperity.figures.style import style
     from asperity.figures.trajectory import draw_run
-    from asperity.study.protocol import outline
+    from asperity.outputs import written_file
+    from asperity.protocol import outline
 
-    with style():
-        figure = draw_run(outline(run_file))
-        try:
-            figure.savefig(picture, metadata={"Software": None})
-        except OSError as error:
-            raise InputError(
-                f"--plot must be written beside --out, got '{picture}' ({error.strerror}); "
-                "choose a folder that is writable and has room"
-            ) from None
+    with style(), written_file(picture, "--plot") as file:
+        draw_run(outline(run_file)).savefig(file, metadata={"Software": None})
     return picture
 
 
-def _report(asked: Protocol, done: RunSummary, files: list[Path], as_json: bool) -> None:
+def _report(
+    asked: Protocol, done: RunSummary, files: list[Path], as_json: bool, statement: str
+) -> None:
     from asperity.cli.report import aligned, to_json
 
     if as_json:
@@ -166,6 +209,7 @@ def _report(asked: Protocol, done: RunSummary, files: list[Path], as_json: bool)
                     "time": done.time,
                     "duration": asked.programme.duration,
                     "stopped": done.stopped,
+                    "stability": statement or None,
                     "files": [str(file) for file in files],
                 }
             )

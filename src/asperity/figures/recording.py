@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,19 +12,19 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import ScalarFormatter
 
 from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, STATED_FILL, new_figure
+from asperity.measurement.cycle import mean_cycle, residual_spectrum
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from asperity.instrument.measure import Measurement
-    from asperity.instrument.measure_static import StaticMeasurement
+    from asperity.measurement.measure import Measurement
+    from asperity.measurement.sliding.measure import SlidingMeasurement
 
     Array = NDArray[np.float64]
 
 #: Columns of a long curve: more than pixels show nothing.
 _COLUMNS = 1200
 _POINTS = 20_000
-_BINS = 90
 _MEASURED, _FITTED, _LOAD = GREY, ELASTO_PLASTIC, "#9DB7D5"
 _LABELLED: dict[str, Any] = {"va": "top", "ha": "left", "fontsize": 10}
 
@@ -45,44 +46,55 @@ def draw_modulated(found: Measurement) -> Figure:
     return figure
 
 
-def draw_static(found: StaticMeasurement) -> Figure:
-    """Friction over time with the steady level of each segment, and its drift.
+def draw_sliding(found: SlidingMeasurement) -> Figure:
+    """Friction over time with the steady part of each segment, its steps and holds.
 
     Parameters
     ----------
-    found : StaticMeasurement
+    found : SlidingMeasurement
     """
     figure = new_figure(5.0, 3.5)
     axis = figure.subplots()
     start = found.time[0]
     _band(axis, found.time - start, found.values, color=_MEASURED)
-    speed = [s.velocity for s in found.segments]
     low, high = np.quantile(found.values, [0.002, 0.998])
     low = min(low, *(s.lowest for s in found.segments))
     high = max(high, *(s.highest for s in found.segments))
     room = 0.22 * (high - low)
-    axis.set_ylim(low - 0.3 * room, high + room)
+    axis.set_ylim(low - 0.3 * room, high + 1.9 * room)
+    length = float(found.time[-1] - start)
+    labelled = False
     for k, s in enumerate(found.segments):
+        middle = (s.start + s.end) / 2 - start
+        if k:
+            axis.axvline(s.start - start, color="#333333", linewidth=0.5, linestyle="dashed")
+        if s.hold:
+            axis.axvspan(s.start - start, s.end - start, color=STATED_FILL, alpha=0.3, linewidth=0)
+            continue
         span = np.array([s.steady.start, s.end])
-        middle = (s.steady.start + s.end) / 2
         axis.plot(
             span - start,
-            s.steady.value + s.slope * (span - middle),
+            s.steady.value + s.slope * (span - span.mean()),
             color=LINKER_DIETERICH,
-            label="steady level and drift" if k == 0 else None,
+            label=None if labelled else "steady level and drift",
         )
-        if k:
-            axis.axvline(s.start - start, color="#333333", linewidth=0.7, linestyle="dashed")
-        if np.isfinite(speed[k]):
+        labelled = True
+        # A velocity that would run into its neighbours is left out.
+        if np.isfinite(s.velocity) and s.end - s.start > 0.15 * length:
             axis.text(
-                (s.start + s.end) / 2 - start,
-                high + 0.85 * room,
-                f"{1e6 * speed[k]:.3g} µm/s",
-                va="top",
-                ha="center",
+                middle, high + 0.75 * room, f"{1e6 * s.velocity:.3g} µm/s", va="top", ha="center"
             )
+    if found.holds:
+        axis.plot(
+            [h.peak_time - start for h in found.holds],
+            [h.peak for h in found.holds],
+            "v",
+            markersize=4,
+            color=_FITTED,
+            label="peak after a hold",
+        )
     axis.set(xlabel=_since(start), ylabel="friction $F/W$")
-    axis.legend(loc="upper right", bbox_to_anchor=(1.0, 0.88), handlelength=1.4)
+    axis.legend(loc="upper right", ncols=2, handlelength=1.4)
     return figure
 
 
@@ -113,29 +125,17 @@ def _draw_recording(axis: Axes, found: Measurement) -> None:
 
 def _draw_cycle(axis: Axes, found: Measurement) -> None:
     """The mean cycle of the force against the phase of the load."""
-    reading, cut = found.reading, slice(*found.window)
-    time, force = found.samples.time[cut], found.samples.force[cut]
-    middle, length = (reading.start + reading.end) / 2, reading.end - reading.start
-    trend = reading.drift[1, 0] * (time - middle) / length if reading.drift.shape[1] else 0.0
-    phase = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
-    where = ((phase % 1.0) * _BINS).astype(int) % _BINS
-    count = np.maximum(np.bincount(where, minlength=_BINS), 1)
-    mean = np.bincount(where, force - trend, minlength=_BINS) / count / reading.W0
-    middle_of = (np.arange(_BINS) + 0.5) / _BINS
-    scale = 1e3
-    filled = np.bincount(where, minlength=_BINS) > 0
+    cycle, scale = mean_cycle(found), 1e3
     axis.plot(
-        middle_of[filled],
-        scale * (mean - reading.mean_friction)[filled],
+        cycle.phase,
+        scale * cycle.measured,
         "o",
         markersize=2.6,
         color=_MEASURED,
         label="measured, mean cycle",
     )
-    fine = np.linspace(0, 1, 400)
-    order = np.arange(1, reading.harmonics.size + 1)[:, None]
-    fit = (reading.harmonics[:, None] * np.exp(2j * np.pi * order * fine)).real.sum(0)
-    axis.plot(fine, scale * fit, color=_FITTED, label=f"{order.size} harmonics")
+    harmonics = found.reading.harmonics.size
+    axis.plot(cycle.fine_phase, scale * cycle.fitted, color=_FITTED, label=f"{harmonics} harmonics")
     low, high = axis.get_ylim()
     axis.set_ylim(low, high + 0.35 * (high - low))
     axis.set(xlabel=r"phase of the load $\phi/2\pi$", ylabel=r"$10^3\,(F/W_0-\bar\mu)$")
@@ -144,24 +144,10 @@ def _draw_cycle(axis: Axes, found: Measurement) -> None:
 
 def _draw_residual(axis: Axes, found: Measurement) -> None:
     """Amplitudes of what the fit leaves, with what it has found beside them."""
-    reading, cut = found.reading, slice(*found.window)
-    most = 1 << 18
-    time, force = found.samples.time[cut][:most], found.samples.force[cut][:most] / reading.W0
-    middle = (reading.start + reading.end) / 2
-    cycles = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
+    reading = found.reading
+    frequency, amplitude = residual_spectrum(found)
     order = np.arange(1, reading.harmonics.size + 1)
-    for n, c in zip(order, reading.harmonics, strict=True):
-        force = force - (c * np.exp(2j * np.pi * n * cycles)).real
-    grid = np.linspace(time[0], time[-1], time.size)
-    level = np.interp(grid, time, force)
-    u = np.linspace(-1, 1, grid.size)
-    level = level - np.polynomial.legendre.legval(u, np.polynomial.legendre.legfit(u, level, 1))
-    hann = np.cos(np.pi / 2 * u) ** 2
-    amplitude = 2 * np.abs(np.fft.rfft(hann * level)) / hann.sum()
-    frequency = np.fft.rfftfreq(grid.size, grid[1] - grid[0])
-    top = min(frequency[-1], (order.size + 1) * reading.frequency)
-    shown = (frequency > frequency[1]) & (frequency <= top)
-    _band(axis, frequency[shown], np.maximum(amplitude[shown], 1e-300), color=_MEASURED, lines=True)
+    _band(axis, frequency, np.maximum(amplitude, 1e-300), color=_MEASURED, lines=True)
     axis.plot(
         order * reading.frequency,
         np.abs(reading.harmonics),
@@ -170,11 +156,11 @@ def _draw_residual(axis: Axes, found: Measurement) -> None:
         markersize=5,
         label="harmonics",
     )
-    floor = float(np.quantile(amplitude[shown], 0.1))
-    ceiling = max(float(np.abs(reading.harmonics).max()), float(amplitude[shown].max()))
+    floor = float(np.quantile(amplitude, 0.1))
+    ceiling = max(float(np.abs(reading.harmonics).max()), float(amplitude.max()))
     axis.set(
         yscale="log",
-        xlim=(0, top),
+        xlim=(0, frequency[-1]),
         ylim=(max(floor, 1e-12) / 3, 20 * ceiling),
         xlabel="frequency (Hz)",
         ylabel="amplitude of $F/W_0$",
@@ -188,12 +174,39 @@ def _since(start: float) -> str:
 
 
 def _band(axis: Axes, x: Array, y: Array, *, color: str, lines: bool = False) -> None:
-    """A curve, or the band between its extremes where it has more points than can be seen."""
-    if y.size <= _POINTS:
-        axis.plot(x, y, color=color, linewidth=0.6)
-    else:
-        edges = np.linspace(0, y.size, _COLUMNS + 1).astype(int)[:-1]
-        low, high = np.minimum.reduceat(y, edges), np.maximum.reduceat(y, edges)
-        axis.fill_between(x[edges], low, high, color=color, linewidth=0.5 if lines else 0.3)
+    """A curve; of more points than can be seen, the extremes in columns of equal width.
+
+    Nothing is drawn between samples that are far apart.
+    """
+    breaks = [] if lines else _gaps(x)
+    for first, stop in pairwise([0, *breaks, x.size]):
+        part_x, part_y = x[first:stop], y[first:stop]
+        if y.size > _POINTS:
+            kept = _extremes(part_x, part_y, (x[-1] - x[0]) / _COLUMNS)
+            part_x, part_y = part_x[kept], part_y[kept]
+        marker = "." if part_x.size == 1 else None
+        axis.plot(part_x, part_y, color=color, linewidth=0.6, marker=marker, markersize=1)
     formatter = ScalarFormatter(useOffset=False)
     axis.yaxis.set_major_formatter(formatter)
+
+
+def _extremes(x: Array, y: Array, width: float) -> NDArray[np.intp]:
+    """First, last, smallest and largest sample of every column of a width, in their order."""
+    column = np.floor((x - x[0]) / width) if width > 0 else np.zeros(x.size)
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(column) != 0]))
+    stops = np.append(starts[1:], y.size)
+    length = np.repeat(np.arange(starts.size), stops - starts)
+    order = np.lexsort((y, length))
+    return np.unique(np.concatenate([starts, stops - 1, order[starts], order[stops - 1]]))
+
+
+def _gaps(time: Array) -> list[int]:
+    """Samples that follow a gap: a step far longer than those before and after, and to be seen."""
+    steps = np.diff(time)
+    if steps.size < 3:
+        return []
+    before = np.concatenate([[np.inf], steps[:-1]])
+    after = np.concatenate([steps[1:], [np.inf]])
+    far = (steps > 5 * np.minimum(before, after)) & (steps > 3 * np.median(steps))
+    seen = steps > 0.003 * (time[-1] - time[0])
+    return [int(at) for at in np.flatnonzero(far & seen) + 1][:_COLUMNS]

@@ -1,7 +1,8 @@
 """What a colour and a line mean, the same in every figure.
 
-The colour is the law (Okabe and Ito's palette, told apart by all common kinds of colour vision),
-the dashes are the velocity as in the paper's captions, and ochre is what the text states.
+The colour is the law (Okabe and Ito's palette, which all common kinds of colour vision can
+distinguish), near-black the law with the mass of the slider; the dashes are the velocity as in the
+paper's captions, and ochre is what the text states.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ ELASTO_PLASTIC = "#00805B"
 STATED = "#8A5A00"
 STATED_FILL = "#E9C46A"
 GREY = "#767676"
+#: Curves that count the mass of the slider, beside the same law without it.
+INERTIA = "#2B2B33"
 
 SLOW, FAST = "solid", "dashed"
 
@@ -30,11 +33,11 @@ def style() -> Iterator[None]:
     with as_file(files("asperity.figures") / "asperity.mplstyle") as path:
         settings = mpl.rc_params_from_file(path, use_default_template=True)
     # The template holds the backend and would switch it; files are written by the figure itself.
-    kept = {name: value for name, value in settings.items() if not name.startswith("backend")}
-    with mpl.rc_context(kept):
+    chosen = {name: value for name, value in settings.items() if not name.startswith("backend")}
+    with mpl.rc_context(chosen):
         yield
 
 
 def new_figure(width: float = 5.0, height: float = 3.5) -> Figure:
-    """An empty figure (inches) that no window or global state knows of."""
+    """An empty figure (inches), not registered with pyplot."""
     return Figure(figsize=(width, height))

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, RICE_RUINA, new_figure
 
 if TYPE_CHECKING:
-    from asperity.study.protocol import Outline
+    from asperity.protocol import Outline
 
 #: Events that are marked; more of them than fit are counted instead.
 _MARKED = {"slip start": LINKER_DIETERICH, "steady": GREY}

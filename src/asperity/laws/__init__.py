@@ -10,12 +10,13 @@ from asperity.laws.nagata import Nagata
 from asperity.laws.parameter import parameter
 from asperity.laws.perrin_rice_zheng import PerrinRiceZheng
 from asperity.laws.prakash_clifton import PrakashClifton
-from asperity.laws.registry import get_law, law_parameters, register, registered
+from asperity.laws.registry import get_law, known_law, register, registered
 from asperity.laws.regularised import Regularised
 from asperity.laws.rice_ruina import RiceRuina
 from asperity.laws.ruina_slip import RuinaSlip
 from asperity.laws.strength_area import StrengthArea
 from asperity.laws.two_state import TwoState
+from asperity.parameters import law_parameters
 
 for _law in (
     *(Amontons, RiceRuina, LinkerDieterich, ElastoPlastic, ElastoPlasticAge, StrengthArea),
@@ -40,6 +41,7 @@ __all__ = [
     "StrengthArea",
     "TwoState",
     "get_law",
+    "known_law",
     "law_parameters",
     "parameter",
     "register",

@@ -27,6 +27,7 @@ class Amontons(Law):
 
     name: ClassVar[str] = "amontons"
     source: ClassVar[str] = "bureau2000"
+    equations: ClassVar[tuple[str, ...]] = (r"F_i=\mu_0W",)
     state_names: ClassVar[tuple[str, ...]] = ()
     rate_dependent: ClassVar[bool] = False
 

@@ -46,9 +46,26 @@ class CutOff(RiceRuina):
 
     name: ClassVar[str] = "cut-off"
     source: ClassVar[str] = "okubo1989, barsinai2014"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W\left[\mu_0+A\ln\frac{\dot x+V_1}{V_0+V_1}"
+        r"+B\ln\frac{V_0\Phi/D_0+V_0/V_2}{1+V_0/V_2}\right]",
+        r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}",
+    )
 
-    V1: ArrayLike = parameter("law.V1", "velocity", "not negative")
-    V2: ArrayLike = parameter("law.V2", "velocity")
+    V1: ArrayLike = parameter(
+        "law.V1",
+        "velocity",
+        "not negative",
+        symbol="V_1",
+        meaning="cut-off velocity of the rate term",
+    )
+    V2: ArrayLike = parameter(
+        "law.V2",
+        "velocity",
+        symbol="V_2",
+        meaning="cut-off velocity of the state term",
+        geophysics="$V_2$",
+    )
 
     def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Odd in `v`, with a jump at rest."""

@@ -34,6 +34,11 @@ class ElastoPlastic(RiceRuina):
 
     name: ClassVar[str] = "elasto-plastic"
     source: ClassVar[str] = "bureau2000"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W\left[\mu_0+A\ln\frac{\dot x_\mathrm{pl}}{V_0}+B\ln\frac{V_0\Phi}{D_0}\right]",
+        r"\dot x_\mathrm{pl}=\frac{d}{dt}\left(x-\frac{F_i\lambda}{W}\right)",
+        r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}",
+    )
 
     lambda_: ArrayLike = parameter("law.lambda", "length", "not negative")
 

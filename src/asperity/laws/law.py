@@ -18,13 +18,15 @@ from jax.typing import ArrayLike
 
 from asperity._jax import configure
 from asperity.laws.inverse import invert_friction
+from asperity.parameters import law_parameters
+from asperity.parameters.display import Displayed, SummaryLine, parameter_line
 
 configure()  # double precision, before any law makes an array
 
 State: TypeAlias = tuple[Array, ...]
 
 
-class Law(eqx.Module):
+class Law(Displayed, eqx.Module):
     """A friction law. Subclass it, declare the parameters as fields, write the equations below.
 
     Class attributes
@@ -37,6 +39,8 @@ class Law(eqx.Module):
         One name per state variable, in the order of the `state` tuple. States are dimensionless
         and logarithmic where the physical quantity is positive (ln of an age, not the age), so
         that no step of a solver can make them cross zero.
+    equations : tuple of str
+        The equations in LaTeX, for people to read; () for none.
     rate_dependent : bool
         False for a law whose force does not depend on velocity; it then has no dynamics of its own.
     """
@@ -44,7 +48,14 @@ class Law(eqx.Module):
     name: ClassVar[str]
     source: ClassVar[str]
     state_names: ClassVar[tuple[str, ...]]
+    equations: ClassVar[tuple[str, ...]] = ()
     rate_dependent: ClassVar[bool] = True
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Name and parameters."""
+        known = law_parameters(type(self))
+        values = ((p, getattr(self, p.path.rsplit(".", 1)[-1])) for p in known.values())
+        return self.name, [parameter_line(p, value) for p, value in values]
 
     @abstractmethod
     def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:

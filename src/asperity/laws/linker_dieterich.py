@@ -35,10 +35,21 @@ class LinkerDieterich(RiceRuina):
 
     name: ClassVar[str] = "linker-dieterich"
     source: ClassVar[str] = "bureau2000, linker1992"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\ln\frac{V_0\Phi}{D_0}\right]",
+        r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}-\frac{\alpha}{B}\frac{\dot W}{W}\Phi",
+    )
     state_names: ClassVar[tuple[str, ...]] = ("log_age_plus_load",)
 
     B: ArrayLike = parameter("law.B", "dimensionless")  # alpha / B: zero has no limit
-    alpha: ArrayLike = parameter("law.alpha", "dimensionless", "finite")
+    alpha: ArrayLike = parameter(
+        "law.alpha",
+        "dimensionless",
+        "finite",
+        symbol=r"\alpha",
+        meaning="Linker-Dieterich coefficient",
+        geophysics=r"$\alpha$",
+    )
 
     def log_age(self, state: State, w: ArrayLike) -> Array:
         """ln(V0 Phi / D0) = s - (alpha / B) ln w."""

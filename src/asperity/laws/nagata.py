@@ -44,10 +44,20 @@ class Nagata(RiceRuina):
 
     name: ClassVar[str] = "nagata"
     source: ClassVar[str] = "nagata2012"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\ln\frac{V_0\Phi}{D_0}\right]",
+        r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}-\frac{c}{B}\frac{\dot F_i}{W_0}\Phi",
+    )
     state_names: ClassVar[tuple[str, ...]] = ("log_age_plus_force",)
 
     B: ArrayLike = parameter("law.B", "dimensionless")  # c / B: zero has no limit
-    c: ArrayLike = parameter("law.c", "dimensionless", "not negative")
+    c: ArrayLike = parameter(
+        "law.c",
+        "dimensionless",
+        "not negative",
+        meaning="weakening by shear stress",
+        geophysics="$c$",
+    )
 
     def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Rice-Ruina friction with the age expressed by s and the force itself."""

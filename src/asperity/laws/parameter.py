@@ -1,4 +1,4 @@
-"""Declaration of a law's parameters: kind of quantity and the rule its values obey."""
+"""Declaration of a law's parameters: kind of quantity, rule, symbol and meaning."""
 
 from __future__ import annotations
 
@@ -6,18 +6,23 @@ from functools import partial
 from typing import Any
 
 import equinox as eqx
-import jax
 import jax.numpy as jnp
-import numpy as np
 
-from asperity.errors import InputError
-from asperity.units import KINDS, to_si
-
-_RULES = {"positive": np.greater, "not negative": np.greater_equal, "finite": None}
+from asperity.parameters import INTERFACE, Parameter, obeying, plain_name
 
 
-def parameter(name: str, kind: str, rule: str = "positive") -> Any:
-    """Declare a field of an `eqx.Module`: texts become SI, values that break the rule are refused.
+def parameter(
+    name: str,
+    kind: str,
+    rule: str = "positive",
+    *,
+    symbol: str = "",
+    meaning: str = "",
+    geophysics: str = "",
+) -> Any:
+    """Declare a field of a law: texts become SI, values that break the rule are refused.
+
+    The declaration is the entry of the parameter in the table of parameters.
 
     Parameters
     ----------
@@ -26,34 +31,41 @@ def parameter(name: str, kind: str, rule: str = "positive") -> Any:
     kind : str
         Kind of quantity, a key of `asperity.units.KINDS`.
     rule : {"positive", "not negative", "finite"}
+    symbol : str
+        In LaTeX; by default that of `asperity.parameters.INTERFACE` for the same quantity, else
+        the name.
+    meaning, geophysics : str
+        In one line; by default as for the symbol.
 
     Returns
     -------
     dataclass field
-        Its values are float64 arrays; its metadata hold the SI unit.
+        Its values are float64 arrays; its metadata hold the entry and the SI unit.
     """
+    bare = plain_name(name)
+    shared = INTERFACE.get(bare)
+    if shared is None or shared.kind != kind:
+        shared = Parameter(bare, kind, rule, symbol=bare)
+    entry = Parameter(
+        bare,
+        kind,
+        rule,
+        meaning or shared.meaning,
+        symbol or shared.symbol,
+        label=name,
+        aliases=shared.aliases,
+        meant=shared.meant,
+        geophysics=geophysics or shared.geophysics,
+    )
     converter = partial(checked, name=name, kind=kind, rule=rule)
-    return eqx.field(converter=converter, metadata={"unit": KINDS[kind].si})
+    return eqx.field(converter=converter, metadata={"parameter": entry, "unit": entry.unit})
 
 
 def checked(value: Any, *, name: str, kind: str, rule: str) -> Any:
-    """Convert `value` to SI and hold it against `rule`.
+    """Convert `value` to SI and check its rule, as `asperity.parameters.obeying`.
 
-    Raises
-    ------
-    InputError
-        Naming the field, the rule, the first offending value and its unit.
+    Returns
+    -------
+    JAX array of float64
     """
-    if isinstance(value, jax.core.Tracer):
-        return value
-    array = np.asarray(to_si(value, kind, name), dtype=float)
-    compare = _RULES[rule]
-    if compare is not None:
-        bad = array[~compare(array, 0.0)]
-        if bad.size:
-            unit = KINDS[kind].si
-            raise InputError(
-                f"{name} must be {rule}, got {bad.flat[0]:g}{' ' + unit if unit else ''}; "
-                f"give a value {'above' if rule == 'positive' else 'of at least'} zero"
-            )
-    return jnp.asarray(array)
+    return jnp.asarray(obeying(value, name, kind, rule))

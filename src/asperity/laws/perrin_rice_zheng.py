@@ -25,6 +25,10 @@ class PerrinRiceZheng(RiceRuina):
 
     name: ClassVar[str] = "perrin-rice-zheng"
     source: ClassVar[str] = "perrin1995"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\ln\frac{V_0\Phi}{2D_0}\right]",
+        r"\dot\Phi=1-\left(\frac{\dot x\Phi}{2D_0}\right)^2",
+    )
 
     def ageing(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """D ln(Phi)/dt = 1/Phi - (v / (2 D0))^2 Phi (1/s)."""

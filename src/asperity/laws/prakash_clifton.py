@@ -40,10 +40,27 @@ class PrakashClifton(RiceRuina):
 
     name: ClassVar[str] = "prakash-clifton"
     source: ClassVar[str] = "prakash1998, cochard2000"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W_e\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\ln\frac{V_0\Phi}{D_0}\right]",
+        r"\dot W_e=-\frac{|\dot x|+V_*}{L}\,(W_e-W)",
+        r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}",
+    )
     state_names: ClassVar[tuple[str, ...]] = ("log_age", "log_load")
 
-    L: ArrayLike = parameter("law.L", "length")
-    V_star: ArrayLike = parameter("law.V_star", "velocity", "not negative")
+    L: ArrayLike = parameter(
+        "law.L",
+        "length",
+        meaning="slip over which the force follows the load",
+        geophysics="$L$",
+    )
+    V_star: ArrayLike = parameter(
+        "law.V_star",
+        "velocity",
+        "not negative",
+        symbol="V_*",
+        meaning="velocity that stands for time while the force follows the load",
+        geophysics="$V^*$",
+    )
 
     def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Rice-Ruina friction times W_e/W."""

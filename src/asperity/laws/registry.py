@@ -2,18 +2,32 @@
 
 from __future__ import annotations
 
-import dataclasses
+import sys
+import warnings
+from pathlib import Path
 
 from asperity.errors import InputError, closest
+from asperity.laws.discovery import installed, law_at, load_installed
 from asperity.laws.law import Law
+from asperity.parameters.arguments import shown
 
 _LAWS: dict[str, type[Law]] = {}
 
 
 def register(law: type[Law]) -> type[Law]:
-    """Make `law` known by its `name`; returns it, so that it serves as a class decorator."""
+    """Make `law` known by its `name`; returns it, so that it serves as a class decorator.
+
+    A file that is loaded again replaces the law that it gave before.
+
+    Raises
+    ------
+    InputError
+        If another law has that name.
+    """
     known = _LAWS.setdefault(law.name, law)
-    if known is not law:
+    if known is not law and _same_source(known, law):
+        _LAWS[law.name] = law
+    elif known is not law:
         raise InputError(
             f"law.name must be unique, got '{law.name}', which {known.__module__} already has; "
             "choose another name"
@@ -21,27 +35,63 @@ def register(law: type[Law]) -> type[Law]:
     return law
 
 
+def _same_source(known: type[Law], law: type[Law]) -> bool:
+    """Whether two classes are one definition, loaded twice from its file."""
+    files = [getattr(sys.modules.get(c.__module__), "__file__", None) for c in (known, law)]
+    if known.__qualname__ != law.__qualname__ or None in files:
+        return False
+    return len({Path(str(file)).resolve() for file in files}) == 1
+
+
 def registered() -> dict[str, type[Law]]:
-    """All registered laws by name."""
+    """All known laws by name, those of installed packages among them.
+
+    An installed law that cannot be imported is left out with a warning.
+    """
+    for name, point in installed().items():
+        if name not in _LAWS:
+            try:
+                register(load_installed(point))
+            except InputError as error:
+                warnings.warn(str(error), stacklevel=2)
     return dict(_LAWS)
 
 
 def get_law(name: str) -> type[Law]:
-    """Look a law up by name.
+    """Look a law up by name: one of the package, registered, or of an installed package.
 
     Raises
     ------
     InputError
         If no law has that name; the message gives the nearest one.
     """
-    try:
-        return _LAWS[name]
-    except KeyError:
+    if not isinstance(name, str):
         raise InputError(
-            f"law must be a registered law, got '{name}'; {closest(name, _LAWS)}"
-        ) from None
+            f"law must be the name of a registered law, got {shown(name)}; "
+            f"choose one of {', '.join(sorted(_LAWS))}"
+        )
+    if name not in _LAWS and name in installed():
+        register(load_installed(installed()[name]))
+    if name not in _LAWS:
+        raise InputError(
+            f"law must be a registered law, got {shown(name)}; {closest(name, registered())}"
+        )
+    return _LAWS[name]
 
 
-def law_parameters(law: type[Law]) -> tuple[str, ...]:
-    """Names of the parameters of a law, as tables write them (``lambda_`` is ``lambda``)."""
-    return tuple(f.name.rstrip("_") for f in dataclasses.fields(law))
+def known_law(text: str) -> str:
+    """Name of a law that is given by its name or by its place, and is then registered.
+
+    Parameters
+    ----------
+    text : str
+        A name, ``module:Name``, or ``path/to/file.py:Name``; a place runs the code there.
+
+    Raises
+    ------
+    InputError
+        If there is no such law.
+    """
+    if ":" not in text:
+        return text
+    return register(law_at(text)).name

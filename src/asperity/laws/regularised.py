@@ -30,6 +30,11 @@ class Regularised(RiceRuina):
 
     name: ClassVar[str] = "regularised"
     source: ClassVar[str] = "rice2001, lapusta2000"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=WA\,\mathrm{arsinh}"
+        r"\left[\frac{\dot x}{2V_0}\exp\frac{\mu_0+B\ln(V_0\Phi/D_0)}{A}\right]",
+        r"\dot\Phi=1-\frac{|\dot x|\Phi}{D_0}",
+    )
 
     def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Odd in `v`, zero at rest."""

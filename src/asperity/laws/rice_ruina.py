@@ -35,6 +35,10 @@ class RiceRuina(Law):
 
     name: ClassVar[str] = "rice-ruina"
     source: ClassVar[str] = "bureau2000"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\ln\frac{V_0\Phi}{D_0}\right]",
+        r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}",
+    )
     state_names: ClassVar[tuple[str, ...]] = ("log_age",)
 
     mu0: ArrayLike = parameter("law.mu0", "dimensionless")

@@ -25,6 +25,10 @@ class RuinaSlip(RiceRuina):
 
     name: ClassVar[str] = "ruina-slip"
     source: ClassVar[str] = "ruina1983"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\ln\frac{V_0\Phi}{D_0}\right]",
+        r"\dot\Phi=-\frac{\dot x\Phi}{D_0}\ln\frac{\dot x\Phi}{D_0}",
+    )
 
     def state_rate(self, v: ArrayLike, v_plastic: ArrayLike, state: State, w: ArrayLike) -> State:
         """The slip law, divided by Phi, on the velocity that friction takes the logarithm of."""

@@ -25,6 +25,11 @@ class StrengthArea(RiceRuina):
     """Product form of Rice-Ruina friction; parameters and state as `RiceRuina`."""
 
     name: ClassVar[str] = "strength-area"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=\mu_0W\left[1+\frac{A}{\mu_0}\ln\frac{\dot x}{V_0}\right]"
+        r"\left[1+\frac{B}{\mu_0}\ln\frac{V_0\Phi}{D_0}\right]",
+        r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}",
+    )
 
     def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Eqs. (3)-(5)."""

@@ -36,10 +36,28 @@ class TwoState(RuinaSlip):
 
     name: ClassVar[str] = "two-state"
     source: ClassVar[str] = "ruina1983, gu1984"
+    equations: ClassVar[tuple[str, ...]] = (
+        r"F_i=W\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\phi+B_2\phi_2\right]",
+        r"\dot\phi=-\frac{\dot x}{D_0}\left(\phi+\ln\frac{\dot x}{V_0}\right)",
+        r"\dot\phi_2=-\frac{\dot x}{D_2}\left(\phi_2+\ln\frac{\dot x}{V_0}\right)",
+    )
     state_names: ClassVar[tuple[str, ...]] = ("log_age", "log_age2")
 
-    B2: ArrayLike = parameter("law.B2", "dimensionless", "finite")
-    D2: ArrayLike = parameter("law.D2", "length")
+    B2: ArrayLike = parameter(
+        "law.B2",
+        "dimensionless",
+        "finite",
+        symbol="B_2",
+        meaning="coefficient of the second state",
+        geophysics="$b_2$",
+    )
+    D2: ArrayLike = parameter(
+        "law.D2",
+        "length",
+        symbol="D_2",
+        meaning="memory length of the second state",
+        geophysics="$L_2$, $D_{c2}$",
+    )
 
     def friction(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
         """Both states add to friction."""

@@ -5,8 +5,8 @@ from asperity.loads.harmonic import Harmonic
 from asperity.loads.modulated import modulated, sampled
 from asperity.loads.modulation import Modulation
 from asperity.loads.periodic import Periodic
-from asperity.loads.programme import Programme
-from asperity.loads.programme_steps import (
+from asperity.loads.programme.programme import Programme
+from asperity.loads.programme.steps import (
     Cycle,
     Follow,
     Hold,

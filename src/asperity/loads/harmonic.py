@@ -33,6 +33,11 @@ class Harmonic(Modulation):
         return self.epsilon
 
     @property
+    def even(self) -> bool:
+        """Always."""
+        return True
+
+    @property
     def formula(self) -> str:
         """What is modulated and how, as a text for provenance."""
         return "w(t) = 1 + eps cos(w t)"

@@ -24,14 +24,14 @@ def modulated(
     epsilon: ArrayLike | str = 0.0,
     *,
     load: Mapping[int, tuple[Any, Any]] | None = None,
-    velocity: ArrayLike | str = 0.0,
-    velocity_phase: ArrayLike = 0.0,
+    pull: ArrayLike | str = 0.0,
+    pull_phase: ArrayLike = 0.0,
     tilt: ArrayLike | str = 0.0,
 ) -> Periodic:
     """Modulation of load, shear force and pulling velocity from amplitudes and phases.
 
         W/W0 = 1 + eps cos wt + sum over n of e_n cos(n wt + p_n)
-        V(t) = V [1 + velocity cos(wt + velocity_phase)]
+        V(t) = V [1 + pull cos(wt + pull_phase)]
 
     Parameters
     ----------
@@ -39,9 +39,9 @@ def modulated(
         Relative amplitude of the load at the modulation frequency, its phase being zero.
     load : mapping of int to pair, optional
         Further harmonics of the load: n -> (e_n, p_n), phases in rad.
-    velocity : array or str
-        Relative amplitude of the pulling velocity.
-    velocity_phase : array
+    pull : array or str
+        Amplitude of the pulling velocity over its mean (dimensionless).
+    pull_phase : array
         Its phase against the load (rad).
     tilt : array or str
         Angle between the direction in which the modulated force acts and the interface's normal
@@ -58,20 +58,27 @@ def modulated(
     InputError
         If the load would vanish within the period, or a value breaks its rule.
     """
-    terms = {1: (to_si(epsilon, "dimensionless", "epsilon"), 0.0)}
-    for n, (amplitude, phase) in (load or {}).items():
-        if n < 2 or n != int(n):
-            raise InputError(
-                f"load must have harmonics from 2 on, got {n}; give the first one as epsilon"
-            )
-        terms[int(n)] = (to_si(amplitude, "dimensionless", f"load[{n}]"), phase)
-    series = tuple(_pair(*terms.get(n, (0.0, 0.0))) for n in range(1, max(terms) + 1))
-    speed = _pair(to_si(velocity, "dimensionless", "velocity"), velocity_phase)
+    series = _load_series(epsilon, load)
+    speed = _pair(to_si(pull, "dimensionless", "pull"), pull_phase)
     gain = np.tan(_checked_tilt(tilt))
     shear = tuple((gain * a, gain * b) for a, b in series) if np.any(gain) else ()
     _require_contact(series)
-    pull = (speed,) if any(np.any(part) for part in speed) else ()
-    return Periodic(series, shear, pull)
+    swing = (speed,) if any(np.any(part) for part in speed) else ()
+    return Periodic(series, shear, swing)
+
+
+def contact_lost(
+    epsilon: ArrayLike | str = 0.0, load: Mapping[int, tuple[Any, Any]] | None = None
+) -> list[str]:
+    """Why the load of each point is none of a contact; empty where the load stays positive.
+
+    Parameters
+    ----------
+    epsilon, load
+        As for `modulated`, of shape (points,).
+    """
+    lowest = np.ravel(_lowest_load(_load_series(epsilon, load)))
+    return ["" if low > 0 else _no_contact(low) for low in lowest]
 
 
 def sampled(
@@ -109,6 +116,18 @@ def sampled(
     series = {name: _series_of(name, values, harmonics) for name, values in given.items()}
     _require_contact(series["load"])
     return Periodic(series["load"], series["shear"], series["velocity"])
+
+
+def _load_series(epsilon: ArrayLike | str, load: Mapping[int, tuple[Any, Any]] | None) -> Series:
+    """Fourier coefficients of the load."""
+    terms = {1: (to_si(epsilon, "dimensionless", "epsilon"), 0.0)}
+    for n, (amplitude, phase) in (load or {}).items():
+        if n < 2 or n != int(n):
+            raise InputError(
+                f"load must have harmonics from 2 on, got {n}; give the first one as epsilon"
+            )
+        terms[int(n)] = (to_si(amplitude, "dimensionless", f"load[{n}]"), phase)
+    return tuple(_pair(*terms.get(n, (0.0, 0.0))) for n in range(1, max(terms) + 1))
 
 
 def _pair(amplitude: ArrayLike, phase: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
@@ -168,22 +187,34 @@ def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Se
 
 
 def _require_contact(series: Series) -> None:
-    """Hold the load against zero over the period, a few points at a time."""
-    pairs = [np.broadcast_arrays(*np.broadcast_arrays(a, b)) for a, b in series]
-    if not pairs:
-        return
+    """Raise `InputError` where the load does not stay positive over the period."""
+    lowest = float(np.min(_lowest_load(series), initial=np.inf))
+    if not lowest > 0:
+        raise InputError(_no_contact(lowest))
+
+
+def _no_contact(lowest: float) -> str:
+    return (
+        f"load must stay positive over the period, so that contact is never lost, got a "
+        f"lowest W/W0 of {lowest:.4g}; lower the amplitudes"
+    )
+
+
+def _lowest_load(series: Series) -> NDArray[np.float64]:
+    """Lowest W/W0 over the period at each point, a few points at a time.
+
+    Where the amplitudes together are below 1 it is their bound 1 - sum e_n instead.
+    """
+    pairs = [np.broadcast_arrays(a, b) for a, b in series]
     shape = np.broadcast_shapes(*(np.shape(a) for a, _ in pairs))
     flat = [[np.broadcast_to(part, shape).ravel() for part in pair] for pair in pairs]
-    lowest = np.inf
-    for start in range(0, max(int(np.prod(shape)), 1), 4096):
-        part = slice(start, start + 4096)
+    lowest = 1 - sum((np.hypot(a, b) for a, b in flat), np.zeros(int(np.prod(shape))))
+    doubtful = np.flatnonzero(~(lowest > 0))
+    for start in range(0, len(doubtful), 4096):
+        part = doubtful[start : start + 4096]
         w = sum(
             a[part] * np.cos(k * _PHASES[:, None]) + b[part] * np.sin(k * _PHASES[:, None])
             for k, (a, b) in enumerate(flat, start=1)
         )
-        lowest = min(lowest, 1 + float(np.min(w)))
-    if not lowest > 0:
-        raise InputError(
-            f"load must stay positive over the period, so that contact is never lost, got a "
-            f"lowest W/W0 of {lowest:.4g}; lower the amplitudes"
-        )
+        lowest[part] = 1 + np.min(w, axis=0)
+    return lowest.reshape(shape)

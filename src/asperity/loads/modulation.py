@@ -28,6 +28,11 @@ class Modulation(eqx.Module):
         """The modulation with `share` of its amplitude: 0 is steady sliding."""
 
     @property
+    def even(self) -> bool:
+        """Whether load, shear force and pulling velocity are known to be even in theta."""
+        return False
+
+    @property
     @abstractmethod
     def formula(self) -> str:
         """What is modulated and how, as a text for provenance."""

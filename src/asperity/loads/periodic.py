@@ -48,6 +48,12 @@ class Periodic(Modulation):
         return jnp.hypot(*self.load[0]) if self.load else 0.0
 
     @property
+    def even(self) -> bool:
+        """Whether there are no sines."""
+        series = (*self.load, *self.shear, *self.pull)
+        return not any(np.any(sine) for _, sine in series)
+
+    @property
     def formula(self) -> str:
         """What is modulated and how, as a text for provenance."""
         parts = {"w(t)": ("1", self.load), "shear/W0": ("", self.shear), "V(t)/V": ("1", self.pull)}

@@ -15,6 +15,7 @@ from pydantic import ValidationError
 from asperity.errors import InputError, closest
 from asperity.materials.number import Number
 from asperity.materials.record import Material
+from asperity.parameters.arguments import file_path
 
 
 @cache
@@ -26,7 +27,7 @@ def packaged() -> Mapping[str, Any]:
 
 def load_material(name: str | PathLike[str]) -> Material:
     """See `asperity.materials.load`."""
-    text = fspath(name)
+    text = fspath(file_path(name, "material"))
     if not isinstance(name, str) or text.endswith(".toml") or Path(text).name != text:
         return _parse(_read(Path(text)), Path(text).stem, text)
     try:

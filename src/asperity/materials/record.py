@@ -14,7 +14,8 @@ from pydantic import BaseModel, ConfigDict, field_validator
 
 from asperity.errors import InputError, closest
 from asperity.materials.number import Number
-from asperity.materials.signs import check_sign
+from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters, obeying
+from asperity.parameters.arguments import shown
 from asperity.units import to_si
 
 if TYPE_CHECKING:
@@ -51,15 +52,20 @@ class Material(BaseModel):
                     f"'{name}'; rename that number"
                 )
             if number.value is not None:
-                check_sign(name, number.si, "numbers", number.si_unit)
+                _check_rule(name, number.si, number.dimension, "numbers")
         return numbers
 
     def __getitem__(self, name: str) -> Number:
+        if not isinstance(name, str):
+            raise InputError(
+                f"{self.name} must be asked for a number by its name, got {shown(name)}; "
+                "write it like material['K']"
+            )
         try:
             return self.numbers[_plain(name)]
         except KeyError:
             raise InputError(
-                f"{self.name} must have the number asked for, got '{name}'; "
+                f"{self.name} must have the number asked for, got {shown(name)}; "
                 f"{closest(name, self.numbers)}"
             ) from None
 
@@ -106,7 +112,7 @@ class Material(BaseModel):
             needs a parameter that neither the material nor `overrides` has.
         """
         # The laws load JAX, which reading numbers does not need.
-        from asperity.laws import get_law, law_parameters
+        from asperity.laws import get_law
 
         law = get_law(name)
         wanted = law_parameters(law)
@@ -132,8 +138,18 @@ class Material(BaseModel):
         if number is None:  # of which only the law's own declaration knows the unit and the rule
             return given[parameter]
         value = to_si(given[parameter], number.dimension, f"{owner}.{parameter}")
-        check_sign(parameter, value, owner, number.si_unit)
+        _check_rule(parameter, value, number.dimension, owner)
         return value
+
+
+def _check_rule(name: str, value: Any, dimension: str, owner: str) -> None:
+    """Refuse a value that breaks the rule of the parameter of that name and dimension.
+
+    Other numbers may have any value.
+    """
+    known = {**INTERFACE, **EXPERIMENT}.get(name)
+    if known is not None and known.kind == dimension:
+        obeying(value, f"{owner}.{name}", dimension, known.rule)
 
 
 def _plain(name: str) -> str:

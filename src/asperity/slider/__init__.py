@@ -1,6 +1,6 @@
 """Law + spring + mass + load = equation of motion."""
 
-from asperity.slider.choice import equation_of_motion
+from asperity.slider.formulation import equation_of_motion
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic

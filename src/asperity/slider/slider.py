@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import equinox as eqx
+import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from asperity.laws import Law
-from asperity.laws.parameter import checked
+from asperity.parameters import MACHINE
+from asperity.parameters.arguments import instance
+from asperity.parameters.display import Displayed, SummaryLine, parameter_line
 
 
-class Slider(eqx.Module):
+class Slider(Displayed, eqx.Module):
     """Law, spring, mass and mean load.
 
     Attributes
@@ -54,7 +57,15 @@ class Slider(eqx.Module):
         InputError
             If a value breaks its rule or has a unit of another kind.
         """
-        self.law = law
-        self.K = checked(spring, name="slider.K", kind="stiffness", rule="positive")
-        self.W0 = checked(load, name="slider.W0", kind="force", rule="positive")
-        self.M = checked(mass, name="slider.M", kind="mass", rule="not negative")
+        # A law whose fields are traced is still an instance of its class.
+        advice = "build one such as material.law('elasto-plastic')"
+        self.law = instance(law, Law, "slider.law", advice)
+        self.K = jnp.asarray(MACHINE["K"].check(spring))
+        self.W0 = jnp.asarray(MACHINE["W0"].check(load))
+        self.M = jnp.asarray(MACHINE["M"].check(mass))
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Law and parameters."""
+        law, lines = self.law.summary()
+        own = [parameter_line(MACHINE[name], getattr(self, name)) for name in ("K", "W0", "M")]
+        return f"Slider, {law}", lines + own

@@ -11,10 +11,14 @@ from typing import Any, overload
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.units.factor import EXACT, normalised, unit_factor
 from asperity.units.kinds import Kind, kind_of
+from asperity.units.scale import EXACT, normalised, unit_factor
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?![\d.])\s*(.*?)\s*", re.S)
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d+))?(?![\d.])\s*(.*?)\s*", re.S)
+#: Powers of ten beyond which no unit brings a number back into the range of doubles.
+_LARGEST_POWER = 5000
+#: Characters of a user's text that a message repeats.
+_SHOWN = 60
 
 
 @overload
@@ -52,12 +56,14 @@ def to_si(value: Any, kind: str, name: str, *, require_unit: bool = False) -> An
     spec = kind_of(kind)
     if isinstance(value, str):
         return _text_to_si(value, kind, name)
-    if _is_traced(value):
+    if is_traced(value):
         return value
     if getattr(getattr(value, "dtype", None), "kind", None) in ("U", "O"):
         return to_si(np.asarray(value).tolist(), kind, name, require_unit=require_unit)
     if isinstance(value, list | tuple):
         return _stacked([to_si(v, kind, name, require_unit=require_unit) for v in value], name)
+    if isinstance(value, int) and not abs(value) < 10**308:
+        raise _beyond_doubles(name, "an integer of more than 308 figures", spec)
     if require_unit and spec.si:
         raise InputError(
             f"{name} must carry a unit, got {_shown(value)}; write it like '{spec.example}'"
@@ -121,7 +127,8 @@ def format_si(value: float, kind: str, digits: int = 4) -> str:
     return f"{value:.{digits}g} {unit}".rstrip()
 
 
-def _is_traced(value: Any) -> bool:
+def is_traced(value: Any) -> bool:
+    """Whether JAX is transforming the function of which `value` is an argument: no number yet."""
     # Looked up, not imported: a program that has not loaded JAX has no tracers.
     jax = sys.modules.get("jax")
     return jax is not None and isinstance(value, jax.core.Tracer)
@@ -159,6 +166,8 @@ def _number_to_si(value: Any, spec: Kind, name: str) -> Any:
         )
     if array.ndim == 0 and isinstance(value, int | float | np.generic):
         return float(value)
+    if not hasattr(value, "astype"):  # a range, for one
+        value = array
     return value if array.dtype == float else value.astype(float)
 
 
@@ -167,16 +176,38 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise InputError(
-            f"{name} must be a finite number{' with a unit' if spec.si else ''}, got '{text}'; "
-            f"write it like '{spec.example}'"
+            f"{name} must be a finite number{' with a unit' if spec.si else ''}, "
+            f"got '{_cut(text)}'; write it like '{spec.example}'"
         )
-    number, unit = Decimal(match[1]), normalised(match[2])
+    digits, unit = Decimal(match[1]), normalised(match[3])
     if spec.si and not unit:
-        raise InputError(f"{name} must carry a unit, got '{text}'; write it like '{spec.example}'")
-    value = float(EXACT.multiply(number, unit_factor(unit, kind, name, text)))
-    if math.isinf(value) or (value == 0 and number != 0):
         raise InputError(
-            f"{name} must lie within the range of double precision, got '{text}'; "
-            f"write it like '{spec.example}'"
+            f"{name} must carry a unit, got '{_cut(text)}'; write it like '{spec.example}'"
         )
+    factor = unit_factor(unit, kind, name, _cut(text))
+    power = _power_of_ten(match[2] or "0")
+    # Decimals have a largest power themselves; of what lies beyond, zero alone is a number.
+    if digits and abs(power + digits.adjusted()) > _LARGEST_POWER:
+        raise _beyond_doubles(name, text, spec)
+    value = float(EXACT.multiply(digits.scaleb(power if digits else 0, EXACT), factor))
+    if math.isinf(value) or (value == 0 and digits != 0):
+        raise _beyond_doubles(name, text, spec)
     return value
+
+
+def _power_of_ten(text: str) -> int:
+    """The integer, or one that is too large if the text is too long to be read as one."""
+    sign, figures = (-1 if text.startswith("-") else 1), text.lstrip("+-").lstrip("0")
+    return sign * (int(figures or "0") if len(figures) < 10 else 10**10)
+
+
+def _beyond_doubles(name: str, text: str, spec: Kind) -> InputError:
+    return InputError(
+        f"{name} must lie within the range of double precision, got '{_cut(text)}'; "
+        f"write it like '{spec.example}'"
+    )
+
+
+def _cut(text: str) -> str:
+    """What a message repeats of a user's text."""
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."

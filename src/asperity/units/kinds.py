@@ -54,6 +54,16 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
         "stiffness": Kind(
             "a stiffness", "N/m", "0.2 N/um", (("mN/m", -3), ("N/m", 0), ("N/mm", 3), ("N/um", 6))
         ),
+        # Of an apparatus whose load is a stress, and where friction alone is recorded.
+        "stress_per_length": Kind(
+            "a stiffness",
+            "Pa/m",
+            "0.06 MPa/um",
+            (("Pa/m", 0), ("kPa/m", 3), ("MPa/m", 6), ("GPa/m", 9), ("MPa/um", 12)),
+        ),
+        "per_length": Kind(
+            "a stiffness over a load", "1/m", "0.003 1/um", (("1/m", 0), ("1/mm", 3), ("1/um", 6))
+        ),
         "damping": Kind(
             "a damping",
             "N*s/m",

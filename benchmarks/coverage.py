@@ -1,0 +1,190 @@
+"""Coverage of intervals from recordings: how many of them hold the truth.
+
+``python -m benchmarks.coverage [--sets 200] [--case steps|holds] [--recordings FOLDER]``
+
+Recordings are computed by SciPy (Radau, relative tolerance 1e-9) from the printed equations, and
+get noise as real recordings have it: white, correlated over half a second and over eight, and a
+line. Each is fitted twice: by `asperity.inference.fit`, and by the same fit under white noise of
+the residual's size, which is what least squares and its covariance amount to. The share of 68 and
+95 % intervals that hold the truth is printed for both.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time as clock
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
+
+from asperity.inference import RecordedRun, RunOptions, fit, recorded_run
+from asperity.recording import Channel, Trace
+
+TRUTH = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6}
+#: Stiffness over the load (1/m), and the load (Pa).
+STIFFNESS, LOAD = 4e3, 2e7
+#: Of the residual of a fit to 3 to 10 um/s on basalt (10 and 100 samples a second): an AR(1) and
+#: an AR(3), and what is slower.
+NOISE = 8e-4
+
+
+@dataclass(frozen=True)
+class Case:
+    """A programme of the drive: velocities (m/s) and times of their changes (s)."""
+
+    velocities: tuple[float, ...]
+    changes: tuple[float, ...]
+    end: float
+    rate: float
+
+
+CASES = {
+    "steps": Case((3e-6, 1e-5, 3e-6), (40.0, 80.0), 140.0, 10.0),
+    "holds": Case((1e-5, 0.0, 1e-5, 0.0, 1e-5), (20.0, 30.0, 50.0, 80.0), 110.0, 10.0),
+}
+
+
+def friction(case: Case, time: np.ndarray) -> np.ndarray:
+    """Friction of the ageing law at the samples, by SciPy."""
+    A, B, D0, V0, mu0 = (TRUTH[n] for n in ("A", "B", "D0", "V0", "mu0"))
+
+    def rhs(_: float, y: np.ndarray, V: float) -> list[float]:
+        v = V0 * np.exp((y[0] - mu0 - B * y[1]) / A)
+        return [STIFFNESS * (V - v), (V0 * np.exp(-y[1]) - v) / D0]
+
+    first = np.log(case.velocities[0] / V0)
+    y = np.array([mu0 + (A - B) * first, -first])
+    out = np.empty_like(time)
+    edges = [0.0, *case.changes, case.end]
+    for a, b, V in zip(edges[:-1], edges[1:], case.velocities, strict=True):
+        here = (time >= a) & ((time < b) | (b == case.end))
+        solution = solve_ivp(
+            rhs, (a, b), y, method="Radau", rtol=1e-9, atol=1e-12, dense_output=True, args=(V,)
+        )
+        out[here] = solution.sol(time[here])[0]
+        y = solution.y[:, -1]
+    return out
+
+
+def coloured(random: np.random.Generator, n: int, rate: float) -> np.ndarray:
+    """Noise with the correlation of real gauges: white, correlated over 1 s and 10 s, a line."""
+    white = random.normal(size=n)
+    quick, slow = (np.exp(-1 / (rate * tau)) for tau in (0.5, 8.0))
+
+    def wander(a: float) -> np.ndarray:
+        start = random.normal()
+        steps = random.normal(size=n) * np.sqrt(1 - a * a)
+        return np.asarray(lfilter([1.0], [1.0, -a], steps, zi=[a * start])[0])
+
+    t = np.arange(n) / rate
+    line = np.sqrt(2) * np.cos(2 * np.pi * (1.37 * t + random.random()))
+    return NOISE * (0.7 * white + 0.5 * wander(quick) + 0.4 * wander(slow) + 0.2 * line)
+
+
+def runs_of(case: Case, sets: int, seed: int = 0) -> Iterator[RecordedRun]:
+    """Recordings of one truth with different noise."""
+    time = np.arange(int(case.end * case.rate)) / case.rate
+    clean = friction(case, time)
+    edges = np.array([0.0, *case.changes, case.end])
+    path = np.interp(
+        time, edges, np.concatenate([[0.0], np.cumsum(np.array(case.velocities) * np.diff(edges))])
+    )
+    for k in range(sets):
+        random = np.random.default_rng([seed, k])
+        noisy = clean + coloured(random, time.size, case.rate)
+        displacement = path + 2e-8 * random.normal(size=time.size)
+        trace = Trace(
+            time,
+            {
+                "friction": Channel(noisy, "dimensionless", "", "friction", ""),
+                "displacement": Channel(displacement, "length", "m", "displacement", "m"),
+                "normal_stress": Channel(np.full(time.size, LOAD), "pressure", "Pa", "ns", "Pa"),
+            },
+        )
+        yield recorded_run(trace, name="run")
+
+
+TRUE = {**{n: TRUTH[n] for n in ("A", "B", "D0")}, "K": STIFFNESS * LOAD}
+
+
+def covered(case: Case, sets: int, options: RunOptions, seed: int = 0) -> dict[str, Any]:
+    """Shares of intervals that hold the truth, by parameter, with means of their widths."""
+    inside = {n: np.zeros(2) for n in TRUE}
+    widths: dict[str, list[float]] = {n: [] for n in TRUE}
+    off: dict[str, list[float]] = {n: [] for n in TRUE}
+    failed, noise_rejected, done = 0, 0, 0
+    begun = clock.perf_counter()
+    for run in runs_of(case, sets, seed):
+        found = fit(
+            run,
+            "rice-ruina",
+            ["A", "B", "D0"],
+            start={n: TRUE[n] for n in TRUE},
+            runs=options,
+            starts=4,
+        )
+        if not found.converged:
+            failed += 1
+            continue
+        done += 1
+        noise_rejected += any("noise" in w for w in found.warnings)
+        for n, truth in TRUE.items():
+            p = found.parameters[n]
+            inside[n] += [
+                p.interval_68[0] <= truth <= p.interval_68[1],
+                p.interval_95[0] <= truth <= p.interval_95[1],
+            ]
+            widths[n].append(p.se / truth)
+            off[n].append(p.value / truth - 1)
+    return {
+        "sets": done,
+        "failed": failed,
+        "noise_warnings": noise_rejected,
+        "seconds": clock.perf_counter() - begun,
+        "parameters": {
+            n: {
+                "cover_68": inside[n][0] / max(done, 1),
+                "cover_95": inside[n][1] / max(done, 1),
+                "mean_se": float(np.mean(widths[n])),
+                "scatter": float(np.std(off[n])),
+                "bias": float(np.mean(off[n])),
+            }
+            for n in TRUE
+        },
+    }
+
+
+def main() -> None:
+    """Print the table of both kinds of intervals."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--sets", type=int, default=200)
+    parser.add_argument("--case", choices=list(CASES), action="append")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--white-only", action="store_true")
+    parser.add_argument("--coloured-only", action="store_true")
+    arguments = parser.parse_args()
+    for name in arguments.case or list(CASES):
+        ways = {"autoregressive": RunOptions(), "white": RunOptions(order=0)}
+        if arguments.white_only:
+            ways.pop("autoregressive")
+        if arguments.coloured_only:
+            ways.pop("white")
+        for way, options in ways.items():
+            result = covered(CASES[name], arguments.sets, options, arguments.seed)
+            print(json.dumps({"case": name, "noise": way, **result}), flush=True)
+            for n, row in result["parameters"].items():
+                print(
+                    f"{name:6} {way:14} {n:3} 68 %: {100 * row['cover_68']:5.1f}  95 %: "
+                    f"{100 * row['cover_95']:5.1f}  se {row['mean_se']:.3g} scatter "
+                    f"{row['scatter']:.3g} bias {row['bias']:+.2g}",
+                    flush=True,
+                )
+
+
+if __name__ == "__main__":
+    main()

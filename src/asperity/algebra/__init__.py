@@ -1,0 +1,1 @@
+"""Linear algebra of many small systems at once, one an operating point."""

@@ -1,0 +1,135 @@
+"""Coefficients of Runge-Kutta methods: the explicit one of order 8, and collocation.
+
+Sources: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
+(Springer, 1993), sections II.5 and II.6; E. Hairer, G. Wanner, Solving Ordinary Differential
+Equations II, 2nd ed. (Springer, 1996), section IV.5.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.polynomial.legendre import Legendre, leggauss, legvander
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+
+
+class ExplicitTableau(NamedTuple):
+    """The method of order 8 of Dormand and Prince, with dense output of order 7.
+
+    Attributes
+    ----------
+    A : array, shape (13, 12)
+        Row k gives the state at stage k; the last row gives the end of the step.
+    C : array, shape (13,)
+        Times of the stages in parts of the step.
+    E5, E3 : array, shape (13,)
+        Weights of the error estimates of orders 5 and 3.
+    extra_A : array, shape (3, 16)
+        Further stages of the dense output.
+    extra_C : array, shape (3,)
+    powers : array, shape (8, 16)
+        Dense output in rising powers of the share of the step, from all stages.
+    """
+
+    A: Float
+    C: Float
+    E5: Float
+    E3: Float
+    extra_A: Float
+    extra_C: Float
+    powers: Float
+
+
+@cache
+def dormand_prince_8() -> ExplicitTableau:
+    """Coefficients as SciPy gives them with its integrator DOP853."""
+    # Imported here because SciPy's integrators take a while to load.
+    from scipy.integrate import DOP853 as METHOD
+
+    change, first, last = np.append(METHOD.B, np.zeros(4)), np.eye(16)[0], np.eye(16)[12]
+    F = np.vstack([change, first - change, 2 * change - last - first, METHOD.D])
+    return ExplicitTableau(
+        A=np.vstack([METHOD.A[:12, :12], METHOD.B[:12]]),
+        C=np.append(METHOD.C[:12], 1.0),
+        E5=np.asarray(METHOD.E5),
+        E3=np.asarray(METHOD.E3),
+        extra_A=np.asarray(METHOD.A_EXTRA),
+        extra_C=np.asarray(METHOD.C_EXTRA),
+        powers=_power_basis() @ F,
+    )
+
+
+def _power_basis() -> Float:
+    """Dense output y + x (F0 + (1-x) (F1 + x (F2 + (1-x) (F3 + ...)))) in powers of x: (8, 7)."""
+    x, rest = Polynomial([0.0, 1.0]), Polynomial([1.0, -1.0])
+    matrix, factor = np.zeros((8, 7)), Polynomial([1.0])
+    for i in range(7):
+        factor = factor * (x if i % 2 == 0 else rest)
+        matrix[: len(factor.coef), i] = factor.coef
+    return matrix
+
+
+@dataclass(frozen=True, eq=False)
+class CollocationScheme:
+    """A collocation method on [0, 1].
+
+    Attributes
+    ----------
+    name : str
+    c : array, shape (stages,)
+        Collocation points.
+    a : array, shape (stages, stages)
+        Integrals from 0 to c_j of the polynomials that interpolate at c.
+    b : array, shape (stages,)
+        The same from 0 to 1.
+    monomials : array, shape (stages, stages)
+        Coefficients of x^k from values at c.
+    top : array, shape (stages,)
+        The highest Legendre coefficient from values at c: the remainder of a resolved orbit.
+    """
+
+    name: str
+    c: Float
+    a: Float
+    b: Float
+    monomials: Float
+    top: Float
+
+    @classmethod
+    def at(cls, name: str, points: Float) -> CollocationScheme:
+        """The method that collocates at `points` of [-1, 1]."""
+        c = (points + 1) / 2
+        powers = np.arange(1, len(c) + 1)
+        monomials = np.linalg.inv(np.vander(c, increasing=True))
+        return cls(
+            name,
+            c,
+            (c[:, None] ** powers / powers) @ monomials,
+            (1 / powers) @ monomials,
+            monomials,
+            np.linalg.inv(legvander(points, len(c) - 1))[-1],
+        )
+
+
+def gauss_legendre(stages: int) -> CollocationScheme:
+    """The method of order 2 `stages`.
+
+    It preserves oscillations, but modes that decay within a step decay too little.
+    """
+    return CollocationScheme.at("Gauss-Legendre", leggauss(stages)[0])
+
+
+def radau_iia(stages: int) -> CollocationScheme:
+    """The method of order 2 `stages` - 1, in which modes that decay within a step vanish.
+
+    Its points are the zeros of P_s - P_(s-1), of which the last is 1.
+    """
+    points = np.sort((Legendre.basis(stages) - Legendre.basis(stages - 1)).roots().real)
+    points[-1] = 1.0
+    return CollocationScheme.at("Radau IIA", points)

@@ -1,0 +1,297 @@
+"""Small dense systems, one per operating point, with the points along the last axes.
+
+Written in element-wise operations on purpose. They vectorise over the points, which calls of LAPACK
+do not, and two LAPACK calls that XLA's CPU backend runs side by side can wait for each other for
+ever (seen with jaxlib 0.10.2 on two cores).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+#: Entries [row][column] of a small matrix, each an array over the operating points.
+Matrix = list[list[Array]]
+
+
+def inverse_points(matrix: Matrix) -> Matrix:
+    """Inverse of a small matrix for every operating point; not finite where it is singular.
+
+    Entries come and go one by one, so that XLA does not write a stack to memory in between.
+    """
+    n = len(matrix)
+    if n == 1:
+        return [[1 / matrix[0][0]]]
+    if n == 2:
+        (a, b), (c, d) = matrix
+        scale = 1 / (a * d - b * c)
+        return [[d * scale, -b * scale], [-c * scale, a * scale]]
+    # By the Schur complement of the first two unknowns: the mechanical ones, which a step of the
+    # spring and the mass never makes singular.
+    upper = [row[:2] for row in matrix[:2]], [row[2:] for row in matrix[:2]]
+    lower = [row[:2] for row in matrix[2:]], [row[2:] for row in matrix[2:]]
+    first = inverse_points(upper[0])
+    across, down = _multiply(first, upper[1]), _multiply(lower[0], first)
+    rest = inverse_points(_subtract(lower[1], _multiply(lower[0], across)))
+    corner = _multiply(rest, down)
+    return [
+        *(
+            [*a, *(-b for b in c)]
+            for a, c in zip(
+                _add(first, _multiply(across, corner)), _multiply(across, rest), strict=True
+            )
+        ),
+        *([*(-a for a in b), *c] for b, c in zip(corner, rest, strict=True)),
+    ]
+
+
+def inverse_by_elimination(matrix: Array) -> Array:
+    """Inverse of a matrix of some dozen rows for every operating point.
+
+    By Gauss-Jordan elimination with partial pivoting; not finite where it is singular.
+
+    Parameters
+    ----------
+    matrix : array, shape (n, n, points)
+    """
+    n, _, points = matrix.shape
+    rows = jnp.arange(n)[:, None]
+
+    def eliminate(k: Array, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
+        rest, free, order = carry
+        column = jax.lax.dynamic_index_in_dim(rest, k, 1, keepdims=False)
+        chosen = jnp.argmax(jnp.where(free, jnp.abs(column), -1.0), axis=0)
+        here = rows == chosen
+        pivot = 1 / jnp.where(here, column, 0.0).sum(0)
+        row = jnp.where(here[:, None], rest, 0.0).sum(0) * pivot
+        row = jnp.where(rows == k, pivot, row)
+        rest = jnp.where((rows == k)[None], 0.0, rest)
+        below = jnp.where(here, 0.0, column)
+        rest = jnp.where(here[:, None], row[None], rest - below[:, None] * row[None])
+        return rest, free & ~here, order.at[k].set(chosen)
+
+    start = matrix, jnp.ones((n, points), dtype=bool), jnp.zeros((n, points), dtype=int)
+    rest, _, order = jax.lax.fori_loop(0, n, eliminate, start)
+    rest = jnp.take_along_axis(rest, order[:, None], 0)
+    return jnp.take_along_axis(rest, jnp.argsort(order, axis=0)[None], 1)
+
+
+def _multiply(a: Matrix, b: Matrix) -> Matrix:
+    columns = list(zip(*b, strict=True))
+    return [[sum(x * y for x, y in zip(row, c, strict=True)) for c in columns] for row in a]
+
+
+def _add(a: Matrix, b: Matrix) -> Matrix:
+    return [[x + y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+
+
+def _subtract(a: Matrix, b: Matrix) -> Matrix:
+    return [[x - y for x, y in zip(*rows, strict=True)] for rows in zip(a, b, strict=True)]
+
+
+def solve_points(matrix: Array, rhs: Array) -> Array:
+    """Solve ``matrix x = rhs`` for every operating point.
+
+    Parameters
+    ----------
+    matrix : array, shape (n, n, ...)
+    rhs : array, shape (n, ...)
+
+    Returns
+    -------
+    array, shape (n, ...)
+        Not finite where a matrix is singular.
+    """
+    return solve_columns(matrix, rhs[:, None])[:, 0]
+
+
+def solve_columns(matrix: Array, rhs: Array) -> Array:
+    """Solve ``matrix X = rhs`` with several right-hand sides.
+
+    By Cramer's rule up to two states, by Householder reflections for more.
+
+    Parameters
+    ----------
+    matrix : array, shape (n, n, ...), real or complex
+    rhs : array, shape (n, columns, ...)
+
+    Returns
+    -------
+    array, shape (n, columns, ...)
+    """
+    n = matrix.shape[0]
+    if n == 1:
+        return rhs / matrix
+    if n == 2:
+        (a, b), (c, d) = matrix
+        return jnp.stack([d * rhs[0] - b * rhs[1], a * rhs[1] - c * rhs[0]]) / (a * d - b * c)
+    rest = jnp.concatenate([matrix, rhs], axis=1)
+    # Reflections mix rows: one that outweighs the others by more than 1e16, as those of fast
+    # motions do, would leave nothing of them.
+    size = jax.lax.stop_gradient(jnp.abs(matrix).max(1, keepdims=True))
+    rest = rest / jnp.where(size > 0, size, 1.0)
+    diagonal, rows = [], []
+    for _ in range(n):
+        pivot, rest = reflect(rest)
+        diagonal.append(pivot)
+        rows.append(rest[0])
+        rest = rest[1:]
+    solution: list[Array] = []  # last unknown first
+    for k in reversed(range(n)):
+        known = n - 1 - k
+        right = rows[k][known:]
+        for j in range(known):
+            right = right - rows[k][j] * solution[known - 1 - j]
+        solution.append(right / diagonal[k])
+    return jnp.stack(solution[::-1])
+
+
+def reflect(rows: Array) -> tuple[Array, Array]:
+    """One Householder reflection of `rows`, shape (rows, columns, ...).
+
+    Returns the first entry of the first column after it, the others being zero, and the
+    remaining columns.
+    """
+    x = rows[:, 0]
+    norm = jnp.sqrt((x * x.conj()).real.sum(0))
+    first = jnp.abs(x[0])
+    signed = norm * jnp.where(first == 0, 1.0, x[0] / jnp.where(first == 0, 1.0, first))
+    v = x.at[0].add(signed)
+    scale = norm * (norm + first)
+    along = (v.conj()[:, None] * rows[:, 1:]).sum(0) / jnp.where(scale == 0, 1.0, scale)
+    return -signed, rows[:, 1:] - v[:, None] * along
+
+
+def jacobian_columns(function: Callable[[Array], Array], Y: Array) -> tuple[Array, list[Array]]:
+    """Value and derivative of an element-wise function of n states.
+
+    Parameters
+    ----------
+    function : callable
+        (n, ...) -> (m, ...), element-wise in the trailing axes.
+    Y : array, shape (n, ...)
+
+    Returns
+    -------
+    value : array, shape (m, ...)
+    columns : list of n arrays, shape (m, ...)
+        Derivative with respect to each state.
+    """
+    value, push = jax.linearize(function, Y)
+    n = Y.shape[0]
+    unit = [jnp.stack([jnp.full(Y.shape[1:], float(i == j)) for j in range(n)]) for i in range(n)]
+    return value, [push(e) for e in unit]
+
+
+def expm_points(matrix: Array) -> Array:
+    """Matrix exponential for every operating point.
+
+    Parameters
+    ----------
+    matrix : array, shape (n, n, points)
+    """
+    if matrix.shape[0] == 1:
+        return jnp.exp(matrix)
+    if matrix.shape[0] == 2:
+        (a, b), (c, d) = matrix
+        half = 0.5 * (a + d)
+        square = (0.5 * (a - d)) ** 2 + b * c
+        root = jnp.sqrt(jnp.abs(square))
+        small = root < 1e-4  # series: accurate to 1e-17, and differentiable at zero
+        safe = jnp.where(small, 1.0, root)
+        cosh = jnp.where(square > 0, jnp.cosh(safe), jnp.cos(safe))
+        cosh = jnp.where(small, 1 + square / 2 + square**2 / 24, cosh)
+        sinhc = jnp.where(square > 0, jnp.sinh(safe), jnp.sin(safe)) / safe
+        sinhc = jnp.where(small, 1 + square / 6 + square**2 / 120, sinhc)
+        traceless = jnp.stack([jnp.stack([a - half, b]), jnp.stack([c, d - half])])
+        identity = jnp.eye(2)[:, :, None]
+        return jnp.exp(half) * (cosh * identity + sinhc * traceless)
+    norm = jnp.abs(matrix).sum(1).max(0)
+    halvings = jnp.maximum(jnp.ceil(jnp.log2(norm + 1e-300)) + 4, 0.0)
+    small = matrix / 2.0**halvings
+    total = term = jnp.broadcast_to(jnp.eye(matrix.shape[0])[:, :, None], matrix.shape)
+    for k in range(1, 14):  # Taylor at norm 1/16: 1e-17
+        term = product(small, term) / k
+        total = total + term
+    return jax.lax.fori_loop(
+        0,
+        jnp.max(halvings).astype(int),
+        lambda i, m: jnp.where(i < halvings, product(m, m), m),
+        total,
+    )
+
+
+def product(a: Array, b: Array) -> Array:
+    """Matrix product for every operating point, (n, n, ...) each."""
+    return (a[:, :, None] * b[None]).sum(1)
+
+
+def scaled_product(maps: Array) -> tuple[Array, Array]:
+    """Product of the maps of successive intervals, the last one leftmost, kept near unit size.
+
+    Parameters
+    ----------
+    maps : array, shape (n, n, intervals, points)
+
+    Returns
+    -------
+    product : array, shape (n, n, points)
+        Divided by the exponential of its scale.
+    log_scale : array, shape (points,)
+    """
+    log_scale = jnp.zeros(maps.shape[3])
+    while maps.shape[2] > 1:  # neighbours first: many products side by side
+        if maps.shape[2] % 2:
+            identity = jnp.broadcast_to(jnp.eye(len(maps))[..., None, None], maps[:, :, :1].shape)
+            maps = jnp.concatenate([maps, identity], axis=2)
+        maps = product(maps[:, :, 1::2], maps[:, :, ::2])
+        size = jnp.abs(maps).max((0, 1))
+        size = jnp.where(size > 0, size, 1.0)
+        maps = maps / size
+        log_scale = log_scale + jnp.log(size).sum(0)
+    return maps[:, :, 0], log_scale
+
+
+def spectral_radius(matrix: Array) -> Array:
+    """Largest modulus of the eigenvalues of (n, n, ...) matrices.
+
+    Exact up to two states; to a per mille for more, by repeated squaring.
+    """
+    if matrix.shape[0] == 1:
+        return jnp.abs(matrix[0, 0])
+    if matrix.shape[0] == 2:
+        (a, b), (c, d) = matrix
+        half, determinant = 0.5 * jnp.abs(a + d), a * d - b * c
+        square = 0.25 * (a - d) ** 2 + b * c
+        real = half + jnp.sqrt(jnp.maximum(square, 0.0))
+        return jnp.where(square >= 0, real, jnp.sqrt(jnp.abs(determinant)))
+    log_scale = jnp.zeros(matrix.shape[2:])
+    for k in range(12):
+        size = jnp.abs(matrix).max((0, 1)) + 1e-300
+        log_scale = log_scale + jnp.log(size) / 2**k
+        matrix = matrix / size
+        matrix = product(matrix, matrix)
+    return jnp.exp(log_scale + jnp.log(jnp.abs(matrix).max((0, 1)) + 1e-300) / 2**12)
+
+
+def spectral_abscissa(matrix: Array) -> Array:
+    """Largest real part of the eigenvalues of (n, n, ...) matrices; NaN where not finite.
+
+    In closed form up to two states. For more by LAPACK, which balances matrices: those of motion
+    with inertia have entries that differ by many orders of magnitude, and entries larger than any
+    eigenvalue. A program must not call it twice, see above.
+    """
+    n = matrix.shape[0]
+    if n == 1:
+        return matrix[0, 0]
+    if n == 2:
+        (a, b), (c, d) = matrix
+        square = 0.25 * (a - d) ** 2 + b * c
+        return 0.5 * (a + d) + jnp.sqrt(jnp.maximum(square, 0.0))
+    finite = jnp.isfinite(matrix).all((0, 1))
+    points_first = jnp.moveaxis(jnp.where(finite, matrix, 0.0), (0, 1), (-2, -1))
+    values = jnp.linalg.eigvals(jax.lax.stop_gradient(points_first))
+    return jnp.where(finite, values.real.max(-1), jnp.nan)

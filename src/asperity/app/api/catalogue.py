@@ -1,0 +1,153 @@
+"""What the page can choose from: materials, laws with their equations, parameters with units.
+
+Names, units, rules and defaults are those of `asperity.parameters`, values those of the materials.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from latex2mathml.converter import convert
+
+from asperity import materials
+from asperity._version import __version__
+from asperity.app.plain import to_json
+from asperity.laws import registered
+from asperity.materials import Material
+from asperity.materials.loader import packaged
+from asperity.operating_point import known_parameters
+from asperity.parameters import MODULATION, OUTPUTS, Parameter, point_parameters, required
+from asperity.parameters.parameter import plain_text
+from asperity.units import KINDS, to_si
+
+#: Numbers of the air layer and of the contacts beside it: the names under which materials have
+#: them, symbol and meaning. `asperity.air` says what each is.
+AIR = {
+    "P0": ("P_0", "pressure of the air"),
+    "h0": ("h_0", "gap between the surfaces"),
+    "R": ("R", "radius of the air layer"),
+    "eta_air": (r"\eta", "viscosity of the air"),
+    "lambda_z": (r"\lambda_z", "normal elastic length of the contacts"),
+}
+
+#: A slider without a range of its material covers these factors on both sides of its value: one
+#: for pure numbers, one for quantities with a unit; a slider that begins at zero ends at the third.
+_PURE, _WITH_UNIT, _FROM_ZERO = 10.0, 100.0, 4.0
+
+
+@cache
+def as_json() -> str:
+    """The catalogue."""
+    return to_json(
+        {
+            "version": __version__,
+            "kinds": {
+                name: {"si": kind.si, "ladder": kind.ladder, "example": kind.example}
+                for name, kind in KINDS.items()
+            },
+            "materials": {name: _material(materials.load(name)) for name in sorted(packaged())},
+            "laws": {name: _law(name) for name in registered()},
+            "outputs": {
+                name: {"unit": o.unit, "meaning": o.meaning, "symbol": mathml(o.symbol)}
+                for name, o in OUTPUTS.items()
+            },
+        }
+    )
+
+
+@cache
+def known_materials() -> dict[str, Material]:
+    """The materials that come with the package: no other file is read for a request."""
+    return {name: materials.load(name) for name in packaged()}
+
+
+def mathml(latex: str, *, display: bool = False) -> str:
+    """A formula as a ``<math>`` element; empty for none."""
+    if not latex:
+        return ""
+    found: str = convert(latex, display="block" if display else "inline")
+    return found
+
+
+def _law(name: str) -> dict[str, Any]:
+    law = registered()[name]
+    known = point_parameters(law)
+    return {
+        "title": _title(law.__doc__ or name),
+        # Those of the class itself: a law derived from another one has equations of its own.
+        "equations": [mathml(e, display=True) for e in vars(law).get("equations", ())],
+        "source": [key.strip() for key in law.source.split(",") if key.strip()],
+        "rate_dependent": law.rate_dependent,
+        "required": required(law),
+        "parameters": [_parameter(p) for p in known.values() if p.name not in MODULATION],
+    }
+
+
+def _title(docstring: str) -> str:
+    """What a docstring says of the law, without what it says of the code."""
+    return docstring.strip().splitlines()[0].split(";")[0].rstrip(".")
+
+
+def _parameter(parameter: Parameter) -> dict[str, Any]:
+    return {
+        "name": parameter.name,
+        "kind": parameter.kind,
+        "rule": parameter.rule,
+        "meaning": plain_text(parameter.meaning),
+        "symbol": mathml(parameter.symbol),
+        "place": parameter.place,
+        "default": parameter.default,
+        "example": to_si(parameter.example, parameter.kind, parameter.name),
+    }
+
+
+def _material(material: Material) -> dict[str, Any]:
+    numbers = {n: material[n] for n in material.numbers if material[n].value is not None}
+    return {
+        "title": material.title,
+        "source": material.source,
+        "numbers": {
+            name: {"value": number.si, "kind": number.dimension, "shown": str(number),
+                   "origin": number.kind, "place": number.place}
+            for name, number in numbers.items()
+        },
+        "sliders": {
+            name: slider(name, material)
+            for name in known_parameters()
+            if name not in MODULATION
+        },
+        "air": [
+            {"name": name, "kind": material[name].dimension, "rule": "positive",
+             "symbol": mathml(symbol), "meaning": meaning, "value": material[name].si,
+             "slider": _around(material[name].si, _WITH_UNIT)}
+            for name, (symbol, meaning) in AIR.items()
+            if name in numbers
+        ],
+    }  # fmt: skip
+
+
+def slider(name: str, material: Material) -> dict[str, Any]:
+    """Value at which the slider of a parameter starts, its ends, and whether it is logarithmic."""
+    parameter = known_parameters()[name]
+    kind = parameter.kind
+    value = to_si(parameter.example, kind, name) if parameter.default is None else parameter.default
+    if name in material and material[name].dimension == kind and material[name].value is not None:
+        value = material[name].si
+    span = None
+    if f"{name}_range" in material and material[f"{name}_range"].dimension == kind:
+        span = material[f"{name}_range"].si_range
+    if parameter.rule == "switch":
+        return {"value": value}
+    if parameter.rule == "amplitude":
+        return {"value": value, "low": 0.0, "high": span[1] if span else 0.9, "log": False}
+    if parameter.rule == "positive":
+        factor = _WITH_UNIT if parameter.unit else _PURE
+        found = {"low": span[0], "high": span[1], "log": True} if span else _around(value, factor)
+        return {"value": value, **found}
+    size = abs(value) or to_si(parameter.example, kind, name)
+    return {"value": value, "low": 0.0, "high": _FROM_ZERO * size, "log": False}
+
+
+def _around(value: float, factor: float) -> dict[str, Any]:
+    return {"low": value / factor, "high": value * factor, "log": True}

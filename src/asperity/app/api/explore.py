@@ -1,0 +1,265 @@
+"""Explore: everything about one operating point, at once.
+
+What the fast methods solve is answered within milliseconds; what they do not is searched for by
+`search`, a job, once the slider rests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from asperity.app.api import catalogue, recipes
+from asperity.app.api.operating_point import (
+    Name,
+    OperatingPoint,
+    borne_share,
+    epsilon_on_contacts,
+    law_class,
+    solve,
+)
+from asperity.app.endpoints import Answer, Job
+from asperity.app.preparation import Preparation
+from asperity.laws import registered
+from asperity.orbit import (
+    Outcome,
+    PeriodicResponse,
+    ResponseFunction,
+    over_a_period,
+    response_function,
+)
+from asperity.parameters import OUTPUTS
+
+#: Harmonics and instants of the period that are shown, and amplitudes and frequencies of curves.
+_HARMONICS, _INSTANTS, _AMPLITUDES, _FREQUENCIES = 8, 256, 24, 80
+#: Curves against the amplitude.
+_CURVES = ("mean_friction", "mu1", "mu2", "phase1", "phase2")
+#: Methods that take milliseconds.
+_FAST = ("fourier",)
+#: Amplitudes that a search solves between two reports.
+_STEP = 3
+
+
+class Explored(OperatingPoint):
+    """An operating point, and what else is shown with it.
+
+    Attributes
+    ----------
+    laws : list of str
+        Laws whose curves against the amplitude are compared.
+    """
+
+    laws: Annotated[list[Name], Field(max_length=13, default_factory=list)]
+
+    def amplitudes(self) -> np.ndarray:
+        """Amplitudes of the curves: over the range of the slider."""
+        slider = catalogue.slider("epsilon", self.chosen_material())
+        return np.linspace(slider["low"], slider["high"], _AMPLITUDES)
+
+    def frequencies(self) -> np.ndarray:
+        """Frequencies (Hz) of the air layer's curve: over the range of the slider."""
+        slider = catalogue.slider("frequency", self.chosen_material())
+        return np.geomspace(slider["low"], slider["high"], _FREQUENCIES)
+
+
+_preparation: Preparation | None = None
+
+
+def use(preparation: Preparation) -> None:
+    """Let programs be compiled before they are needed."""
+    global _preparation
+    _preparation = preparation
+
+
+def explore(asked: Explored) -> dict[str, Any]:
+    """Response, curves and share of the air layer, as far as the fast methods know them."""
+    numbers = asked.sourced()
+    values = {name: number.value for name, number in numbers.items()}
+    epsilon = epsilon_on_contacts(asked, values)
+    laws = list(dict.fromkeys([asked.law, *asked.laws]))
+    for name in laws:
+        law_class(name)
+    answer: dict[str, Any] = {
+        "numbers": values,
+        "origins": {name: number.origin for name, number in numbers.items()},
+        "epsilon": epsilon,
+        "air": _air(asked, values),
+        **recipes.explore(asked, values, epsilon),
+    }
+    waiting = [name for name in laws if not _prepared(name)]
+    if waiting:
+        answer["preparing"] = waiting[0]
+    if asked.law in waiting:
+        return answer
+    point = solve(law_class(asked.law), values, epsilon, methods=_FAST, **_KEPT)
+    answer["point"] = point_record(point, searched=False)
+    grid = asked.amplitudes()
+    answer["amplitudes"] = grid
+    answer["curves"] = {n: _fast_curve(asked, n, grid) for n in laws if n not in waiting}
+    return answer
+
+
+_KEPT = {"harmonics": _HARMONICS, "waveform": _INSTANTS}
+
+
+def _moves_by_inertia(values: Mapping[str, float]) -> bool:
+    """Whether the equations are others than the quasi-static ones, which have the fast method."""
+    return bool(values.get("inertia", 0.0) or values.get("eta", 0.0))
+
+
+def _fast_curve(asked: Explored, name: str, grid: np.ndarray) -> dict[str, Any]:
+    """Curves against the amplitude; null where only a search will know."""
+    values = asked.values(name)
+    law = law_class(name)
+    if not law.rate_dependent:
+        return _curve_record(solve(law, values, grid))
+    if _moves_by_inertia(values):
+        empty = np.full(len(grid), np.nan)
+        return {**dict.fromkeys(_CURVES, empty), "left": list(range(len(grid)))}
+    function = _function(name)
+    own = {n: v for n, v in values.items() if n in function.parameters}
+    found = function({**own, "epsilon": grid})
+    c1, c2 = np.asarray(found.harmonics).T
+    return {
+        "mean_friction": np.asarray(found.mean_friction),
+        "mu1": np.abs(c1),
+        "mu2": np.abs(c2),
+        # Without modulation there is no phase.
+        "phase1": np.where(grid > 0, np.angle(c1), np.nan),
+        "phase2": np.where(grid > 0, np.angle(c2), np.nan),
+        "left": np.flatnonzero(np.asarray(found.outcome) != Outcome.CONVERGED),
+    }
+
+
+@cache
+def _function(name: str) -> ResponseFunction:
+    return response_function(name, harmonics=2, multipliers=False, search=False)
+
+
+def _curve_record(found: PeriodicResponse) -> dict[str, Any]:
+    record = {name: getattr(found, name) for name in _CURVES}
+    return {**record, "left": []}
+
+
+def point_record(found: PeriodicResponse, *, searched: bool) -> dict[str, Any]:
+    """Everything that is shown of one response."""
+    converged = bool(found.converged)
+    record: dict[str, Any] = {"converged": converged, "searched": searched or converged}
+    if not converged:
+        return {**record, "result": str(found.result[()]) if searched else ""}
+    period = over_a_period(found)
+    return {
+        **record,
+        "result": stability_sentence(found),
+        "stable": bool(found.stable),
+        "phase": period.phase,
+        "force": period.force,
+        "slip": period.plastic_velocity,
+        "age": period.age,
+        "harmonics": found.harmonics,
+        "multipliers": found.multipliers,
+        **{name: getattr(found, name)[()] for name in _SHOWN},
+        "mode": str(found.mode[()]),
+    }
+
+
+_SHOWN = (
+    *("mean_friction", "delta_mu", "mu_ss", "mu1", "mu2", "phase1", "phase2"),
+    *("floquet_max", "mode_frequency", "growth_rate"),
+)
+
+
+def stability_sentence(found: PeriodicResponse) -> str:
+    """Stability of one response in plain words."""
+    if found.log_multipliers.shape[-1] == 0:
+        return "no dynamics: the force follows the load"
+    rate, turn = float(found.growth_rate), float(found.mode_frequency)
+    per_second = f"by a factor e in {_digits(1 / abs(rate))} s" if rate else "by nothing"
+    if bool(found.stable):
+        how = f"turns at {_digits(turn)} Hz and" if turn > 0 else "does not turn and"
+        return f"stable; the slowest mode {how} decays {per_second}"
+    kind = str(found.mode[()])
+    how = {
+        "fold": "away without turning (a fold)",
+        "period doubling": "with twice the period (a period doubling)",
+        "Neimark-Sacker": f"and turns at {_digits(turn)} Hz (Neimark-Sacker)",
+    }.get(kind, "")
+    return f"unstable; a disturbance grows {per_second} {how}".rstrip()
+
+
+def _digits(value: float) -> str:
+    return f"{value:.3g}"
+
+
+def _air(asked: Explored, values: Mapping[str, float]) -> dict[str, Any] | None:
+    if asked.air is None:
+        return None
+    frequency = asked.frequencies()
+    share, phase = borne_share(asked, values, frequency)
+    here, lag = borne_share(asked, values, values["frequency"])
+    return {
+        "frequency": frequency,
+        "share": share,
+        "phase": phase,
+        "share_here": float(here),
+        "phase_here": float(lag),
+        "numbers": asked.air_values(),
+    }
+
+
+def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
+    """Search for what the fast methods left open: the point itself, then the curves.
+
+    Each message has ``point``, or ``curve`` with the law, the indices and the values there.
+    """
+    asked = Explored.model_validate(argument)
+    values = asked.values()
+    epsilon = epsilon_on_contacts(asked, values)
+
+    def on_progress(done: int, points: int) -> None:
+        report()
+
+    point = solve(law_class(asked.law), values, epsilon, progress=on_progress, **_KEPT)
+    report(point=point_record(point, searched=True))
+    grid = asked.amplitudes()
+    for name in dict.fromkeys([asked.law, *asked.laws]):
+        left = np.asarray(_fast_curve(asked, name, grid)["left"], dtype=int)
+        own = asked.values(name)
+        for start in range(0, len(left), _STEP):
+            rows = left[start : start + _STEP]
+            found = solve(law_class(name), own, grid[rows], progress=on_progress)
+            values_there = {n: getattr(found, n) for n in _CURVES}
+            reasons = [str(text) for text in found.result]
+            report(curve=name, rows=rows, converged=found.converged, result=reasons, **values_there)
+    return {}
+
+
+def preparations() -> dict[str, Callable[[], Any]]:
+    """Programs by law, quasi-static; others are compiled when they are asked for."""
+    first = ["elasto-plastic", "rice-ruina", "linker-dieterich"]
+    names = [*first, *(name for name in registered() if name not in first)]
+    return {name: partial(_prepare, name) for name in names if registered()[name].rate_dependent}
+
+
+def _prepare(name: str) -> None:
+    numbers = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0}
+    asked = Explored.model_validate({"law": name, "numbers": numbers})
+    values = asked.values()
+    solve(law_class(name), values, 0.1, methods=_FAST, **_KEPT)
+    _fast_curve(asked, name, asked.amplitudes())
+
+
+def _prepared(name: str) -> bool:
+    return _preparation is None or _preparation.want(name)
+
+
+assert set(_CURVES) <= set(OUTPUTS)
+
+ENDPOINTS = (
+    Answer("explore", Explored, explore),
+    Job("explore/search", Explored, "asperity.app.api.explore:search", lane="search", seconds=120),
+)

@@ -1,0 +1,141 @@
+"""The operating point that Explore and Map ask about, from names and numbers to checked values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from asperity.air import AirLayer, effective_modulation, modulation_phase
+from asperity.app.api.catalogue import AIR, known_materials
+from asperity.app.endpoints import Question
+from asperity.errors import InputError, closest
+from asperity.laws import Law, get_law, registered
+from asperity.materials import Material
+from asperity.operating_point import SourcedNumber, numbers_for, sourced_numbers
+from asperity.orbit import PeriodicResponse, periodic_response
+from asperity.parameters import obeying, point_parameters
+from asperity.slider.named import slider_from
+
+Name = Annotated[str, Field(max_length=60)]
+#: SI, or a text with its unit.
+Value = Annotated[str, Field(max_length=60)] | float | int
+
+
+class OperatingPoint(Question):
+    """A law, where its numbers come from, and the numbers that are others.
+
+    Attributes
+    ----------
+    material : str
+        One that comes with the package.
+    law : str
+    numbers : mapping of str to number or str
+        By the names of `asperity.parameters`; the material has the rest.
+    air : mapping of str to number or str, optional
+        Numbers of `AIR` that are not the material's; epsilon is then the amplitude of the load
+        before the air layer takes its share. None: epsilon is what the contacts bear.
+    """
+
+    material: Name = "bureau2000"
+    law: Name
+    numbers: Annotated[dict[Name, Value], Field(max_length=40, default_factory=dict)]
+    air: Annotated[dict[Name, Value], Field(max_length=10)] | None = None
+
+    def chosen_material(self) -> Material:
+        """The material, of those that come with the package."""
+        known = known_materials()
+        if self.material not in known:
+            raise InputError(
+                f"material must be one of the package's, got '{self.material}'; "
+                f"{closest(self.material, known)}"
+            )
+        return known[self.material]
+
+    def sourced(self, law: str | None = None) -> dict[str, SourcedNumber]:
+        """Numbers of the point with their sources, for its own law or for another one."""
+        law = law or self.law
+        get_law(law)
+        material = self.chosen_material()
+        own = point_parameters(get_law(law))
+        others = {n for found in registered().values() for n in point_parameters(found)}
+        given = {n: v for n, v in self.numbers.items() if n in own or n not in others}
+        return numbers_for(law, sourced_numbers(given, material, "page", law))
+
+    def values(self, law: str | None = None) -> dict[str, float]:
+        """SI values of the numbers."""
+        return {name: number.value for name, number in self.sourced(law).items()}
+
+    def air_values(self) -> dict[str, float]:
+        """SI values of the air layer's numbers."""
+        material = self.chosen_material()
+        given = dict(self.air or {})
+        for name in given:
+            if name not in AIR:
+                raise InputError(f"air must have known numbers, got '{name}'; {closest(name, AIR)}")
+        return {
+            n: float(obeying(given.get(n, material[n].si), n, material[n].dimension, "positive"))
+            for n in AIR
+        }
+
+
+def law_class(name: str) -> type[Law]:
+    """The law of a name."""
+    found: type[Law] = get_law(name)
+    return found
+
+
+def borne_share(point: OperatingPoint, values: Mapping[str, float], frequency: Any) -> Any:
+    """The share of the load's modulation that the contacts bear, and its phase (rad)."""
+    layer, contact = air_arguments(point.air_values(), values)
+    return (
+        effective_modulation(frequency, layer=layer, **contact),
+        modulation_phase(frequency, layer=layer, **contact),
+    )
+
+
+def air_arguments(
+    air: Mapping[str, float], values: Mapping[str, float]
+) -> tuple[AirLayer, dict[str, float]]:
+    """The air layer, and the contacts that work beside it."""
+    layer = AirLayer(P0=air["P0"], h0=air["h0"], eta=air["eta_air"], R=air["R"])
+    mass = values.get("M", 0.0)
+    return layer, {"W0": values["W0"], "M": mass, "lambda_z": air["lambda_z"]}
+
+
+def epsilon_on_contacts(point: OperatingPoint, values: Mapping[str, float]) -> float:
+    """Relative amplitude of the load on the contacts.
+
+    Raises
+    ------
+    InputError
+        If the air layer makes more of it than the load itself.
+    """
+    if point.air is None:
+        return values["epsilon"]
+    share, _ = borne_share(point, values, values["frequency"])
+    found = float(share) * values["epsilon"]
+    if not found < 1:
+        raise InputError(
+            f"epsilon on the contacts must be below 1, got {found:g}; the air layer and the mass "
+            "resonate: lower epsilon or change the frequency"
+        )
+    return found
+
+
+def solve(
+    law: type[Law], values: Mapping[str, float], epsilon: Any, **options: Any
+) -> PeriodicResponse:
+    """Periodic response of one point, or of several amplitudes."""
+    damping = values.get("eta", 0.0)
+    return periodic_response(
+        slider_from(law, values),
+        velocity=values["V"],
+        epsilon=np.asarray(epsilon, dtype=float),
+        frequency=values["frequency"],
+        inertia=bool(values.get("inertia", 0.0)),
+        radiation_damping=damping if damping > 0 else None,
+        **options,
+    )

@@ -1,0 +1,201 @@
+"""Protocols of the page: checked with the line of each mistake, run, and recorded.
+
+A protocol of the page names no file: neither a law or a material of its own, nor a recording that a
+step follows.
+"""
+
+from __future__ import annotations
+
+import re
+import tempfile
+import tomllib
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from asperity.errors import InputError, closest
+from asperity.laws import registered
+from asperity.materials.loader import packaged
+from asperity.outputs import size_text
+from asperity.protocol import (
+    Protocol,
+    ProtocolError,
+    load_protocol,
+    outline,
+    record_run,
+    write_csv,
+)
+from asperity.protocol import run_protocol as run_to_file
+
+#: Rows of a motion (bytes in its file).
+_LARGEST_MOTION = 256 * 1024**2
+#: Stretches of time that are shown.
+_SHOWN = 700
+
+Mistake = dict[str, Any]
+
+
+def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
+    """The protocol, or its mistakes: ``sentence`` and ``line``, counted from 1, or None."""
+    try:
+        content = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        line = re.search(r"at line (\d+)", str(error))
+        last = text.count("\n") + 1
+        what = " ".join(str(error).split())
+        sentence = f"protocol must be valid TOML, got: {what}; correct that line"
+        return None, [{"sentence": sentence, "line": int(line[1]) if line else last}]
+    except RecursionError:
+        sentence = "protocol must not be nested so deep, got more; write fewer blocks"
+        return None, [{"sentence": sentence, "line": None}]
+    lines = _lines(text, content)
+    refused = list(_files_named(content, lines))
+    if refused:
+        return None, refused
+    try:
+        with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
+            path = Path(folder) / "protocol.toml"
+            path.write_text(text, encoding="utf-8")
+            protocol = load_protocol(path)
+            _ = protocol.rows  # what the solver's table says is read here
+            return protocol, []
+    except ProtocolError as error:
+        return None, [{"sentence": m, "line": _line_of(m, lines, text)} for m in error.mistakes]
+    except InputError as error:
+        sentence = str(error).replace(str(path), "the protocol")
+        return None, [{"sentence": sentence, "line": _line_of(sentence, lines, text)}]
+
+
+def run(text: str, out: Path, report: Callable[..., None]) -> dict[str, Any]:
+    """Run a protocol, write its recording to `out`, and outline the motion.
+
+    Parameters
+    ----------
+    text : str
+    out : Path
+        CSV: what the tribometer records, or the motion itself where there is none.
+    report : callable
+        Called with ``reached`` and ``duration`` (s).
+    """
+    from asperity.protocol.stability import stability_statement
+    from asperity.recording.writers import write
+
+    report(stage="checking")
+    protocol, mistakes = checked(text)
+    if protocol is None:
+        raise InputError(mistakes[0]["sentence"])
+    _check_size(protocol)
+    with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
+        motion = Path(folder) / "motion.nc"
+
+        def on_progress(reached: float, end: float) -> None:
+            report(reached=float(reached), duration=float(end))
+
+        done = run_to_file(protocol, motion, progress=on_progress)
+        shown = outline(motion, _SHOWN)
+        if protocol.setup is None:
+            write_csv(motion, out)
+        else:
+            write(record_run(protocol.setup, motion), out)
+    time = shown.time
+    return {
+        "stopped": done.stopped,
+        "stability": stability_statement(protocol) or "",
+        "rows": done.rows,
+        "events": shown.events[:500],
+        "curves": {
+            name: {
+                "x": [t for t in time for _ in (0, 1)],
+                "y": [v for pair in zip(shown.low[name], shown.high[name], strict=True)
+                      for v in pair],
+            }
+            for name in ("load", "force", "velocity")
+        },
+    }  # fmt: skip
+
+
+def _check_size(protocol: Protocol) -> None:
+    if protocol.rows is None:
+        return
+    size = protocol.rows * protocol.row_bytes
+    if size > _LARGEST_MOTION:
+        raise InputError(
+            f"solver.sampling must leave at most {size_text(_LARGEST_MOTION)} of motion for the "
+            f"page, got {size_text(size)}; lower it, shorten the steps, or use asperity run"
+        )
+
+
+def _files_named(content: dict[str, Any], lines: dict[str, int]) -> Iterator[Mistake]:
+    """What would read a file of this machine."""
+    if "folder" in content:
+        yield _mistake(
+            "folder must be left out on the page, got one; write the steps out", "folder", lines
+        )
+    law = content.get("law")
+    if isinstance(law, str) and law not in registered():
+        advice = closest(law, registered())
+        yield _mistake(f"law must be a registered one, got {law[:80]!r}; {advice}", "law", lines)
+    material = content.get("material")
+    if isinstance(material, str) and material and material not in packaged():
+        advice = closest(material, packaged())
+        yield _mistake(
+            f"material must be one of the package's, got {material[:80]!r}; {advice}",
+            "material",
+            lines,
+        )
+    for place, step in _steps(content.get("steps"), "step "):
+        if "follow" in step.lower():
+            yield _mistake(
+                f"{place} must name no file on the page, got {step[:80]!r}; use asperity run for "
+                "steps that follow a recording",
+                place,
+                lines,
+            )
+
+
+def _mistake(sentence: str, place: str, lines: dict[str, int]) -> Mistake:
+    return {"sentence": sentence, "line": lines.get(place)}
+
+
+def _steps(steps: Any, prefix: str) -> Iterator[tuple[str, str]]:
+    """Places and texts of all lines, in their order."""
+    if not isinstance(steps, Sequence) or isinstance(steps, str):
+        return
+    for number, step in enumerate(steps, start=1):
+        if isinstance(step, str):
+            yield f"{prefix}{number}", step
+        elif isinstance(step, dict):
+            yield from _steps(step.get("steps"), f"{prefix}{number}.")
+
+
+def _lines(text: str, content: dict[str, Any]) -> dict[str, int]:
+    """Line of each step and field by its place, such as "step 3.1" and "solver.sampling"."""
+    found: dict[str, int] = {}
+    table = ""
+    for number, line in enumerate(text.splitlines(), start=1):
+        plain = line.strip()
+        if head := re.match(r"\[+\s*([^\]]+?)\s*\]+", plain):
+            table = head[1].replace('"', "").replace("'", "")
+            found.setdefault(table, number)
+        elif field := re.match(r"""["']?([\w ]+?)["']?\s*=""", plain):
+            found.setdefault(f"{table}.{field[1]}" if table else field[1], number)
+    at = max(text.find("steps"), 0)
+    for place, step in _steps(content.get("steps"), "step "):
+        there = text.find(step, at)
+        if there < 0:  # written with escapes
+            continue
+        at = there + len(step)
+        found[place] = text.count("\n", 0, there) + 1
+    return found
+
+
+def _line_of(sentence: str, lines: dict[str, int], text: str) -> int | None:
+    """The line that a sentence is about: of the longest place that it begins with."""
+    begun = [place for place in lines if re.match(rf"{re.escape(place)}(?![\w])", sentence)]
+    if begun:
+        return lines[max(begun, key=len)]
+    if wrong := re.search(r"got '([^']+)'", sentence):
+        there = text.find(wrong[1])
+        if there >= 0:
+            return text.count("\n", 0, there) + 1
+    return None

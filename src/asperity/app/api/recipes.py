@@ -1,0 +1,155 @@
+"""The same calculation as Python and as a command, to be copied from the page."""
+
+from __future__ import annotations
+
+import keyword
+from collections.abc import Mapping
+
+from asperity.app.api.operating_point import OperatingPoint, law_class
+from asperity.parameters import law_parameters, point_parameters
+from asperity.sweep.map import Axis
+from asperity.units import format_si, to_si
+
+
+def exact_text(value: float, kind: str) -> str:
+    """The shortest text with a unit that is read back as the same double."""
+    texts = (format_si(value, kind, digits) for digits in range(1, 18))
+    plain = (text for text in texts if "e" not in text.split(" ")[0])
+    return next((t for t in plain if to_si(t, kind, "value") == value), format_si(value, kind, 17))
+
+
+def explore(point: OperatingPoint, values: Mapping[str, float], epsilon: float) -> dict[str, str]:
+    """Python and command of one operating point.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+    values : mapping of str to float
+        All numbers in SI.
+    epsilon : float
+        On the contacts.
+    """
+    return {"python": _python(point, values), "command": _command(point, values, epsilon)}
+
+
+def plane(
+    point: OperatingPoint, fixed: Mapping[str, float], x: Axis, y: Axis, show: str
+) -> dict[str, str]:
+    """Python and command of a map.
+
+    Parameters
+    ----------
+    point : OperatingPoint
+    fixed : mapping of str to float
+        Numbers that do not vary, in SI.
+    x, y : Axis
+    show : str
+        Quantity of the picture.
+    """
+    law = law_class(point.law)
+    known = point_parameters(law)
+    numbers = ", ".join(f'"{n}": {v!r}' for n, v in fixed.items() if v != known[n].default)
+    axes = [
+        f'    {side}=Axis("{a.name}", {float(a.low)!r}, {float(a.high)!r}, {a.count}'
+        + (", log=True" if a.log else "") + "),"
+        for side, a in (("x", x), ("y", y))
+    ]  # fmt: skip
+    python = [
+        "import asperity as asp",
+        "from asperity.sweep.map import Axis",
+        "",
+        f"numbers = {{{numbers}}}",
+        "found = asp.map(",
+        f'    "{point.law}",',
+        "    numbers,",
+        *axes,
+        ")",
+        f'print(found["{show}"])',
+    ]
+    parts = _command_of_point(point, fixed)
+    for side, a in (("x", x), ("y", y)):
+        ends = f"{float(a.low)!r}:{float(a.high)!r}:{a.count} {a.unit}".rstrip()
+        parts.append(f'--{side} "{a.name}={ends}"' + (f" --log-{side}" if a.log else ""))
+    parts += ["--out map.nc", "--plot map.png", f"--show {show}"]
+    return {
+        "python": "\n".join(python) + "\n",
+        "command": "asperity map " + " ".join(parts),
+    }
+
+
+def _python(point: OperatingPoint, values: Mapping[str, float]) -> str:
+    material = point.chosen_material()
+    law = law_class(point.law)
+    changed = {
+        name: values[name]
+        for name in law_parameters(law)
+        if name not in material or material[name].value is None or material[name].si != values[name]
+    }
+    known = point_parameters(law)
+
+    def text(name: str) -> str:
+        value = exact_text(values[name], known[name].kind)
+        return f'"{value}"' if known[name].unit else value
+
+    own = "".join(
+        f", {name}_={text(name)}" if keyword.iskeyword(name) else f", {name}={text(name)}"
+        for name in changed
+    )
+    lines = [
+        "import asperity as asp",
+        "",
+        f'material = asp.materials.load("{material.name}")',
+        f'law = material.law("{point.law}"{own})',
+        f"slider = asp.Slider(law, spring={text('K')}, load={text('W0')}"
+        + (f", mass={text('M')})" if "M" in values else ")"),
+    ]
+    amplitude = text("epsilon")
+    if point.air is not None:
+        air = point.air_values()
+        lines += [
+            "",
+            f"layer = asp.air.AirLayer(P0={air['P0']!r}, h0={air['h0']!r}, "
+            f"eta={air['eta_air']!r}, R={air['R']!r})",
+            "share = asp.air.effective_modulation(",
+            f"    {values['frequency']!r}, W0={values['W0']!r}, M={values.get('M', 0.0)!r}, "
+            f"lambda_z={air['lambda_z']!r}, layer=layer",
+            ")",
+        ]
+        amplitude = f"share * {values['epsilon']!r}"
+    call = [f"velocity={text('V')}", f"epsilon={amplitude}", f"frequency={text('frequency')}"]
+    if values.get("inertia"):
+        call.append("inertia=True")
+    if values.get("eta"):
+        call.append(f"radiation_damping={text('eta')}")
+    lines += [
+        "",
+        "response = asp.periodic_response(",
+        f"    slider, {', '.join(call)}",
+        ")",
+        "print(response)",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _command(point: OperatingPoint, values: Mapping[str, float], epsilon: float) -> str:
+    return "asperity response " + " ".join(_command_of_point(point, {**values, "epsilon": epsilon}))
+
+
+def _command_of_point(point: OperatingPoint, values: Mapping[str, float]) -> list[str]:
+    """Options of the numbers that differ from the material's."""
+    material = point.chosen_material()
+    known = point_parameters(law_class(point.law))
+    parts = [f"--law {point.law} --material {material.name}"]
+    for name, option in (("V", "-V"), ("epsilon", "-e"), ("frequency", "-f")):
+        if name in values:
+            parts.append(f'{option} "{exact_text(values[name], known[name].kind)}"')
+    if values.get("inertia"):
+        parts.append("--inertia")
+    if values.get("eta"):
+        parts.append(f'--radiation-damping "{exact_text(values["eta"], "damping")}"')
+    for name in (n for n in values if n not in {"V", "epsilon", "frequency", "inertia", "eta"}):
+        published = name in material and material[name].value is not None
+        usual = material[name].si if published else known[name].default
+        if values[name] != usual:
+            parts.append(f'--set "{name}={exact_text(values[name], known[name].kind)}"')
+    return parts

@@ -1,0 +1,222 @@
+"""The application: static files, the catalogue, and the endpoints of every tab."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import importlib
+import logging
+import os
+import re
+from collections.abc import AsyncIterator, Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import unquote
+
+from starlette.applications import Starlette
+from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect, Request
+from starlette.responses import FileResponse, Response, StreamingResponse
+from starlette.routing import Mount, Route
+from starlette.staticfiles import StaticFiles
+
+from asperity.app.api import TABS, catalogue
+from asperity.app.endpoints import Answer, Job, Upload, asked
+from asperity.app.jobs import processes
+from asperity.app.jobs.processes import Jobs
+from asperity.app.lane import Busy, Lane, Superseded
+from asperity.app.plain import to_json
+from asperity.app.preparation import Preparation
+from asperity.app.security import BODY_LIMIT, BodyTooLarge, BodyTooSlow, Guard, sentence, too_large
+from asperity.app.uploads import Uploads
+from asperity.errors import InputError
+
+STATIC = Path(__file__).parent / "static"
+
+_CLIENT = re.compile(r"[A-Za-z0-9-]{1,40}")
+_BUSY = "too many computations wait; try again in a while"
+
+_log = logging.getLogger("asperity.app")
+
+
+def build(port: int, *, in_notebook: bool = False, prepare: bool = True) -> Guard:
+    """The application behind its guard.
+
+    Parameters
+    ----------
+    port : int
+        On which it will be served: part of the names that requests must carry.
+    in_notebook : bool
+        Whether pages of this machine may show it in a frame.
+    prepare : bool
+        Whether to compile what the first tab needs as soon as the server starts.
+    """
+    modules = [importlib.import_module(f"asperity.app.api.{tab}") for tab in TABS]
+    lane = Lane(threads=min(2, os.cpu_count() or 1))
+    lanes: dict[str, Jobs] = {}
+    uploads = Uploads()
+    tasks: dict[str, Callable[[], Any]] = {}
+    routes: list[Route | Mount] = []
+    limits: dict[str, int] = {}
+    reused: set[str] = set()
+    for module in modules:
+        tasks |= getattr(module, "preparations", dict)()
+        for endpoint in module.ENDPOINTS:
+            path = f"/api/{endpoint.path}"
+            if isinstance(endpoint, Upload):
+                handler = _upload(endpoint, uploads)
+                limits[path] = endpoint.largest
+            elif isinstance(endpoint, Job):
+                jobs = lanes.setdefault(endpoint.lane, Jobs())
+                if not endpoint.limits:  # a job with limits has a process for itself
+                    reused.add(endpoint.lane)
+                handler = _job(endpoint, jobs, uploads)
+                limits[path] = endpoint.largest or BODY_LIMIT
+            else:
+                handler = _answer(endpoint, lane)
+            handler = _refusing(handler, limits.get(path, BODY_LIMIT))
+            routes.append(Route(path, handler, methods=["POST"]))
+    preparation = Preparation(tasks)
+    for module in modules:
+        if hasattr(module, "use"):
+            module.use(preparation)
+
+    async def state(request: Request) -> Response:
+        return _json(to_json(preparation.state()))
+
+    async def whole_catalogue(request: Request) -> Response:
+        return _json(catalogue.as_json())
+
+    async def page(request: Request) -> Response:
+        return FileResponse(STATIC / "index.html")
+
+    routes += [
+        Route("/", page),
+        Route("/api/state", state),
+        Route("/api/catalogue", whole_catalogue),
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+
+    @contextlib.asynccontextmanager
+    async def lifespan(app: Starlette) -> AsyncIterator[None]:
+        if prepare:
+            preparation.start(list(tasks)[:3])
+            for name in reused:
+                await lanes[name].prepare()
+        yield
+        preparation.close()
+        lane.close()
+        for jobs in lanes.values():
+            await jobs.close()
+        uploads.close()
+
+    handlers: dict[Any, Any] = {HTTPException: _http_error, Exception: _fault}
+    app = Starlette(routes=routes, lifespan=lifespan, exception_handlers=handlers)
+    app.router.redirect_slashes = False
+    return Guard(app, port, in_notebook, limits)
+
+
+def _answer(endpoint: Answer, lane: Lane) -> Callable[[Request], Any]:
+    async def handle(request: Request) -> Response:
+        question = await asked(request, endpoint.question)
+        client = f"{endpoint.path} {_client(request)}"
+        return _json(await lane.run(client, lambda: to_json(endpoint.answer(question))))
+
+    return handle
+
+
+def _upload(endpoint: Upload, uploads: Uploads) -> Callable[[Request], Any]:
+    async def handle(request: Request) -> Response:
+        # A form of another site cannot send this type without being asked first.
+        if request.headers.get("content-type", "") != "application/octet-stream":
+            raise InputError(
+                "request.body must be a file, got another type; send application/octet-stream"
+            )
+        upload = uploads.begin(unquote(request.headers.get("x-file-name", "recording")))
+        whole, size = False, 0
+        try:
+            async with asyncio.timeout(endpoint.seconds):
+                with upload.path.open("wb") as file:
+                    async for piece in request.stream():
+                        size += len(piece)
+                        file.write(piece)
+            whole = True
+        except TimeoutError:
+            raise BodyTooSlow from None
+        finally:
+            if not whole:
+                uploads.remove(upload.key)
+        return _json(to_json({"id": upload.key, "name": upload.name, "size": size}))
+
+    return handle
+
+
+def _job(endpoint: Job, jobs: Jobs, uploads: Uploads) -> Callable[[Request], Any]:
+    async def handle(request: Request) -> Response:
+        question = await asked(request, endpoint.question)
+        if endpoint.check is not None:
+            endpoint.check(question)
+        argument = question.model_dump()
+        if endpoint.argument is not None:
+            argument = endpoint.argument(question, uploads)
+        messages = jobs.run(
+            f"{endpoint.path} {_client(request)}",
+            endpoint.job,
+            argument,
+            limits=endpoint.limits,
+            seconds=endpoint.seconds,
+        )
+
+        async def lines() -> AsyncIterator[str]:
+            async with contextlib.aclosing(messages):
+                try:
+                    async for message in messages:
+                        yield to_json(message) + "\n"
+                except processes.Busy:
+                    yield to_json({"error": _BUSY, "done": True}) + "\n"
+
+        return StreamingResponse(lines(), media_type="application/x-ndjson")
+
+    return handle
+
+
+def _refusing(handle: Callable[[Request], Any], limit: int) -> Callable[[Request], Any]:
+    """The same, with a sentence for each thing that a request can do wrong."""
+
+    async def handle_or_refuse(request: Request) -> Response:
+        try:
+            response: Response = await handle(request)
+        except InputError as error:
+            return sentence(400, str(error))
+        except Superseded:
+            return sentence(409, "a newer request took the place of this one")
+        except Busy:
+            return sentence(503, _BUSY)
+        except BodyTooLarge:
+            return too_large(limit)
+        except BodyTooSlow:
+            return sentence(408, "the rest of the request did not come; send it again")
+        except ClientDisconnect:
+            return Response(status_code=499)
+        return response
+
+    return handle_or_refuse
+
+
+def _client(request: Request) -> str:
+    name = request.headers.get("x-client", "")
+    return name if _CLIENT.fullmatch(name) else "anonymous"
+
+
+def _json(text: str) -> Response:
+    return Response(text, media_type="application/json")
+
+
+async def _http_error(request: Request, error: HTTPException) -> Response:
+    texts = {404: "there is no such page", 405: "this address takes another method"}
+    return sentence(error.status_code, texts.get(error.status_code, "the request is refused"))
+
+
+async def _fault(request: Request, error: Exception) -> Response:
+    _log.error("%s failed", request.url.path, exc_info=error)
+    return sentence(500, "the server failed for a reason of its own; its console says more")

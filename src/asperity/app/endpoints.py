@@ -1,0 +1,156 @@
+"""Endpoints: a path, what a request must hold, and who answers it.
+
+A tab's module in `asperity.app.api` lists its endpoints as ``ENDPOINTS``; `asperity.app.api.TABS`
+lists the modules.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from starlette.requests import Request
+
+from asperity.app.uploads import Uploads
+from asperity.errors import InputError
+
+
+class Question(BaseModel):
+    """What a request holds; other fields are refused."""
+
+    model_config = ConfigDict(extra="forbid", strict=True)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A computation of some milliseconds, answered with JSON.
+
+    Attributes
+    ----------
+    path : str
+        Below ``/api/``.
+    question : type of Question
+    answer : callable
+        From the question to anything that `asperity.app.plain` knows; called in a thread.
+    """
+
+    path: str
+    question: type[Question]
+    answer: Callable[[Any], Any]
+
+
+@dataclass(frozen=True)
+class Job:
+    """A computation of any length in a process of its own, answered with a line of JSON a message.
+
+    It ends when the page closes the connection, or begins another job on the same path.
+
+    Attributes
+    ----------
+    path : str
+        Below ``/api/``.
+    question : type of Question
+    job : str
+        ``module:function``, called with the question's fields and a function that reports; see
+        `asperity.app.jobs.worker`.
+    lane : str
+        Jobs of one lane share a worker process, so that long ones of one kind hold up no other.
+    check : callable, optional
+        Raises `InputError` for what cannot be computed, before a process is asked.
+    limits : mapping of str to int, optional
+        See `asperity.app.jobs.processes.Jobs.run`.
+    seconds : float
+        After which the job is ended.
+    argument : callable, optional
+        From the question and the server's files to what the job is called with; else the
+        question's fields.
+    largest : int, optional
+        Bytes of the body, where they may be more than of other requests.
+    """
+
+    path: str
+    question: type[Question]
+    job: str
+    lane: str
+    check: Callable[[Any], None] | None = None
+    limits: Mapping[str, int] | None = None
+    seconds: float = 600.0
+    argument: Callable[[Any, Uploads], Any] | None = None
+    largest: int | None = None
+
+
+@dataclass(frozen=True)
+class Upload:
+    """A file that is stored for later requests; the body is the file itself.
+
+    The header ``X-File-Name`` says what people call it, percent-encoded. The answer is ``{"id",
+    "name", "size"}``.
+
+    Attributes
+    ----------
+    path : str
+        Below ``/api/``.
+    largest : int
+        Bytes.
+    seconds : float
+        After which the rest is not waited for.
+    """
+
+    path: str
+    largest: int
+    seconds: float = 900.0
+
+
+async def asked(request: Request, kind: type[Question]) -> Any:
+    """The question that a request holds.
+
+    Raises
+    ------
+    InputError
+        If the body is no JSON, or something else is asked.
+    """
+    if request.headers.get("content-type", "").split(";")[0].strip() != "application/json":
+        raise InputError("request.body must be JSON, got another type; send application/json")
+    body = await request.body()
+    try:
+        value = json.loads(body, parse_constant=_no_constant)
+    except (ValueError, RecursionError):
+        raise InputError("request.body must be JSON, got something else; send JSON") from None
+    if not isinstance(value, dict):
+        raise InputError("request.body must be a JSON object, got another value; send an object")
+    try:
+        return kind.model_validate(value)
+    except ValidationError as error:
+        raise InputError(_sentence(error)) from None
+    except RecursionError:
+        raise InputError("request.body must not be nested so deep, got more; send less") from None
+
+
+def _no_constant(name: str) -> float:
+    raise ValueError(name)
+
+
+def _sentence(error: ValidationError) -> str:
+    """The first mistake."""
+    mistake = error.errors(include_url=False)[0]
+    own = mistake.get("ctx", {}).get("error")
+    if isinstance(own, InputError):
+        return str(own)
+    field = ".".join(str(part)[:60] for part in mistake["loc"]) or "request"
+    if mistake["type"] == "extra_forbidden":
+        return f"{field} must be a known field, got another one; leave it out"
+    if mistake["type"] == "missing":
+        return f"{field} must be given, got nothing; add the field"
+    rule = " ".join(mistake["msg"].split()).removeprefix("Input should be ")
+    return f"{field} must be {rule}, got {_shown(mistake['input'])}; correct the value"
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, float) and not math.isfinite(value):
+        return "a number out of range"
+    text = json.dumps(value, ensure_ascii=False, default=str)
+    return text if len(text) <= 60 else f"a value of {len(text)} characters"

@@ -1,0 +1,264 @@
+"""Worker processes: few at a time, reused, and ended when they do not stop by themselves."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import sys
+from collections.abc import AsyncGenerator, Mapping
+from typing import Any
+
+#: Longest message of a worker (bytes).
+_LONGEST = 64 * 1024**2
+#: Time (s) that a cancelled job has to stop by itself.
+_PATIENCE = 1.0
+
+
+class Busy(Exception):  # noqa: N818
+    """Too many jobs wait."""
+
+
+class Jobs:
+    """Runs jobs in worker processes.
+
+    A client has at most one job: a newer one ends the earlier.
+
+    Parameters
+    ----------
+    workers : int
+        Jobs that run at the same time; others wait.
+    most : int
+        Jobs that may wait.
+    """
+
+    def __init__(self, workers: int = 1, most: int = 20) -> None:
+        self._most = most
+        self._free = asyncio.Semaphore(workers)
+        self._waiting = 0
+        self._idle: list[_Worker] = []
+        self._current: dict[str, asyncio.Event] = {}
+        self._alive: set[_Worker] = set()
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._closed = False
+
+    async def run(
+        self,
+        client: str,
+        job: str,
+        argument: Any,
+        *,
+        limits: Mapping[str, int] | None = None,
+        seconds: float = 600.0,
+    ) -> AsyncGenerator[dict[str, Any], None]:
+        """Messages of a job, the last of which has ``done``.
+
+        Leaving the iterator early ends the job.
+
+        Parameters
+        ----------
+        client : str
+        job : str
+            ``module:function``; see `asperity.app.jobs.worker`.
+        argument
+            Of JSON's own types.
+        limits : mapping of str to int, optional
+            ``memory`` (bytes) and ``seconds`` (of processor time); a worker with limits runs this
+            job only.
+        seconds : float
+            After which the job is ended.
+
+        Raises
+        ------
+        Busy
+            If too many jobs wait.
+        """
+        if self._waiting >= self._most:
+            raise Busy
+        newer = asyncio.Event()
+        earlier = self._current.pop(client, None)
+        if earlier is not None:
+            earlier.set()
+        self._current[client] = newer
+        self._waiting += 1
+        try:
+            if self._free.locked():
+                yield {"waiting": self._waiting}
+            await self._free.acquire()
+        finally:
+            self._waiting -= 1
+        if newer.is_set():
+            self._free.release()
+            yield {"error": "superseded", "cancelled": True, "done": True}
+            return
+        try:
+            async for message in self._run(job, argument, limits, seconds, newer):
+                yield message
+        finally:
+            if self._current.get(client) is newer:
+                del self._current[client]
+
+    async def _run(
+        self,
+        job: str,
+        argument: Any,
+        limits: Mapping[str, int] | None,
+        seconds: float,
+        newer: asyncio.Event,
+    ) -> AsyncGenerator[dict[str, Any], None]:
+        """Messages of the job; the place that it took is given back when its worker is free."""
+        if self._closed:
+            self._free.release()
+            return
+        worker = None
+        finished = False
+        superseded = asyncio.ensure_future(newer.wait())
+        try:
+            worker = self._idle.pop() if self._idle and not limits else await _Worker.start()
+            self._alive.add(worker)
+            await worker.send({"job": job, "argument": argument, "limits": dict(limits or {})})
+            end = asyncio.get_running_loop().time() + seconds
+            while not finished:
+                reading = asyncio.ensure_future(worker.read())
+                left = end - asyncio.get_running_loop().time()
+                await asyncio.wait(
+                    {reading, superseded}, timeout=left, return_when=asyncio.FIRST_COMPLETED
+                )
+                if not reading.done():
+                    reading.cancel()
+                    why = "superseded" if superseded.done() else _too_long(seconds)
+                    yield {"error": why, "cancelled": superseded.done(), "done": True}
+                    return
+                message = reading.result()
+                finished = message is None or bool(message.get("done"))
+                yield message or {"error": _why_it_ended(limits), "done": True}
+        finally:
+            superseded.cancel()
+            # Whoever asked may be gone, and this task with them: the worker is looked after by
+            # another one.
+            task = asyncio.get_running_loop().create_task(
+                self._look_after(worker, reusable=not limits, finished=finished)
+            )
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+    async def _look_after(self, worker: _Worker | None, *, reusable: bool, finished: bool) -> None:
+        """Keep a worker for the next job if its own is done, or stops when asked."""
+        try:
+            if worker is not None:
+                if reusable and worker.running and (finished or await worker.stop_job()):
+                    self._idle.append(worker)
+                else:
+                    worker.kill()
+                    self._alive.discard(worker)
+                    await worker.ended()
+        finally:
+            self._free.release()
+
+    async def prepare(self) -> None:
+        """Start a worker for the first job."""
+        worker = await _Worker.start()
+        self._alive.add(worker)
+        self._idle.append(worker)
+
+    async def close(self) -> None:
+        """End all workers, and wait until they have ended."""
+        self._closed = True
+        workers = [*self._alive]
+        for worker in workers:
+            worker.kill()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await asyncio.gather(*(worker.ended() for worker in workers))
+
+
+class _Worker:
+    """One process."""
+
+    def __init__(self, process: asyncio.subprocess.Process) -> None:
+        self._process = process
+        # One reader for all lines: reading may be given up between two of them.
+        self._lines: asyncio.Queue[bytes] = asyncio.Queue()
+        self._reader = asyncio.get_running_loop().create_task(self._read_lines())
+
+    @classmethod
+    async def start(cls) -> _Worker:
+        """Start a process."""
+        return cls(
+            await asyncio.create_subprocess_exec(
+                sys.executable,
+                "-m",
+                "asperity.app.jobs.worker",
+                stdin=asyncio.subprocess.PIPE,
+                stdout=asyncio.subprocess.PIPE,
+                limit=_LONGEST,
+            )
+        )
+
+    @property
+    def running(self) -> bool:
+        """Whether the process has not ended."""
+        return self._process.returncode is None
+
+    async def send(self, message: Mapping[str, Any]) -> None:
+        """Write a line."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(ConnectionError):
+            self._process.stdin.write(json.dumps(message).encode() + b"\n")
+            await self._process.stdin.drain()
+
+    async def read(self) -> dict[str, Any] | None:
+        """Read a line; None where the process has ended."""
+        line = await self._lines.get()
+        if not line:
+            return None
+        found: dict[str, Any] = json.loads(line)
+        return found
+
+    async def _read_lines(self) -> None:
+        assert self._process.stdout is not None
+        try:
+            while line := await self._process.stdout.readline():
+                self._lines.put_nowait(line)
+        except ValueError:  # a message beyond any measure
+            self.kill()
+        await self._process.wait()
+        self._lines.put_nowait(b"")
+
+    async def ended(self) -> None:
+        """Wait until the process has ended and its pipes are closed."""
+        await self._reader
+        if self._process.stdin is not None:
+            self._process.stdin.close()
+            with contextlib.suppress(ConnectionError):
+                await self._process.stdin.wait_closed()
+
+    async def stop_job(self) -> bool:
+        """Ask the job to stop, and return whether it did within `_PATIENCE`."""
+        await self.send({"cancel": True})
+
+        async def until_done() -> bool:
+            while (message := await self.read()) is not None:
+                if message.get("done"):
+                    return True
+            return False
+
+        try:
+            return await asyncio.wait_for(until_done(), _PATIENCE)
+        except TimeoutError:
+            return False
+
+    def kill(self) -> None:
+        """End the process at once."""
+        with contextlib.suppress(ProcessLookupError):
+            self._process.kill()
+
+
+def _too_long(seconds: float) -> str:
+    return f"the computation took longer than {seconds:.0f} s and was ended; ask for less"
+
+
+def _why_it_ended(limits: Mapping[str, int] | None) -> str:
+    """A sentence on a process that ended before its job did."""
+    if limits:
+        return "the computation exceeded its time or memory and was ended; ask for less"
+    return "the computation's process ended before its work did; try again"

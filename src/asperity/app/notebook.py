@@ -1,0 +1,110 @@
+"""The page in a cell of a notebook."""
+
+from __future__ import annotations
+
+import html
+from functools import cache
+from typing import Any
+from urllib.parse import urlencode
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.laws import registered
+from asperity.parameters import DRIVE
+from asperity.parameters.arguments import whole_number
+from asperity.slider import Slider
+from asperity.slider.named import slider_values
+from asperity.slider.problem import checked_slider
+
+
+class Page:
+    """A view of the page, which a notebook shows in its cell.
+
+    Attributes
+    ----------
+    address : str
+        Which any browser of this machine can open.
+    height : int
+        Of the frame (px).
+    """
+
+    def __init__(self, address: str, height: int) -> None:
+        self.address = address
+        self.height = height
+
+    def __repr__(self) -> str:
+        return f"<asperity page: {self.address}>"
+
+    def _repr_html_(self) -> str:
+        address = html.escape(self.address, quote=True)
+        return (
+            f'<iframe src="{address}" width="100%" height="{self.height}" '
+            'title="asperity" style="border: 0"></iframe>'
+        )
+
+
+def explore(
+    slider: Slider | None = None,
+    *,
+    velocity: Any = None,
+    epsilon: Any = None,
+    frequency: Any = None,
+    height: int = 900,
+) -> Page:
+    """Show the page's Explore tab in a notebook's cell.
+
+    A server runs in the background of this process, for browsers of this machine only.
+
+    Parameters
+    ----------
+    slider : Slider, optional
+        Where the sliders of the page start; its law must be a registered one.
+    velocity, epsilon, frequency : float or str, optional
+        As for `asperity.periodic_response`.
+    height : int
+        Of the frame (px).
+
+    Returns
+    -------
+    Page
+        Shown by Jupyter; elsewhere, open its `address`.
+
+    Raises
+    ------
+    InputError
+        If the extra ``app`` is not installed, or a value breaks its rule.
+    """
+    given: dict[str, Any] = {}
+    if slider is not None:
+        checked_slider(slider)
+        law = type(slider.law)
+        if registered().get(law.name) is not law:
+            raise InputError(
+                f"slider.law must be a registered one, got {law.__name__}; "
+                "register it with asperity.laws.register"
+            )
+        given = {"law": law.name, "laws": "", **slider_values(slider)}
+    for name, value in (("V", velocity), ("epsilon", epsilon), ("frequency", frequency)):
+        if value is not None:
+            given[name] = DRIVE[name].check(value)
+    height = whole_number(height, "height", least=100)
+    for name, value in given.items():
+        if isinstance(value, str):
+            continue
+        if np.size(value) != 1:
+            raise InputError(
+                f"{name} must be one number, got an array of shape {np.shape(value)}; "
+                "the page shows one operating point"
+            )
+        given[name] = repr(float(np.ravel(value)[0]))
+    fragment = f"#explore?{urlencode(given)}" if given else "#explore"
+    return Page(_server() + fragment, height)
+
+
+@cache
+def _server() -> str:
+    """The address of this process' server, started when it is first needed."""
+    from asperity.app.server import serve_in_background
+
+    return serve_in_background()

@@ -1,0 +1,36 @@
+"""Results as JSON: arrays become lists, and numbers that are not finite become null."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+
+def to_json(value: Any) -> str:
+    """JSON in one line."""
+    return json.dumps(plain(value), allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+
+
+def plain(value: Any) -> Any:
+    """A tree of what JSON knows.
+
+    Complex arrays become pairs of real and imaginary part along a last axis.
+    """
+    if isinstance(value, Mapping):
+        return {str(key): plain(v) for key, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, bool | int | str):
+        return value
+    array = np.asarray(value)
+    if array.dtype.kind == "c":
+        return plain(np.stack([array.real, array.imag], axis=-1))
+    if array.dtype.kind == "f" and not np.isfinite(array).all():
+        return plain(array.tolist())
+    return array.tolist()

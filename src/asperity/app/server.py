@@ -1,0 +1,122 @@
+"""The server: listens on this machine only, and ends in order."""
+
+from __future__ import annotations
+
+import signal
+import socket
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from asperity.app.extra import require_extra
+from asperity.errors import InputError
+from asperity.parameters.arguments import shown
+
+ADDRESS = "127.0.0.1"
+
+
+def serve(port: int = 8765, *, started: Callable[[str], Any] | None = None) -> None:
+    """Serve the page until the process is asked to end.
+
+    Parameters
+    ----------
+    port : int
+        0 for any that is free.
+    started : callable, optional
+        Called with the page's address when it can be opened.
+
+    Raises
+    ------
+    InputError
+        If the extra ``app`` is not installed or the port cannot be used.
+    """
+    require_extra()
+    listening = listen(port)
+    server = server_on(listening)
+    if started is not None:
+        _call_when_started(server, started, address_of(listening))
+    # uvicorn ends in order on both signals, and raises them again when it is done: an end that was
+    # asked for is no failure.
+    earlier = {s: signal.signal(s, signal.SIG_IGN) for s in (signal.SIGTERM, signal.SIGINT)}
+    try:
+        server.run(sockets=[listening])
+    finally:
+        for number, handler in earlier.items():
+            signal.signal(number, handler)
+        listening.close()
+
+
+def serve_in_background() -> str:
+    """Serve the page from a thread of this process, on a free port; returns its address.
+
+    Pages of this machine, such as a notebook, may show it in a frame. Nothing is compiled before it
+    is asked for.
+    """
+    require_extra()
+    listening = listen(0)
+    server = server_on(listening, in_notebook=True, prepare=False)
+    run = threading.Thread(target=server.run, kwargs={"sockets": [listening]}, daemon=True)
+    run.start()
+    while not server.started and run.is_alive():
+        time.sleep(0.01)
+    return address_of(listening)
+
+
+def listen(port: int) -> socket.socket:
+    """A socket that listens on this machine only.
+
+    Raises
+    ------
+    InputError
+        If the port is no port or is taken.
+    """
+    if not 0 <= port < 65536:
+        raise InputError(
+            f"--port must be from 0 to 65535, got {shown(port)}; leave it out for 8765"
+        )
+    listening = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind((ADDRESS, port))
+    except OSError as error:
+        listening.close()
+        raise InputError(
+            f"--port must be free, got {port} ({error.strerror}); name another one, or 0 for any"
+        ) from None
+    return listening
+
+
+def address_of(listening: socket.socket) -> str:
+    """The page's address."""
+    return f"http://{ADDRESS}:{listening.getsockname()[1]}/"
+
+
+def server_on(listening: socket.socket, *, in_notebook: bool = False, prepare: bool = True) -> Any:
+    """A uvicorn server for a socket; parameters as of `asperity.app.application.build`."""
+    import uvicorn
+
+    from asperity.app.application import build
+
+    config = uvicorn.Config(
+        build(listening.getsockname()[1], in_notebook=in_notebook, prepare=prepare),
+        log_level="warning",
+        server_header=False,
+        date_header=False,
+        ws="none",
+        lifespan="on",
+        timeout_keep_alive=30,
+        timeout_graceful_shutdown=2,
+        limit_concurrency=256,
+        h11_max_incomplete_event_size=32 * 1024,
+    )
+    return uvicorn.Server(config)
+
+
+def _call_when_started(server: Any, started: Callable[[str], Any], address: str) -> None:
+    def wait() -> None:
+        while not server.started:
+            time.sleep(0.01)
+        started(address)
+
+    threading.Thread(target=wait, daemon=True).start()

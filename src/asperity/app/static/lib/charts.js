@@ -1,0 +1,373 @@
+// Figures as SVG. A general chart library takes 100 ms for the five figures of Explore, these a few:
+// they have to follow a slider. Colours are classes of the style sheet, so that light, dark and
+// print need no redrawing.
+
+import { el, fresh } from "./dom.js";
+import { csv, saveFile } from "./save.js";
+import { digits } from "./units.js";
+
+const figures = new Set();
+
+const RIGHT = 14;
+/** Room (px) for the label of the axis upwards, and for a character of its ticks. */
+const LABEL = 32;
+const CHARACTER = 6.6;
+const TOP = 10;
+const BOTTOM = 42;
+const GAP = 16;
+
+/** Class of the colour of a series, counted from 0. */
+export function series(index) {
+  return `s${(index % 6) + 1}`;
+}
+
+/**
+ * A figure with a title, a note and buttons that save it.
+ *
+ * `columns()` returns what the CSV holds: arrays by name. `options` are elements beside the title.
+ */
+export class Figure {
+  constructor({ name, title, height = 240, columns, options }) {
+    Object.assign(this, { name, title, height, columns });
+    this.readout = el("div", { class: "readout", "aria-hidden": "true" });
+    this.plot = el("div", {
+      class: "plot", pointermove: (e) => this.#hover(e), pointerleave: () => this.#hover(null),
+    });
+    this.plot.style.minHeight = `${height}px`; // nothing moves when the picture comes
+    this.note = el("div", { class: "note" });
+    const label = fresh("figure");
+    const button = (text, what, act) => el("button", {
+      type: "button", class: "quiet small", "aria-label": `${title}: save ${what}`, click: act,
+    }, text);
+    this.heading = el("h3", { id: label }, title);
+    this.element = el(
+      "figure",
+      { class: `panel ${name}`, "aria-labelledby": label },
+      el("figcaption", {}, this.heading, options,
+        el("span", { class: "exports" },
+          button("SVG", "as SVG", () => this.#saveSvg()),
+          button("PNG", "as PNG", () => this.#savePng()),
+          button("CSV", "the numbers as CSV", () => this.#saveCsv()))),
+      el("div", { class: "stage" }, this.plot, this.readout),
+      this.note,
+    );
+    figures.add(this);
+  }
+
+  /**
+   * Show a chart.
+   *
+   * `chart.x` is an axis and `chart.rows` are panels above each other, each with an axis `y`. An
+   * axis has `label`, `log`, `range` (else that of the data) and `format`, from a number to a text.
+   * A row has `lines` and `points` ({x, y, cls, name, title}), `bars` ({x, y, cls, name}), `marks`
+   * (x of vertical lines), `circle` (its radius), `image` ({url, x, y}: corners), `equal` (both axes
+   * in one scale) and `text` (in the middle).
+   * `description` says in words what there is to see.
+   */
+  draw(chart, description = "") {
+    this.chart = chart;
+    this.description = description;
+    const width = this.plot.clientWidth;
+    if (!width) return;
+    const drawn = drawChart(chart, width, this.height, description);
+    this.plot.innerHTML = drawn.svg;
+    this.frames = drawn.frames;
+  }
+
+  /** Position of an event on the first row, in units of the axes; null outside. */
+  at(event) {
+    const box = this.plot.getBoundingClientRect();
+    const frame = this.frames?.[0];
+    if (!frame) return null;
+    const [px, py] = [event.clientX - box.left, event.clientY - box.top];
+    if (px < frame.left || px > frame.right || py < frame.top || py > frame.bottom) return null;
+    return [frame.x.back(px), frame.y.back(py)];
+  }
+
+  #hover(event) {
+    const text = event && this.frames ? this.#under(event) : "";
+    this.readout.hidden = !text;
+    if (!text) return;
+    this.readout.textContent = text;
+    const box = this.plot.getBoundingClientRect();
+    const x = event.clientX - box.left;
+    const y = event.clientY - box.top;
+    const wide = this.readout.offsetWidth;
+    this.readout.style.left = `${Math.max(0, Math.min(x + 12, box.width - wide))}px`;
+    this.readout.style.top = `${Math.max(0, y - this.readout.offsetHeight - 10)}px`;
+  }
+
+  #under(event) {
+    const box = this.plot.getBoundingClientRect();
+    const px = event.clientX - box.left;
+    const py = event.clientY - box.top;
+    const k = this.frames.findIndex((f) => py >= f.top && py <= f.bottom && px >= f.left && px <= f.right);
+    if (k < 0) return "";
+    const frame = this.frames[k];
+    const row = this.chart.rows[k];
+    if (row.readout) return row.readout(frame.x.back(px), frame.y.back(py));
+    let best = null;
+    for (const kind of ["points", "bars", "lines"]) {
+      for (const item of row[kind] || []) {
+        for (let i = 0; i < item.x.length; i += 1) {
+          const y = item.y[i];
+          if (y === null || y === undefined) continue;
+          const dx = frame.x.to(item.x[i]) - px;
+          const dy = frame.y.to(y) - py;
+          const far = kind === "bars" ? Math.abs(dx) : Math.hypot(dx, kind === "lines" ? 0.35 * dy : dy);
+          if (far < 24 && (!best || far < best.far)) best = { far, item, i, y };
+        }
+      }
+    }
+    if (!best) return "";
+    const { item, i, y } = best;
+    if (item.title) return typeof item.title === "function" ? item.title(i) : item.title;
+    const name = item.name ? `${item.name}: ` : "";
+    return `${name}${(row.y.format || digits)(y)} at ${(this.chart.x.format || digits)(item.x[i])}`;
+  }
+
+  #saveSvg() {
+    const svg = this.#styled();
+    if (svg) saveFile(`${this.name}.svg`, svg, "image/svg+xml");
+  }
+
+  #savePng() {
+    const svg = this.#styled();
+    if (!svg) return;
+    const image = new Image();
+    image.onload = () => {
+      const canvas = document.createElement("canvas");
+      canvas.width = 3 * image.width;
+      canvas.height = 3 * image.height;
+      canvas.getContext("2d").drawImage(image, 0, 0, canvas.width, canvas.height);
+      canvas.toBlob((blob) => saveFile(`${this.name}.png`, blob));
+    };
+    image.src = `data:image/svg+xml;charset=utf-8,${encodeURIComponent(svg)}`;
+  }
+
+  /** The picture with its styles written into it, on the page's surface. */
+  #styled() {
+    const shown = this.plot.querySelector("svg");
+    if (!shown) return null;
+    const copy = shown.cloneNode(true);
+    copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
+    const from = shown.querySelectorAll("*");
+    copy.querySelectorAll("*").forEach((node, i) => {
+      const style = getComputedStyle(from[i]);
+      for (const property of ["fill", "stroke", "stroke-width", "stroke-dasharray", "font-size", "font-family", "opacity"]) {
+        const value = style.getPropertyValue(property);
+        if (value) node.setAttribute(property, value);
+      }
+      node.removeAttribute("class");
+    });
+    const ground = document.createElementNS("http://www.w3.org/2000/svg", "rect");
+    ground.setAttribute("width", "100%");
+    ground.setAttribute("height", "100%");
+    ground.setAttribute("fill", getComputedStyle(this.element).backgroundColor);
+    copy.prepend(ground);
+    return new XMLSerializer().serializeToString(copy);
+  }
+
+  #saveCsv() {
+    const columns = this.columns && this.columns();
+    if (columns) saveFile(`${this.name}.csv`, csv(columns), "text/csv");
+  }
+}
+
+/** Draw everything again, after the width has changed. */
+export function redrawAll() {
+  for (const figure of figures) {
+    if (figure.chart && figure.element.isConnected) figure.draw(figure.chart, figure.description);
+  }
+}
+
+// --- Drawing ---------------------------------------------------------------------------------
+
+function drawChart(chart, width, height, description) {
+  const { rows } = chart;
+  const each = (height - TOP - BOTTOM - GAP * (rows.length - 1)) / rows.length;
+  const frames = [];
+  const parts = [];
+  const yRanges = rows.map((row) => row.y.range || extent(itemsOf(row).flatMap((i) => i.y), row.y.log, 0.06));
+  const longest = Math.max(2, ...rows.flatMap((row, k) =>
+    ticks(scale(yRanges[k], 1, 0, row.y.log), row.y, each / 30).map((t) => t.label.length)));
+  const LEFT = Math.min(0.4 * width, LABEL + CHARACTER * longest);
+  let xRange = chart.x.range || extent(rows.flatMap((r) => itemsOf(r).flatMap((i) => i.x)), chart.x.log, 0);
+  rows.forEach((row, k) => {
+    const top = TOP + k * (each + GAP);
+    const frame = { left: LEFT, right: width - RIGHT, top, bottom: top + each };
+    let yRange = yRanges[k];
+    if (row.equal) [xRange, yRange] = equal(frame, xRange, yRange);
+    frame.x = scale(xRange, frame.left, frame.right, chart.x.log);
+    frame.y = scale(yRange, frame.bottom, frame.top, row.y.log);
+    frames.push(frame);
+    parts.push(drawRow(row, frame, chart.x, k === rows.length - 1));
+  });
+  const foot = frames[frames.length - 1];
+  parts.push(text((foot.left + foot.right) / 2, height - 6, chart.x.label, "axis-label", "middle"));
+  return {
+    frames,
+    svg: `<svg width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" role="img" aria-label="${escape(description)}">${parts.join("")}</svg>`,
+  };
+}
+
+function itemsOf(row) {
+  return [...(row.lines || []), ...(row.points || []), ...(row.bars || [])];
+}
+
+function drawRow(row, frame, x, last) {
+  const { left, right, top, bottom } = frame;
+  const parts = [];
+  const clip = fresh("clip");
+  parts.push(`<clipPath id="${clip}"><rect x="${left}" y="${top - 1}" width="${right - left}" height="${bottom - top + 2}"/></clipPath>`);
+  for (const t of ticks(frame.y, row.y, (bottom - top) / 30)) {
+    const y = round(frame.y.to(t.value));
+    parts.push(`<path class="grid" d="M${left} ${y}H${right}"/>`);
+    parts.push(text(left - 7, y + 4, t.label, "tick-label", "end"));
+  }
+  for (const t of ticks(frame.x, x, (right - left) / 70)) {
+    const px = round(frame.x.to(t.value));
+    parts.push(`<path class="grid" d="M${px} ${top}V${bottom}"/>`);
+    if (last) parts.push(text(px, bottom + 17, t.label, "tick-label", "middle"));
+  }
+  parts.push(`<g clip-path="url(#${clip})">`);
+  if (row.image?.url) parts.push(drawImage(row.image, frame));
+  for (const mark of row.marks || []) {
+    const px = round(frame.x.to(mark));
+    parts.push(`<path class="mark" d="M${px} ${top}V${bottom}"/>`);
+  }
+  if (row.circle) {
+    const radius = frame.x.to(row.circle) - frame.x.to(0);
+    parts.push(`<circle class="circle" cx="${round(frame.x.to(0))}" cy="${round(frame.y.to(0))}" r="${round(radius)}"/>`);
+  }
+  for (const bars of row.bars || []) {
+    const wide = Math.min(28, 0.55 * Math.abs(frame.x.to(bars.x[1] ?? 1) - frame.x.to(bars.x[0] ?? 0)));
+    bars.x.forEach((at, i) => {
+      if (!(bars.y[i] > 0) && row.y.log) return;
+      const y = frame.y.to(bars.y[i]);
+      const foot = row.y.log ? bottom : frame.y.to(0);
+      parts.push(`<rect class="bar ${bars.cls}" x="${round(frame.x.to(at) - wide / 2)}" y="${round(Math.min(y, foot))}" width="${round(wide)}" height="${round(Math.abs(foot - y))}"/>`);
+    });
+  }
+  for (const line of row.lines || []) parts.push(drawLine(line, frame));
+  for (const points of row.points || []) {
+    points.x.forEach((at, i) => {
+      if (points.y[i] === null || points.y[i] === undefined) return;
+      const px = round(frame.x.to(at));
+      const py = round(frame.y.to(points.y[i]));
+      parts.push(points.cross
+        ? `<path class="cross ${points.cls}" d="M${px - 5} ${py - 5}l10 10m0 -10l-10 10"/>`
+        : `<circle class="point ${points.cls}" cx="${px}" cy="${py}" r="${points.size || 5.5}"/>`);
+    });
+  }
+  parts.push("</g>", `<path class="frame" d="M${left} ${top}V${bottom}H${right}"/>`);
+  const middle = (top + bottom) / 2;
+  parts.push(`<text class="axis-label" text-anchor="middle" transform="translate(14 ${round(middle)}) rotate(-90)">${escape(row.y.label)}</text>`);
+  if (row.text) parts.push(text((left + right) / 2, middle, row.text, "nothing", "middle"));
+  return parts.join("");
+}
+
+function drawLine(line, frame) {
+  let path = "";
+  let pen = "M";
+  for (let i = 0; i < line.x.length; i += 1) {
+    const y = line.y[i];
+    if (y === null || y === undefined) {
+      pen = "M";
+      continue;
+    }
+    path += `${pen}${round(frame.x.to(line.x[i]))} ${round(clampPixel(frame.y.to(y)))}`;
+    pen = "L";
+  }
+  return path ? `<path class="line ${line.cls} ${line.thick ? "thick" : ""} ${line.dashed ? "dashed" : ""}" d="${path}"/>` : "";
+}
+
+function drawImage(image, frame) {
+  const [x0, x1] = image.x.map((v) => frame.x.to(v));
+  const [y0, y1] = image.y.map((v) => frame.y.to(v));
+  return `<image href="${image.url}" x="${round(x0)}" y="${round(y1)}" width="${round(x1 - x0)}" height="${round(y0 - y1)}" preserveAspectRatio="none" class="map-image"/>`;
+}
+
+/** Browsers draw nothing of paths that run too far off the screen. */
+function clampPixel(value) {
+  return Math.max(-2000, Math.min(4000, value));
+}
+
+function text(x, y, content, cls, anchor) {
+  return `<text class="${cls}" x="${round(x)}" y="${round(y)}" text-anchor="${anchor}">${escape(content)}</text>`;
+}
+
+const round = (value) => Math.round(value * 10) / 10;
+
+const ESCAPES = { "&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&#39;" };
+const escape = (value) => String(value).replace(/[&<>"']/g, (c) => ESCAPES[c]);
+
+// --- Axes ------------------------------------------------------------------------------------
+
+function extent(values, log, margin) {
+  let low = Infinity;
+  let high = -Infinity;
+  for (const v of values) {
+    if (v === null || v === undefined || !Number.isFinite(v) || (log && v <= 0)) continue;
+    if (v < low) low = v;
+    if (v > high) high = v;
+  }
+  if (low > high) return log ? [0.1, 10] : [0, 1];
+  if (log) {
+    const far = (high / low) ** margin;
+    return low === high ? [low / 2, high * 2] : [low / far, high * far];
+  }
+  // What differs by rounding only is a constant.
+  if (high - low <= 1e-9 * Math.max(Math.abs(low), Math.abs(high))) {
+    const pad = Math.abs(high) * 0.05 || 1;
+    return [low - pad, high + pad];
+  }
+  return [low - margin * (high - low), high + margin * (high - low)];
+}
+
+/** Ranges in one scale, about the same middles. */
+function equal(frame, [x0, x1], [y0, y1]) {
+  const unit = Math.max((x1 - x0) / (frame.right - frame.left), (y1 - y0) / (frame.bottom - frame.top));
+  const around = (low, high, size) => [(low + high - unit * size) / 2, (low + high + unit * size) / 2];
+  return [around(x0, x1, frame.right - frame.left), around(y0, y1, frame.bottom - frame.top)];
+}
+
+function scale([low, high], from, to, log) {
+  const f = log ? Math.log10 : (v) => v;
+  const [a, b] = [f(low), f(high)];
+  const back = (p) => a + ((p - from) / (to - from)) * (b - a);
+  return {
+    low, high, log,
+    to: (v) => from + ((f(v) - a) / (b - a)) * (to - from),
+    back: (p) => (log ? 10 ** back(p) : back(p)),
+  };
+}
+
+function ticks({ low, high, log }, axis, most) {
+  const label = axis.format || digits;
+  if (axis.ticks) return axis.ticks.map((value) => ({ value, label: label(value) }));
+  if (log) {
+    const powers = [];
+    const first = Math.ceil(Math.log10(low) - 1e-9);
+    const last = Math.floor(Math.log10(high) + 1e-9);
+    const step = Math.max(1, Math.ceil((last - first + 1) / Math.max(2, most)));
+    for (let p = first; p <= last; p += step) powers.push(10 ** p);
+    if (powers.length >= 2) return powers.map((value) => ({ value, label: label(Number(value.toPrecision(3))) }));
+    const found = [];
+    for (let p = first - 1; p <= last; p += 1) {
+      for (const m of [1, 2, 5]) {
+        const value = Number(`${m}e${p}`);
+        if (value >= low && value <= high) found.push(value);
+      }
+    }
+    return found.map((value) => ({ value, label: label(value) }));
+  }
+  const rough = (high - low) / Math.max(2.5, most);
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 2.5, 5, 10].find((m) => m * power >= rough * 0.999) * power;
+  const found = [];
+  for (let n = Math.ceil(low / step - 1e-9); n * step <= high + 1e-9 * step; n += 1) {
+    found.push(Number((n * step).toPrecision(12)));
+  }
+  return found.map((value) => ({ value, label: label(value, 8) }));
+}

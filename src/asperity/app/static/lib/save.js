@@ -1,0 +1,43 @@
+// Files and texts that leave the page.
+
+/** Offer a file. */
+export function saveFile(name, content, type) {
+  const url = content instanceof Blob ? URL.createObjectURL(content) : URL.createObjectURL(new Blob([content], { type }));
+  const link = document.createElement("a");
+  link.href = url;
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(url), 10000);
+}
+
+/** Columns of numbers and texts as CSV; a number is written with all its digits. */
+export function csv(columns) {
+  const names = Object.keys(columns);
+  const length = Math.max(...names.map((n) => columns[n].length));
+  const cell = (value) => {
+    if (value === null || value === undefined) return "";
+    const text = String(value);
+    return /[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text;
+  };
+  const rows = Array.from({ length }, (_, i) => names.map((n) => cell(columns[n][i])).join(","));
+  return [names.map(cell).join(","), ...rows].join("\n") + "\n";
+}
+
+/** Copy a text, and say so on the button. */
+export async function copyText(text, button) {
+  const label = button.textContent;
+  try {
+    await navigator.clipboard.writeText(text);
+    button.textContent = "Copied";
+  } catch {
+    const area = document.createElement("textarea");
+    area.value = text;
+    document.body.append(area);
+    area.select();
+    const done = document.execCommand("copy");
+    area.remove();
+    button.textContent = done ? "Copied" : "Select and copy";
+    button.focus();
+  }
+  setTimeout(() => { button.textContent = label; }, 1500);
+}

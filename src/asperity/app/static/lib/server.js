@@ -1,0 +1,113 @@
+// Requests to the server that the page came from.
+
+const client = Array.from(crypto.getRandomValues(new Uint8Array(8)), (b) =>
+  b.toString(16).padStart(2, "0"),
+).join("");
+
+/** A request that the server refuses; the message is the server's sentence. */
+export class Refused extends Error {}
+
+async function send(path, body, signal, part) {
+  let response;
+  try {
+    response = await fetch(`/api/${path}`, {
+      method: "POST",
+      headers: { "Content-Type": "application/json", "X-Client": part ? `${client}-${part}` : client },
+      body: JSON.stringify(body),
+      signal,
+    });
+  } catch (error) {
+    if (error.name === "AbortError") throw error;
+    throw new Refused("The server does not answer; is asperity serve still running?");
+  }
+  if (!response.ok) {
+    const told = await response.json().catch(() => ({}));
+    throw new Refused(told.error || `The server answered with ${response.status}.`);
+  }
+  return response;
+}
+
+/** JSON of a GET request. */
+export async function get(path) {
+  return (await fetch(`/api/${path}`)).json();
+}
+
+/** JSON answer to a POST request. */
+export async function ask(path, body, signal) {
+  return (await send(path, body, signal)).json();
+}
+
+/**
+ * Run a job: `onMessage` is called with each of its messages, and the last one is returned.
+ * Aborting the signal ends the job; so does another job on the same path with the same `part`.
+ */
+export async function run(path, body, onMessage, signal, part) {
+  const response = await send(path, body, signal, part);
+  const reader = response.body.pipeThrough(new TextDecoderStream()).getReader();
+  let rest = "";
+  let last = {};
+  for (;;) {
+    const { done, value } = await reader.read();
+    if (done) return last;
+    const lines = (rest + value).split("\n");
+    rest = lines.pop();
+    for (const line of lines) {
+      last = JSON.parse(line);
+      if (last.error && !last.cancelled) throw new Refused(last.error);
+      onMessage(last);
+    }
+  }
+}
+
+/** Send a file; `onProgress` is called with the share that has gone out. */
+export function sendFile(path, file, onProgress, signal) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.open("POST", `/api/${path}`);
+    request.setRequestHeader("Content-Type", "application/octet-stream");
+    request.setRequestHeader("X-File-Name", encodeURIComponent(file.name));
+    request.responseType = "json";
+    request.upload.addEventListener("progress", (event) => onProgress(event.loaded / event.total));
+    request.addEventListener("load", () => {
+      if (request.status === 200) resolve(request.response);
+      else reject(new Refused(request.response?.error || `The server answered with ${request.status}.`));
+    });
+    request.addEventListener("error", () => reject(new Refused("The server did not take the file; is it too large, or has asperity serve ended?")));
+    request.addEventListener("abort", () => reject(new DOMException("", "AbortError")));
+    signal.addEventListener("abort", () => request.abort());
+    request.send(file);
+  });
+}
+
+/**
+ * Asks for the newest question only: while an answer is on its way, later questions replace each
+ * other, and the last of them is asked next.
+ */
+export class Latest {
+  constructor(path, onAnswer, onError) {
+    this.path = path;
+    this.onAnswer = onAnswer;
+    this.onError = onError;
+    this.busy = false;
+    this.pending = null;
+  }
+
+  ask(body, extra) {
+    this.pending = { body, extra };
+    if (!this.busy) this.#next();
+  }
+
+  async #next() {
+    this.busy = true;
+    while (this.pending) {
+      const { body, extra } = this.pending;
+      this.pending = null;
+      try {
+        await this.onAnswer(await ask(this.path, body), extra, this.pending !== null);
+      } catch (error) {
+        this.onError(error, extra);
+      }
+    }
+    this.busy = false;
+  }
+}

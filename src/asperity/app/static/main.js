@@ -1,0 +1,96 @@
+// The page: tabs, theme, and the state of the server.
+
+import { redrawAll } from "./lib/charts.js";
+import { el, fill } from "./lib/dom.js";
+import { linkTo, readLink, writeLink } from "./lib/link.js";
+import { get } from "./lib/server.js";
+import { useKinds } from "./lib/units.js";
+import * as data from "./tabs/data.js";
+import * as explore from "./tabs/explore.js";
+import * as map from "./tabs/map.js";
+import * as paper from "./tabs/paper.js";
+
+// A tab's module has `name`, `title`, and `create(page)`, which returns its element and
+// `show(parameters)`, called each time that the tab is opened with the parameters of the link, and may
+// have `hide()`, called when another tab is opened.
+const TABS = [explore, map, data, paper];
+
+const content = document.getElementById("content");
+const bar = document.getElementById("tabs");
+const state = document.getElementById("state");
+const opened = new Map();
+let current = null;
+
+const page = {
+  catalogue: null,
+  /** Write a view of the tab into the address. */
+  setLink(tab, parameters) {
+    if (current === tab) writeLink(tab, parameters);
+    opened.get(tab).parameters = parameters;
+  },
+  /** Open another tab with a view. */
+  open(tab, parameters) {
+    location.hash = linkTo(tab, parameters);
+  },
+  /** Say something in the header; read out by screen readers. */
+  say(text) {
+    if (state.textContent !== text) state.textContent = text;
+  },
+};
+
+function show() {
+  const { tab, parameters } = readLink();
+  const module = TABS.find((t) => t.name === tab) || TABS[0];
+  if (current && current !== module.name) opened.get(current)?.hide?.();
+  current = module.name;
+  for (const link of bar.querySelectorAll("a")) {
+    if (link.dataset.tab === current) link.setAttribute("aria-current", "page");
+    else link.removeAttribute("aria-current");
+  }
+  if (!opened.has(current)) opened.set(current, { ...module.create(page), parameters });
+  const { element } = opened.get(current);
+  document.title = `${module.title} – asperity`;
+  if (content.firstElementChild !== element) fill(content, element);
+  opened.get(current).show(parameters);
+}
+
+function changeTheme() {
+  const root = document.documentElement;
+  const dark = root.dataset.theme
+    ? root.dataset.theme === "dark"
+    : matchMedia("(prefers-color-scheme: dark)").matches;
+  root.dataset.theme = dark ? "light" : "dark";
+  try {
+    localStorage.setItem("asperity-theme", root.dataset.theme);
+  } catch {
+    // Storage may be switched off.
+  }
+}
+
+let resized = 0;
+
+async function start() {
+  page.catalogue = await get("catalogue");
+  useKinds(page.catalogue.kinds);
+  fill(bar, TABS.map((t) => el("li", {}, el("a", {
+    href: `#${t.name}`, "data-tab": t.name,
+    click: (event) => {
+      // A tab that was open before comes back as it was.
+      const earlier = opened.get(t.name);
+      if (earlier && current !== t.name) {
+        event.preventDefault();
+        page.open(t.name, earlier.parameters);
+      }
+    },
+  }, t.title))));
+  document.getElementById("theme").addEventListener("click", changeTheme);
+  addEventListener("hashchange", show);
+  addEventListener("resize", () => {
+    clearTimeout(resized);
+    resized = setTimeout(redrawAll, 120);
+  });
+  addEventListener("beforeprint", redrawAll);
+  show();
+}
+
+start();

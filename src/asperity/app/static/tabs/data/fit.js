@@ -1,0 +1,238 @@
+// A law fitted to what was measured, or several compared.
+
+import { Figure, series } from "../../lib/charts.js";
+import { choice, tick } from "../../lib/controls.js";
+import { el, fill, fresh } from "../../lib/dom.js";
+import { copyText, csv, saveFile } from "../../lib/save.js";
+import { Refused, run } from "../../lib/server.js";
+import { digits } from "../../lib/units.js";
+
+const SETTINGS = {
+  laws: ["elasto-plastic"], material: "bureau2000", free: ["eps_ratio", "lambda"], fixed: "",
+  prior: false, profile: false, inertia: false,
+};
+
+export class FitPanel {
+  constructor(page, { rows, tables, changed }) {
+    Object.assign(this, { page, rows, tables, changed });
+    this.settings = { ...SETTINGS };
+    this.form = el("form", { class: "fit-form", submit: (e) => { e.preventDefault(); this.start(); } });
+    this.data = el("p", { class: "note" });
+    this.status = el("p", { class: "sentence", role: "status" });
+    this.message = el("p", { class: "message", role: "alert" });
+    this.results = el("div", { class: "card-body" });
+    this.fitButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Fit");
+    this.cancel = el("button", { type: "button", click: () => this.work?.abort() }, "Cancel");
+    this.cancel.hidden = true;
+    this.element = el("section", { class: "recording fit", "aria-label": "Fit and compare" },
+      el("h3", {}, "Fit and compare"), this.data, this.form,
+      el("div", { class: "actions" }, this.fitButton, this.cancel), this.status, this.message, this.results);
+    this.element.hidden = true;
+    this.#build();
+  }
+
+  save(parameters) {
+    if (!this.element.hidden && JSON.stringify(this.settings) !== JSON.stringify(SETTINGS)) parameters.set("fit", JSON.stringify(this.settings));
+  }
+
+  restore(parameters) {
+    this.settings = { ...SETTINGS };
+    try {
+      const given = JSON.parse(parameters.get("fit") || "{}");
+      const { laws } = this.page.catalogue;
+      if (Array.isArray(given.laws)) this.settings.laws = given.laws.filter((n) => laws[n]?.rate_dependent);
+      if (Array.isArray(given.free)) this.settings.free = given.free.filter((n) => typeof n === "string");
+      for (const n of ["material", "fixed"]) if (typeof given[n] === "string") this.settings[n] = given[n];
+      for (const n of ["prior", "profile", "inertia"]) this.settings[n] = given[n] === true;
+    } catch {
+      // A link that was cut: the settings to begin with.
+    }
+    this.#build();
+  }
+
+  refresh() {
+    const rows = this.rows().length;
+    const tables = this.tables().length;
+    this.element.hidden = !(rows || tables);
+    const parts = [rows && `${rows} measured ${rows === 1 ? "amplitude" : "amplitudes"}`, tables && `${tables} ${tables === 1 ? "table" : "tables"}`].filter(Boolean);
+    this.data.textContent = `Data: ${parts.join(" and ")}.`;
+  }
+
+  #build() {
+    const { laws, materials } = this.page.catalogue;
+    const { settings } = this;
+    const names = Object.keys(laws).filter((n) => laws[n].rate_dependent);
+    const set = (key) => (value) => { settings[key] = value; this.changed(); };
+    const toggle = (key, n, order) => (on) => {
+      settings[key] = order.filter((m) => (m === n ? on : settings[key].includes(m)));
+      this.#free();
+      this.fitButton.textContent = settings.laws.length > 1 ? "Compare" : "Fit";
+      this.changed();
+    };
+    const id = fresh("fixed");
+    const fixed = el("textarea", { id, rows: 3, spellcheck: "false", placeholder: "V = 10 um/s", input: () => set("fixed")(fixed.value) });
+    fixed.value = settings.fixed;
+    this.freeHolder = el("div", { class: "ticks" });
+    fill(this.form,
+      el("fieldset", {}, el("legend", {}, "Laws: one is fitted, several are compared"),
+        el("div", { class: "ticks" }, names.map((n) => tick(n, settings.laws.includes(n), toggle("laws", n, names), laws[n].title).element))),
+      el("fieldset", {}, el("legend", {}, "Free parameters"), this.freeHolder),
+      el("div", { class: "fit-more" },
+        choice("Other numbers from", [["", "no material"], ...Object.keys(materials).map((n) => [n, n])], settings.material, set("material")).element,
+        el("div", { class: "choice" }, el("label", { for: id }, "Fixed numbers, one a line; V is the pulling velocity"), fixed),
+        el("div", { class: "ticks" },
+          tick("Published uncertainties as priors", settings.prior, set("prior")).element,
+          tick("Intervals by profile likelihood", settings.profile, set("profile")).element,
+          tick("The mass counts", settings.inertia, set("inertia")).element)));
+    this.#free();
+    this.fitButton.textContent = settings.laws.length > 1 ? "Compare" : "Fit";
+  }
+
+  #free() {
+    const { laws } = this.page.catalogue;
+    const own = [...new Set(this.settings.laws.flatMap((l) => laws[l].parameters.filter((p) => p.place !== "drive").map((p) => p.name)))];
+    const names = ["eps_ratio", ...own.filter((n) => !["V0", "inertia", "epsilon", "frequency", "V"].includes(n))];
+    fill(this.freeHolder, names.map((n) => tick(n, this.settings.free.includes(n), (on) => {
+      this.settings.free = names.filter((m) => (m === n ? on : this.settings.free.includes(m)));
+      this.changed();
+    }).element));
+    this.names = names;
+  }
+
+  async start() {
+    this.work?.abort();
+    this.work = new AbortController();
+    const { signal } = this.work;
+    const { settings } = this;
+    this.message.textContent = "";
+    fill(this.results);
+    const fixed = {};
+    for (const line of settings.fixed.split(/[\n;]+/).filter((l) => l.trim())) {
+      const [n, ...rest] = line.split("=");
+      if (!n.trim() || !rest.join("=").trim()) {
+        this.message.textContent = `Fixed numbers must be NAME = VALUE, got “${line.trim()}”; write it like V = 1 um/s.`;
+        return;
+      }
+      fixed[n.trim()] = rest.join("=").trim();
+    }
+    const asked = {
+      laws: settings.laws, free: settings.free.filter((n) => this.names.includes(n)),
+      rows: this.rows(), tables: this.tables(), fixed,
+      material: settings.material || null, prior: settings.prior ? settings.material || null : null,
+      profile: settings.profile, inertia: settings.inertia,
+    };
+    this.#running(true);
+    try {
+      const last = await run("data/fit", asked, (told) => {
+        if (told.waiting) this.status.textContent = "Waiting for another fit…";
+        if (told.minimisations !== undefined) this.status.textContent = `Fitting… ${told.minimisations} minimisations finished.`;
+      }, signal);
+      if (last.result) this.#draw(last.result);
+    } catch (error) {
+      if (error.name === "AbortError") this.status.textContent = "Cancelled.";
+      else if (error instanceof Refused) {
+        this.status.textContent = "";
+        this.message.textContent = capital(error.message);
+      } else throw error;
+    } finally {
+      this.#running(false);
+    }
+  }
+
+  #running(on) {
+    this.cancel.hidden = !on;
+    this.fitButton.disabled = on;
+    if (on) this.status.textContent = "Fitting…";
+  }
+
+  #draw({ fit, comparison, residuals, command }) {
+    const python = () => this.#python();
+    const record = fit || comparison;
+    const buttons = el("div", { class: "actions" },
+      el("button", { type: "button", click: (e) => copyText(python(), e.currentTarget) }, "Copy as Python"),
+      el("button", { type: "button", click: (e) => copyText(command, e.currentTarget) }, "Copy as command"),
+      el("button", { type: "button", click: () => saveFile(fit ? "fit.json" : "comparison.json", JSON.stringify(record, null, 2), "application/json") }, "JSON"),
+      el("button", { type: "button", click: () => this.#saveCsv(fit ? { [fit.law]: fit } : comparison.laws) }, "CSV"));
+    if (fit) {
+      this.status.textContent = fitSentence(fit);
+      fill(this.results, buttons, ...fitTables(fit), this.#residuals(residuals));
+    } else {
+      this.status.textContent = capital(comparison.verdict);
+      const laws = Object.entries(comparison.laws);
+      const lowest = Math.min(...laws.filter(([, l]) => l.aicc !== null).map(([, l]) => l.aicc));
+      fill(this.results, buttons,
+        table(["Law", "χ²", "degrees of freedom", "p", "AICc − lowest", "weight", ""],
+          laws.map(([n, l]) => [n, digits(l.chi2), String(l.dof), digits(l.p_value, 2), l.aicc === null ? "–" : digits(l.aicc - lowest), digits(l.weight, 3), l.converged ? (l.excluded ? `excluded: ${l.why}` : "") : l.message]), "Comparison"),
+        ...laws.filter(([, l]) => l.converged).map(([n, l]) => el("details", { open: n === comparison.best }, el("summary", {}, n), el("p", {}, fitSentence(l)), ...fitTables(l))),
+        residuals && this.#residuals(residuals));
+    }
+    this.figure?.();
+  }
+
+  #residuals({ value, observable }) {
+    const names = [...new Set(observable)];
+    const figure = new Figure({ name: "residuals", title: "Residuals in standard deviations", height: 230, columns: () => ({ observable, residual: value }) });
+    fill(figure.note, names.map((n, k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), n)));
+    this.figure = () => {
+      const at = value.map((_, i) => i + 1);
+      const of = (n) => at.filter((_, i) => observable[i] === n);
+      const far = 1.1 * Math.max(3, ...value.map(Math.abs));
+      figure.draw({ x: { label: "datum", range: [0, value.length + 1] }, rows: [{
+        y: { label: "residual", range: [-far, far] },
+        lines: [{ x: [0, value.length + 1], y: [0, 0], cls: "ink", name: "zero" }],
+        points: names.map((n, k) => ({ x: of(n), y: value.filter((_, i) => observable[i] === n), cls: series(k), title: (i) => `${n}: ${digits(value.filter((_, j) => observable[j] === n)[i], 3)}` })),
+      }] }, `Residuals of ${names.join(", ")}.`);
+    };
+    return figure.element;
+  }
+
+  #saveCsv(fits) {
+    const rows = Object.entries(fits).flatMap(([law, f]) => Object.entries(f.parameters).map(([n, p]) => ({ law, parameter: n, value: p.value, se: p.se, low_95: p.interval_95[0], high_95: p.interval_95[1], unit: p.unit })));
+    saveFile("parameters.csv", csv(Object.fromEntries(Object.keys(rows[0]).map((n) => [n, rows.map((r) => r[n])]))), "text/csv");
+  }
+
+  #python() {
+    const { laws, free, material, profile, inertia } = this.settings;
+    const one = laws.length === 1;
+    const list = (names) => `[${names.map((n) => `"${n}"`).join(", ")}]`;
+    const fixed = this.settings.fixed.split(/[\n;]+/).filter((l) => l.includes("=")).map((l) => l.split("=").map((p) => p.trim()));
+    const chosen = `{${fixed.map(([n, v]) => `"${n}": "${v}"`).join(", ")}}`;
+    const files = [...this.tables().map((t) => t.name), ...(this.rows().length ? ["campaign.csv"] : [])];
+    return `import asperity as asp\nfrom asperity import inference\n\nfixed = ${chosen}\ngiven = {name: fixed[name] for name in ("V", "epsilon", "frequency") if name in fixed}\ntables = [inference.read_table(path, given) for path in ${list(files)}]\n`
+      + `found = inference.${one ? "fit" : "compare"}(\n    tables,\n    ${one ? `"${laws[0]}"` : list(laws)},\n    ${list(free.filter((n) => this.names.includes(n)))},\n    fixed=fixed,\n`
+      + `${material ? `    material=asp.materials.load("${material}"),\n` : ""}${profile ? "    profile=True,\n" : ""}${inertia ? "    inertia=True,\n" : ""})\n`;
+  }
+}
+
+function fitSentence(fit) {
+  if (!fit.converged) return capital(fit.message);
+  const p = fit.p_value;
+  const judged = p === null ? "" : p < 0.01 ? ": the law or the uncertainties are wrong" : ": the law describes the data";
+  return `${capital(fit.law)}: χ² = ${digits(fit.chi2)} for ${fit.dof} degrees of freedom, p = ${digits(p, 2)}${judged}.`;
+}
+
+function fitTables(fit) {
+  if (!fit.converged) return [];
+  const names = Object.keys(fit.parameters);
+  const end = (v, low) => (v === null ? (low ? "−∞" : "∞") : digits(v));
+  return [
+    ...fit.warnings.map((w) => el("p", { class: "message" }, capital(`${w}.`))),
+    table(["Parameter", "Estimate", "Standard error", "95 % interval", "Unit", ""], Object.entries(fit.parameters).map(([n, p]) => [
+      n, digits(p.value, 5), digits(p.se, 2), `${end(p.interval_95[0], true)} to ${end(p.interval_95[1], false)}`, p.unit || "1",
+      fit.undetermined.includes(n) ? "not determined by these data" : p.at_bound ? "at its bound" : p.prior ? `prior ${digits(p.prior.mean)} ± ${digits(p.prior.sd, 2)}` : "",
+    ]), "Parameters"),
+    names.length > 1 ? table(["Correlation", ...names], names.map((n, i) => [n, ...names.map((_, j) => (j > i ? "" : digits(fit.correlation.matrix[i][j], 2)))]), "Correlations") : null,
+    table(["Observable", "χ²", "data"], Object.entries(fit.observables).map(([n, o]) => [n, digits(o.chi2), String(o.n)]), "Chi-squared of each observable"),
+    el("p", { class: "note" }, `Log-likelihood ${digits(fit.log_likelihood, 6)}, AICc ${digits(fit.aicc, 6)}, BIC ${digits(fit.bic, 6)}. Noise: ${fit.noise.model}.`),
+  ].filter(Boolean);
+}
+
+function table(head, rows, label) {
+  return el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": label }, el("table", {},
+    el("thead", {}, el("tr", {}, head.map((t) => (t ? el("th", { scope: "col" }, t) : el("td", {}))))),
+    el("tbody", {}, rows.map(([first, ...rest]) => el("tr", {}, el("th", { scope: "row" }, first), rest.map((t) => el("td", {}, t)))))));
+}
+
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

@@ -1,0 +1,167 @@
+// The virtual tribometer: a protocol that is checked while it is written, run, and recorded.
+
+import { Figure, series } from "../../lib/charts.js";
+import { choice } from "../../lib/controls.js";
+import { el, fill, fresh } from "../../lib/dom.js";
+import { copyText } from "../../lib/save.js";
+import { Refused, run } from "../../lib/server.js";
+import { digits } from "../../lib/units.js";
+
+/** Time (ms) without a key after which the text is checked. */
+const REST = 350;
+/** Longest text (characters) that a link holds. */
+const LONGEST = 4000;
+
+export class ProtocolPanel {
+  constructor(page, { read, changed }) {
+    Object.assign(this, { page, read, changed });
+    const id = fresh("protocol");
+    this.text = el("textarea", {
+      id, rows: 22, spellcheck: "false", autocomplete: "off", autocapitalize: "off", class: "code",
+      "aria-describedby": `${id}-mistakes`,
+      input: () => { this.#checkLater(); this.changed(); },
+    });
+    this.mistakes = el("div", { class: "mistakes", id: `${id}-mistakes`, role: "status" });
+    this.status = el("p", { class: "sentence", role: "status" });
+    this.message = el("p", { class: "message", role: "alert" });
+    this.bar = el("progress", { max: 1, "aria-label": "Progress of the run" });
+    this.bar.hidden = true;
+    this.result = el("div", { class: "card-body" });
+    this.runButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Run");
+    this.cancel = el("button", { type: "button", click: () => this.work?.abort() }, "Cancel");
+    this.cancel.hidden = true;
+    this.chooser = el("div");
+    this.figure = new Figure({
+      name: "motion", title: "The motion", height: 420,
+      columns: () => ({ time: this.found.curves.load.x, load: this.found.curves.load.y, force: this.found.curves.force.y, velocity: this.found.curves.velocity.y }),
+    });
+    this.details = el("details", { class: "recording virtual" },
+      el("summary", {}, el("h3", {}, "Virtual tribometer")),
+      el("p", { class: "note" }, "A protocol in TOML, as for asperity run: what slides, how it begins, the steps, and what records them."),
+      this.chooser,
+      el("div", { class: "choice" }, el("label", { for: id }, "Protocol"), this.text), this.mistakes,
+      el("div", { class: "actions" }, this.runButton, this.cancel,
+        el("button", { type: "button", click: (e) => copyText(this.#python(), e.currentTarget) }, "Copy as Python"),
+        el("button", { type: "button", click: (e) => copyText("asperity run protocol.toml --out run.nc --record recording.csv", e.currentTarget) }, "Copy as command")),
+      this.status, this.bar, this.message, this.result);
+    this.details.addEventListener("toggle", () => { if (this.protocols && this.details.open) { this.#check(); this.changed(); } });
+    this.element = this.details;
+  }
+
+  begin(protocols) {
+    this.protocols = protocols;
+    this.name = protocols.modulation ? "modulation" : Object.keys(protocols)[0];
+    this.text.value = protocols[this.name];
+    this.#chooser();
+  }
+
+  #chooser() {
+    fill(this.chooser, choice("Begin with", Object.keys(this.protocols).map((n) => [n, n.replaceAll("_", " ")]), this.name, (n) => {
+      this.name = n;
+      this.text.value = this.protocols[n];
+      this.#check();
+      this.changed();
+    }).element);
+  }
+
+  save(parameters) {
+    if (!this.protocols || !this.details.open) return;
+    parameters.set("run", this.name);
+    if (this.text.value !== this.protocols[this.name] && this.text.value.length < LONGEST) parameters.set("protocol", this.text.value);
+  }
+
+  restore(parameters) {
+    const chosen = parameters.get("run");
+    if (chosen in this.protocols) this.name = chosen;
+    this.text.value = parameters.get("protocol") || this.protocols[this.name];
+    this.#chooser();
+    this.details.open = parameters.has("run");
+  }
+
+  #checkLater() {
+    clearTimeout(this.resting);
+    this.resting = setTimeout(() => this.#check(), REST);
+  }
+
+  async #check() {
+    clearTimeout(this.resting);
+    this.checking?.abort();
+    this.checking = new AbortController();
+    const { signal } = this.checking;
+    try {
+      const last = await run("data/protocol", { text: this.text.value }, () => {}, signal);
+      if (!signal.aborted && last.result) this.#checked(last.result);
+    } catch (error) {
+      if (error.name === "AbortError") return;
+      if (!(error instanceof Refused)) throw error;
+      this.#checked({ mistakes: [{ sentence: error.message, line: null }] });
+    }
+  }
+
+  #checked({ mistakes, duration, rows, steps, records }) {
+    this.text.setAttribute("aria-invalid", String(mistakes.length > 0));
+    fill(this.mistakes, mistakes.length
+      ? mistakes.map(({ sentence, line }) => el("p", {}, line
+        ? el("button", { type: "button", class: "quiet small", click: () => this.#goTo(line) }, `line ${line}`) : "", ` ${capital(sentence)}`))
+      : el("p", { class: "fine" }, `${steps} steps, ${digits(duration, 4)} s${rows ? `, ${Math.round(rows).toLocaleString("en")} rows` : ""}; ${records ? "recorded by its tribometer" : "without a tribometer: the motion itself is read"}.`));
+  }
+
+  #goTo(line) {
+    const lines = this.text.value.split("\n");
+    const start = lines.slice(0, line - 1).join("\n").length + (line > 1 ? 1 : 0);
+    this.text.focus();
+    this.text.setSelectionRange(start, start + lines[line - 1].length);
+    this.text.scrollTop = Math.max(0, (line - 5) * parseFloat(getComputedStyle(this.text).lineHeight));
+  }
+
+  async start() {
+    this.work?.abort();
+    this.work = new AbortController();
+    this.message.textContent = "";
+    fill(this.result);
+    this.cancel.hidden = false;
+    this.bar.hidden = false;
+    this.bar.removeAttribute("value");
+    this.status.textContent = "Preparing…";
+    try {
+      const last = await run("data/run", { text: this.text.value }, (told) => {
+        if (told.waiting) this.status.textContent = "Waiting for another run…";
+        if (told.reached !== undefined) {
+          this.bar.value = told.reached / told.duration;
+          this.status.textContent = `${digits(told.reached, 3)} s of ${digits(told.duration, 3)} s`;
+        }
+      }, this.work.signal);
+      if (last.result) this.#draw(last.result);
+    } catch (error) {
+      this.status.textContent = error.name === "AbortError" ? "Cancelled." : "";
+      if (error instanceof Refused) this.message.textContent = capital(error.message);
+      else if (error.name !== "AbortError") throw error;
+    } finally {
+      this.cancel.hidden = true;
+      this.bar.hidden = true;
+    }
+  }
+
+  #draw(found) {
+    this.found = found;
+    this.status.textContent = found.stopped ? capital(found.stopped) : `Done: ${found.rows.toLocaleString("en")} rows.`;
+    fill(this.result,
+      found.stability && el("p", { class: "note" }, capital(found.stability)),
+      el("div", { class: "actions" }, el("button", { type: "button", class: "primary", click: () => this.read({ id: found.id, name: found.name }) }, "Read this recording")),
+      this.figure.element);
+    const { load, force, velocity } = found.curves;
+    this.figure.draw({
+      x: { label: "time (s)" },
+      rows: [["load (N)", load, 5], ["force (N)", force, 0], ["velocity (m/s)", velocity, 1]]
+        .map(([label, curve, k]) => ({ y: { label }, lines: [{ ...curve, cls: series(k), name: label }] })),
+    }, "Load, force and slip velocity over the run.");
+  }
+
+  #python() {
+    return 'from asperity.protocol import load_protocol, record_run, run_protocol\n\nprotocol = load_protocol("protocol.toml")\nrun_protocol(protocol, "run.nc")\nif protocol.setup is not None:\n    trace = record_run(protocol.setup, "run.nc")\n    print(trace)\n';
+  }
+}
+
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

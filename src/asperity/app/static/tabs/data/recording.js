@@ -1,0 +1,392 @@
+// One recording: what was understood of it, corrections by hand, what was measured.
+
+import { Figure, series } from "../../lib/charts.js";
+import { choice, tick } from "../../lib/controls.js";
+import { el, fill, fresh } from "../../lib/dom.js";
+import { copyText, csv, saveFile } from "../../lib/save.js";
+import { Refused, run, sendFile } from "../../lib/server.js";
+import { digits, quantity } from "../../lib/units.js";
+
+const ROLE_NAMES = {
+  time: "time", W: "normal load", F: "shear force", velocity: "velocity",
+  displacement: "displacement", friction: "friction",
+};
+let numbered = 0;
+
+export class RecordingCard {
+  constructor(page, known, state, { changed, removed }) {
+    Object.assign(this, { page, known, changed, removed });
+    this.state = { key: null, name: "", ...state };
+    this.state.source = { columns: {}, units: {}, channels: {}, ...(state.source || {}) };
+    this.state.options = { ...(state.options || {}) };
+    this.number = numbered += 1;
+    this.result = null;
+    this.recording = null;
+    this.chosen = new Map();
+    this.status = el("p", { class: "sentence", role: "status" });
+    this.bar = el("progress", { max: 1, "aria-label": `Progress of ${this.state.name}` });
+    this.message = el("p", { class: "message", role: "alert" });
+    this.body = el("div", { class: "card-body" });
+    this.forms = el("div", { class: "card-forms" });
+    this.element = el("article", { class: "recording", tabindex: "-1", "aria-label": this.state.name },
+      el("header", {}, el("h3", {}, this.state.name),
+        el("button", { type: "button", class: "quiet", "aria-label": `Remove ${this.state.name}`, click: () => this.remove() }, "Remove")),
+      this.status, this.bar, this.message, this.forms, this.body);
+    this.bar.hidden = true;
+  }
+
+  saved() {
+    return [this.state.key, this.state.name, this.state.source, this.state.options];
+  }
+
+  rows() {
+    const rows = this.result?.measured?.rows || [];
+    return rows.filter((row, i) => row.kind === "amplitude" && !row.reason && this.chosen.get(i) !== false);
+  }
+
+  table() {
+    const table = this.result?.table;
+    return table ? { name: table.name, text: table.text } : null;
+  }
+
+  remove() {
+    this.stop();
+    this.removed();
+  }
+
+  stop() {
+    this.work?.abort();
+    this.work = new AbortController();
+    return this.work.signal;
+  }
+
+  async send(file) {
+    const signal = this.stop();
+    this.#says("Sending…");
+    this.bar.hidden = false;
+    try {
+      const sent = await sendFile("data/upload", file, (share) => { this.bar.value = share; }, signal);
+      this.state.key = sent.id;
+      await this.measure();
+    } catch (error) {
+      this.#refused(error);
+    }
+  }
+
+  async measure() {
+    const signal = this.stop();
+    this.message.textContent = "";
+    this.bar.hidden = false;
+    this.bar.removeAttribute("value");
+    this.#says("Reading…");
+    try {
+      const { source, options } = this.state;
+      const last = await run("data/measure", { recording: this.state.key, source, options }, (told) => {
+        if (signal.aborted) return;
+        if (told.waiting) this.#says("Waiting for another recording…");
+        if (told.stage === "measuring") this.#says("Measuring…");
+        if (told.recording) { this.recording = told.recording; this.#drawForms(); }
+      }, signal, `r${this.number}`);
+      if (signal.aborted || !last.result) return;
+      this.result = last.result;
+      this.chosen.clear();
+      this.bar.hidden = true;
+      this.#draw();
+      this.changed();
+    } catch (error) {
+      this.#refused(error);
+    }
+  }
+
+  #refused(error) {
+    if (error.name === "AbortError") return;
+    if (!(error instanceof Refused)) throw error;
+    this.bar.hidden = true;
+    this.result = null;
+    fill(this.body);
+    this.#says("Not measured.", "bad");
+    this.message.textContent = capital(error.message);
+    if (this.state.key) this.#drawForms();
+    this.changed();
+  }
+
+  #says(text, state = "") {
+    this.status.dataset.state = state;
+    this.status.textContent = text;
+  }
+
+  // --- Corrections -----------------------------------------------------------------------------
+
+  #drawForms() {
+    const { source, options } = this.state;
+    const open = this.forms.querySelector("details")?.open;
+    const again = () => this.measure();
+    const text = (label, value, set, placeholder = "", kind = "text") => {
+      const id = fresh("field");
+      const field = el("input", {
+        type: kind, id, placeholder, spellcheck: "false", autocomplete: "off",
+        change: () => { set(field.value.trim()); again(); },
+      });
+      field.value = value ?? "";
+      return el("div", { class: "choice" }, el("label", { for: id }, label), field);
+    };
+    const optional = (object, key) => (value) => { if (value) object[key] = value; else delete object[key]; };
+    const numbers = (value) => value.split(/[,;\s]+/).filter(Boolean).map(Number).filter(Number.isFinite);
+    const { recording } = this;
+    const channels = recording ? [this.#channelTable(recording, again)] : [];
+    const mode = options.mode || "auto";
+    fill(this.forms, el("details", { open: Boolean(open || !this.recording || this.message.textContent) },
+      el("summary", {}, "Channels, units and options"),
+      ...channels,
+      el("form", { class: "filters", submit: (e) => e.preventDefault() },
+        choice("What it is", [["auto", "found by the program"], ["modulated", "a modulated load"], ["sliding", "velocity steps and holds"]],
+          mode, (v) => { options.mode = v; again(); }).element,
+        text("Frequency", options.frequency, optional(options, "frequency"), "found, or 120 Hz"),
+        tick("Take it as exact", Boolean(options.exact_frequency), (on) => { if (on) options.exact_frequency = true; else delete options.exact_frequency; again(); }).element,
+        text("Harmonics", options.harmonics ?? 4, (v) => { options.harmonics = Math.round(Number(v)) || 4; }, "4", "text"),
+        text("Window (s)", options.window?.join(" to "), (v) => {
+          const found = numbers(v.replace("to", " ").replaceAll(":", " "));
+          if (found.length === 2) options.window = found; else delete options.window;
+        }, "chosen, or 10 to 60"),
+        tick("Whole periods only", Boolean(options.whole_periods), (on) => { if (on) options.whole_periods = true; else delete options.whole_periods; again(); }).element,
+        choice("Drift", ["none", "linear", "quadratic"].map((n) => [n, n]), options.detrend || "linear", (v) => { options.detrend = v; again(); }).element,
+        text("Velocity steps (s)", options.steps?.join(", "), (v) => { const f = numbers(v); if (f.length) options.steps = f; else delete options.steps; }, "found, or 12.5, 60"),
+        text("Holds (s)", options.holds?.map((h) => h.join(":")).join(", "), (v) => {
+          const f = v.split(/[,;]+/).map((h) => numbers(h.replace(":", " "))).filter((h) => h.length === 2);
+          if (f.length) options.holds = f; else delete options.holds;
+        }, "found, or 100:110"),
+        text("Sampling rate", source.rate, optional(source, "rate"), "from the file, or 10 kHz"),
+        text("Area", source.area, optional(source, "area"), "makes stresses forces, 25 cm^2"),
+        text("Group", source.group, optional(source, "group"), "of HDF5, MATLAB, TDMS"),
+        text("Delimiter", source.delimiter, optional(source, "delimiter"), "seen from the file"),
+        text("Decimal mark", source.decimal, optional(source, "decimal"), "seen from the file"),
+        text("Made channel", Object.entries(source.channels).map(([n, e]) => `${n} = ${e}`).join("; "), (v) => {
+          source.channels = Object.fromEntries(v.split(";").map((one) => one.split("=").map((p) => p.trim())).filter((p) => p.length === 2 && p[0] && p[1]));
+        }, "load = A - B"))));
+  }
+
+  #channelTable(recording, again) {
+    const { source } = this.state;
+    const roleOf = (name) => Object.entries({ ...recording.roles }).find(([, n]) => n === name)?.[0] || "";
+    const shown = (channel, value) => (value === undefined ? "–" : channel.kind ? quantity(value, channel.kind, 3) : digits(value, 3));
+    const rows = recording.channels.map((channel) => {
+      const role = el("select", {
+        "aria-label": `Role of ${channel.name}`,
+        change: () => {
+          for (const [r, n] of Object.entries(source.columns)) if (n === channel.name) delete source.columns[r];
+          if (role.value) source.columns[role.value] = channel.name;
+          again();
+        },
+      }, [["", "–"], ...Object.entries(ROLE_NAMES)].map(([v, t]) => el("option", { value: v }, t)));
+      role.value = roleOf(channel.name);
+      const unit = el("input", {
+        type: "text", class: "unit", "aria-label": `Unit of ${channel.name}`, placeholder: channel.recorded_unit || "unit",
+        change: () => {
+          if (unit.value.trim()) source.units[channel.name] = unit.value.trim(); else delete source.units[channel.name];
+          again();
+        },
+      });
+      unit.value = source.units[channel.name] || "";
+      return el("tr", {},
+        el("th", { scope: "row" }, channel.name), el("td", {}, role), el("td", {}, unit),
+        el("td", {}, channel.kind === null ? "not understood" : channel.unit || "pure number"),
+        el("td", {}, `${shown(channel, channel.least)} to ${shown(channel, channel.largest)}`),
+        el("td", {}, channel.curve ? sparkline(channel.curve) : ""));
+    });
+    const rate = recording.rate ? `${digits(recording.rate, 6)} Hz` : "uneven sampling";
+    return el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": "Channels as understood" },
+      el("p", { class: "note" }, `${recording.samples.toLocaleString("en")} samples, ${digits(recording.start, 6)} s to ${digits(recording.end, 6)} s, ${rate}; ${recording.provenance.format || ""}`),
+      el("table", {}, el("thead", {}, el("tr", {}, ["Channel", "Role", "Unit", "Understood", "Values", ""].map((t) => el("th", { scope: "col" }, t)))),
+        el("tbody", {}, rows)));
+  }
+
+  // --- Results ---------------------------------------------------------------------------------
+
+  #draw() {
+    if (this.result.table) return this.#drawTable();
+    const { measured } = this.result;
+    const { record } = measured;
+    this.#says(this.#sentence(record, measured.note), record.verdict === "ok" ? "stable" : "unstable");
+    const figures = record.mode === "modulated" ? this.#modulated(measured) : this.#sliding(measured);
+    fill(this.body,
+      el("div", { class: "actions" },
+        copy("Copy as Python", () => this.result.python), copy("Copy as command", () => this.result.command),
+        el("button", { type: "button", click: () => saveFile(`${this.state.name}.json`, JSON.stringify(record, null, 2), "application/json") }, "JSON"),
+        el("button", { type: "button", click: () => saveRows(`${this.state.name}-rows.csv`, measured.rows) }, "CSV")),
+      figures.readings, this.#rowTable(measured.rows),
+      el("div", { class: "panels" }, figures.list.map((f) => f.element)),
+      this.#checks(record.checks), this.#findings());
+    for (const [figure, chart, description] of figures.charts) figure.draw(chart, description);
+    return undefined;
+  }
+
+  #sentence(record, note) {
+    const bad = record.checks.filter((c) => c.verdict === "bad").map((c) => c.name);
+    const doubtful = record.checks.filter((c) => c.verdict === "suspicious").map((c) => c.name);
+    const verdict = bad.length ? `bad: ${bad.join(", ")}` : doubtful.length ? `doubtful: ${doubtful.join(", ")}` : "all checks are good";
+    const what = record.mode === "modulated"
+      ? `Modulated at ${digits(record.frequency, 6)} Hz by ${digits(100 * record.epsilon, 3)} %`
+      : `No modulation: ${count(record.steps.length, "velocity step")}, ${count(record.holds.length, "hold")}`;
+    return `${what}; ${verdict}.${note && record.mode === "sliding" && this.state.options.mode === "sliding" ? ` ${note}` : ""}`;
+  }
+
+  #modulated({ record, curves }) {
+    const names = ["mean_friction", "delta_mu", ...Object.keys(record).filter((n) => /^(mu|phase)\d$/.test(n)), "epsilon", "frequency", "W0"];
+    const units = { frequency: "Hz", W0: record.unit };
+    const readings = el("dl", { class: "readings" }, names.filter((n) => record[n] !== null).map((n) => el("div", {},
+      el("dt", {}, n), el("dd", {}, `${withDoubt(record[n], record.uncertainties[n])} ${n.startsWith("phase") ? "rad" : units[n] || ""}`.trim()))));
+    const whole = this.#figure("whole", "The recording", curves.force, ["time", "force over W0"]);
+    const cycle = this.#figure("cycle", "Mean cycle", { x: curves.cycle.phase, y: curves.cycle.measured }, ["phase", "friction less mean"]);
+    const spectrum = this.#figure("spectrum", "What the harmonics leave", curves.spectrum, ["frequency", "amplitude"]);
+    const amplitudes = record.harmonics.map(([a, b]) => Math.hypot(a, b));
+    const bars = this.#figure("harmonics", "Harmonics", { x: amplitudes.map((_, i) => i + 1), y: amplitudes }, ["harmonic", "amplitude"]);
+    const { start, end } = record.window;
+    return {
+      readings, list: [whole, cycle, bars, spectrum],
+      charts: [
+        [whole, { x: { label: "time (s)" }, rows: [
+          { y: { label: "W/W₀" }, marks: [start, end], lines: [{ ...curves.load, cls: series(5), name: "load" }] },
+          { y: { label: "F/W₀" }, marks: [start, end], lines: [{ ...curves.force, cls: series(0), name: "force" }] },
+        ] }, `Load and force; read from ${digits(start, 6)} s to ${digits(end, 6)} s.`],
+        [cycle, { x: { label: "phase of the load / 2π", range: [0, 1] }, rows: [{
+          y: { label: "F/W₀ − mean" },
+          lines: [{ x: curves.cycle.fine_phase, y: curves.cycle.fitted, cls: series(1), name: "harmonics", thick: true }],
+          points: [{ x: curves.cycle.phase, y: curves.cycle.measured, cls: series(0) }],
+        }] }, "Mean cycle with the fitted harmonics."],
+        [bars, { x: { label: "harmonic n", range: [0.4, amplitudes.length + 0.6], ticks: amplitudes.map((_, i) => i + 1) }, rows: [{
+          y: { label: "μₙ", log: true, range: [Math.min(...amplitudes.filter((v) => v > 0)) / 3, 2 * Math.max(...amplitudes)] },
+          bars: [{ x: amplitudes.map((_, i) => i + 1), y: amplitudes, cls: series(0), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])} ± ${digits(record.uncertainties[`mu${i + 1}`], 2)}` }],
+        }] }, amplitudes.map((v, i) => `μ${i + 1} ${digits(v, 3)}`).join(", ")],
+        [spectrum, { x: { label: "frequency (Hz)" }, rows: [{
+          y: { label: "amplitude of F/W₀", log: true },
+          lines: [{ ...curves.spectrum, cls: series(5), name: "left" }],
+          points: [{ x: amplitudes.map((_, i) => (i + 1) * record.frequency), y: amplitudes, cls: series(1), title: (i) => `μ${i + 1} = ${digits(amplitudes[i])}` }],
+        }] }, "Spectrum of what the fit leaves, beside the harmonics."],
+      ],
+    };
+  }
+
+  #sliding({ record, curves }) {
+    const readings = el("dl", { class: "readings" },
+      [["mean friction", withDoubt(record.friction.value, record.friction.uncertainty)],
+        ...(record.healing ? [["healing per decade", withDoubt(record.healing.per_decade, record.healing.uncertainty)]] : [])]
+        .map(([t, v]) => el("div", {}, el("dt", {}, t), el("dd", {}, v))));
+    const whole = this.#figure("whole", "Friction, segments, steps and holds", curves.friction, ["time", "friction"]);
+    whole.height = 320;
+    const levels = record.segments.filter((s) => !s.hold).map((s) => ({ x: [s.steady.start, s.end], y: [s.steady.value, s.steady.value], cls: series(1), thick: true, name: `${quantity(s.velocity ?? 0, "velocity", 3)}` }));
+    const rate = this.#figure("rates", "Rate dependence A − B", { x: record.steps.map((s) => s.velocity_after), y: record.steps.map((s) => s.rate_dependence) }, ["velocity after", "rate dependence"]);
+    const healing = this.#figure("healing", "Healing after holds", { x: record.holds.map((h) => h.hold_time), y: record.holds.map((h) => h.healing) }, ["hold time", "healing"]);
+    const charts = [[whole, { x: { label: "time (s)" }, rows: [{
+      y: { label: "friction F/W" }, marks: record.segments.slice(1).map((s) => s.start),
+      lines: [{ ...curves.friction, cls: series(5), name: "friction" }, ...levels],
+      points: [{ x: record.holds.map((h) => h.peak_time), y: record.holds.map((h) => h.peak), cls: series(0), title: (i) => `peak after ${digits(record.holds[i].hold_time, 3)} s: ${digits(record.holds[i].peak, 4)}` }],
+    }] }, `Friction over time: ${count(record.steps.length, "step")}, ${count(record.holds.length, "hold")}.`]];
+    const list = [whole];
+    if (record.steps.length) {
+      list.push(rate);
+      const at = record.steps.map((s) => Math.abs(s.velocity_after));
+      charts.push([rate, { x: { label: "velocity after the step (m/s)", log: true }, rows: [{ y: { label: "A − B" }, ...errorBars(at, record.steps.map((s) => s.rate_dependence), record.steps.map((s) => s.rate_uncertainty)) }] }, "A − B of each velocity step."]);
+    }
+    if (record.holds.length) {
+      list.push(healing);
+      charts.push([healing, { x: { label: "hold time (s)", log: true }, rows: [{ y: { label: "healing" }, ...errorBars(record.holds.map((h) => h.hold_time), record.holds.map((h) => h.healing), record.holds.map((h) => h.healing_uncertainty)) }] }, "Healing against the time of each hold."]);
+    }
+    return { readings, list, charts };
+  }
+
+  #figure(kind, title, curve, [x, y]) {
+    return new Figure({ name: kind, title, height: kind === "whole" ? 360 : 260, columns: () => ({ [x]: curve.x, [y]: curve.y }) });
+  }
+
+  /** Rows of the table that a fit takes, to be left out one by one. */
+  #rowTable(rows) {
+    const modulated = rows.some((r) => r.kind === "amplitude");
+    const columns = modulated
+      ? [["epsilon", "ε"], ["frequency", "f (Hz)"], ["mean_friction", "mean μ"], ["delta_mu", "Δμ̄"], ["mu1", "μ₁"], ["phase1", "phase₁"], ["mu2", "μ₂"]]
+      : [["velocity_before", "V before"], ["velocity_after", "V after"], ["change", "change"], ["rate_dependence", "A − B"], ["hold_time", "hold (s)"], ["relaxation", "relaxation"], ["healing", "healing"]];
+    if (!rows.length) return el("p");
+    const cell = (row, n) => {
+      const value = row[n];
+      if (value === null || value === undefined) return "–";
+      if (n.startsWith("velocity")) return quantity(value, "velocity", 3);
+      return withDoubt(value, row[`${n}_uncertainty`] ?? (n === "rate_dependence" ? row.rate_uncertainty : null));
+    };
+    return el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": "What was measured" }, el("table", {},
+      el("thead", {}, el("tr", {}, [modulated ? "In fits" : "", "From (s)", ...columns.map(([, t]) => t), "Verdict"].map((t) => (t ? el("th", { scope: "col" }, t) : el("td", {}))))),
+      el("tbody", {}, rows.map((row, i) => {
+        const box = el("input", {
+          type: "checkbox", "aria-label": `Use part ${row.part} in fits`, change: () => { this.chosen.set(i, box.checked); this.changed(); },
+        });
+        box.checked = this.chosen.get(i) !== false;
+        return el("tr", {}, el("td", {}, modulated && !row.reason ? box : ""), el("td", {}, digits(row.start, 6)),
+          row.reason ? el("td", { colspan: columns.length + 1 }, row.reason) : [...columns.map(([n]) => el("td", {}, cell(row, n))), el("td", { class: row.verdict }, row.verdict)]);
+      }))));
+  }
+
+  #checks(checks) {
+    const worst = checks.filter((c) => c.verdict === "bad" || c.verdict === "suspicious");
+    return el("details", { open: worst.length > 0 }, el("summary", {}, `Checks: ${checks.length - worst.length} good, ${worst.length} doubtful or bad`),
+      el("ul", { class: "checks" }, [...worst, ...checks.filter((c) => !worst.includes(c))].map((c) => el("li", { class: c.verdict },
+        el("span", { class: "badge" }, c.verdict), el("b", {}, c.name), ` ${c.sentence}`))));
+  }
+
+  #findings() {
+    const found = this.recording?.findings || [];
+    if (!found.length) return null;
+    return el("details", {}, el("summary", {}, `${count(found.length, "finding")} in the file`),
+      el("ul", { class: "checks" }, found.map((f) => el("li", { class: f.severity }, el("span", { class: "badge" }, f.severity), el("b", {}, f.name), ` ${f.sentence}`))));
+  }
+
+  #drawTable() {
+    const { table } = this.result;
+    this.#says(table.json ? "A lock-in reading." : `A lock-in table of ${count(table.count, "row")}.`, "stable");
+    fill(this.forms);
+    fill(this.body, table.json ? [] : el("div", { class: "table-holder tall", tabindex: "0", role: "region", "aria-label": table.name }, el("table", {},
+      el("thead", {}, el("tr", {}, table.header.map((h) => el("th", { scope: "col" }, h)))),
+      el("tbody", {}, table.rows.map((row) => el("tr", {}, row.map((v) => el("td", {}, v)))))))); 
+  }
+}
+
+function errorBars(x, y, doubt) {
+  return {
+    lines: x.map((at, i) => ({ x: [at, at], y: [y[i] - 2 * (doubt[i] ?? 0), y[i] + 2 * (doubt[i] ?? 0)], cls: series(0) })),
+    points: [{ x, y, cls: series(0), title: (i) => `${withDoubt(y[i], doubt[i])} at ${digits(x[i], 3)}` }],
+  };
+}
+
+function sparkline({ x, y }) {
+  const known = y.map((v, i) => [x[i], v]).filter(([, v]) => v !== null);
+  if (known.length < 2) return "";
+  const [low, high] = [Math.min(...known.map((k) => k[1])), Math.max(...known.map((k) => k[1]))];
+  const [first, last] = [known[0][0], known.at(-1)[0]];
+  const path = known.map(([t, v], i) => `${i ? "L" : "M"}${(120 * (t - first) / (last - first || 1)).toFixed(1)} ${(23 - 22 * (v - low) / (high - low || 1)).toFixed(1)}`).join("");
+  const holder = el("span", { class: "spark" });
+  holder.innerHTML = `<svg width="120" height="24" viewBox="0 0 120 24" aria-hidden="true"><path d="${path}"/></svg>`;
+  return holder;
+}
+
+function copy(label, text) {
+  return el("button", { type: "button", click: (e) => { const t = text(); if (t) copyText(t, e.currentTarget); } }, label);
+}
+
+function saveRows(name, rows) {
+  const names = [...new Set(rows.flatMap((r) => Object.keys(r)))];
+  saveFile(name, csv(Object.fromEntries(names.map((n) => [n, rows.map((r) => r[n])]))), "text/csv");
+}
+
+/** A value with the digits that its standard uncertainty leaves. */
+export function withDoubt(value, doubt) {
+  if (value === null || value === undefined) return "–";
+  if (!doubt || !Number.isFinite(doubt)) return digits(value, 5);
+  const places = Math.max(0, Math.min(12, 1 - Math.floor(Math.log10(doubt))));
+  if (places > 7 || Math.abs(value) >= 1e6) return `${digits(value, 5)} ± ${digits(doubt, 2)}`;
+  return `${value.toFixed(places).replace("-", "−")} ± ${doubt.toFixed(places)}`;
+}
+
+function count(number, word) {
+  return `${number || "no"} ${word}${number === 1 ? "" : "s"}`;
+}
+
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

@@ -1,0 +1,417 @@
+// Explore: one operating point, and everything about it while the sliders move.
+
+import { Figure, series } from "../lib/charts.js";
+import { choice, group, Quantity, tick } from "../lib/controls.js";
+import { el, fill, formula } from "../lib/dom.js";
+import { copyText } from "../lib/save.js";
+import { get, Latest, Refused, run } from "../lib/server.js";
+import { digits, quantity } from "../lib/units.js";
+
+export const name = "explore";
+export const title = "Explore";
+
+/** Time (ms) without a movement after which a search begins. */
+const REST = 250;
+/** Numbers of the drive and of the machine, in the order of the page; the law's own follow. */
+const FIRST = ["V", "epsilon", "frequency", "W0", "K", "M"];
+
+export function create(page) {
+  const { catalogue } = page;
+  const laws = Object.keys(catalogue.laws);
+  const view = fresh();
+  let figures = null;
+  let searching = null;
+  let resting = 0;
+  let answer = null;
+
+  function fresh() {
+    return {
+      material: Object.keys(catalogue.materials)[0],
+      law: laws.includes("elasto-plastic") ? "elasto-plastic" : laws[0],
+      laws: ["rice-ruina", "linker-dieterich"].filter((n) => laws.includes(n)),
+      numbers: {}, air: null, phases: false,
+    };
+  }
+
+  const latest = new Latest("explore", answered, refused);
+
+  // --- The address ---------------------------------------------------------------------------
+
+  function toParameters() {
+    const found = new URLSearchParams();
+    found.set("material", view.material);
+    found.set("law", view.law);
+    found.set("laws", view.laws.join(","));
+    for (const [n, v] of Object.entries(view.numbers)) found.set(n, v);
+    if (view.air) {
+      found.set("air", "1");
+      for (const [n, v] of Object.entries(view.air)) found.set(`air.${n}`, v);
+    }
+    if (view.phases) found.set("show", "phases");
+    return found;
+  }
+
+  function fromParameters(parameters) {
+    Object.assign(view, fresh());
+    if (catalogue.materials[parameters.get("material")]) view.material = parameters.get("material");
+    if (catalogue.laws[parameters.get("law")]) view.law = parameters.get("law");
+    if (parameters.has("laws")) {
+      view.laws = parameters.get("laws").split(",").filter((n) => catalogue.laws[n]);
+    }
+    view.phases = parameters.get("show") === "phases";
+    const number = (text) => (Number.isFinite(Number(text)) ? Number(text) : text);
+    const sliders = catalogue.materials[view.material].sliders;
+    for (const [n, text] of parameters) {
+      if (n in sliders) view.numbers[n] = number(text);
+      else if (n.startsWith("air.")) (view.air ||= {})[n.slice(4)] = number(text);
+    }
+    if (parameters.get("air") === "1") view.air ||= {};
+  }
+
+  // --- Asking and drawing ----------------------------------------------------------------------
+
+  function question() {
+    const sliders = catalogue.materials[view.material].sliders;
+    const drive = Object.fromEntries(["V", "epsilon", "frequency"].map((n) => [n, sliders[n].value]));
+    return {
+      material: view.material, law: view.law, laws: view.laws,
+      numbers: { ...needed(), ...drive, ...view.numbers }, air: view.air,
+    };
+  }
+
+  /** Numbers that the chosen laws need and the material does not have: where their sliders start. */
+  function needed() {
+    const { numbers, sliders } = catalogue.materials[view.material];
+    const found = {};
+    for (const law of [view.law, ...view.laws]) {
+      for (const n of catalogue.laws[law].required) {
+        if (!numbers[n]) found[n] = sliders[n].value;
+      }
+    }
+    return found;
+  }
+
+  function changed() {
+    page.setLink(name, toParameters());
+    stopSearch();
+    latest.ask(question(), { since: performance.now() });
+  }
+
+  function stopSearch() {
+    clearTimeout(resting);
+    if (searching) searching.abort();
+    searching = null;
+  }
+
+  async function answered(found, { since }, more) {
+    answer = found;
+    message.textContent = "";
+    page.say(found.preparing ? `Preparing ${found.preparing}, once; this takes some seconds.` : "");
+    if (found.preparing) {
+      resting = setTimeout(() => latest.ask(question(), { since: performance.now() }), 400);
+    }
+    if (!found.point) return;
+    draw();
+    // The picture is on the screen after the next frame.
+    await new Promise((resolve) => requestAnimationFrame(() => setTimeout(resolve)));
+    performance.measure("slider to picture", { start: since, end: performance.now() });
+    if (performance.getEntriesByName("slider to picture").length > 1000) {
+      performance.clearMeasures("slider to picture");
+    }
+    const open = !found.point.searched || Object.values(found.curves).some((c) => c.left.length);
+    if (open && !more && !latest.pending && !found.preparing) resting = setTimeout(search, REST);
+  }
+
+  function refused(error) {
+    if (!(error instanceof Refused)) throw error;
+    message.textContent = error.message;
+    page.say("");
+  }
+
+  async function search() {
+    searching = new AbortController();
+    const { signal } = searching;
+    try {
+      await run("explore/search", question(), (told) => {
+        if (signal.aborted) return;
+        if (told.point) answer.point = told.point;
+        else if (told.curve) {
+          const curve = answer.curves[told.curve];
+          told.rows.forEach((row, i) => {
+            for (const n of ["mean_friction", "mu1", "mu2", "phase1", "phase2"]) {
+              curve[n][row] = told[n][i];
+            }
+            if (!told.converged[i] && !curve.lost) {
+              curve.lost = { at: answer.amplitudes[row], row, why: told.result[i] };
+            }
+          });
+          curve.left = curve.left.filter((row) => !told.rows.includes(row));
+        } else return;
+        draw();
+      }, signal);
+    } catch (error) {
+      if (error.name !== "AbortError") refused(error);
+    }
+  }
+
+  // --- Figures ---------------------------------------------------------------------------------
+
+  function makeFigures() {
+    const found = {
+      period: new Figure({
+        name: "period", title: "One period", height: 400,
+        columns: () => answer.point?.converged && {
+          phase: answer.point.phase, force: answer.point.force, slip_velocity: answer.point.slip,
+          ...(answer.point.age ? { age: answer.point.age } : {}),
+        },
+      }),
+      amplitude: new Figure({
+        name: "amplitude", title: "Against the amplitude", height: 400, columns: amplitudeColumns,
+        options: phases.element,
+      }),
+      harmonics: new Figure({
+        name: "harmonics", title: "Harmonics of the force", height: 230,
+        columns: () => answer.point?.converged && {
+          harmonic: answer.point.harmonics.map((_, i) => i + 1),
+          real: answer.point.harmonics.map((c) => c[0]),
+          imaginary: answer.point.harmonics.map((c) => c[1]),
+          amplitude: answer.point.harmonics.map(([a, b]) => Math.hypot(a, b)),
+        },
+      }),
+      multipliers: new Figure({
+        name: "multipliers", title: "Floquet multipliers", height: 230,
+        columns: () => answer.point?.converged && {
+          real: answer.point.multipliers.map((m) => m[0]),
+          imaginary: answer.point.multipliers.map((m) => m[1]),
+        },
+      }),
+      air: new Figure({
+        name: "air", title: "Air layer", height: 230,
+        columns: () => answer.air && {
+          frequency: answer.air.frequency, share: answer.air.share, phase: answer.air.phase,
+        },
+      }),
+    };
+    return found;
+  }
+
+  function amplitudeColumns() {
+    if (!answer?.curves) return null;
+    const columns = { epsilon: answer.amplitudes };
+    for (const [law, curve] of Object.entries(answer.curves)) {
+      for (const n of ["mean_friction", "mu1", "mu2", "phase1", "phase2"]) {
+        columns[`${law} ${n}`] = curve[n];
+      }
+    }
+    return columns;
+  }
+
+  function draw() {
+    if (!answer || !answer.point) return;
+    drawSentence();
+    drawPeriod();
+    drawHarmonics();
+    drawMultipliers();
+    drawAmplitude();
+    drawAir();
+  }
+
+  function drawSentence() {
+    const { point } = answer;
+    const word = !point.searched ? "searching" : !point.converged ? "lost" : point.stable ? "stable" : "unstable";
+    sentence.dataset.state = word;
+    const text = word === "searching"
+      ? "Searching for the orbit…"
+      : word === "lost" ? `No orbit: ${point.result}.` : `${capital(point.result)}.`;
+    if (sentence.textContent !== text) sentence.textContent = text;
+    const shown = point.converged
+      ? [
+        ["mean F/W₀", digits(point.mean_friction, 5)], ["Δμ̄", digits(point.delta_mu, 4)],
+        ["μ₁", digits(point.mu1, 4)], ["phase", `${digits(point.phase1, 3)} rad`],
+        ["μ₂", digits(point.mu2, 4)], ["ε on the contacts", digits(answer.epsilon, 4)],
+      ]
+      : [["ε on the contacts", digits(answer.epsilon, 4)]];
+    fill(readings, shown.map(([label, value]) => el("div", {}, el("dt", {}, label), el("dd", {}, value))));
+  }
+
+  function drawPeriod() {
+    const { point } = answer;
+    const x = { label: "time over the period", range: [0, 1] };
+    if (!point.converged) return figures.period.draw(nothing(x), "No orbit.");
+    const rows = [["F/W₀", point.force], ["slip velocity / V", point.slip]];
+    if (point.age) rows.push(["age / steady age", point.age]);
+    return figures.period.draw({
+      x,
+      rows: rows.map(([label, y]) => ({ y: { label }, lines: [{ x: point.phase, y, cls: series(0), thick: true }] })),
+    }, `Force from ${digits(Math.min(...point.force))} to ${digits(Math.max(...point.force))} W₀, ` +
+      `slip up to ${digits(Math.max(...point.slip))} V.`);
+  }
+
+  function drawHarmonics() {
+    const { point } = answer;
+    const x = { label: "harmonic n" };
+    if (!point.converged) return figures.harmonics.draw(nothing(x), "No orbit.");
+    const size = point.harmonics.map(([a, b]) => Math.hypot(a, b));
+    const order = size.map((_, i) => i + 1);
+    const largest = Math.max(...size);
+    const phase = (i) => digits(Math.atan2(point.harmonics[i][1], point.harmonics[i][0]), 3);
+    return figures.harmonics.draw({
+      x: { ...x, format: String, range: [0.4, size.length + 0.6], ticks: order },
+      rows: [{
+        y: { label: "amplitude μₙ", log: true, range: [Math.max(Math.min(...size.filter((s) => s > 0)) / 3, largest * 1e-9), largest * 2] },
+        bars: [{ x: order, y: size, cls: series(0), title: (i) => `μ${i + 1} = ${digits(size[i])}, phase ${phase(i)} rad` }],
+      }],
+    }, size.map((s, i) => `μ${i + 1} ${digits(s, 3)}`).join(", "));
+  }
+
+  function drawMultipliers() {
+    const { point } = answer;
+    const x = { label: "real part" };
+    if (!point.converged) return figures.multipliers.draw(nothing(x), "No orbit.");
+    const known = point.multipliers.filter((m) => m[0] !== null);
+    const far = 1.15 * Math.max(1, ...known.map(([a, b]) => Math.hypot(a, b)));
+    return figures.multipliers.draw({
+      x: { ...x, range: [-far, far] },
+      rows: [{
+        y: { label: "imaginary part", range: [-far, far] }, equal: true, circle: 1,
+        points: [{
+          x: known.map((m) => m[0]), y: known.map((m) => m[1]), cls: point.stable ? "good" : "bad",
+          title: (i) => `m = ${digits(known[i][0], 5)} ${known[i][1] < 0 ? "−" : "+"} ${digits(Math.abs(known[i][1]), 5)} i, |m| = ${digits(Math.hypot(...known[i]), 5)}`,
+        }],
+      }],
+    }, point.result);
+  }
+
+  function drawAmplitude() {
+    const shown = view.phases
+      ? [["phase of μ₁ (rad)", "phase1"], ["phase of μ₂ (rad)", "phase2"]]
+      : [["mean F/W₀", "mean_friction"], ["μ₁", "mu1"], ["μ₂", "mu2"]];
+    const curves = Object.entries(answer.curves);
+    const rows = shown.map(([label, key]) => ({
+      y: { label },
+      marks: [answer.epsilon],
+      lines: curves.map(([law, curve], k) => ({
+        x: answer.amplitudes, y: curve[key], cls: series(k), name: law, thick: law === view.law,
+      })),
+      points: curves.filter(([, curve]) => curve.lost?.row > 0).map(([law, curve]) => ({
+        x: [answer.amplitudes[curve.lost.row - 1]], y: [curve[key][curve.lost.row - 1]], cross: true,
+        cls: series(curves.findIndex(([n]) => n === law)), title: `${law}: ${curve.lost.why}`,
+      })),
+    }));
+    fill(figures.amplitude.note,
+      curves.map(([law, curve], k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), law,
+        curve.lost ? el("span", { class: "lost" }, ` – lost at ε = ${digits(curve.lost.at, 3)}: ${curve.lost.why}`)
+          : curve.left.length ? " …" : "")));
+    const high = Math.max(answer.amplitudes.at(-1), answer.epsilon * 1.03);
+    return figures.amplitude.draw({ x: { label: "ε on the contacts", range: [0, high] }, rows },
+      `Curves of ${curves.map(([law]) => law).join(", ")}.`);
+  }
+
+  function drawAir() {
+    const { air } = answer;
+    figures.air.element.hidden = !air;
+    if (!air) return null;
+    const here = answer.numbers.frequency;
+    figures.air.note.textContent =
+      `At ${quantity(here, "frequency")} the contacts bear ` +
+      `${digits(100 * air.share_here, 3)} % of the modulation, ${digits(Math.abs(air.phase_here), 3)} rad ` +
+      `${air.phase_here < 0 ? "behind" : "ahead of"} the load; the air layer carries the rest.`;
+    return figures.air.draw({
+      x: { label: "frequency", log: true, format: (v) => quantity(v, "frequency", 3) },
+      rows: [{
+        y: { label: "share εeff/ε", range: [0, 1.05 * Math.max(1, ...air.share)] },
+        marks: [here],
+        lines: [{ x: air.frequency, y: air.share, cls: series(0), thick: true }],
+        points: [{ x: [here], y: [air.share_here], cls: series(1) }],
+      }],
+    }, figures.air.note.textContent);
+  }
+
+  function nothing(x) {
+    return {
+      x: { ...x, range: [0, 1], ticks: [] },
+      rows: [{ y: { label: "", range: [0, 1], ticks: [] }, text: answer.point.searched ? "no orbit" : "searching…" }],
+    };
+  }
+
+  // --- Controls --------------------------------------------------------------------------------
+
+  const controls = el("form", { class: "controls", "aria-label": "Operating point", submit: (e) => e.preventDefault() });
+  const sentence = el("p", { class: "sentence", role: "status" });
+  const readings = el("dl", { class: "readings" });
+  const message = el("p", { class: "message", role: "alert" });
+  const equations = el("div", { class: "equations" });
+
+  function buildControls() {
+    const material = catalogue.materials[view.material];
+    const law = catalogue.laws[view.law];
+    const byName = Object.fromEntries(law.parameters.map((p) => [p.name, p]));
+    const sliderOf = (p) => new Quantity({
+      parameter: p,
+      slider: { ...material.sliders[p.name], value: view.numbers[p.name] ?? material.sliders[p.name].value },
+      onInput: (value) => { view.numbers[p.name] = value; changed(); },
+    }).element;
+    const own = law.parameters.filter((p) => p.place === "law");
+    const rebuild = () => { buildControls(); changed(); };
+    fill(controls,
+      choice("Material", Object.entries(catalogue.materials).map(([n, m]) => [n, `${n} – ${m.title}`]), view.material,
+        (value) => { view.material = value; view.numbers = {}; rebuild(); }).element,
+      choice("Law", laws.map((n) => [n, n]), view.law, (value) => { view.law = value; rebuild(); }).element,
+      group("Drive and machine", true,
+        FIRST.filter((n) => byName[n]).map((n) => sliderOf(byName[n])),
+        tick("The mass counts (inertia)", Boolean(view.numbers.inertia),
+          (on) => { if (on) view.numbers.inertia = 1; else delete view.numbers.inertia; changed(); }).element),
+      group("Law", false, own.map(sliderOf)),
+      group("Air layer", false,
+        tick("Air between the surfaces", view.air !== null, (on) => { view.air = on ? {} : null; rebuild(); },
+          "ε is then the amplitude of the load, of which the contacts bear a share").element,
+        view.air === null ? [] : material.air.map((p) => new Quantity({
+          parameter: p,
+          slider: { ...p.slider, value: view.air[p.name] ?? p.value },
+          onInput: (value) => { view.air[p.name] = value; changed(); },
+        }).element)),
+      group("Compare with", false,
+        laws.filter((n) => n !== view.law).map((n) => tick(n, view.laws.includes(n), (on) => {
+          view.laws = laws.filter((m) => (m === n ? on : view.laws.includes(m)));
+          changed();
+        }, catalogue.laws[n].title).element)),
+      el("div", { class: "actions" },
+        el("button", { type: "button", click: () => { Object.assign(view, fresh()); rebuild(); } }, "Start again")),
+    );
+    fill(equations, el("p", { class: "law-title" }, law.title), law.equations.map((e) => el("div", { class: "equation" }, formula(e))));
+  }
+
+  const element = el("section", { class: "tab explore", "aria-label": title },
+    controls,
+    el("div", { class: "results" }, el("h2", { class: "visually-hidden" }, "Response")));
+  const results = element.lastElementChild;
+
+  const phases = tick("phases", view.phases, (on) => {
+    view.phases = on;
+    page.setLink(name, toParameters());
+    draw();
+  }, "Phases of the harmonics in place of their amplitudes");
+  const copies = el("div", { class: "actions" },
+    ...[["Copy link", () => location.href], ["Copy as Python", () => answer?.python], ["Copy as command", () => answer?.command]]
+      .map(([label, text]) => el("button", { type: "button", click: (e) => { const t = text(); if (t) copyText(t, e.currentTarget); } }, label)));
+
+  return {
+    element,
+    show(parameters) {
+      if (!figures) {
+        figures = makeFigures();
+        results.append(el("div", { class: "summary" }, sentence, readings, message, copies),
+          el("div", { class: "panels" }, Object.values(figures).map((f) => f.element)),
+          el("section", { class: "law", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
+      }
+      fromParameters(parameters);
+      phases.set(view.phases);
+      buildControls();
+      changed();
+    },
+  };
+}
+
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

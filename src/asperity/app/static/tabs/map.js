@@ -1,0 +1,361 @@
+// Map: stability and response over two numbers.
+
+import { Figure } from "../lib/charts.js";
+import { bar, picture } from "../lib/colours.js";
+import { choice, Entry, group, tick } from "../lib/controls.js";
+import { el, fill } from "../lib/dom.js";
+import { copyText } from "../lib/save.js";
+import { ask, Refused, run } from "../lib/server.js";
+import { digits, quantity } from "../lib/units.js";
+
+export const name = "map";
+export const title = "Map";
+
+/** Time (ms) without a change after which a map begins. */
+const REST = 300;
+/** Quantities with a sign, drawn about zero. */
+const SIGNED = ["growth_rate", "log_multiplier", "delta_mu", "phase1", "phase2"];
+const SHOWN = ["growth_rate", "mu1", "mu2", "mean_friction", "delta_mu", "phase1", "phase2", "mode_frequency"];
+const FINEST = [16, 32, 64, 128];
+
+export function create(page) {
+  const { catalogue } = page;
+  const laws = Object.keys(catalogue.laws);
+  const view = fresh();
+  let figure = null;
+  let grid = null;
+  let running = null;
+  let resting = 0;
+  let shown = null;
+  let marker = null;
+
+  function fresh() {
+    const material = Object.keys(catalogue.materials)[0];
+    const { sliders } = catalogue.materials[material];
+    const side = (n) => ({ name: n, low: sliders[n].low, high: sliders[n].high, log: sliders[n].log });
+    return {
+      material, law: laws.includes("rice-ruina") ? "rice-ruina" : laws[0],
+      // Without modulation there is nothing to map along that edge.
+      x: { ...side("epsilon"), low: sliders.epsilon.high / 50 }, y: side("K"),
+      show: "growth_rate", count: 64, numbers: {},
+    };
+  }
+
+  const parametersOf = (law) => catalogue.laws[law].parameters.filter((p) => p.rule !== "switch");
+  const parameter = (n) => parametersOf(view.law).find((p) => p.name === n);
+  const sliderOf = (n) => catalogue.materials[view.material].sliders[n];
+
+  // --- The address ---------------------------------------------------------------------------
+
+  function toParameters() {
+    const found = new URLSearchParams({
+      material: view.material, law: view.law, show: view.show, count: view.count,
+    });
+    for (const side of ["x", "y"]) {
+      const { name: n, low, high, log } = view[side];
+      found.set(side, [n, low, high, log ? "log" : "linear"].join(","));
+    }
+    for (const [n, v] of Object.entries(view.numbers)) found.set(n, v);
+    return found;
+  }
+
+  function fromParameters(parameters) {
+    Object.assign(view, fresh());
+    if (catalogue.materials[parameters.get("material")]) view.material = parameters.get("material");
+    if (catalogue.laws[parameters.get("law")]) view.law = parameters.get("law");
+    if (SHOWN.includes(parameters.get("show"))) view.show = parameters.get("show");
+    if (FINEST.includes(Number(parameters.get("count")))) view.count = Number(parameters.get("count"));
+    for (const side of ["x", "y"]) {
+      const [n, low, high, log] = (parameters.get(side) || "").split(",");
+      if (parameter(n)) view[side] = { name: n, low: number(low), high: number(high), log: log === "log" };
+    }
+    for (const [n, text] of parameters) if (parameter(n)) view.numbers[n] = number(text);
+  }
+
+  // --- Asking ----------------------------------------------------------------------------------
+
+  function question() {
+    const numbers = {};
+    for (const p of parametersOf(view.law)) {
+      const published = catalogue.materials[view.material].numbers[p.name];
+      if (catalogue.laws[view.law].required.includes(p.name) && !published) {
+        numbers[p.name] = sliderOf(p.name).value;
+      }
+    }
+    Object.assign(numbers, view.numbers);
+    for (const side of ["x", "y"]) delete numbers[view[side].name];
+    return {
+      material: view.material, law: view.law, numbers, x: view.x, y: view.y, show: view.show,
+      count: view.count,
+    };
+  }
+
+  function changed() {
+    page.setLink(name, toParameters());
+    stop();
+    resting = setTimeout(start, REST);
+  }
+
+  function stop() {
+    clearTimeout(resting);
+    if (running) running.abort();
+    running = null;
+    progress.hidden = true;
+    cancel.hidden = true;
+  }
+
+  async function start() {
+    const asked = question();
+    running = new AbortController();
+    const { signal } = running;
+    message.textContent = "";
+    progress.hidden = false;
+    cancel.hidden = false;
+    progress.removeAttribute("value");
+    status.textContent = "Solving the first, coarse grid…";
+    try {
+      await run("map", asked, (told) => {
+        if (signal.aborted) return;
+        if (told.waiting) status.textContent = "Waiting for another map to be done…";
+        if (told.progress !== undefined) progress.value = told.progress;
+        if (!told.grid) return;
+        grid = told.grid;
+        shown = asked;
+        draw();
+        if (grid.count < asked.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;
+      }, signal);
+      if (signal.aborted) return;
+      status.textContent = `${grid.count} × ${grid.count} points.`;
+      stop();
+    } catch (error) {
+      if (error.name === "AbortError") return;
+      stop();
+      status.textContent = "";
+      if (!(error instanceof Refused)) throw error;
+      message.textContent = error.message;
+    }
+  }
+
+  // --- The figure ------------------------------------------------------------------------------
+
+  function axisOf(side) {
+    const p = parameter(side.name);
+    return {
+      label: p.meaning, log: side.log, range: [side.low, side.high],
+      format: (v) => quantity(v, p.kind, 3),
+    };
+  }
+
+  function draw() {
+    if (!grid || !shown || shown.law !== view.law) return;
+    const known = grid.values.flat().filter((v) => v !== null).sort((a, b) => a - b);
+    const at = (share) => known[Math.min(known.length - 1, Math.floor(share * known.length))];
+    const signed = SIGNED.includes(shown.show);
+    // A few extreme points would leave all others in one colour.
+    const far = signed ? Math.max(Math.abs(at(0.02)), Math.abs(at(0.98))) || 1 : 0;
+    const limits = signed ? [-far, far] : [at(0.02), at(0.98) > at(0.02) ? at(0.98) : at(0.02) + 1];
+    const colours = signed ? "vik" : "batlow";
+    const [x, y] = [axisOf(withSi(shown.x, grid.x)), axisOf(withSi(shown.y, grid.y))];
+    const output = catalogue.outputs[shown.show];
+    figure.draw({
+      x,
+      rows: [{
+        y,
+        image: { url: known.length ? picture(grid.values, colours, limits) : "", x: corners(grid.x, x.log), y: corners(grid.y, y.log) },
+        lines: grid.boundaries.map((line) => ({ x: line.x, y: line.y, cls: "boundary", thick: true })),
+        points: marker ? [{ x: [marker[0]], y: [marker[1]], cls: "ink", size: 6 }] : [],
+        readout: (px, py) => readAt(px, py),
+      }],
+    }, description());
+    fill(figure.note,
+      el("div", { class: "scale" }, el("span", {}, digits(limits[0], 3)), scaleBar(colours), el("span", {}, digits(limits[1], 3)),
+        el("span", { class: "what" }, `${output.meaning}${output.unit === "1" ? "" : ` (${output.unit})`}`)),
+      grid.boundaries.map((line) => el("p", {}, el("span", { class: "swatch boundary" }), describeLine(line))),
+      grid.boundaries.length || !known.length ? null : el("p", {}, grid.stable.flat().some(Boolean) ? "No stability boundary here: stable wherever an orbit was found." : "No stability boundary here: unstable everywhere."),
+      grid.failed ? el("p", { class: "lost" }, `${grid.failed} of ${grid.count ** 2} points have no orbit: ${grid.reasons[0]}`) : null,
+      grid.not_located ? el("p", {}, `In ${grid.not_located} places stability changes without a crossing that could be located.`) : null);
+  }
+
+  /** An axis with its ends in SI, as the server understood them. */
+  function withSi(side, values) {
+    return { ...side, low: values[0], high: values.at(-1) };
+  }
+
+  function describeLine(line) {
+    const kinds = [...new Set(line.kind)].filter(Boolean).join(" and ");
+    const turning = line.mode_frequency.filter((f) => f > 0);
+    const [low, high] = [Math.min(...turning), Math.max(...turning)].map((f) => digits(f, 3));
+    const hertz = turning.length ? `, turning at ${low === high ? low : `${low} to ${high}`} Hz` : "";
+    return `Stability boundary: ${kinds}${hertz}`;
+  }
+
+  function description() {
+    return `Map of ${catalogue.outputs[shown.show].meaning} for ${shown.law}. ${grid.boundaries.map(describeLine).join(". ")}`;
+  }
+
+  function scaleBar(colours) {
+    const holder = el("span", { class: "bar-holder" });
+    holder.innerHTML = bar(colours);
+    return holder;
+  }
+
+  function corners(values, log) {
+    const n = values.length;
+    const f = log ? Math.log : (v) => v;
+    const back = log ? Math.exp : (v) => v;
+    const half = (f(values[n - 1]) - f(values[0])) / (n - 1) / 2;
+    return [back(f(values[0]) - half), back(f(values[n - 1]) + half)];
+  }
+
+  function nearest(values, v, log) {
+    const f = log ? Math.log : (u) => u;
+    let best = 0;
+    values.forEach((u, i) => { if (Math.abs(f(u) - f(v)) < Math.abs(f(values[best]) - f(v))) best = i; });
+    return best;
+  }
+
+  function readAt(px, py) {
+    if (!grid) return "";
+    const i = nearest(grid.x, px, shown.x.log);
+    const j = nearest(grid.y, py, shown.y.log);
+    const value = grid.values[j][i];
+    const [p, q] = [parameter(shown.x.name), parameter(shown.y.name)];
+    const where = `${p.name} ${quantity(px, p.kind, 3)}, ${q.name} ${quantity(py, q.kind, 3)}`;
+    return value === null ? `${where}: no orbit` : `${where}: ${digits(value, 4)}, ${grid.stable[j][i] ? "stable" : "unstable"}`;
+  }
+
+  function openExplore([px, py]) {
+    const parameters = new URLSearchParams({ material: shown.material, law: shown.law, laws: "" });
+    for (const [n, v] of Object.entries(shown.numbers)) parameters.set(n, v);
+    parameters.set(shown.x.name, Number(px.toPrecision(4)));
+    parameters.set(shown.y.name, Number(py.toPrecision(4)));
+    page.open("explore", parameters);
+  }
+
+  function pressed(event) {
+    if (!grid) return;
+    const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
+    if (event.key === "Enter" && marker) openExplore(marker);
+    if (!steps) return;
+    event.preventDefault();
+    const middle = Math.floor(grid.count / 2);
+    const [i, j] = marker
+      ? [nearest(grid.x, marker[0], shown.x.log) + steps[0], nearest(grid.y, marker[1], shown.y.log) + steps[1]]
+      : [middle, middle];
+    const inside = (k) => Math.max(0, Math.min(grid.count - 1, k));
+    marker = [grid.x[inside(i)], grid.y[inside(j)]];
+    draw();
+    status.textContent = readAt(...marker);
+  }
+
+  // --- Controls --------------------------------------------------------------------------------
+
+  const controls = el("form", { class: "controls", "aria-label": "Map", submit: (e) => e.preventDefault() });
+  const message = el("p", { class: "message", role: "alert" });
+  const status = el("p", { class: "status", role: "status" });
+  const progress = el("progress", { max: 1, "aria-label": "Progress of the map", hidden: true });
+  const cancel = el("button", {
+    type: "button", hidden: true,
+    click: () => { stop(); status.textContent = "Cancelled."; },
+  }, "Cancel");
+
+  function buildControls() {
+    const names = parametersOf(view.law).map((p) => [p.name, `${p.name} – ${p.meaning}`]);
+    const rebuild = () => { buildControls(); changed(); };
+    const axisControls = (side, label) => {
+      const p = parameter(view[side].name);
+      const entry = (end, text) => new Entry({
+        parameter: { ...p, meaning: `${text} of ${label}` }, label: text, value: view[side][end],
+        onInput: (value) => { view[side][end] = value; changed(); },
+      }).element;
+      return group(label, true,
+        choice("Number", names, view[side].name, (value) => {
+          const { low, high, log } = sliderOf(value);
+          view[side] = { name: value, low, high, log };
+          marker = null;
+          rebuild();
+        }).element,
+        el("div", { class: "ends" }, entry("low", "from"), entry("high", "to")),
+        tick("At equal ratios (logarithmic)", view[side].log, (on) => { view[side].log = on; changed(); }).element);
+    };
+    const others = parametersOf(view.law).filter((p) => ![view.x.name, view.y.name].includes(p.name));
+    fill(controls,
+      choice("Law", laws.map((n) => [n, n]), view.law, (value) => {
+        view.law = value;
+        for (const side of ["x", "y"]) {
+          if (!parameter(view[side].name)) view[side] = fresh()[side];
+        }
+        marker = null;
+        rebuild();
+      }).element,
+      axisControls("x", "Across"),
+      axisControls("y", "Up"),
+      group("Picture", false,
+        choice("Shows", SHOWN.map((n) => [n, catalogue.outputs[n].meaning]), view.show, (value) => { view.show = value; changed(); }).element,
+        choice("Finest grid", FINEST.map((n) => [n, `${n} × ${n}`]), view.count, (value) => { view.count = Number(value); changed(); }).element),
+      group("Other numbers", false,
+        tick("The mass counts (inertia)", Boolean(view.numbers.inertia), (on) => {
+          if (on) view.numbers.inertia = 1; else delete view.numbers.inertia;
+          changed();
+        }).element,
+        others.map((p) => new Entry({
+          parameter: p, value: view.numbers[p.name] ?? sliderOf(p.name).value,
+          onInput: (value) => { view.numbers[p.name] = value; changed(); },
+        }).element)),
+      el("div", { class: "actions" },
+        el("button", { type: "button", click: () => { Object.assign(view, fresh()); marker = null; rebuild(); } }, "Start again")));
+  }
+
+  async function copyAs(kind, button) {
+    try {
+      copyText((await ask("map/text", question()))[kind], button);
+    } catch (error) {
+      message.textContent = error.message;
+    }
+  }
+
+  const results = el("div", { class: "results" }, el("h2", { class: "visually-hidden" }, "Stability map"));
+  const element = el("section", { class: "tab map", "aria-label": title }, controls, results);
+
+  return {
+    element,
+    show(parameters) {
+      if (!figure) {
+        figure = new Figure({
+          name: "stability-map", title: "Response and stability", height: 560,
+          columns: () => grid && {
+            [shown.x.name]: grid.y.flatMap(() => grid.x),
+            [shown.y.name]: grid.y.flatMap((v) => grid.x.map(() => v)),
+            [shown.show]: grid.values.flat(),
+            stable: grid.stable.flat(),
+          },
+        });
+        figure.plot.tabIndex = 0;
+        figure.plot.setAttribute("role", "group");
+        figure.plot.setAttribute("aria-label", "Map: arrow keys move a point, Enter takes it to Explore");
+        figure.plot.addEventListener("keydown", pressed);
+        figure.plot.addEventListener("click", (event) => {
+          const at = figure.at(event);
+          if (at && grid) openExplore(at);
+        });
+        results.append(
+          el("div", { class: "summary" }, el("p", { class: "hint" }, "A click takes the point to Explore; with the keyboard, arrow keys and Enter."),
+            el("div", { class: "work" }, status, progress, cancel), message,
+            el("div", { class: "actions" },
+              el("button", { type: "button", click: (e) => copyText(location.href, e.currentTarget) }, "Copy link"),
+              el("button", { type: "button", click: (e) => copyAs("python", e.currentTarget) }, "Copy as Python"),
+              el("button", { type: "button", click: (e) => copyAs("command", e.currentTarget) }, "Copy as command"))),
+          figure.element);
+      }
+      fromParameters(parameters);
+      buildControls();
+      changed();
+    },
+    hide: stop,
+  };
+}
+
+/** A number of the address, or its text where it has a unit. */
+function number(text) {
+  return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
+}

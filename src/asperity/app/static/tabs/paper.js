@@ -1,0 +1,303 @@
+// Paper: figures of a published paper that follow sliders, and the ledger of its claims.
+
+import { Figure, series } from "../lib/charts.js";
+import { choice, Quantity } from "../lib/controls.js";
+import { el, fill, fresh } from "../lib/dom.js";
+import { copyText, csv, saveFile } from "../lib/save.js";
+import { ask, Latest, Refused, run } from "../lib/server.js";
+import { digits, quantity } from "../lib/units.js";
+
+export const name = "paper";
+export const title = "Paper";
+
+const VERDICTS = ["reproduced", "misprint", "differs"];
+const KINDS = ["test", "fit", "arithmetic", "identity"];
+
+export function create(page) {
+  const view = { show: "figures", figure: "figure-02", numbers: {}, status: "", kind: "", section: "", search: "" };
+  let paper = null;
+  let answer = null;
+  let verdicts = null;
+  let computing = null;
+
+  const latest = new Latest("paper/figure", answered, refused);
+  const message = el("p", { class: "message", role: "alert" });
+  const controls = el("form", { class: "controls", "aria-label": "Figure and numbers", submit: (e) => e.preventDefault() });
+  const sentence = el("p", { class: "sentence", role: "status" });
+  const ends = el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": "At the end of each curve" });
+  const figure = new Figure({ name: "paper-figure", title: "Figure", height: 460, columns: figureColumns });
+  const copies = el("div", { class: "actions" }, ...[
+    ["Copy link", () => location.href], ["Copy as Python", () => answer?.python], ["Copy as command", () => answer?.command],
+  ].map(([label, text]) => el("button", {
+    type: "button", click: (e) => { const t = text(); if (t) copyText(t, e.currentTarget); },
+  }, label)));
+  const figures = el("div", { class: "paper-figures" }, controls,
+    el("div", { class: "results" },
+      el("div", { class: "summary" }, sentence, message, copies), figure.element,
+      el("section", { class: "law", "aria-label": "Numbers" }, el("h3", {}, "At the end of each curve"), ends)));
+  const ledgerView = el("div", { class: "ledger" });
+  const switches = el("div", { class: "switch", role: "group", "aria-label": "What is shown" });
+  const heading = el("h2", {}, title);
+  const cite = el("p", { class: "note" });
+  const element = el("section", { class: "tab paper", "aria-label": title },
+    el("div", { class: "paper-head" }, heading, cite, switches), figures, ledgerView);
+
+  // --- The address -----------------------------------------------------------------------------
+
+  function link() {
+    const found = new URLSearchParams();
+    if (view.show !== "figures") found.set("show", view.show);
+    if (view.show === "figures") {
+      found.set("figure", view.figure);
+      for (const [n, v] of Object.entries(view.numbers)) found.set(n, v);
+    } else for (const n of ["status", "kind", "section", "search"]) if (view[n]) found.set(n, view[n]);
+    page.setLink(name, found);
+  }
+
+  function fromParameters(parameters) {
+    view.show = parameters.get("show") === "ledger" ? "ledger" : "figures";
+    if (paper.figures.some((f) => f.name === parameters.get("figure"))) view.figure = parameters.get("figure");
+    view.numbers = {};
+    for (const { name: n } of current().numbers) {
+      if (!parameters.has(n)) continue;
+      const text = parameters.get(n);
+      view.numbers[n] = Number.isFinite(Number(text)) ? Number(text) : text;
+    }
+    for (const n of ["status", "kind", "section", "search"]) view[n] = parameters.get(n) || "";
+  }
+
+  const current = () => paper.figures.find((f) => f.name === view.figure);
+
+  // --- Figures ---------------------------------------------------------------------------------
+
+  function changed() {
+    link();
+    sentence.textContent = asSentence();
+    latest.ask({ figure: view.figure, numbers: view.numbers }, null);
+  }
+
+  function asSentence() {
+    const { place, title: what, numbers } = current();
+    const moved = numbers.filter((n) => n.name in view.numbers);
+    if (!moved.length) return `${place}: ${what}. All numbers are as printed.`;
+    const one = (n) => {
+      const value = view.numbers[n.name];
+      return `${n.label} = ${typeof value === "number" ? quantity(value, n.kind, 3) : value} in place of ${quantity(n.slider.value, n.kind, 3)}`;
+    };
+    return `${place} with ${moved.map(one).join(", ")}.`;
+  }
+
+  async function answered(found) {
+    message.textContent = "";
+    if (found.preparing) {
+      page.say(`Preparing ${found.preparing}, once; this takes some seconds.`);
+      setTimeout(() => latest.ask({ figure: view.figure, numbers: view.numbers }, null), 500);
+      return;
+    }
+    page.say("");
+    answer = found;
+    draw();
+  }
+
+  function refused(error) {
+    if (!(error instanceof Refused)) throw error;
+    message.textContent = capital(error.message);
+    page.say("");
+  }
+
+  function draw() {
+    if (!answer?.printed || view.show !== "figures") return;
+    const { x, rows, printed, moved, stated } = answer;
+    const isMoved = Object.keys(view.numbers).length > 0;
+    const [scale, unit] = x.column === "V" ? [1e6, " (µm/s)"] : [1, ""];
+    const xs = (curve) => curve.values[x.column].map((v) => scale * v);
+    figure.heading.textContent = `${current().place}: ${current().title}`;
+    figure.height = Math.max(360, 190 * rows.length);
+    const drawn = rows.map((row) => ({
+      y: { label: row.label, log: row.log },
+      lines: [
+        ...(isMoved ? printed.map((curve) => ({ x: xs(curve), y: curve.values[row.column], cls: "printed dashed", name: `${curve.name}, as printed` })) : []),
+        ...moved.map((curve, k) => ({ x: xs(curve), y: curve.values[row.column], cls: series(k), name: curve.name, thick: true })),
+        ...(stated[row.column] || []).filter((s) => s.ends.length > 1).map((s) => ({ x: s.ends.map(() => s.x), y: s.ends, cls: "stated", thick: true, name: s.text })),
+      ],
+      points: (stated[row.column] || []).map((s) => ({ x: s.ends.map(() => s.x), y: s.ends, cls: "stated", title: s.text })),
+    }));
+    const largest = Math.max(...moved.flatMap(xs));
+    const range = x.log ? undefined : [0, 1.02 * largest];
+    figure.draw({ x: { label: x.label + unit, log: x.log, range }, rows: drawn },
+      `${asSentence()} Curves: ${moved.map((c) => c.name).join(", ")}.`);
+    const hasStated = rows.some((row) => stated[row.column]);
+    fill(figure.note,
+      moved.map((curve, k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), curve.name)),
+      isMoved && el("p", { class: "key" }, el("span", { class: "swatch printed" }), "as printed"),
+      hasStated && el("p", { class: "key" }, el("span", { class: "swatch stated" }), "stated in the text"));
+    drawEnds();
+  }
+
+  function drawEnds() {
+    const { rows, printed, moved, stated } = answer;
+    const last = (curve, column) => curve.values[column].at(-1);
+    const said = rows.flatMap((row) => (stated[row.column] || []).map((s) =>
+      el("li", {}, `${row.label} at ${digits(s.x, 3)}: ${s.ends.map((v) => digits(v, 3)).join(" to ")} (${s.text})`)));
+    fill(ends, el("table", {},
+      el("thead", {}, el("tr", {}, ["Curve", "Quantity", "As printed", "Moved"].map((t) => el("th", { scope: "col" }, t)))),
+      el("tbody", {}, moved.flatMap((curve, k) => rows.map((row) => el("tr", {},
+        el("th", { scope: "row" }, curve.name), el("td", {}, row.label),
+        el("td", {}, digits(last(printed[k], row.column), 4)), el("td", {}, digits(last(curve, row.column), 4))))))),
+    said.length > 0 && el("ul", { class: "said" }, said));
+  }
+
+  function figureColumns() {
+    if (!answer?.printed) return null;
+    const columns = {};
+    answer.moved.forEach((curve, k) => {
+      for (const [column, values] of Object.entries(curve.values)) {
+        columns[`${curve.name} ${column}`] = values;
+        if (column !== answer.x.column) columns[`${curve.name} ${column} as printed`] = answer.printed[k].values[column];
+      }
+    });
+    return columns;
+  }
+
+  function buildControls() {
+    const own = current();
+    fill(controls,
+      choice("Figure", paper.figures.map((f) => [f.name, `${f.place} – ${f.title}`]), view.figure, (value) => {
+        view.figure = value;
+        const kept = current().numbers.map((n) => n.name);
+        view.numbers = Object.fromEntries(Object.entries(view.numbers).filter(([n]) => kept.includes(n)));
+        buildControls();
+        changed();
+      }).element,
+      el("fieldset", {}, el("legend", {}, "Numbers of the paper"), own.numbers.map((n) => new Quantity({
+        parameter: { name: n.name, kind: n.kind, meaning: n.meaning, symbol: `<i>${n.label.replace("_eff", "<sub>eff</sub>")}</i>` },
+        slider: { ...n.slider, value: view.numbers[n.name] ?? n.slider.value },
+        onInput: (value) => {
+          if (value === n.slider.value) delete view.numbers[n.name];
+          else view.numbers[n.name] = value;
+          changed();
+        },
+      }).element)),
+      el("div", { class: "actions" }, el("button", {
+        type: "button", click: () => { view.numbers = {}; buildControls(); changed(); },
+      }, "As printed")));
+  }
+
+  // --- Ledger ----------------------------------------------------------------------------------
+
+  const count = el("p", { class: "sentence", role: "status" });
+  const list = el("div", { class: "claims" });
+  const ledgerMessage = el("p", { class: "message", role: "alert" });
+  const filters = {};
+
+  function buildLedger() {
+    const changedFilter = (key) => (value) => { view[key] = value; link(); drawLedger(); };
+    const all = (names, word) => [["", word], ...names.map((n) => [n, n])];
+    const sections = [...new Set(paper.claims.map((c) => c.section))].sort();
+    filters.status = choice("Verdict", all(VERDICTS, "all verdicts"), view.status, changedFilter("status"));
+    filters.kind = choice("Kind", all(KINDS, "all kinds"), view.kind, changedFilter("kind"));
+    filters.section = choice("Section", all(sections, "all sections"), view.section, changedFilter("section"));
+    const id = fresh("search");
+    filters.search = el("input", { type: "search", id, value: view.search, input: () => changedFilter("search")(filters.search.value) });
+    fill(ledgerView,
+      el("form", { class: "filters", role: "search", "aria-label": "Claims", submit: (e) => e.preventDefault() },
+        filters.status.element, filters.kind.element, filters.section.element,
+        el("div", { class: "choice" }, el("label", { for: id }, "Text"), filters.search)),
+      el("div", { class: "summary" }, count, ledgerMessage, el("div", { class: "actions" },
+        el("button", { type: "button", click: (e) => copyText(location.href, e.currentTarget) }, "Copy link"),
+        el("button", { type: "button", click: (e) => copyText(LEDGER_PYTHON, e.currentTarget) }, "Copy as Python"),
+        el("button", { type: "button", click: (e) => copyText("asperity reproduce bureau2000 --out report", e.currentTarget) }, "Copy as command"),
+        el("button", { type: "button", click: saveLedger }, "CSV"))),
+      list);
+  }
+
+  const LEDGER_PYTHON = 'from asperity.papers import find_paper\n\nfor claim in find_paper("bureau2000").ledger():\n    print(claim.verdict, claim.place, claim.statement, claim.computed, sep=" | ")\n';
+
+  function shownClaims() {
+    const words = view.search.toLowerCase().split(/\s+/).filter(Boolean);
+    return paper.claims.map((c) => ({ ...c, ...(verdicts?.get(c.id) || {}) })).filter((c) => {
+      const text = `${c.place} ${c.statement} ${c.stated} ${c.computed || ""} ${c.why}`.toLowerCase();
+      return (!view.status || c.verdict === view.status) && (!view.kind || c.kind === view.kind)
+        && (!view.section || c.section === view.section) && words.every((w) => text.includes(w));
+    });
+  }
+
+  function drawLedger() {
+    const shown = shownClaims();
+    const tally = VERDICTS.map((v) => [v, shown.filter((c) => c.verdict === v).length]).filter(([, n]) => n);
+    const waits = view.status && !verdicts;
+    count.textContent = waits ? "The verdicts are being computed…"
+      : `${shown.length} of ${paper.claims.length} claims${tally.length ? `: ${tally.map(([v, n]) => `${n} ${v}`).join(", ")}` : ""}.`;
+    fill(list, shown.map((c) => el("article", { class: "claim", "data-verdict": c.verdict || "" },
+      el("p", { class: "claim-head" },
+        el("span", { class: "badge" }, c.verdict || "…"), el("span", { class: "kind" }, c.kind), el("span", { class: "place" }, c.place)),
+      el("h3", {}, c.statement),
+      el("dl", {}, el("dt", {}, "Stated"), el("dd", {}, c.stated),
+        el("dt", {}, "Computed"), el("dd", {}, c.computed || "…")),
+      el("details", {}, el("summary", {}, "How, and what to make of it"),
+        c.rule && el("p", {}, `Rule: ${c.rule}.`), el("p", {}, c.how), el("p", {}, c.why)))));
+  }
+
+  function saveLedger() {
+    const shown = shownClaims();
+    const names = ["id", "place", "kind", "statement", "stated", "computed", "verdict"];
+    saveFile("claims.csv", csv(Object.fromEntries(names.map((n) => [n, shown.map((c) => c[n])]))), "text/csv");
+  }
+
+  async function computeLedger() {
+    if (verdicts || computing) return;
+    computing = new AbortController();
+    try {
+      const last = await run("paper/ledger", {}, (m) => {
+        if (m.finished) page.say(`${m.finished} of ${m.total} claims computed`);
+      }, computing.signal);
+      if (last.result) verdicts = new Map(last.result.claims.map((c) => [c.id, c]));
+      page.say("");
+      if (view.show === "ledger") drawLedger();
+    } catch (error) {
+      if (!(error instanceof Refused)) throw error;
+      ledgerMessage.textContent = capital(error.message);
+    } finally {
+      computing = null;
+    }
+  }
+
+  function buildSwitches() {
+    fill(switches, [["figures", "Figures"], ["ledger", "Ledger"]].map(([key, text]) => el("button", {
+      type: "button", "aria-pressed": String(view.show === key),
+      click: () => { view.show = key; present(); link(); },
+    }, text)));
+  }
+
+  function present() {
+    buildSwitches();
+    figures.hidden = view.show !== "figures";
+    ledgerView.hidden = view.show !== "ledger";
+    if (view.show === "figures") {
+      buildControls();
+      changed();
+      draw();
+    } else {
+      buildLedger();
+      drawLedger();
+      computeLedger();
+    }
+  }
+
+  return {
+    element,
+    async show(parameters) {
+      if (!paper) {
+        paper = await ask("paper", {});
+        heading.textContent = paper.paper.title;
+        cite.textContent = `${paper.paper.authors}, ${paper.paper.journal}`;
+      }
+      fromParameters(parameters);
+      present();
+    },
+  };
+}
+
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

@@ -1,0 +1,127 @@
+"""Files that the page sends: in one temporary folder, under names of the server's own.
+
+A file is known by a random name that only who sent it knows. What the sender calls it is a text for
+messages and never becomes part of a path; of its ending, one of a list is kept, since some formats
+are told apart by it.
+"""
+
+from __future__ import annotations
+
+import re
+import secrets
+import tempfile
+from collections import OrderedDict
+from dataclasses import dataclass
+from pathlib import Path
+
+from asperity.errors import InputError, printable
+from asperity.outputs import free_disk, size_text
+
+#: Largest file (bytes), and all files together.
+LARGEST, TOGETHER = 512 * 1024**2, 2 * 1024**3
+#: Files that are kept; the one that was used longest ago goes first.
+_MOST_FILES = 200
+#: Room (bytes) that is left on the disk.
+_SPARE = 256 * 1024**2
+_ENDINGS = ("csv", "txt", "dat", "tsv", "h5", "hdf5", "nc", "mat", "tdms", "json", "gz", "look")
+
+
+@dataclass(frozen=True)
+class Upload:
+    """One file.
+
+    Attributes
+    ----------
+    key : str
+        What the page knows it by.
+    path : Path
+    name : str
+        What its sender calls it: for people only.
+    """
+
+    key: str
+    path: Path
+    name: str
+
+    def named(self, sentence: str) -> str:
+        """A sentence with the sender's name in place of the server's."""
+        return sentence.replace(str(self.path), self.name).replace(self.path.name, self.name)
+
+
+class Uploads:
+    """The files of a server; the folder is removed with its content when the server ends."""
+
+    def __init__(self, together: int = TOGETHER) -> None:
+        self._together = together
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        self._files: OrderedDict[str, Upload] = OrderedDict()
+
+    def begin(self, name: str) -> Upload:
+        """A place for a new file.
+
+        Raises
+        ------
+        InputError
+            If the disk is full.
+        """
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="asperity-page-")
+        folder = Path(self._folder.name)
+        self._make_room()
+        if free_disk(folder) < LARGEST + _SPARE:
+            raise InputError(
+                f"the disk must have {size_text(LARGEST + _SPARE)} free for a file of the page, "
+                f"got {size_text(free_disk(folder))}; make room"
+            )
+        key = secrets.token_hex(16)
+        ending = re.search(r"\.(\w{1,5})$", name)
+        known = ending is not None and ending[1].lower() in _ENDINGS
+        suffix = f".{ending[1].lower()}" if ending is not None and known else ""
+        upload = Upload(key, folder / f"{key}{suffix}", _shown(name))
+        self._files[key] = upload
+        return upload
+
+    def get(self, key: str) -> Upload:
+        """The file of a key.
+
+        Raises
+        ------
+        InputError
+            If there is none.
+        """
+        upload = self._files.get(key)
+        if upload is None or not upload.path.is_file():
+            raise InputError(
+                "recording must be one that the server still has, got another; drop the file again"
+            )
+        self._files.move_to_end(key)
+        return upload
+
+    def remove(self, key: str) -> None:
+        """Delete a file, if it is there."""
+        upload = self._files.pop(key, None)
+        if upload is not None:
+            upload.path.unlink(missing_ok=True)
+
+    def close(self) -> None:
+        """Delete all files and their folder."""
+        self._files.clear()
+        if self._folder is not None:
+            self._folder.cleanup()
+            self._folder = None
+
+    def _make_room(self) -> None:
+        """Delete the files that were used longest ago where there are too many."""
+        while self._files and (
+            len(self._files) >= _MOST_FILES or self._size() > self._together - LARGEST
+        ):
+            self.remove(next(iter(self._files)))
+
+    def _size(self) -> int:
+        return sum(f.path.stat().st_size for f in self._files.values() if f.path.is_file())
+
+
+def _shown(name: str) -> str:
+    """The last part of a name, fit for a line."""
+    last = re.split(r"[/\\]", name)[-1].strip()
+    return printable(last, 120) or "recording"

@@ -1,0 +1,162 @@
+"""Bifurcations of periodic orbits: which there are, and where on a branch they lie.
+
+At a fold a branch turns back in the parameter and a multiplier passes +1; at a period doubling one
+passes -1; at a Neimark-Sacker bifurcation a complex pair passes the unit circle, and a slow
+oscillation grows on top of the modulation. Each has a test function along the arclength whose
+zero is found by Brent's method: the direction of the parameter for folds, ln|m| for the others.
+
+Source: Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory, chapters 4, 5 and 10;
+R. Seydel, Practical Bifurcation and Stability Analysis, chapter 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from asperity.branches.follower import BranchFollower, BranchOrbit
+
+Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branch point"]
+
+#: Arguments of multipliers below this, or this close to pi, count as real.
+_REAL = 1e-6
+#: Secant steps that carry a bifurcation over to a finer mesh, and their tolerance on t.
+_SECANT_STEPS = 12
+_TOLERANCE = 1e-12
+#: Largest last secant step that is attributed to round-off.
+_STALLED = 1e-9
+
+
+class LocatedBifurcation(NamedTuple):
+    """A bifurcation on a branch.
+
+    Attributes
+    ----------
+    kind : str
+    branch_orbit : BranchOrbit
+    critical : int
+        Which multiplier, by falling modulus, is critical.
+    before, after : int
+        Unstable multipliers on the two sides, along the branch.
+    """
+
+    kind: Kind
+    branch_orbit: BranchOrbit
+    critical: int
+    before: int
+    after: int
+
+
+class _UnsolvedError(Exception):
+    """Newton's method failed between two solved points."""
+
+
+def bifurcations_between(
+    follower: BranchFollower, start: BranchOrbit, length: float, end: BranchOrbit
+) -> Iterator[LocatedBifurcation]:
+    """All bifurcations that show between two neighbouring orbits."""
+    before, after = start.unstable, end.unstable
+    turned = start.direction * end.direction < 0
+    if turned:
+        index = min(before, after) if before != after else 0
+        found = _root(follower, start, length, _direction)
+        if found is not None:
+            yield LocatedBifurcation("fold", found, index, before, after)
+    index, last = min(before, after), max(before, after)
+    while index < last:
+        found = _root(follower, start, length, _log_modulus(index))
+        if found is None:
+            return
+        kind = kind_of(found.logs[index])
+        if kind == "branch point" and turned:
+            index += 1  # the multiplier of the fold itself
+            continue
+        width = 2 if kind == "Neimark-Sacker" else 1
+        near, far = (index, index + width) if before < after else (index + width, index)
+        yield LocatedBifurcation(kind, found, index, near, far)
+        index += width
+
+
+def kind_of(log: complex) -> Kind:
+    """Bifurcation of a multiplier on the unit circle."""
+    angle = abs(np.angle(np.exp(1j * log.imag)))
+    if angle < _REAL:
+        return "branch point"
+    return "period doubling" if np.pi - angle < _REAL else "Neimark-Sacker"
+
+
+def criterion(kind: Kind, index: int) -> Callable[[BranchOrbit], float]:
+    """Vanishes at the bifurcation."""
+    return _direction if kind == "fold" else _log_modulus(index)
+
+
+def _direction(branch_orbit: BranchOrbit) -> float:
+    return branch_orbit.direction
+
+
+def _log_modulus(index: int) -> Callable[[BranchOrbit], float]:
+    return lambda branch_orbit: float(branch_orbit.logs[index].real)
+
+
+def _root(
+    follower: BranchFollower,
+    start: BranchOrbit,
+    length: float,
+    function: Callable[[BranchOrbit], float],
+) -> BranchOrbit | None:
+    """The orbit between 0 and `length` at which `function` vanishes."""
+    # Loading SciPy's optimisation would slow the start of a process that continues nothing.
+    from scipy.optimize import brentq
+
+    seen: dict[float, BranchOrbit] = {}
+
+    def value(distance: float) -> float:
+        branch_orbit, _ = follower.step(start.point, distance)
+        if branch_orbit is None:
+            raise _UnsolvedError
+        seen[distance] = branch_orbit
+        return function(branch_orbit)
+
+    try:
+        root = brentq(value, 0.0, length, xtol=1e-13, rtol=1e-14)
+    except (_UnsolvedError, ValueError):
+        return None
+    return seen[root] if root in seen else follower.step(start.point, root)[0]
+
+
+def polished(
+    follower: BranchFollower, found: LocatedBifurcation, intervals: int
+) -> BranchOrbit | None:
+    """The bifurcation solved again on a mesh of `intervals`, by the secant method."""
+    return root_near(
+        follower,
+        follower.finer(found.branch_orbit.point, intervals),
+        criterion(found.kind, found.critical),
+    )
+
+
+def root_near(
+    follower: BranchFollower, start: BranchOrbit | None, function: Callable[[BranchOrbit], float]
+) -> BranchOrbit | None:
+    """The orbit at which `function` vanishes, near `start` on its branch; None where lost."""
+    if start is None:
+        return None
+    before, value_before = 0.0, function(start)
+    distance, branch_orbit = 1e-4, start
+    for _ in range(_SECANT_STEPS):
+        now, _ = follower.step(start.point, distance)
+        if now is None:
+            return None
+        branch_orbit, value = now, function(now)
+        if value == value_before:
+            return branch_orbit
+        change = -value * (distance - before) / (value - value_before)
+        before, value_before = distance, value
+        distance += change
+        if abs(change) < _TOLERANCE:
+            return branch_orbit
+        if abs(change) > 1.0:
+            return None
+    return branch_orbit if abs(change) < _STALLED else None

@@ -1,0 +1,252 @@
+"""The recorder of a branch of periodic orbits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity._version import __version__
+from asperity.branches.parameters import fixed_as_text
+from asperity.orbit.floquet import from_logs
+from asperity.parameters.display import Displayed, SummaryLine, count_text, number_line
+from asperity.slider import Motion
+
+if TYPE_CHECKING:
+    import xarray
+
+    from asperity.branches.follower import BranchFollower, BranchOrbit
+    from asperity.branches.parameters import ContinuedParameter
+    from asperity.orbit.methods.branch_following.arclength import ContinuationPoint
+    from asperity.slider.problem import Problem
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Bifurcation:
+    """A bifurcation of a branch.
+
+    Attributes
+    ----------
+    kind : str
+        "fold", "period doubling" or "Neimark-Sacker"; "branch point" where a multiplier passes
+        +1 and the branch does not turn.
+    value : float
+        The parameter there, SI.
+    error : float
+        Relative change of `value` between two meshes; inf where the finer one failed.
+    mean_friction : float
+    log_multipliers : complex array, shape (states,)
+        ln|m| + i arg m by falling modulus.
+    frequency : float
+        Frequency (Hz) of the mode that passes the unit circle, between 0 and half that of the
+        modulation: multipliers know frequencies only up to whole multiples of it. 0 at folds.
+    unstable_before, unstable_after : int
+        Number of multipliers outside the unit circle on the two sides, along the branch.
+    index : int
+        The bifurcation lies between this point of the branch and the next.
+    critical : BranchOrbit
+        The critical orbit, from where branches are switched.
+    """
+
+    kind: str
+    value: float
+    error: float
+    mean_friction: float
+    log_multipliers: NDArray[np.complex128]
+    frequency: float
+    unstable_before: int
+    unstable_after: int
+    index: int
+    critical: BranchOrbit = field(repr=False)
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers by falling modulus."""
+        return from_logs(self.log_multipliers)
+
+    @property
+    def stability_change(self) -> int:
+        """+1 where the branch becomes stable here, -1 where it ceases to be, 0 for neither."""
+        return int(self.unstable_after == 0) - int(self.unstable_before == 0)
+
+    def __str__(self) -> str:
+        """One line."""
+        mode = f", mode at {self.frequency:.6g} Hz" if self.frequency else ""
+        return (
+            f"{self.kind} at {self.value:.10g}{mode}: "
+            f"{self.unstable_before} -> {self.unstable_after} unstable multipliers"
+        )
+
+
+class BranchOrigin(NamedTuple):
+    """Line and operating point of a branch.
+
+    Attributes
+    ----------
+    follower : BranchFollower
+    moving : ContinuedParameter
+    problem : Problem
+        The operating point at the start.
+    """
+
+    follower: BranchFollower
+    moving: ContinuedParameter
+    problem: Problem
+
+
+@dataclass(frozen=True, repr=False)
+class Branch(Displayed):
+    """A branch of periodic orbits in one parameter, in the order in which it was followed.
+
+    Convention as `PeriodicResponse`: F/W0 = mean_friction + sum Re(c_n e^{i n w t}). On a branch
+    of doubled period mean and harmonics are those over two periods of the modulation, c_n
+    belongs to n f / 2, and a multiplier is that of two periods.
+
+    Attributes
+    ----------
+    name, unit : str
+        The parameter and its SI unit.
+    parameter : array, shape (points,)
+        Values along the branch; not monotonic where it folds.
+    mean_friction : array, shape (points,)
+    harmonics : complex array, shape (points, count)
+        c_1, c_2, ...
+    log_multipliers : complex array, shape (points, states)
+        ln|m| + i arg m by falling modulus.
+    periods : int
+        Periods of the modulation in one of the orbit.
+    bifurcations : tuple of Bifurcation
+        In the order of the branch.
+    result : str
+        Why the branch ends where it does.
+    completed : bool
+        Whether it ended at an end of the span.
+    motion : Motion
+        Equation of motion, with the slider; the continued parameter has its value at the start.
+    fixed : dict
+        Parameters of the operating point that were kept fixed, SI.
+    origin : BranchOrigin
+        Origin, from which other branches are switched to.
+    last : ContinuationPoint
+        The last orbit, on its mesh.
+    """
+
+    name: str
+    unit: str
+    parameter: Float
+    mean_friction: Float
+    harmonics: NDArray[np.complex128]
+    log_multipliers: NDArray[np.complex128]
+    periods: int
+    bifurcations: tuple[Bifurcation, ...]
+    result: str
+    completed: bool
+    motion: Motion
+    fixed: dict[str, float]
+    origin: BranchOrigin = field(repr=False)
+    last: ContinuationPoint = field(repr=False)
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """The parameter followed, and the bifurcations met."""
+        law = self.motion.slider.law.name
+        points = count_text(len(self.parameter), "point")
+        lines = [
+            number_line(self.name, self.parameter, self.unit),
+            number_line("mean_friction", self.mean_friction),
+            *(SummaryLine("bifurcation", str(b)) for b in self.bifurcations),
+            SummaryLine("result", self.result),
+        ]
+        return f"Branch, {law}, {self.motion.name}, {points}", lines
+
+    @property
+    def mu1(self) -> Float:
+        """Amplitude of the harmonic at the frequency of the modulation, over W0."""
+        return np.abs(self.harmonics[:, self.periods - 1])
+
+    @property
+    def mu2(self) -> Float:
+        """Amplitude of the harmonic at twice the frequency of the modulation, over W0."""
+        return np.abs(self.harmonics[:, 2 * self.periods - 1])
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers; beyond the range of doubles they are inf or 0."""
+        return from_logs(self.log_multipliers)
+
+    @property
+    def unstable(self) -> NDArray[np.int64]:
+        """Number of multipliers outside the unit circle."""
+        return np.asarray((self.log_multipliers.real > 0).sum(1))
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether a small perturbation dies out."""
+        return np.asarray(self.unstable == 0)
+
+    @property
+    def thresholds(self) -> Float:
+        """Values of the parameter at which the leading multiplier crosses the unit circle."""
+        return np.array([b.value for b in self.bifurcations if b.stability_change])
+
+    def to_dataset(self) -> xarray.Dataset:
+        """The branch as a labelled dataset, ready for NetCDF.
+
+        Returns
+        -------
+        xarray.Dataset
+            Along the dimensions `point` and `bifurcation`; every variable has `units` and
+            `long_name`, real and imaginary parts are variables of their own.
+        """
+        import xarray
+
+        def along(values: Any, units: str, name: str, *extra: str) -> tuple:
+            return ("point", *extra), values, {"units": units, "long_name": name}
+
+        def at(values: list, units: str, name: str) -> tuple:
+            return "bifurcation", np.asarray(values), {"units": units, "long_name": name}
+
+        unit, found = self.unit or "1", self.bifurcations
+        data = {
+            "parameter": along(self.parameter, unit, self.name),
+            "mean_friction": along(self.mean_friction, "1", "mean of F/W0"),
+            "mu1": along(self.mu1, "1", "first harmonic of F/W0, peak"),
+            "mu2": along(self.mu2, "1", "second harmonic of F/W0, peak"),
+            "stable": along(self.stable, "1", "all multipliers inside the unit circle"),
+            "bifurcation_kind": at([b.kind for b in found], "1", "kind of the bifurcation"),
+            "bifurcation_value": at([b.value for b in found], unit, self.name),
+            "bifurcation_frequency": at(
+                [b.frequency for b in found], "Hz", "frequency of the critical mode"
+            ),
+            "bifurcation_stability_change": at(
+                [b.stability_change for b in found], "1", "+1 gained, -1 lost, 0 neither"
+            ),
+        }
+        for name, values, axis in (
+            ("harmonics", self.harmonics, "harmonic"),
+            ("log_multipliers", self.log_multipliers, "multiplier"),
+        ):
+            for part in ("real", "imag"):
+                label = f"{part} part of {name}"
+                data[f"{name}_{part}"] = along(getattr(values, part), "1", label, axis)
+        return xarray.Dataset(data, attrs=self.provenance)
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Version, law, equation of motion, fixed parameters, and why the branch ends."""
+        law = type(self.motion.slider.law)
+        fixed = fixed_as_text(law, self.fixed)
+        return {
+            "asperity_version": __version__,
+            "law": law.name,
+            "source": law.source,
+            "equation_of_motion": self.motion.name,
+            "continued_parameter": self.name,
+            "parameters": fixed,
+            "periods": self.periods,
+            "result": self.result,
+            "convention": "F/W0 = mean + sum mu_n cos(n w t / periods + phase_n)",
+        }

@@ -1,0 +1,185 @@
+"""Switching onto the branch of doubled period at a period doubling, and following it.
+
+An orbit of two periods of the modulation is an orbit of one period of a modulation repeated twice
+in it, at half the frequency. Where a multiplier of the simple orbit is -1 its eigenvector v changes
+sign from one period to the next: (v, -v) is the direction in which the doubled orbits leave.
+
+Source: R. Seydel, Practical Bifurcation and Stability Analysis, section 7.6.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity._jax import jit_large
+from asperity.branches.branch import Bifurcation, Branch
+from asperity.branches.follower import BranchFollower, BranchOrbit
+from asperity.branches.recorder import INTERVALS, BranchRecorder
+from asperity.errors import InputError
+from asperity.loads import Excitation, Modulation
+from asperity.orbit.methods.branch_following.arclength import (
+    ContinuationPoint,
+    Tangent,
+    slip_units,
+    weighted_row,
+)
+from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
+from asperity.orbit.methods.collocation.condensation import condense, localise, transfer_maps
+from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.parameters.arguments import counted, function, instance, whole_number
+from asperity.slider.problem import Problem
+
+#: Distances at which the doubled branch is sought, in units of the exponent of the slip rate.
+_DISTANCES = (0.05, 0.02, 0.1, 0.2)
+
+
+class Repeated(Modulation):
+    """A modulation run through twice while theta runs from 0 to 2 pi.
+
+    Parameters
+    ----------
+    load : Modulation
+    """
+
+    load: Modulation
+
+    def at(self, theta: ArrayLike) -> Excitation:
+        """Values and slopes at the phase `theta` (rad) of the double period."""
+        once = self.load.at(2 * jnp.asarray(theta))
+        return once._replace(w_slope=2 * once.w_slope, shear_slope=2 * once.shear_slope)
+
+    @property
+    def amplitude(self) -> ArrayLike:
+        """That of the modulation."""
+        return self.load.amplitude
+
+    @property
+    def formula(self) -> str:
+        """That of the modulation."""
+        return self.load.formula
+
+    def scaled(self, share: ArrayLike) -> Repeated:
+        """The modulation with `share` of its amplitude."""
+        return Repeated(self.load.scaled(share))
+
+
+def doubled_branch(
+    branch: Branch,
+    bifurcation: Bifurcation,
+    *,
+    most_steps: int = 1000,
+    progress: Callable[[int, int], None] | None = None,
+) -> Branch:
+    """Follow the branch of doubled period that leaves a branch at a period doubling.
+
+    Parameters
+    ----------
+    branch : Branch
+        Of simple period.
+    bifurcation : Bifurcation
+        One of its period doublings.
+    most_steps : int
+    progress : callable, optional
+        Called after each step with the number of steps and `most_steps`.
+
+    Returns
+    -------
+    Branch
+        With `periods` 2: its harmonics c_n belong to n f / 2, its multipliers to two periods. It
+        starts beside the period doubling and is followed within the same span. The two halves of a
+        doubled branch are one orbit, begun a period later: one of them is followed.
+
+    Raises
+    ------
+    InputError
+        If the bifurcation is no period doubling, the branch is itself one of doubled period,
+        or no doubled orbit is found beside it.
+    """
+    branch = instance(branch, Branch, "branch", "follow one with continuation")
+    advice = "take one of the branch's bifurcations"
+    bifurcation = instance(bifurcation, Bifurcation, "bifurcation", advice)
+    most_steps = whole_number(most_steps, "most_steps", least=1)
+    progress = function(progress, "progress")
+    if bifurcation.kind != "period doubling":
+        raise InputError(
+            f"bifurcation must be a period doubling, got a {bifurcation.kind}; choose another one"
+        )
+    if branch.periods != 1:
+        raise InputError(
+            f"branch must have the period of the modulation, got one of {branch.periods} periods; "
+            "follow further doublings in the multipliers of this branch"
+        )
+    follower, moving, problem = branch.origin
+    simple = follower.finer(bifurcation.critical.point, INTERVALS)
+    twice = BranchFollower(_doubled_line(follower.line), 2 * follower.harmonics)
+    start = None if simple is None else _beside(follower, twice, simple)
+    if start is None:
+        raise InputError(
+            "bifurcation must have a doubled orbit beside it, got none that Newton's method finds; "
+            "continue in another parameter"
+        )
+    recorder = BranchRecorder(twice, moving, start, counted(progress, most_steps), periods=2)
+    return recorder.branch(recorder.follow_branch(most_steps), problem)
+
+
+def _doubled_line(line: ParameterLine) -> ParameterLine:
+    def doubled(problem: Problem, factor: float) -> Problem:
+        omega = problem.system.omega * factor
+        system = eqx.tree_at(lambda q: q.omega, problem.system, omega)
+        return Problem(system, Repeated(problem.load))
+
+    # Rates of growth are relative: half the frequency grows by the same factor.
+    return ParameterLine(
+        doubled(line.origin, 0.5), doubled(line.added, 0.5), doubled(line.growth, 1.0)
+    )
+
+
+def _beside(
+    follower: BranchFollower, twice: BranchFollower, simple: BranchOrbit
+) -> BranchOrbit | None:
+    """A doubled orbit near the critical simple one."""
+    point = simple.point
+    orbit, tangent = _alternating(follower.line, point.orbit, point.t)
+    for distance in _DISTANCES:
+        branch_orbit, _ = twice.step(ContinuationPoint(orbit, point.t, tangent), distance)
+        if branch_orbit is not None:
+            return branch_orbit
+    return None
+
+
+@jit_large
+def _maps(line: ParameterLine, orbit: Orbit, t: Array) -> tuple[Array, Array, Array]:
+    """Transfer maps, response of the slopes, and units of the states."""
+    (response,) = condense(localise(*line.at(t), orbit), orbit)
+    return transfer_maps(response, orbit), response, slip_units(line, orbit, t)
+
+
+def _alternating(line: ParameterLine, orbit: Orbit, t: Array) -> tuple[Orbit, Tangent]:
+    """The simple orbit twice, and the unit direction that changes sign in between."""
+    maps, response, units = (np.asarray(a) for a in _maps(line, orbit, t))
+    total = np.eye(len(maps))
+    for i in range(maps.shape[2]):
+        total = maps[:, :, i, 0] @ total
+    values, vectors = np.linalg.eig(total)
+    vector = vectors[:, np.argmin(np.abs(values + 1))].real
+    nodes = np.empty(orbit.nodes.shape)
+    for i in range(maps.shape[2]):
+        nodes[:, i, 0] = vector
+        vector = maps[:, :, i, 0] @ vector
+    slopes = 2 * np.einsum("nkcmb,cmb->nkmb", response, nodes)
+    mesh = np.concatenate([orbit.mesh / 2, np.pi + orbit.mesh[1:] / 2])
+    twice = orbit.moved(
+        mesh=mesh,
+        nodes=np.concatenate([orbit.nodes, orbit.nodes], axis=1),
+        slopes=2 * np.concatenate([orbit.slopes, orbit.slopes], axis=2),
+    )
+    nodes = np.concatenate([nodes, -nodes], axis=1)
+    slopes = np.concatenate([slopes, -slopes], axis=2)
+    size = np.sqrt((np.asarray(weighted_row(twice, nodes, units)) * nodes).sum())
+    return twice, Tangent(nodes / size, slopes / size, np.zeros(1))

@@ -1,0 +1,166 @@
+"""Control parameters by name, and the lines on which one or two of them move."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError, closest
+from asperity.laws import Law
+from asperity.orbit.methods.branch_following.parameter_line import ParameterLine, still
+from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
+from asperity.parameters.arguments import number, pair, shown
+from asperity.slider.named import equation_parameters, with_value
+from asperity.slider.problem import Problem
+
+#: Spans of a larger ratio than this are continued by equal factors.
+_LOGARITHMIC = 2.0
+
+
+@dataclass(frozen=True)
+class ContinuedParameter:
+    """A parameter that moves from `start` to `end` as the coordinate t goes from 0 to 1.
+
+    Attributes
+    ----------
+    name : str
+    unit : str
+        SI unit of the values; "" for none.
+    start, end : float
+    logarithmic : bool
+        Whether it moves by equal factors.
+    """
+
+    name: str
+    unit: str
+    start: float
+    end: float
+    logarithmic: bool
+
+    def value(self, t: Any) -> Any:
+        """Values at the coordinates `t`."""
+        if self.logarithmic:
+            return self.start * (self.end / self.start) ** np.asarray(t)
+        return self.start + (self.end - self.start) * np.asarray(t)
+
+    def coordinate(self, value: Any) -> Any:
+        """The inverse of `value`."""
+        if self.logarithmic:
+            return np.log(np.asarray(value) / self.start) / np.log(self.end / self.start)
+        return (np.asarray(value) - self.start) / (self.end - self.start)
+
+    def slope(self, t: Any) -> Any:
+        """Derivative of the value by the coordinate."""
+        if self.logarithmic:
+            return self.value(t) * np.log(self.end / self.start)
+        return (self.end - self.start) * np.ones_like(t)
+
+
+def moving_parameter(
+    problem: Problem, name: str, span: Any, field: str = "span"
+) -> ContinuedParameter:
+    """A parameter of `problem` with the span it shall move over.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter, or the span is not two different values it may have.
+    """
+    name = continued_name(type(problem.system.slider.law), name)
+    known = equation_parameters(*problem)
+    if name not in known:
+        raise InputError(
+            f"parameter must be one that the equations have, got '{name}'; {closest(name, known)}"
+        )
+    parameter = known[name]
+    ends = [_end(parameter, end, field) for end in pair_of(span, name, field)]
+    start, end = ends
+    if start == end:
+        raise InputError(
+            f"{field} must have two different ends, got {start:g} twice; give (start, end)"
+        )
+    ratio = max(start, end) / min(start, end) if min(start, end) > 0 else 0.0
+    return ContinuedParameter(
+        name, parameter.unit, start, end, name != "epsilon" and ratio > _LOGARITHMIC
+    )
+
+
+def continued_name(law: type[Law], name: str) -> str:
+    """The one name of a parameter that can be continued in.
+
+    Raises
+    ------
+    InputError
+        If neither the law nor the experiment has one of that name.
+    """
+    if not isinstance(name, str):
+        raise InputError(
+            f"parameter must be the name of a parameter, got {shown(name)}; write it like 'epsilon'"
+        )
+    if name in MODULATION:
+        raise InputError(
+            f"parameter must be one that continuation can change, got '{name}'; give it as "
+            "modulation=asperity.loads.modulated(...) and continue in another one"
+        )
+    known = {n: p for n, p in point_parameters(law).items() if p.path}
+    return known_name(name, known)
+
+
+def pair_of(span: Any, name: str, field: str) -> tuple[Any, Any]:
+    """The two ends of a span.
+
+    Raises
+    ------
+    InputError
+        If there are not two.
+    """
+    return pair(span, field)
+
+
+def line_through(
+    problem: Problem, parameters: tuple[ContinuedParameter, ...], at: Any, direction: Any
+) -> ParameterLine:
+    """The line on which the coordinates of `parameters` are `at` + t `direction`.
+
+    Parameters
+    ----------
+    problem : Problem
+        The other parameters, NumPy arrays of shape (1,).
+    parameters : tuple of ContinuedParameter
+        Different ones.
+    at, direction : sequence of float
+    """
+    known = equation_parameters(*problem)
+    origin, added, growth = problem, still(problem), still(problem)
+    for moving, start, step in zip(parameters, at, direction, strict=True):
+        parameter = known[moving.name]
+        if moving.logarithmic:
+            rate = np.array([step * np.log(moving.end / moving.start)])
+            # A rate of the logarithm, the same for omega as for the frequency.
+            growth = with_value(growth, parameter, rate / parameter.scale)
+        else:
+            rate = np.array([step * (moving.end - moving.start)])
+            added = with_value(added, parameter, rate)
+        origin = with_value(origin, parameter, np.array([moving.value(float(start))]))
+    return ParameterLine(origin, added, growth)
+
+
+def fixed_as_text(law: type[Law], fixed: Mapping[str, float]) -> str:
+    """The parameters that were kept, with their units."""
+    known = point_parameters(law)
+    return "; ".join(f"{n} = {value!r} {known[n].unit}".rstrip() for n, value in fixed.items())
+
+
+def _end(parameter: Parameter, value: Any, field: str) -> float:
+    """An end of a span, which the parameter must be able to have."""
+    found = number(value, field, parameter.kind, parameter.rule)
+    # What can be 0 in a table, for not being there, has to be there to be continued in.
+    if parameter.name in ("M", "eta") and not found > 0:
+        raise InputError(
+            f"{field} must be positive for {parameter.name}, got {found:g} {parameter.unit}; "
+            "give a span above zero"
+        )
+    return found

@@ -1,0 +1,67 @@
+"""``asperity compare``: which friction laws do the data exclude."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from asperity.cli.fit import checked_laws, fit_options
+from asperity.cli.fit_data import FitData
+
+_EPILOG = """\b
+Example:
+  asperity compare readings.csv --laws rice-ruina,linker-dieterich,elasto-plastic \\
+      --material bureau2000 --free lambda,alpha,eps_ratio,A,B
+
+\b
+Each law takes those of the free parameters that it has. A law is excluded if
+chi-squared has a probability below 0.001 while that of another law has not, or
+if its AICc exceeds the lowest by 10 or more.
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.option("--laws", default="all", metavar="NAMES", help="Laws to compare: a,b,c or all.")
+@fit_options
+def compare(
+    data: tuple[Path, ...],
+    laws: str,
+    free: list[str],
+    options: Mapping[str, Any],
+    reading: FitData,
+    as_json: bool,
+) -> int:
+    """Fit several laws to the same readings and say which the data exclude."""
+    from asperity import inference
+    from asperity.cli.report import aligned, to_json
+    from asperity.inference.record import comparison_record
+
+    read = reading.read(data, options["fixed"])
+    found = inference.compare(read, checked_laws(laws), free, **options)
+    without = found.not_compared
+    if as_json:
+        click.echo(to_json(comparison_record(found)))
+    else:
+        rows = [("law", "chi-squared", "dof", "p", "AICc - lowest", "")]
+        lowest = min((j.fit.aicc for j in found.laws.values() if j.fit.converged), default=0.0)
+        for name, j in found.laws.items():
+            if not j.fit.converged:
+                rows.append((name, "", "", "", "", j.fit.message))
+                continue
+            rows.append(
+                (
+                    name,
+                    f"{j.fit.chi2:.4g}",
+                    str(j.fit.dof),
+                    f"{j.fit.p_value:.2g}",
+                    f"{j.fit.aicc - lowest:.4g}",
+                    "excluded" if j.excluded else "",
+                )
+            )
+        rows += [(name, "", "", "", "", f"not compared: {why}") for name, why in without.items()]
+        click.echo(aligned(rows))
+        click.echo(found.verdict)
+    return 0 if all(j.fit.converged for j in found.laws.values()) else 1

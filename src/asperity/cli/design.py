@@ -1,0 +1,145 @@
+"""``asperity design``: which operating points to measure next."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.options import json_option
+
+if TYPE_CHECKING:
+    from asperity.inference import Design
+
+_EPILOG = """\b
+Examples:
+  asperity design plan.toml
+  asperity design plan.toml --simulate 200 --csv points.csv --json
+
+\b
+A plan names the law, its free parameters with the values that are expected,
+the ranges of V, epsilon, frequency and other settings, what is measured with
+which noise, a number of points or a time, and an aim: parameters to measure or
+a rival law to exclude. Quantities carry their unit. docs/design.md has a plan
+line by line, examples/load_on_age.toml is one.
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.argument("plan", type=Path)
+@click.option(
+    "--simulate",
+    type=click.IntRange(0, 100_000),
+    default=0,
+    metavar="N",
+    help="Fit N synthetic sets of readings and compare the spread of the estimates.",
+)
+@click.option(
+    "--csv", "table", type=Path, metavar="CSV", help="Write the points as a table for `response`."
+)
+@json_option()
+def design(plan: Path, simulate: int, table: Path | None, as_json: bool) -> int:
+    """Operating points that measure parameters or exclude a law best.
+
+    Points, expected standard errors, and how many times fewer readings they are than an even grid
+    of the same interval.
+    """
+    from asperity import inference
+    from asperity.cli.progress import bar
+    from asperity.cli.report import to_json
+    from asperity.outputs import output_file, written_file
+
+    target = None
+    if table is not None:
+        target = output_file(table, "--csv", example="points.csv", inputs={"plan": plan})
+    checked = inference.read_plan(plan)
+    with bar("step") as update:
+        found = inference.design(checked, simulate=simulate, progress=update)
+    if target is not None:
+        with written_file(target) as fresh:
+            fresh.write_text(_csv(found), encoding="utf-8")
+    click.echo(to_json(found.record()) if as_json else design_text(found))
+    return 0
+
+
+def _csv(found: Design) -> str:
+    rows = found.rows()
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(rows)
+    return text.getvalue()
+
+
+def design_text(found: Design) -> str:
+    """A design as a person reads it."""
+    from asperity.cli.report import aligned
+    from asperity.parameters import point_parameters
+    from asperity.units import format_si
+
+    plan = found.plan
+    known = point_parameters(plan.truth.law)
+    axes = [a.name for a in plan.axes]
+    rows: list[tuple[str, ...]] = [(*axes, "readings", *plan.noise)]
+    for p in found.points:
+        settings = [format_si(p.setting[n], known[n].kind, 4) for n in axes]
+        predicted = [f"{v:.4g} +- {e:.1g}" for v, e in p.predicted.values()]
+        rows.append((*settings, str(p.readings), *predicted))
+    aim = f"to measure {', '.join(plan.measured)}"
+    if plan.rival is not None:
+        aim = f"to exclude {plan.rival.law.name}"
+    lines = [f"{plan.truth.law.name}: {found.readings} readings {aim}", aligned(rows, "  ")]
+    if plan.budget.time is not None:
+        lines.append(f"time {found.spent:.4g} s of {plan.budget.time:.4g} s")
+    table = [("", "expected", "std. error", "even grid", "")]
+    table += [
+        (n, f"{p.value:.4g}", f"{p.se:.3g}", f"{p.se_grid:.3g}", p.unit)
+        for n, p in found.parameters.items()
+    ]
+    lines += ["parameters", aligned(table, "  ")]
+    grid = " x ".join(f"{m} {n}" for n, m in zip(axes, found.grid_levels, strict=True))
+    what = "chi-squared" if plan.rival is not None else "interval"
+    fewer = "infinitely many" if math.isinf(found.fewer) else f"{found.fewer:.3g}"
+    lines += [
+        f"{fewer} times fewer readings than an even grid for the same {what} ({grid}; "
+        f"{found.grid_usable[0]} of {found.grid_usable[1]} usable)",
+        f"efficiency at least {found.efficiency:.3f}, of the whole readings "
+        f"{found.efficiency_whole:.3f}",
+        f"{found.candidates} of {found.combinations} combinations can be used",
+        *(f"  {count} not: {reason}" for reason, count in found.left_out.items()),
+    ]
+    if plan.rival is not None:
+        values = "; ".join(f"{n} = {v:.4g}" for n, v in (found.rival_values or {}).items())
+        lines.append(
+            f"expected chi-squared {found.chi2:.4g} (even grid {found.chi2_grid:.4g}), probability "
+            f"of deciding {found.probability:.3g} (even grid {found.probability_grid:.3g}); "
+            f"{plan.rival.law.name} comes nearest with {values}"
+        )
+    for axis, levels in found.alone.items():
+        best = min(levels, key=lambda level: level[2])
+        several = [f"{format_si(v, known[axis].kind, 3)}: {more:.3g}" for v, _, more in levels]
+        lines.append(
+            f"readings at one {axis} alone, in multiples of the design's: {', '.join(several)}; "
+            f"best {format_si(best[0], known[axis].kind, 3)}"
+        )
+    lines += _simulation_lines(found)
+    return "\n".join([*lines, *(f"warning: {w}" for w in found.warnings)])
+
+
+def _simulation_lines(found: Design) -> list[str]:
+    from asperity.cli.report import aligned
+
+    s: Any = found.simulation
+    if s is None:
+        return []
+    rows = [("", "spread", "expected")]
+    rows += [
+        (n, f"{x:.3g} +- {s.uncertainty[n]:.1g}", f"{found.parameters[n].se:.3g}")
+        for n, x in s.spread.items()
+    ]
+    decided = "" if s.decided is None else f", {s.decided:.3g} of them exclude the rival"
+    return [f"{s.sets} simulated fits{decided}", aligned(rows, "  ")]

@@ -1,0 +1,227 @@
+"""``asperity fit``: a friction law fitted to lock-in readings and recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.fit_data import RUN_OPTIONS, FitData, priors_of, run_options
+from asperity.cli.measure.source import Source, source_options
+from asperity.cli.options import json_option, law_named, material_named, settings_of
+from asperity.cli.posterior import PosteriorOptions, posterior_options, posterior_text
+from asperity.errors import InputError
+
+if TYPE_CHECKING:
+    from asperity.inference import Fit
+
+_EPILOG = """\b
+Examples:
+  asperity fit readings.csv --law elasto-plastic --material bureau2000 \\
+      --free lambda,eps_ratio,A,B
+  asperity fit readings.csv --law elasto-plastic --material bureau2000 \\
+      --free lambda,eps_ratio --fix "K=0.21 N/um" --prior bureau2000 --profile --json
+  asperity fit readings.csv --law elasto-plastic --material bureau2000 \\
+      --free lambda,eps_ratio --posterior --out posterior.nc
+  asperity fit velocity_steps.csv --law rice-ruina --free A,B,D0,K --window 100:400
+
+\b
+Table: one operating point a row, in SI without units: V, epsilon (as applied),
+frequency, other parameters that differ between rows, and observables
+mean_friction, delta_mu, mu1, mu2, phase1, phase2 with the standard uncertainty
+of each in NAME_err, covariances in NAME_NAME_cov. Tables and JSON by
+'asperity measure' go in as they are; give the velocity by --fix "V=1 um/s".
+Harmonics are compared as complex numbers where phases are given. eps_ratio is
+the share of epsilon that the contacts carry.
+
+\b
+Recording: any file that 'asperity measure' reads, with friction (or force and
+load) and the displacement or velocity of the load point. It is compared with the
+motion through the whole of it; its stiffness K is free, its noise autoregressive.
+"""
+
+
+def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Options that ``fit`` and ``compare`` share, gathered into `free` and `options`."""
+
+    @wraps(command)
+    def gathered(
+        *,
+        free: str,
+        fixes: tuple[str, ...],
+        starts: tuple[str, ...],
+        material: str | None,
+        prior: tuple[str, ...],
+        profile: bool,
+        inertia: bool,
+        radiation_damping: bool,
+        source: Source,
+        window: str | None,
+        steps: str | None,
+        velocities: str | None,
+        trend: str,
+        drift: bool,
+        initial: str,
+        gauge: str | None,
+        gauge_order: int,
+        **others: Any,
+    ) -> Any:
+        names = [name.strip() for name in free.split(",") if name.strip()]
+        options = {
+            "fixed": settings_of(fixes, "--fix"),
+            "start": settings_of(starts, "--start"),
+            "material": material_named(material),
+            "prior": priors_of(prior, names),
+            "profile": profile,
+            "inertia": inertia,
+            "radiation_damping": radiation_damping,
+            "runs": run_options(
+                trend=trend, drift=drift, initial=initial, gauge=gauge, gauge_order=gauge_order
+            ),
+        }
+        reading = FitData(source, window, steps, velocities)
+        return command(free=names, options=options, reading=reading, **others)
+
+    found: Callable[..., Any] = source_options(gathered)
+    for option in (
+        click.argument("data", nargs=-1, required=True, type=Path),
+        click.option("--free", required=True, metavar="NAMES", help="Free parameters: a,b,c."),
+        click.option(
+            "--fix", "fixes", multiple=True, metavar="NAME=VALUE", help="Fix a parameter."
+        ),
+        click.option("--start", "starts", multiple=True, metavar="NAME=VALUE", help="Start value."),
+        click.option("--material", metavar="NAME", help="Fixes what is given nowhere else."),
+        click.option(
+            "--prior",
+            multiple=True,
+            metavar="NAME|NAME=VALUE+-SD",
+            help='Published uncertainties of a material, or "K=0.2+-0.01 N/um"; repeatable.',
+        ),
+        click.option("--profile", is_flag=True, help="Intervals by profile likelihood."),
+        click.option("--inertia", is_flag=True, help="The mass of the slider counts."),
+        click.option("--radiation-damping", is_flag=True, help="The damping eta counts."),
+        *RUN_OPTIONS,
+        json_option(),
+    ):
+        found = option(found)
+    return found
+
+
+@click.command(epilog=_EPILOG)
+@click.option("--law", metavar="NAME", help="Friction law, such as elasto-plastic.")
+@fit_options
+@posterior_options
+@click.option("--report", type=Path, metavar="DIR", help="Folder for a page, a material and draws.")
+def fit(
+    data: tuple[Path, ...],
+    law: str | None,
+    free: list[str],
+    options: Mapping[str, Any],
+    sampling: PosteriorOptions,
+    reading: FitData,
+    report: Path | None,
+    as_json: bool,
+) -> int:
+    """Fit a friction law to tables of lock-in readings and to recordings.
+
+    Estimates with intervals, correlations, what the data cannot determine, and whether the law
+    describes them.
+    """
+    from asperity import inference
+    from asperity.cli.report import to_json
+    from asperity.inference.record import fit_record
+
+    sampling.check()
+    read = reading.read(data, options["fixed"])
+    found = inference.fit(read, law_named(law), free, **options)
+    posterior = sampling.sample(found)
+    if report is not None and found.converged:
+        from asperity.fit_report import write_report
+
+        write_report(report, found, posterior)
+    if as_json:
+        more = {"posterior": posterior.record()} if posterior else {}
+        click.echo(to_json({**fit_record(found), **more}))
+    else:
+        click.echo(fit_text(found))
+        if posterior:
+            click.echo(posterior_text(posterior))
+    return 0 if found.converged and (posterior is None or posterior.converged) else 1
+
+
+def fit_text(found: Fit) -> str:
+    """A fit as a person reads it."""
+    from asperity.cli.report import aligned
+
+    if not found.converged:
+        return f"{found.law}: {found.message}"
+    rows = [("", "estimate", "std. error", "95 % interval", "", "")]
+    for name, p in found.parameters.items():
+        notes = "at its bound" if p.at_bound else ""
+        if name in found.undetermined:
+            notes = "not determined by these data"
+        elif p.prior is not None:
+            notes = f"prior {p.prior.mean:.4g} +- {p.prior.sd:.2g} ({p.prior.source})"
+        low, high = p.interval_95
+        rows.append(
+            (name, f"{p.value:.6g}", f"{p.se:.2g}", f"{low:.5g} to {high:.5g}", p.unit, notes)
+        )
+    names = list(found.parameters)
+    matrix = [
+        (n, *(f"{found.correlation[i, j]:+.2f}" for j in range(i)))
+        for i, n in enumerate(names)
+        if i
+    ]
+    fits = [
+        (n, f"{chi2:.4g}", f"for {count} data") for n, (chi2, count) in found.observables.items()
+    ]
+    lines = [found.law, aligned(rows, "  ")]
+    if matrix:
+        width = len(names)
+        filled = [tuple(row) + ("",) * (width - len(row)) for row in matrix]
+        lines += ["correlations", aligned([("", *names[:-1]), *filled], "  ")]
+    lines += [
+        f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom, p = {found.p_value:.3g}",
+        aligned(fits, "  "),
+        *_runs(found),
+        f"log-likelihood {found.log_likelihood:.6g}, AICc {found.aicc:.6g}, BIC {found.bic:.6g}",
+    ]
+    return "\n".join([*lines, *(f"warning: {w}" for w in found.warnings)])
+
+
+def _runs(found: Fit) -> list[str]:
+    """Noise of the recordings."""
+    from asperity.inference.runs.term import RunTerm
+
+    lines = []
+    for term in found.objective.terms:
+        if isinstance(term, RunTerm):
+            noise = term.noise
+            lines.append(
+                f"{term.name}: noise {noise['model']}, {noise['effective_samples']:.4g} effective "
+                f"of {noise['samples']} samples, whiteness p = {noise['whiteness_p']:.2g}"
+            )
+    return lines
+
+
+def checked_laws(text: str) -> list[str]:
+    """Names of laws from ``all`` or a list.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown.
+    """
+    from asperity.laws import get_law, registered
+
+    if text.strip() == "all":
+        return [name for name, law in registered().items() if law.rate_dependent]
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    if not names:
+        raise InputError(f"--laws must name laws, got '{text}'; write 'all' or a,b,c")
+    for name in names:
+        get_law(name)
+    return names

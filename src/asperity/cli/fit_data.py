@@ -1,0 +1,210 @@
+"""Data of ``asperity fit``: tables of readings and recordings, told apart by what they hold."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.measure.source import Source
+from asperity.cli.measure.times import span_of, times_of
+from asperity.cli.measure.words import naming_options
+from asperity.errors import InputError
+
+if TYPE_CHECKING:
+    from asperity.inference import LockInTable, Prior, RecordedRun
+
+_PRIOR = re.compile(r"^(?P<value>.+?)\s*(?:\+-|±|\+/-)\s*(?P<sd>[-+.\deE]+)\s*(?P<unit>.*)$")
+
+RUN_OPTIONS = (
+    click.option("--window", metavar="START:END", help="Seconds of a recording to fit."),
+    click.option(
+        "--steps",
+        metavar="TIMES|FILE",
+        help="Times (s) at which the velocity of the drive changes.",
+    ),
+    click.option(
+        "--velocities",
+        metavar="VALUES",
+        help='Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.',
+    ),
+    click.option(
+        "--trend",
+        metavar="none|linear|quadratic",
+        default="linear",
+        show_default=True,
+        help="Trend of the friction of a recording over slip.",
+    ),
+    click.option("--drift", is_flag=True, help="A drift of the friction over time besides."),
+    click.option(
+        "--initial",
+        metavar="steady|free",
+        default="steady",
+        show_default=True,
+        help="State at the beginning of a recording.",
+    ),
+    click.option("--gauge", metavar="HZ", help='Low-pass of the force gauge, like "50 Hz".'),
+    click.option(
+        "--gauge-order", type=click.IntRange(1, 8), default=1, show_default=True, help="Its order."
+    ),
+)
+
+
+@dataclass(frozen=True)
+class FitData:
+    """How the data of a fit are read, from the options.
+
+    Attributes
+    ----------
+    source : Source
+        Columns and units of recordings.
+    window, steps, velocities : str or None
+        As the options of these names.
+    """
+
+    source: Source
+    window: str | None
+    steps: str | None
+    velocities: str | None
+
+    def read(
+        self, paths: Sequence[Path], fixed: Mapping[str, str]
+    ) -> list[LockInTable | RecordedRun]:
+        """Tables and recordings from files.
+
+        Raises
+        ------
+        InputError
+            If a file cannot be read, or options for one recording meet several.
+        """
+        from asperity import inference
+
+        tables = [is_table(path) for path in paths]
+        one_only = [n for n in ("steps", "velocities") if getattr(self, n) is not None]
+        if one_only and tables.count(False) != 1:
+            raise InputError(
+                f"--{one_only[0]} must go with one recording, got {tables.count(False)}; cut the "
+                "recordings beforehand"
+            )
+        at = {n: fixed[n] for n in ("V", "epsilon", "frequency") if n in fixed}
+        found: list[LockInTable | RecordedRun] = []
+        for path, table in zip(paths, tables, strict=True):
+            if table:
+                found.append(inference.read_table(path, at))
+                continue
+            with naming_options():
+                found.append(
+                    inference.recorded_run(
+                        self.source.read(path),
+                        name=path.stem,
+                        window=None if self.window is None else span_of(self.window, "--window"),
+                        steps=None if self.steps is None else times_of(self.steps, "--steps"),
+                        velocities=None if self.velocities is None else _speeds(self.velocities),
+                    )
+                )
+        return found
+
+
+def is_table(path: Path) -> bool:
+    """Whether a file holds readings rather than a recording: it has a column of an observable."""
+    from asperity.inference.table import OBSERVABLES
+
+    if path.suffix.lower() == ".json":
+        return True
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            for line in file:
+                if line.strip() and not line.lstrip().startswith("#"):
+                    return any(cell in OBSERVABLES for cell in re.split(r"[,;\t\s]+", line.strip()))
+    except OSError:
+        return True  # the reader of tables says what is wrong
+    return False
+
+
+def run_options(
+    *, trend: str, drift: bool, initial: str, gauge: str | None, gauge_order: int
+) -> Any:
+    """How recordings are compared with the motion, from the options."""
+    from asperity.inference import RunOptions
+    from asperity.units import to_si
+
+    trends = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
+    if trend not in trends:
+        raise InputError(f"--trend must be none, linear or quadratic, got '{trend}'; choose one")
+    if initial not in ("steady", "free"):
+        raise InputError(f"--initial must be steady or free, got '{initial}'; choose one")
+    corner = None
+    if gauge is not None:
+        corner = gauge_order, to_si(gauge, "frequency", "--gauge", require_unit=True)
+        if not corner[1] > 0:
+            raise InputError(f"--gauge must be positive, got '{gauge}'; give its corner frequency")
+    linear = ("offset", *trends[trend], *(("drift",) if drift else ()))
+    return RunOptions(linear=linear, initial=initial, gauge=corner)
+
+
+def priors_of(texts: Sequence[str], free: Sequence[str]) -> dict[str, Prior]:
+    """Priors of ``--prior``: materials, and NAME=VALUE+-DEVIATION UNIT.
+
+    Raises
+    ------
+    InputError
+        If a text is neither, or a name is given twice.
+    """
+    from asperity import materials
+    from asperity.inference.unknowns import Prior, material_priors
+    from asperity.laws import registered
+    from asperity.parameters import all_parameters
+
+    found: dict[str, Prior] = {}
+    known = all_parameters(registered().values())
+    for text in texts:
+        name, equals, rest = (part.strip() for part in text.partition("="))
+        if not equals:
+            found |= material_priors(materials.load(text), free)
+            continue
+        match = _PRIOR.match(rest)
+        if match is None:
+            raise InputError(
+                f"--prior must be a material or NAME=VALUE+-DEVIATION UNIT, got '{text}'; write "
+                'it like --prior "K=0.2+-0.01 N/um"'
+            )
+        plain = name.partition("[")[0]
+        if plain not in known:
+            raise InputError(f"--prior must name a parameter, got '{name}'; correct the name")
+        scale, si = _unit_of(known[plain], match["unit"], f"--prior {name}")
+        try:
+            mean, sd = (float(match[part]) * scale for part in ("value", "sd"))
+        except ValueError:
+            raise InputError(
+                f"--prior {name} must have numbers, got '{rest}'; write it like 0.2+-0.01 N/um"
+            ) from None
+        if not sd > 0:
+            raise InputError(f"--prior {name} must have a positive deviation, got {sd:g}; give one")
+        found[name] = Prior(mean, sd, "given", si)
+    return found
+
+
+def _unit_of(parameter: Any, unit: str, label: str) -> tuple[float, str]:
+    """SI value and SI unit of a unit; K may be of a stress or of a pure number over a length."""
+    from asperity.units import KINDS, to_si
+
+    others = ["stress_per_length", "per_length"] if parameter.name == "K" else []
+    for kind in others:
+        try:
+            return float(to_si(f"1 {unit}", kind, label)), KINDS[kind].si
+        except InputError:
+            continue
+    return float(to_si(f"1 {unit}", parameter.kind, label)), KINDS[parameter.kind].si
+
+
+def _speeds(text: str) -> list[float]:
+    from asperity.units import to_si
+
+    return [
+        0.0 if part.strip() == "0" else float(to_si(part, "velocity", "--velocities"))
+        for part in text.split(",")
+    ]

@@ -1,0 +1,1 @@
+"""``asperity measure``: recordings read by options, measured, printed as text, JSON or tables."""

@@ -1,0 +1,272 @@
+"""``asperity measure``: what a recording says about friction, and whether to believe it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.measure.reading import FileRows, ReadingOptions
+from asperity.cli.measure.source import Source, source_options
+from asperity.cli.measure.times import span_of, spans_of, times_of
+from asperity.cli.measure.words import in_options, naming_options
+from asperity.cli.options import json_option
+from asperity.errors import InputError
+
+if TYPE_CHECKING:
+    from asperity.measurement.verdicts.verdict import Check
+
+_EPILOG = """\b
+Examples:
+  asperity measure recording.csv
+  asperity measure recording.csv --load Fn --force Ft --unit Fn=N --unit Ft=N \\
+      --frequency "120 Hz" --window 10:60 --json --plot recording.png
+  asperity measure velocity_step.txt --no-modulation --plot steps.png
+  asperity measure amplitudes.csv --amplitudes
+  asperity measure day1/*.csv --out campaign.csv
+
+\b
+Convention: W/W0 = 1 + epsilon cos phi, phi from the measured load,
+F/W0 = mean_friction + sum of mu_n cos(n phi + phase_n).
+
+\b
+Exit code 0: measured; 1: measured, but a check says bad, or rows of a table have a reason
+in place of numbers; 2: bad input.
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.argument("recordings", type=Path, nargs=-1, required=True)
+@source_options
+@click.option(
+    "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
+    help='Where to look for the modulation, like "120 Hz"; it is fitted.',
+)  # fmt: skip
+@click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
+@click.option(
+    "--harmonics", metavar="N", type=click.IntRange(1, 64), default=4, show_default=True,
+    help="How many.",
+)  # fmt: skip
+@click.option(
+    "--window",
+    metavar="START:END",
+    help="Seconds to read, like 10:60; chosen by the program if not given.",
+)
+@click.option("--whole-periods", is_flag=True, help="Cut the window to whole periods.")
+@click.option(
+    "--detrend",
+    metavar="none|linear|quadratic",
+    default="linear",
+    show_default=True,
+    help="Drift that is fitted together with the harmonics.",
+)
+@click.option(
+    "--no-modulation", is_flag=True, help="A recording without it: velocity steps and holds."
+)
+@click.option(
+    "--steps",
+    metavar="TIMES|FILE",
+    help="Times of the velocity steps in seconds, like 12.5,60, or a file of them, one a line.",
+)
+@click.option(
+    "--holds",
+    metavar="TIMES|FILE",
+    help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
+)
+@click.option(
+    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
+)
+@click.option(
+    "--out",
+    type=Path,
+    metavar="CSV|NC",
+    help="Measure all recordings into one table: a row for each amplitude, step and hold.",
+)
+@click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(1),
+    help="Processes of a table; as many as cores if not given.",
+)
+@json_option()
+@click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
+def measure(
+    recordings: tuple[Path, ...],
+    source: Source,
+    frequency: str,
+    exact_frequency: bool,
+    harmonics: int,
+    window: str | None,
+    whole_periods: bool,
+    detrend: str,
+    no_modulation: bool,
+    steps: str | None,
+    holds: str | None,
+    amplitudes: bool,
+    out: Path | None,
+    resume: bool,
+    jobs: int | None,
+    as_json: bool,
+    plot: Path | None,
+) -> int:
+    """Harmonics of the friction force against the measured load, with uncertainties and verdicts.
+
+    RECORDINGS are files of a laboratory: CSV or other text, HDF5, MATLAB, TDMS or LOOK. Several
+    are measured into one table with --out.
+    """
+    options = ReadingOptions(
+        modulated=not no_modulation,
+        frequency=_frequency(frequency, exact_frequency),
+        exact_frequency=exact_frequency,
+        harmonics=harmonics,
+        window=None if window is None else span_of(window, "--window"),
+        whole_periods=whole_periods,
+        detrend=detrend,
+        steps=None if steps is None else times_of(steps, "--steps"),
+        holds=None if holds is None else spans_of(holds, "--holds"),
+    )
+    if (steps or holds) and not no_modulation:
+        raise InputError(
+            "--steps and --holds must go with --no-modulation, got them without; add it"
+        )
+    if out is not None:
+        if plot is not None or steps or holds:
+            raise InputError(
+                "--plot, --steps and --holds must go with one recording without --out, got both; "
+                "measure that recording by itself"
+            )
+        return _campaign(recordings, source, options, out, resume, jobs, as_json)
+    if len(recordings) > 1:
+        raise InputError(
+            f"--out must be given with several recordings, got {len(recordings)} without; name "
+            "the table, like --out campaign.csv"
+        )
+    if resume or jobs is not None:
+        raise InputError(
+            "--resume and --jobs must go with --out, got no table; name it or leave them out"
+        )
+    (recording,) = recordings
+    if amplitudes:
+        if no_modulation or plot is not None:
+            raise InputError(
+                "--amplitudes must go without --no-modulation and --plot, got both; leave one out"
+            )
+        return _amplitudes(recording, source, options, as_json)
+    if plot is not None:
+        _check_picture(plot, recording)
+    with naming_options():
+        trace = source.read(recording)
+        found = options.measure(trace)
+    _print(found, recording, trace.provenance, as_json)
+    if plot is not None:
+        _plot(found, plot)
+    return _verdict(found.checks)
+
+
+def _amplitudes(recording: Path, source: Source, options: ReadingOptions, as_json: bool) -> int:
+    from asperity.cli.measure.text import amplitudes_text
+    from asperity.cli.report import to_json
+    from asperity.measurement.campaign import modulated_rows
+
+    with naming_options():
+        rows = modulated_rows(recording, options.amplitudes(source.read(recording)))
+    rows = [row | {"reason": in_options(row["reason"])} for row in rows]
+    if as_json:
+        click.echo(to_json({"recording": str(recording), "amplitudes": rows}))
+    else:
+        click.echo(amplitudes_text(rows, recording.name))
+    return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
+
+
+def _campaign(
+    recordings: tuple[Path, ...],
+    source: Source,
+    options: ReadingOptions,
+    out: Path,
+    resume: bool,
+    jobs: int | None,
+    as_json: bool,
+) -> int:
+    import os
+
+    from asperity.cli.progress import bar
+    from asperity.cli.report import to_json
+    from asperity.measurement.campaign import run_campaign
+
+    rows_of = FileRows(source, options)
+    with bar("files") as update:
+        done = run_campaign(
+            recordings,
+            rows_of,
+            out,
+            inputs=rows_of.inputs(),
+            resume=resume,
+            jobs=jobs or os.cpu_count() or 1,
+            progress=update,
+        )
+    if as_json:
+        numbers = {"files": done.files, "rows": done.rows, "failed": done.failed}
+        click.echo(to_json({**numbers, "out": str(out)}))
+    if done.failed:
+        click.echo(
+            f"asperity: {done.failed} of {done.rows} rows have no numbers; the column 'reason' of "
+            f"{out} says why",
+            err=True,
+        )
+    return int(done.failed > 0)
+
+
+def _check_picture(path: Path, recording: Path) -> None:
+    """Before anything is read: a mistake must not cost the work."""
+    from asperity.outputs import output_files
+
+    if path.suffix.lower() != ".png":
+        raise InputError(f"--plot must be a PNG file, got '{path}'; write it like --plot out.png")
+    output_files({"--plot": path}, inputs={"recording": recording})
+
+
+def _frequency(text: str, exact: bool) -> float | None:
+    from asperity.units import to_si
+
+    if text != "auto":
+        return to_si(text, "frequency", "--frequency")
+    if exact:
+        raise InputError(
+            "--exact-frequency must go with --frequency, got 'auto'; give the frequency or leave "
+            "the option out"
+        )
+    return None
+
+
+def _print(found: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
+    from asperity._version import __version__
+    from asperity.cli.measure.text import modulated_text, sliding_text
+    from asperity.cli.report import to_json
+    from asperity.measurement.record import modulated_record, sliding_record
+
+    modulated = hasattr(found, "reading")
+    if as_json:
+        record = modulated_record(found) if modulated else sliding_record(found)
+        told = {"recording": str(recording), "version": __version__, **provenance}
+        click.echo(to_json({**record, "provenance": told}))
+    else:
+        click.echo((modulated_text if modulated else sliding_text)(found, recording.name))
+
+
+def _plot(found: Any, path: Path) -> None:
+    from asperity.figures.recording import draw_modulated, draw_sliding
+    from asperity.figures.style import style
+    from asperity.outputs import written_file
+
+    with style(), written_file(path, "--plot") as file:
+        figure = (draw_modulated if hasattr(found, "reading") else draw_sliding)(found)
+        figure.savefig(file, metadata={"Software": None})
+
+
+def _verdict(checks: tuple[Check, ...]) -> int:
+    for check in checks:
+        if check.verdict == "bad":
+            click.echo(f"asperity: {check.name} is bad: {check.sentence}", err=True)
+    return int(any(check.verdict == "bad" for check in checks))

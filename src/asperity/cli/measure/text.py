@@ -1,0 +1,279 @@
+"""Measurements as aligned text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from asperity.cli.measure.words import in_options
+from asperity.cli.report import aligned
+
+if TYPE_CHECKING:
+    from asperity.measurement.measure import Measurement
+    from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.verdicts.verdict import Check
+    from asperity.recording.finding import Finding
+
+
+#: What is slower than a tenth of a nanometre a day is rounding.
+_STILL = 1e-15
+
+
+def modulated_text(found: Measurement, name: str) -> str:
+    """A reading, as the command prints it.
+
+    Parameters
+    ----------
+    found : Measurement
+    name : str
+        Of the recording.
+    """
+    reading, unit = found.reading, found.samples.unit
+    rows = [
+        _row("W0", reading.W0, reading.uncertainty("W0"), unit, "mean load"),
+        _row("epsilon", reading.epsilon, reading.uncertainty("epsilon"), "", "amplitude of W/W0"),
+        _row("frequency", reading.frequency, reading.uncertainty("frequency"), "Hz", ""),
+        _row("mean_force", reading.mean_force, reading.uncertainty("mean_force"), unit, ""),
+        _row(
+            "mean_friction",
+            reading.mean_friction,
+            reading.uncertainty("mean_friction"),
+            "",
+            "mean of F/W0",
+        ),
+    ]
+    if math.isfinite(found.delta_mu):
+        rows.append(
+            _row(
+                "delta_mu",
+                found.delta_mu,
+                found.delta_mu_uncertainty,
+                "",
+                "mean_friction - F(0)/W0 without modulation",
+            )
+        )
+    for side, level in (("before", found.before), ("after", found.after)):
+        if level is not None:
+            rows.append(_row(f"F0_{side}", level.value, level.uncertainty, unit, "no modulation"))
+    for n in range(1, reading.harmonics.size + 1):
+        phasor = reading.phasor(n)
+        where = f"amplitude of F/W0 at {'' if n == 1 else n}f"
+        rows.append(_row(f"mu{n}", phasor.amplitude, phasor.amplitude_uncertainty, "", where))
+        rows.append(
+            _row(f"phase{n}", phasor.phase, phasor.phase_uncertainty, "rad", "against the load")
+        )
+    head = (
+        f"{name}: {reading.start:.6g} s to {reading.end:.6g} s, {reading.samples} samples, "
+        f"{reading.periods:.5g} periods; window chosen by the {found.chosen_by}"
+    )
+    return "\n".join(
+        [
+            head,
+            aligned(rows, "  "),
+            *_quality(found.checks),
+            *_seen(found.samples.findings),
+            *_unread(found.samples.unread),
+        ]
+    )
+
+
+def amplitudes_text(rows: list[dict[str, Any]], name: str) -> str:
+    """The amplitudes of a recording as a table.
+
+    Parameters
+    ----------
+    rows : list of dict
+        From `asperity.measurement.campaign.modulated_rows`.
+    name : str
+        Of the recording.
+    """
+    shown = ("epsilon", "frequency", "mean_friction", "delta_mu", "mu1", "phase1", "mu2")
+    head = ("part", "from (s)", "to (s)", *shown, "verdict")
+    table: list[tuple[str, ...]] = [head]
+    reasons = []
+    for row in rows:
+        if row["reason"]:
+            reasons.append(f"part {row['part']}: {row['reason']}")
+            continue
+        cells = []
+        for number in shown:
+            value, doubt = row.get(number), row.get(f"{number}_uncertainty", math.nan)
+            if value is None or not math.isfinite(value):
+                cells.append("-")
+                continue
+            cells.append(" ".join(c for c in _row("", value, doubt, "", "")[1:3] if c))
+        times = f"{row['start']:.6g}", f"{row['end']:.6g}"
+        table.append((str(row["part"]), *times, *cells, row["verdict"]))
+    named = [f"part {row['part']}: {row['checks']}" for row in rows if row.get("checks")]
+    count = f"{name}: {len(rows)} modulated {'part' if len(rows) == 1 else 'parts'}"
+    return "\n".join([count, aligned(table, "  "), *reasons, *named])
+
+
+def sliding_text(found: SlidingMeasurement, name: str) -> str:
+    """A recording without modulation, as the command prints it.
+
+    Parameters
+    ----------
+    found : SlidingMeasurement
+    name : str
+        Of the recording.
+    """
+    friction = found.friction
+    rates = ", ".join(f"{rate:.4g} Hz ({100 * share:.0f} %)" for rate, share in found.rates)
+    rows = [_row("friction", friction.value, friction.uncertainty, "", "mean of F/W")]
+    if found.load is not None:
+        rows.append(_row("load", found.load.value, found.load.uncertainty, found.load_unit, "mean"))
+    head = (
+        f"{name}: {friction.start:.10g} s to {friction.end:.10g} s, {found.time.size} samples "
+        f"at {rates}"
+    )
+    lines = [head, aligned(rows, "  "), *_segments(found), *_steps(found), *_holds(found)]
+    return "\n".join([*lines, *_quality(found.checks), *_unread(found.unread)])
+
+
+def _segments(found: SlidingMeasurement) -> list[str]:
+    table = [("from (s)", "to (s)", "velocity", "mean friction", "drift (1/s)", "scatter")]
+    for s in found.segments:
+        shown = [*_row("", s.steady.value, s.steady.uncertainty, "", "")[1:3]]
+        steady = " ".join(part for part in shown if part)
+        table.append(
+            (
+                f"{s.start:.10g}",
+                f"{s.end:.10g}",
+                "hold" if s.hold else velocity_text(s.velocity),
+                steady,
+                f"{s.slope:.2g}",
+                f"{s.scatter:.2g}",
+            )
+        )
+    return [f"segments, chosen by the {found.chosen_by}", aligned(table, "  ")]
+
+
+def velocity_text(velocity: float) -> str:
+    """A velocity with four digits; "-" where it is not known, zero below an atom a day."""
+    from asperity.units import format_si
+
+    if not math.isfinite(velocity):
+        return "-"
+    return "0 m/s" if abs(velocity) < _STILL else format_si(velocity, "velocity", 4)
+
+
+def _steps(found: SlidingMeasurement) -> list[str]:
+    lines = []
+    for k, step in enumerate(found.steps, 1):
+        rows = [
+            _row(
+                "change",
+                step.change,
+                step.uncertainty,
+                "",
+                f"of steady friction at the step; noise {step.noise_uncertainty:.2g}, choice of "
+                f"window and trend {step.choice_uncertainty:.2g}",
+            )
+        ]
+        if math.isfinite(step.rate_dependence):
+            rows.append(
+                _row(
+                    "A - B",
+                    step.rate_dependence,
+                    step.rate_uncertainty,
+                    "",
+                    f"d mu/d ln V; 95 %: +- {step.rate_interval_95:.2g}",
+                )
+            )
+            rows.append(("peak", f"{step.peak:.4g}", "", "beyond the level before"))
+        if step.trend != "none":
+            rows.append(
+                (
+                    "trend",
+                    step.trend,
+                    "",
+                    f"{_slope(found, step.slope_before)} before, "
+                    f"{_slope(found, step.slope_after)} after",
+                )
+            )
+        speeds = f"{velocity_text(step.velocity_before)} to {velocity_text(step.velocity_after)}"
+        lines += [f"step {k} at {step.time:.10g} s, {speeds}", aligned(rows, "  ")]
+    return lines
+
+
+def _slope(found: SlidingMeasurement, slope: float) -> str:
+    return f"{1e-3 * slope:.2g} /mm" if found.velocity_from else f"{slope:.2g} /s"
+
+
+def _holds(found: SlidingMeasurement) -> list[str]:
+    if not found.holds:
+        return []
+    table: list[tuple[str, ...]] = [
+        ("from (s)", "hold (s)", "level", "relaxation", "peak", "healing", "reload (1/mm)")
+    ]
+    for hold in found.holds:
+        numbers = (
+            (hold.level, hold.level_uncertainty),
+            (hold.relaxation, hold.relaxation_uncertainty),
+            (hold.peak, 0.0),
+            (hold.healing, hold.healing_uncertainty),
+        )
+        cells = []
+        for value, doubt in numbers:
+            shown = _row("", value, doubt, "", "")[1:3] if doubt else (f"{value:.5g}", "")
+            cells.append(" ".join(part for part in shown if part))
+        reload = f"{1e-3 * hold.reload_slope:.3g}" if math.isfinite(hold.reload_slope) else "-"
+        table.append((f"{hold.start:.10g}", f"{hold.hold_time:.4g}", *cells, reload))
+    lines = ["holds", aligned(table, "  ")]
+    if found.healing is not None:
+        rate = found.healing
+        rows = [
+            _row(
+                "healing rate",
+                rate.per_decade,
+                rate.uncertainty,
+                "",
+                f"per decade of hold time, {rate.holds} holds; 95 %: +- {rate.interval_95:.2g}",
+            )
+        ]
+        lines.append(aligned(rows, "  "))
+    return lines
+
+
+def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tuple[str, ...]:
+    """A number with as many digits as its uncertainty allows: two uncertain ones."""
+    if not (math.isfinite(doubt) and doubt > 0 and math.isfinite(value)):
+        return name, f"{value:.9g} {unit}".strip(), "", meaning
+    last = math.floor(math.log10(doubt)) - 1
+    digits = max(0, min(15, -last))
+    if value and (abs(value) < 1e-3 or abs(value) >= 1e6):
+        power = math.floor(math.log10(abs(value)))
+        shown = f"{value:.{max(0, min(15, power - last))}e}"
+    else:
+        shown = f"{value:.{digits}f}"
+    return name, f"{shown} {unit}".strip(), f"+- {doubt:.2g}", meaning
+
+
+def _quality(checks: Iterable[Check]) -> list[str]:
+    """A row a name: of several checks of one name the first of the gravest, and how many more."""
+    by_name: dict[str, list[Check]] = {}
+    for check in checks:
+        by_name.setdefault(check.name, []).append(check)
+    from asperity.measurement.verdicts.verdict import worst
+
+    rows = []
+    for name, same in by_name.items():
+        gravest = worst(same)
+        check = next(c for c in same if c.verdict == gravest)
+        more = f" (and {len(same) - 1} more)" if len(same) > 1 else ""
+        rows.append((check.verdict, name, f"{check.number:.3g}", in_options(check.sentence) + more))
+    return ["quality", aligned(rows, "  ")]
+
+
+def _seen(findings: Iterable[Finding]) -> list[str]:
+    """What was found anywhere in the recording, read or not."""
+    rows = [(f.severity, f.name, f.sentence) for f in findings]
+    return ["whole recording", aligned(rows, "  ")] if rows else []
+
+
+def _unread(count: int) -> list[str]:
+    """One line for what is said about columns that are not read."""
+    findings = "finding is" if count == 1 else "findings are"
+    return [f"{count} more {findings} about columns that were not read"] if count else []

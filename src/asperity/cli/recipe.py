@@ -1,0 +1,94 @@
+"""``asperity recipe``: a paper's own way from measurements to numbers."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.options import json_option, settings_of
+from asperity.errors import InputError
+
+if TYPE_CHECKING:
+    from asperity.papers.bureau2000.recipe import Recipe
+
+_EPILOG = """\b
+Example:
+  asperity recipe bureau2000 readings.csv --thresholds bifurcation.csv \\
+      --fix "K=0.2 N/um" --fix "W0=7 N"
+
+\b
+Readings: a table as for 'asperity fit'. Rows with epsilon = 0 and mean_friction,
+at two velocities or more, give B - A; rows with epsilon above 0 and delta_mu
+give eps_ratio and bound alpha; mu1 gives lambda. Cells may be empty.
+
+\b
+Thresholds: bifurcations between steady sliding and stick-slip, one a row, in SI
+without units: V, K_over_W0 (1/m), K_over_W0_err, frequency (Hz) of the first
+oscillations, frequency_err. They give A, B and D0.
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.argument("paper")
+@click.argument("readings", nargs=-1, required=True, type=Path)
+@click.option(
+    "--thresholds", type=Path, required=True, metavar="CSV", help="Table of bifurcations."
+)
+@click.option("--fix", "fixes", multiple=True, metavar="NAME=VALUE", help="K, W0 or V0.")
+@json_option()
+def recipe(
+    paper: str,
+    readings: tuple[Path, ...],
+    thresholds: Path,
+    fixes: tuple[str, ...],
+    as_json: bool,
+) -> int:
+    """Numbers as a PAPER finds them, step by step, beside the paper's own.
+
+    For bureau2000: A, B and D0 from steady sliding and its bifurcation, eps_ratio from the drop of
+    the mean, lambda from mu1, a bound on alpha from the drop; uncertainties of all steps.
+    """
+    from asperity import inference
+    from asperity.cli.progress import bar
+    from asperity.cli.report import to_json
+    from asperity.inference.table import joined
+    from asperity.papers import find_paper
+
+    package = find_paper(paper).package
+    if importlib.util.find_spec(f"{package}.recipe") is None:
+        raise InputError(
+            f"paper must have a recipe, got '{paper}', which has none; bureau2000 has one"
+        )
+    steps: Any = importlib.import_module(f"{package}.recipe")
+    bifurcations = steps.read_thresholds(thresholds)
+    tables = [inference.read_table(path) for path in readings]
+    table = tables[0] if len(tables) == 1 else joined(tables)[0]
+    fixed = settings_of(fixes, "--fix")
+    with bar("step") as update:
+        found = steps.paper_procedure(table, bifurcations, fixed=fixed, progress=update)
+    click.echo(to_json(found.record()) if as_json else recipe_text(found))
+    return 0
+
+
+def recipe_text(found: Recipe) -> str:
+    """Numbers beside the paper's, as a person reads them."""
+    from asperity.cli.report import aligned
+
+    rows = [("step", "", "here", "paper", "", "from")]
+    for name, r in found.numbers.items():
+        here = f"{r.value:.4g} +- {r.se:.2g} {r.unit}".rstrip()
+        if r.upper_limit is not None:
+            here = f"below {r.upper_limit:.3g} (95 %)"
+        paper = ""
+        if r.published is not None:
+            paper = f"{r.published:.4g}"
+            if r.published_uncertainty:
+                paper += f" +- {r.published_uncertainty:.2g}"
+            paper = f"{paper} {r.unit}".rstrip() + f" ({r.published_place})"
+        apart = "" if r.deviation is None else f"{r.deviation:+.1f} s.d."
+        rows.append((str(r.step), name, here, paper, apart, r.how))
+    return "\n".join([aligned(rows), *(f"warning: {w}" for w in found.warnings)])

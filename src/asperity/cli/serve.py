@@ -1,0 +1,45 @@
+"""``asperity serve``: the page in a browser."""
+
+from __future__ import annotations
+
+import os
+import sys
+
+import click
+
+_EPILOG = """\b
+Examples:
+  asperity serve --open
+  asperity serve --port 9000
+
+\b
+The page listens on this machine only and fetches nothing from elsewhere. Ctrl-C
+ends it. It needs the extra: pip install 'asperity[app]'
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.option(
+    "--port",
+    type=int,
+    default=8765,
+    show_default=True,
+    metavar="NUMBER",
+    help="Port to listen on; 0 for any that is free.",
+)
+@click.option("--open", "opened", is_flag=True, help="Open the page in the browser.")
+def serve(port: int, opened: bool) -> None:
+    """Serve the page: explore, map, and look at recordings in a browser."""
+    from asperity.app.server import serve as run
+
+    def started(address: str) -> None:
+        click.echo(f"asperity: {address}  (Ctrl-C ends it)", err=True)
+        if opened:
+            import webbrowser
+
+            webbrowser.open(address)
+
+    run(port, started=started)
+    # Without waiting for a program that is just being compiled.
+    sys.stderr.flush()
+    os._exit(0)

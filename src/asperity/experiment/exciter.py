@@ -1,0 +1,90 @@
+"""The vibration exciter: what it applies, and what of it the contacts bear."""
+
+from __future__ import annotations
+
+import cmath
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.air import AirLayer, transfer_function
+from asperity.errors import InputError
+from asperity.loads import Modulate
+from asperity.slider import Slider
+from asperity.units import to_si
+
+
+@dataclass(frozen=True)
+class Exciter:
+    """A harmonic load of one frequency, part of which an air layer takes.
+
+    Attributes
+    ----------
+    frequency : float
+        Hz.
+    transfer : complex
+        T, borne over applied modulation, e^{+i w t}: eps_eff = abs(T) eps.
+    """
+
+    frequency: float
+    transfer: complex = 1.0
+
+    @classmethod
+    def through_air(
+        cls,
+        frequency: float | str,
+        slider: Slider,
+        lambda_z: float | str,
+        layer: AirLayer | None,
+    ) -> Exciter:
+        """The exciter of a slider on elastic contacts and an air layer, None for a vacuum.
+
+        Bureau et al. (2000), Appendix, Eq. (40).
+
+        Parameters
+        ----------
+        frequency : float or str
+            Hz.
+        slider : Slider
+            With mass and mean load.
+        lambda_z : float or str
+            Normal elastic length (m).
+        layer : AirLayer or None
+        """
+        hertz = to_si(frequency, "frequency", "exciter.frequency")
+        length = to_si(lambda_z, "length", "exciter.lambda_z")
+        transfer = transfer_function(
+            hertz, W0=np.asarray(slider.W0), M=np.asarray(slider.M), lambda_z=length, layer=layer
+        )
+        return cls(hertz, complex(transfer))
+
+    def steps(
+        self, epsilon: float, duration: float, rise: float, velocity: float | None = None
+    ) -> tuple[Modulate, Modulate]:
+        """The step as it is applied, and as the contacts feel it.
+
+        Parameters
+        ----------
+        epsilon : float
+            Applied relative amplitude.
+        duration, rise : float
+            Seconds; the amplitude comes and goes within `rise` each.
+        velocity : float, optional
+            Pulling velocity (m/s) from now on.
+
+        Raises
+        ------
+        InputError
+            If the contacts would be lost.
+        """
+        size, phase = cmath.polar(self.transfer)
+        if not size * epsilon < 1:
+            raise InputError(
+                f"exciter.epsilon must leave the contacts loaded, got {epsilon:g} of which they "
+                f"bear {size * epsilon:g}; lower it below {1 / size:.3g}"
+            )
+        common: dict[str, Any] = {"frequency": self.frequency, "rise": rise, "fall": rise}
+        common["velocity"] = velocity
+        applied = Modulate(duration, epsilon, **common)
+        return applied, Modulate(duration, size * epsilon, phase=phase, **common)

@@ -1,0 +1,194 @@
+"""The quasi-static loading-unloading test that measures the shear elastic length lambda.
+
+Below the threshold of sliding the asperities deform and hardly slip: a shear force F displaces the
+slider by F lambda/W, and the far end of the spring by F (lambda/W + 1/K). Bureau et al. (2000),
+Sec. IV, after Berthoud and Baumberger (1998).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.experiment.motion import motion_rate, signals
+from asperity.loads import Programme, Slide
+from asperity.recording.trace import Trace
+from asperity.slider import Slider
+from asperity.tribometer.tribometer import Tribometer
+from asperity.units import to_si
+
+Array = NDArray[np.float64]
+
+FORCE, LOAD, DISPLACEMENT, DRIVE = "shear force", "normal force", "displacement", "drive position"
+
+#: Share of each branch that is left out at either end: what turns there is filtered.
+_TRIM = 0.1
+
+#: A turn of the force counts when it goes back by this share of its whole range.
+_TURN = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticLength:
+    """What a loading-unloading test says.
+
+    Attributes
+    ----------
+    lambda_, uncertainty : float
+        Shear elastic length (m), and its standard uncertainty from the scatter of the cycles.
+    cycles : array, shape (n,)
+        lambda of each pair of a loading and an unloading (m), in which a steady drift of the
+        gauge cancels.
+    stiffness : float
+        Mean slope dF/dx (N/m).
+    """
+
+    lambda_: float
+    uncertainty: float
+    cycles: Array
+    stiffness: float
+
+
+def loading_recording(
+    slider: Slider,
+    tribometer: Tribometer,
+    *,
+    velocity: float | str,
+    low: float = 0.2,
+    high: float = 0.6,
+    cycles: int = 6,
+    seed: int = 0,
+    **options: Any,
+) -> Trace:
+    """Record the test on a simulated slider, which comes from steady sliding.
+
+    Parameters
+    ----------
+    slider : Slider
+        With a law of elastic asperities.
+    tribometer : Tribometer
+        With the channels ``"shear force"`` and ``"normal force"``, and ``"displacement"`` of the
+        slider or ``"drive position"`` or both.
+    velocity : float or str
+        Of the drive (m/s), to and fro.
+    low, high : float
+        Turning points of the force, over that of steady sliding.
+    cycles : int
+        Pairs of loading and unloading.
+    seed : int
+        Of the tribometer's noise.
+    **options
+        Of `asperity.transients.transient`.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or the motion ends before the test does.
+    """
+    speed = to_si(velocity, "velocity", "loading_recording.velocity")
+    if not 0 < low < high < 1:
+        raise InputError(
+            f"loading_recording.low and high must lie between 0 and 1 and rise, got {low:g} and "
+            f"{high:g}; stay below the threshold of sliding, as 0.2 and 0.6 do"
+        )
+    if cycles < 2:
+        raise InputError(
+            f"loading_recording.cycles must be at least 2, got {cycles}; their scatter is the "
+            "uncertainty"
+        )
+    W0 = np.asarray(slider.W0).item()
+    stroke = float(slider.law.mu_ss(speed)) * W0 / np.asarray(slider.K).item() / speed
+    back, there = (1 - low) * stroke, (high - low) * stroke
+    rounds = [Slide(there, velocity=speed), Slide(there, velocity=-speed)] * cycles
+    programme = Programme(Slide(back, velocity=-speed), *rounds, load=W0, velocity=speed)
+    columns, last = signals(
+        slider, programme, motion_rate(tribometer), ("force", "load", "displacement"), **options
+    )
+    if last.stopped is not None:
+        raise InputError(
+            f"loading_recording.slider must stay below the threshold, got a motion that ended: "
+            f"{last.stopped}"
+        )
+    offered = {
+        FORCE: columns["force"],
+        LOAD: columns["load"],
+        DISPLACEMENT: columns["displacement"],
+        DRIVE: programme.position(columns["time"]),
+    }
+    taken = {name: offered[name] for name in tribometer.sensors if name in offered}
+    return tribometer.record(columns["time"], taken, seed=seed, provenance=last.provenance)
+
+
+def elastic_length(
+    trace: Trace,
+    *,
+    displacement: str = DISPLACEMENT,
+    force: str = FORCE,
+    load: str = LOAD,
+    spring: float | str | None = None,
+) -> ElasticLength:
+    """Shear elastic length from a recording of loading and unloading.
+
+    Parameters
+    ----------
+    trace : Trace
+        Simulated or read from a file.
+    displacement, force, load : str
+        Channels: of the slider's displacement, or of the drive's if `spring` is given.
+    spring : float or str, optional
+        Spring stiffness (N/m) between drive and slider, in series with the asperities.
+
+    Returns
+    -------
+    ElasticLength
+
+    Raises
+    ------
+    InputError
+        If fewer than two pairs of loading and unloading are found.
+
+    Notes
+    -----
+    Each branch between two turning points is fitted by x = a + F dx/dF; the first one, which comes
+    from sliding, is left out.
+    """
+    F, x, W = (trace.channel(name).values for name in (force, displacement, load))
+    K = None if spring is None else to_si(spring, "stiffness", "elastic_length.spring")
+    turns = _turning_points(F)
+    branches = list(pairwise(turns[1:]))
+    slopes, lengths = [], []
+    for a, b in branches[: 2 * (len(branches) // 2)]:
+        rim = max(int(_TRIM * (b - a)), 1)
+        cut = slice(a + rim, b - rim)
+        slope = np.polynomial.Polynomial.fit(F[cut], x[cut], 1).convert().coef[1]
+        slopes.append(slope)
+        lengths.append(np.mean(W[cut]) * (slope - (0.0 if K is None else 1 / K)))
+    pairs = np.reshape(lengths, (-1, 2)).mean(1)
+    if pairs.size < 2:
+        raise InputError(
+            f"elastic_length.trace must hold two cycles of loading and unloading at least, got "
+            f"{pairs.size}; record more, or choose the channel of the shear force"
+        )
+    doubt = float(np.std(pairs, ddof=1) / np.sqrt(pairs.size))
+    return ElasticLength(float(pairs.mean()), doubt, pairs, float(1 / np.mean(slopes)))
+
+
+def _turning_points(force: Array) -> list[int]:
+    """First sample, every extreme from which the force goes back for good, and last sample."""
+    reach = _TURN * float(np.ptp(force))
+    turns, best, rising = [0], 0, None
+    for i, value in enumerate(force):
+        if rising is None:
+            if abs(value - force[0]) > reach:
+                rising, best = value > force[0], i
+        elif (value > force[best]) if rising else (value < force[best]):
+            best = i
+        elif abs(value - force[best]) > reach:
+            turns.append(best)
+            rising, best = not rising, i
+    return [*turns, len(force) - 1]

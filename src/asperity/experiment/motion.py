@@ -1,0 +1,53 @@
+"""Signals of a simulated motion, sampled finely enough for the tribometer."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.loads import Programme
+from asperity.slider import Slider
+from asperity.transients import Trajectory, integrate_blocks
+from asperity.tribometer.tribometer import Tribometer
+
+Array = NDArray[np.float64]
+
+#: Samples of the motion for one of the recorder's, at least: with half as many amplitudes would be
+#: 4e-5 too small.
+_FINER = 8
+
+
+def motion_rate(tribometer: Tribometer) -> float:
+    """Rate (Hz) at which a motion has to be sampled for a tribometer: a multiple of its own."""
+    recorder = float(tribometer.recorder.rate)
+    fastest = max(float(sensor.bandwidth) for sensor in tribometer.sensors.values())
+    return recorder * max(_FINER, int(np.ceil(4 * fastest / recorder)))
+
+
+def signals(
+    slider: Slider, programme: Programme, rate: float, names: tuple[str, ...], **options: Any
+) -> tuple[dict[str, Array], Trajectory]:
+    """Time and columns of a transient, keeping nothing else of it.
+
+    Parameters
+    ----------
+    slider, programme
+    rate : float
+        Hz.
+    names : tuple of str
+        Attributes of `Trajectory`.
+    **options
+        Of `asperity.transients.transient`.
+
+    Returns
+    -------
+    (dict of str to array, Trajectory)
+        The columns, ``time`` among them, and the last block, which knows why it ended.
+    """
+    kept: dict[str, list[Array]] = {name: [] for name in ("time", *names)}
+    for block in integrate_blocks(slider, programme, sampling=rate, **options):
+        for name, parts in kept.items():
+            parts.append(getattr(block, name))
+    return {name: np.concatenate(parts) for name, parts in kept.items()}, block

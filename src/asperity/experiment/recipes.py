@@ -1,0 +1,178 @@
+"""Series of holds and of velocity steps, as steps of a programme and as recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.experiment.loading import DISPLACEMENT, DRIVE, FORCE, LOAD
+from asperity.experiment.motion import motion_rate, signals
+from asperity.loads import Hold, Programme, Slide, Step
+from asperity.loads.programme.segments import Segment
+from asperity.loads.programme.steps import Given, Level
+from asperity.recording.trace import Trace
+from asperity.slider import Slider
+from asperity.tribometer.tribometer import Tribometer
+from asperity.units import to_si
+
+
+@dataclass(frozen=True)
+class SlideHoldSlide(Step):
+    """Slide, then hold and slide again for each hold time.
+
+    Attributes
+    ----------
+    holds : sequence of float or str
+        Hold times (s), in the order of the experiment.
+    sliding : float or str
+        Duration of sliding before, between and after the holds (s).
+    """
+
+    holds: Sequence[Given]
+    sliding: Given
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """The segments of all holds."""
+        if not len(self.holds):
+            raise InputError(
+                f"{name}.holds must hold a time, got none; give some, like 10 s, 100 s"
+            )
+        steps: list[Step] = [Slide(self.sliding)]
+        for hold in self.holds:
+            steps += [Hold(hold), Slide(self.sliding)]
+        return _laid_out(steps, level, name)
+
+
+@dataclass(frozen=True)
+class VelocitySteps(Step):
+    """Slide at one velocity after the other, the same length of load-point displacement at each.
+
+    Attributes
+    ----------
+    velocities : sequence of float or str
+        Pulling velocities (m/s), in the order of the experiment.
+    slip : float or str
+        Load-point displacement at each (m).
+    """
+
+    velocities: Sequence[Given]
+    slip: Given
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """One segment for each velocity."""
+        slip = to_si(self.slip, "length", f"{name}.slip")
+        speeds = [to_si(v, "velocity", f"{name}.velocities") for v in self.velocities]
+        if not (speeds and min(speeds) > 0 and slip > 0):
+            raise InputError(
+                f"{name} must have positive velocities and slip, got {len(speeds)} velocities and "
+                f"{slip:g} m; hold with 'hold 10 s'"
+            )
+        return _laid_out([Slide(slip / v, velocity=v) for v in speeds], level, name)
+
+
+def _laid_out(steps: Sequence[Step], level: Level, name: str) -> tuple[list[Segment], Level]:
+    segments: list[Segment] = []
+    for step in steps:
+        more, level = step.lay_out(level, name)
+        segments += more
+    return segments, level
+
+
+def slide_hold_slide(
+    slider: Slider,
+    tribometer: Tribometer,
+    holds: Sequence[float | str],
+    *,
+    velocity: float | str,
+    sliding: float | str = "10 s",
+    seed: int = 0,
+    **options: Any,
+) -> Trace:
+    """Record a slide-hold-slide series on a simulated slider.
+
+    Parameters
+    ----------
+    slider : Slider
+    tribometer : Tribometer
+        With any of the channels ``"shear force"``, ``"normal force"``, ``"displacement"`` of the
+        slider and ``"drive position"``, the load-point displacement.
+    holds : sequence of float or str
+        Hold times (s).
+    velocity : float or str
+        Of the drive where it slides (m/s).
+    sliding : float or str
+        Duration of sliding before, between and after the holds (s).
+    seed : int
+        Of the tribometer's noise.
+    **options
+        Of `asperity.transients.transient`.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or the motion ends before the series does.
+    """
+    series = SlideHoldSlide(tuple(holds), sliding)
+    return _recording(slider, tribometer, series, velocity, "slide_hold_slide", seed, options)
+
+
+def velocity_steps(
+    slider: Slider,
+    tribometer: Tribometer,
+    velocities: Sequence[float | str],
+    *,
+    slip: float | str,
+    seed: int = 0,
+    **options: Any,
+) -> Trace:
+    """Record a series of velocity steps at equal slip on a simulated slider.
+
+    Parameters
+    ----------
+    slider, tribometer, seed, **options
+        As of `slide_hold_slide`.
+    velocities : sequence of float or str
+        Of the drive (m/s); the series begins with steady sliding at the first.
+    slip : float or str
+        Load-point displacement at each velocity (m).
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or the motion ends before the series does.
+    """
+    series = VelocitySteps(tuple(velocities), slip)
+    first = velocities[0] if len(velocities) else 0.0
+    return _recording(slider, tribometer, series, first, "velocity_steps", seed, options)
+
+
+def _recording(
+    slider: Slider,
+    tribometer: Tribometer,
+    series: Step,
+    velocity: float | str,
+    name: str,
+    seed: int,
+    options: dict[str, Any],
+) -> Trace:
+    speed = to_si(velocity, "velocity", f"{name}.velocity")
+    programme = Programme(series, load=np.asarray(slider.W0).item(), velocity=speed)
+    wanted = ("force", "load", "displacement")
+    columns, last = signals(slider, programme, motion_rate(tribometer), wanted, **options)
+    if last.stopped is not None:
+        raise InputError(
+            f"{name}.slider must slide to the end of the series, got a motion that ended: "
+            f"{last.stopped}"
+        )
+    offered = {
+        FORCE: columns["force"],
+        LOAD: columns["load"],
+        DISPLACEMENT: columns["displacement"],
+        DRIVE: programme.position(columns["time"]),
+    }
+    taken = {channel: offered[channel] for channel in tribometer.sensors if channel in offered}
+    return tribometer.record(columns["time"], taken, seed=seed, provenance=last.provenance)

@@ -1,0 +1,112 @@
+"""Predictions of a fitted law between the measured amplitudes, with bands of the parameters."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.inference import Fit, LockInTable, Posterior
+from asperity.inference.forward import Forward, LockInTerm
+from asperity.orbit import Outcome
+
+Float = NDArray[np.float64]
+
+#: Amplitudes of a curve, and sets of parameters that a band is made of.
+_AMPLITUDES, _SETS = 24, 100
+
+
+class Band(NamedTuple):
+    """Quantiles of a predicted quantity against the applied amplitude at one velocity.
+
+    Attributes
+    ----------
+    epsilon : array, shape (n,)
+    low, middle, high : array, shape (n,)
+        2.5, 50 and 97.5 %; NaN where fewer than half of the sets have a periodic orbit.
+    """
+
+    epsilon: Float
+    low: Float
+    middle: Float
+    high: Float
+
+
+def bands_of(
+    found: Fit, term: LockInTerm, posterior: Posterior | None, *, seed: int = 0
+) -> dict[float, dict[str, Band]]:
+    """Bands of mean_friction, delta_mu, mu1 and mu2 for each velocity of a table.
+
+    Parameters
+    ----------
+    found : Fit
+    term : LockInTerm
+    posterior : Posterior or None
+        Without one, parameters are drawn from the normal approximation.
+    seed : int
+        Of the choice of draws.
+    """
+    values = _drawn(found, posterior, np.random.default_rng(seed))
+    count = len(next(iter(values.values())))
+    table = term.table
+    bands = {}
+    for velocity in np.unique(table.points["V"]):
+        row = int(np.flatnonzero(table.points["V"] == velocity)[0])
+        top = table.points["epsilon"][table.points["V"] == velocity].max()
+        epsilon = np.linspace(top / _AMPLITUDES, top, _AMPLITUDES)
+        fixed = {n: np.full(_AMPLITUDES, v[row]) for n, v in term.forward.fixed.items()}
+        points = {n: np.full(_AMPLITUDES, v[row]) for n, v in table.points.items()}
+        curve = LockInTable("curve", points | {"epsilon": epsilon}, {}, {})
+        forward = Forward(
+            found.objective.law,
+            curve,
+            fixed | {"epsilon": epsilon},
+            inertia=term.forward.inertia,
+            radiation_damping=term.forward.radiation_damping,
+        )
+        free = {n: np.repeat(v, _AMPLITUDES) for n, v in values.items()}
+        predicted, outcome = forward.predicted(free, count)
+        good = outcome == Outcome.CONVERGED
+        quantities = {
+            "mean_friction": predicted.mean_friction,
+            "delta_mu": predicted.mean_friction - predicted.mu_ss,
+            "mu1": np.abs(predicted.harmonics[:, 0]),
+            "mu2": np.abs(predicted.harmonics[:, 1]),
+        }
+        bands[float(velocity)] = {
+            name: _band(epsilon, np.where(good, q, np.nan).reshape(count, _AMPLITUDES))
+            for name, q in quantities.items()
+        }
+    return bands
+
+
+def _band(epsilon: Float, values: Float) -> Band:
+    few = np.isfinite(values).mean(0) < 0.5
+    filled = np.where(few, 0.0, values)
+    low, middle, high = np.where(few, np.nan, np.nanquantile(filled, [0.025, 0.5, 0.975], axis=0))
+    return Band(epsilon, low, middle, high)
+
+
+def _drawn(
+    found: Fit, posterior: Posterior | None, random: np.random.Generator
+) -> dict[str, Float]:
+    """Sets of parameters by name, each of shape (sets,)."""
+    if posterior is not None:
+        chains, draws = posterior.log_density.shape
+        chosen = random.choice(chains * draws, min(_SETS, chains * draws), replace=False)
+        return {n: d.reshape(-1)[chosen] for n, d in posterior.draws.items()}
+    unknowns = found.objective.unknowns
+    u = found.objective.coordinates(found.values)
+    sd = np.array(
+        [
+            min(abs(p.se / k.slope(p.value)), 1.0) if p.value else 0.0
+            for k, p in zip(unknowns, found.parameters.values(), strict=True)
+        ]
+    )
+    covariance = found.correlation * np.outer(sd, sd)
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    low, high = np.array([k.bounds for k in unknowns]).T
+    drawn = np.clip(u + random.normal(size=(_SETS, u.size)) @ root.T, low, high)
+    return {k.name: np.asarray(k.to_value(drawn[:, i])) for i, k in enumerate(unknowns)}

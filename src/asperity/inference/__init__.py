@@ -1,0 +1,38 @@
+"""From data to verdict: which law, which numbers, and how sure."""
+
+from asperity.inference.comparison import Comparison, Judged, compare
+from asperity.inference.design import Design, DesignPlan, design, plan_of, read_plan
+from asperity.inference.fit import fit
+from asperity.inference.objective import DataTerm, Objective
+from asperity.inference.posterior import Posterior, sample_posterior
+from asperity.inference.result import Estimate, Fit, Optimum
+from asperity.inference.runs.assembly import RunOptions
+from asperity.inference.runs.run import RecordedRun, recorded_run
+from asperity.inference.table import LockInTable, read_table, table_of
+from asperity.inference.unknowns import Prior
+
+__all__ = [
+    "Comparison",
+    "DataTerm",
+    "Design",
+    "DesignPlan",
+    "Estimate",
+    "Fit",
+    "Judged",
+    "LockInTable",
+    "Objective",
+    "Optimum",
+    "Posterior",
+    "Prior",
+    "RecordedRun",
+    "RunOptions",
+    "compare",
+    "design",
+    "fit",
+    "plan_of",
+    "read_plan",
+    "read_table",
+    "recorded_run",
+    "sample_posterior",
+    "table_of",
+]

@@ -1,0 +1,386 @@
+"""Which laws do the data exclude, and what would tell the others apart."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.inference.cross_validation import CrossValidation, leave_one_run_out
+from asperity.inference.evidence import Evidence, evidence_of
+from asperity.inference.fit import Data, fit, listed_data
+from asperity.inference.forward import Forward, LockInTerm, all_converged
+from asperity.inference.outliers import outlying_rows
+from asperity.inference.residuals import residuals_of, weights_of
+from asperity.inference.result import Fit
+from asperity.inference.table import LockInTable, joined
+from asperity.inference.unknowns import MissingNumberError
+from asperity.laws import get_law
+from asperity.parameters import law_parameters
+
+#: A law is excluded by its own misfit below this probability of chi-squared, if another law is not.
+_IMPOSSIBLE = 1e-3
+#: At or above this probability of chi-squared there are no outliers to look for.
+_DESCRIBED = 0.01
+#: Not so if its AICc is less than this above the lowest: the other law is no better then.
+_AS_GOOD = 4.0
+#: A law is excluded beside the best one from this difference of AICc on: its weight is 1/150.
+LARGEST_AICC_DIFFERENCE = 10.0
+#: What is tried to tell two laws apart: factors of the applied amplitude, velocity and frequency.
+_FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
+#: Largest amplitude on the contacts that is tried.
+_LARGEST_EPSILON = 0.95
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A fitted law and whether the data exclude it.
+
+    Attributes
+    ----------
+    fit : Fit
+    excluded : bool
+    why : str
+    weight : float
+        Akaike weight among the laws compared.
+    evidence : Evidence or None
+        None where it was not asked for, or the fit did not converge.
+    cross_validation : CrossValidation or None
+        The same.
+    """
+
+    fit: Fit
+    excluded: bool
+    why: str
+    weight: float
+    evidence: Evidence | None = None
+    cross_validation: CrossValidation | None = None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Laws fitted to the same data.
+
+    Attributes
+    ----------
+    laws : mapping of str to Judged
+        By rising AICc.
+    decided : bool
+        Whether exactly one law is left, and describes the data.
+    best : str
+        Law of the lowest AICc; empty if none converged.
+    verdict : str
+    left_out : tuple of str
+        Rows that the verdict is without, because no law describes them together with the others.
+    not_compared : mapping of str to str
+        Laws of which no fit could be made, and why.
+    """
+
+    laws: Mapping[str, Judged]
+    decided: bool
+    best: str
+    verdict: str
+    left_out: tuple[str, ...] = ()
+    not_compared: Mapping[str, str] = field(default_factory=dict)
+
+
+def compare(
+    data: Data | Iterable[Data],
+    laws: Sequence[str],
+    free: Sequence[str],
+    *,
+    evidence: bool = True,
+    progress: Callable[[int], None] | None = None,
+    **options: Any,
+) -> Comparison:
+    """Fit several laws to the same data and say which of them the data exclude.
+
+    Parameters
+    ----------
+    data : LockInTable, RecordedRun or Trace, or several
+    laws : sequence of str
+    free : sequence of str
+        Free parameters; each law takes those that it has.
+    evidence : bool
+        Whether to compute evidence and leave-one-run-out cross-validation too.
+    progress : callable, optional
+        As of `fit`.
+    **options
+        As of `fit`.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    InputError
+        As `fit`; if fewer than two laws are given, or a free parameter belongs to none of them.
+
+    Notes
+    -----
+    The rule, fixed beforehand: a law is excluded if its chi-squared has a probability below 0.001
+    while that of another law has not and its AICc is lower by 4 or more, or if its AICc exceeds
+    the lowest by 10 or more. If no law describes the data, their uncertainties may be too small:
+    chi-squared is divided by that of the best law per degree of freedom before the second
+    comparison. Rows that alone keep every law from describing the data are left out, and named.
+    """
+    if len(set(laws)) < 2:
+        raise InputError(
+            f"laws must be two or more, got {', '.join(laws) or 'none'}; name those to compare"
+        )
+    several = listed_data(data)
+    own = {name: _own(name, free, laws) for name in dict.fromkeys(laws)}
+
+    given = {key: options.pop(key) for key in ("fixed", "start") if options.get(key)}
+    not_compared: dict[str, str] = {}
+
+    def fits_to(data: Sequence[Any]) -> dict[str, Fit]:
+        done = {}
+        for name, names in own.items():
+            mine: dict[str, Any] = {
+                key: {n: values[n] for n in _own(name, list(values), laws)}
+                for key, values in given.items()
+            }
+            try:
+                done[name] = fit(data, name, names, progress=progress, **mine, **options)
+            except MissingNumberError as error:
+                not_compared[name] = str(error)
+        return done
+
+    fits = fits_to(several)
+    if len(fits) < 2:
+        raise InputError(
+            f"laws must have numbers of two or more, got them of {len(fits)}; "
+            + "; ".join(not_compared.values())
+        )
+    found = judge(fits)
+    outliers = _common_outliers(fits)
+    if outliers:
+        table = joined([d for d in several if isinstance(d, LockInTable)])[0]
+        out = np.isin(np.arange(table.rows), outliers)
+        rest = judge(fits_to([table.without(out)]))
+        found = _without(found, rest, table.row_names[out].tolist())
+    found = replace(found, not_compared=not_compared)
+    return _examined(found) if evidence else found
+
+
+def _common_outliers(fits: Mapping[str, Fit]) -> list[int]:
+    """Rows without which some law describes the data: the fewest that do."""
+    lists = [
+        outlying_rows(f.residuals[0])
+        for f in fits.values()
+        if f.converged and len(f.residuals) == 1 and isinstance(f.objective.terms[0], LockInTerm)
+    ]
+    if not lists or any(
+        f.converged and (f.dof <= 0 or f.p_value >= _DESCRIBED) for f in fits.values()
+    ):
+        return []
+    return min((rows for rows in lists if rows), key=len, default=[])
+
+
+def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Comparison:
+    """The comparison without outliers, with a verdict that says what they do."""
+
+    def excluded(found: Comparison) -> list[str]:
+        return sorted(name for name, j in found.laws.items() if j.excluded)
+
+    beside = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
+    said = (
+        f"No law describes {_listed(rows)} together with the other rows; check that measurement. "
+        f"With it, {beside} would be excluded. Without: "
+    )
+    return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
+
+
+def _examined(found: Comparison) -> Comparison:
+    """The comparison with evidence and cross-validation of every law."""
+    judged = {
+        name: replace(j, evidence=evidence_of(j.fit), cross_validation=leave_one_run_out(j.fit))
+        if j.fit.converged
+        else j
+        for name, j in found.laws.items()
+    }
+    return replace(found, laws=judged, verdict=found.verdict + _second_opinion(judged, found.best))
+
+
+def _second_opinion(judged: Mapping[str, Judged], best: str) -> str:
+    """What evidence and cross-validation say beside the rule, about laws that are left."""
+    said = ""
+    left = [n for n, j in judged.items() if not j.excluded and j.evidence and n != best]
+    top = judged[best].evidence if best in judged else None
+    for name in left:
+        other = judged[name].evidence
+        if top and other and top.reliable and other.reliable:
+            apart = top.log - other.log
+            ahead, behind = (best, name) if apart >= 0 else (name, best)
+            said += (
+                f" The evidence prefers {ahead} to {behind} by a factor of "
+                f"{math.exp(min(abs(apart), 700.0)):.2g}, with the priors stated."
+            )
+        first, second = judged[best].cross_validation, judged[name].cross_validation
+        if first and second and math.isfinite(first.log_density + second.log_density):
+            gain, error = first.difference(second)
+            said += (
+                f" Runs that were left out are predicted by {best} better than by {name} by "
+                f"{gain:.2g} +- {error:.2g} in the log density."
+            )
+    return said
+
+
+def judge(fits: Mapping[str, Fit]) -> Comparison:
+    """Apply the rule of `compare` to fits of several laws."""
+    done = {name: f for name, f in fits.items() if f.converged}
+    if not done:
+        return Comparison(
+            {name: Judged(f, False, f.message, math.nan) for name, f in fits.items()},
+            False,
+            "",
+            "These data were not described by any law: no fit converged.",
+        )
+    best = min(done, key=lambda name: done[name].aicc)
+    describes = any(f.dof <= 0 or f.p_value >= _IMPOSSIBLE for f in done.values())
+    top = done[best]
+    inflation = 1.0 if describes else max(1.0, top.chi2 / max(top.dof, 1))
+    total = sum(math.exp(-(f.aicc - top.aicc) / 2) for f in done.values())
+    judged = {}
+    for name in sorted(fits, key=lambda n: fits[n].aicc if n in done else math.inf):
+        found = fits[name]
+        if name not in done:
+            judged[name] = Judged(found, False, found.message, math.nan)
+            continue
+        weight = math.exp(-(found.aicc - top.aicc) / 2) / total
+        judged[name] = Judged(found, *_excluded(found, top, describes, inflation), weight)
+    left = [name for name, j in judged.items() if name in done and not j.excluded]
+    decided = describes and len(left) == 1 and len(done) == len(fits)
+    return Comparison(judged, decided, best, _verdict(judged, left, best, describes))
+
+
+def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
+    others = {p for law in laws for p in law_parameters(get_law(law))}
+    mine = law_parameters(get_law(name))
+    return [p for p in free if p in mine or p not in others]
+
+
+def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:
+    if found is best:
+        return False, ""
+    worst = max(
+        found.observables,
+        key=lambda n: found.observables[n][0] - best.observables.get(n, (0.0, 0))[0],
+    )
+    (chi2, n), rival = found.observables[worst], best.observables.get(worst, (0.0, 0))[0]
+    where = (
+        f"the worst observable is {worst} with chi-squared {chi2:.4g} for {n} data, where "
+        f"{best.law} has {rival:.4g}"
+    )
+    behind = found.aicc - best.aicc
+    misfit = found.dof > 0 and found.p_value < _IMPOSSIBLE
+    if misfit and describes and behind >= _AS_GOOD:
+        return True, (
+            f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom has a probability of "
+            f"{found.p_value:.2g}; {where}"
+        )
+    deviance = 2 * (best.log_likelihood - found.log_likelihood)
+    fair = behind - deviance + deviance / inflation
+    if fair >= LARGEST_AICC_DIFFERENCE:
+        even = (
+            f", and {fair:.4g} above it if all uncertainties are {math.sqrt(inflation):.3g} times "
+            "as large"
+            if inflation > 1
+            else ""
+        )
+        return True, f"its AICc is {behind:.4g} above that of {best.law}{even}; {where}"
+    return False, ""
+
+
+def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, describes: bool) -> str:
+    out = [name for name, j in judged.items() if j.excluded]
+    unknown = [name for name, j in judged.items() if not j.fit.converged]
+    parts = []
+    if not describes:
+        f = judged[best].fit
+        factor = math.sqrt(f.chi2 / max(f.dof, 1))
+        parts.append(
+            f"No law describes these data within their uncertainties: the best, {best}, has "
+            f"chi-squared {f.chi2:.4g} for {f.dof} degrees of freedom; either all laws are wrong "
+            f"or the uncertainties are too small by a factor of about {factor:.3g}, beside which "
+            + (f"the data would exclude {_listed(out)}" if out else "the data could not tell")
+        )
+    elif len(left) == 1 and not unknown:
+        parts.append(f"These data leave {left[0]} and exclude {_listed(out)}")
+    elif out:
+        parts.append(f"These data exclude {_listed(out)} and cannot tell {_listed(left)} apart")
+    else:
+        parts.append(f"These data cannot tell {_listed(left)} apart")
+    parts += [f"{name}: {judged[name].why}" for name in out]
+    if unknown:
+        parts.append(f"{_listed(unknown)}: no fit converged, so that nothing is said of it")
+    if describes and len(left) > 1:
+        parts.append(what_would_tell(judged[left[0]].fit, judged[left[1]].fit))
+    return "; ".join(p for p in parts if p) + "."
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _value(found: Fit, name: str) -> Any:
+    """A parameter of a fit, free or fixed."""
+    return found.values.get(name, found.objective.fixed.get(name))
+
+
+def what_would_tell(first: Fit, second: Fit) -> str:
+    """Where the predictions of two fitted laws differ most, as a sentence.
+
+    Looks at the operating points of the data with velocity, amplitude and frequency changed by
+    factors up to 4, and at differences in units of the median uncertainty of each observable.
+    """
+    term = next((t for t in first.objective.terms if isinstance(t, LockInTerm)), None)
+    if term is None:
+        return ""
+    table = term.table
+    largest = float(table.points["epsilon"].max())
+    ratio = max(float(_value(f, "eps_ratio")) for f in (first, second))
+    trials = []
+    for name in ("V", "epsilon", "frequency"):
+        for factor in _FACTORS:
+            if name == "epsilon" and largest * factor * ratio >= _LARGEST_EPSILON:
+                continue
+            trials.append({**table.points, name: table.points[name] * factor})
+    typical = {n: np.full(table.rows, np.nanmedian(e)) for n, e in table.errors.items()}
+    best: tuple[float, str] = (0.0, "")
+    for changed in trials:
+        trial = LockInTable(table.name, changed, table.values, typical)
+        predictions = []
+        for f in (first, second):
+            forward = Forward(
+                f.objective.law,
+                trial,
+                {**f.objective.fixed, **{n: v for n, v in changed.items() if n not in f.values}},
+            )
+            predicted, _, outcome = forward(f.values)
+            predictions.append(predicted if all_converged(outcome) else None)
+        if None in predictions:
+            continue
+        weights = weights_of(trial)
+        a, b = (residuals_of(weights, p, {}) for p in predictions if p is not None)
+        if a.values.shape != b.values.shape:
+            continue
+        apart = np.abs(a.values - b.values)
+        j = int(np.argmax(apart))
+        if apart[j] > best[0]:
+            point = {n: changed[n][a.row[j]] for n in ("V", "epsilon", "frequency")}
+            best = (
+                float(apart[j]),
+                f"{a.observable[j]} at V = {point['V']:.3g} m/s, eps = {point['epsilon']:.3g}, "
+                f"f = {point['frequency']:.4g} Hz, where they differ by {apart[j]:.2g} of its "
+                "standard uncertainties",
+            )
+    if not best[1]:
+        return ""
+    return f"what would tell them apart best among points near the measured ones: {best[1]}"

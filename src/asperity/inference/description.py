@@ -1,0 +1,243 @@
+"""Description of a fit: intervals, what the data do not determine, and warnings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi_squared
+
+from asperity.inference.intervals import Interval, bounded_interval
+from asperity.inference.objective import Objective, log_density
+from asperity.inference.residuals import Residuals
+from asperity.inference.result import Estimate, Fit, Optimum
+
+Float = NDArray[np.float64]
+
+#: Minima are the same if their chi-squared differs by less and no coordinate by more.
+_SAME_CHI2, _SAME_COORDINATE = 1e-3, 1e-2
+#: Other minima this close in chi-squared are reported: 3 standard deviations.
+_RIVAL = 9.0
+#: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
+_UNDETERMINED = 1.0
+#: Below this probability chi-squared says that the law or the uncertainties are wrong.
+_MISFIT = 0.01
+#: A bound is reached if the estimate is nearer to it than this share of its standard error.
+_AT_BOUND = 1e-3
+
+
+def failed_fit(objective: Objective) -> Fit:
+    """A fit without a solution: all its numbers are NaN, and its message says why."""
+    nan = math.nan
+    estimates = {
+        u.name: Estimate(u.name, u.parameter.unit, nan, nan, (nan, nan), (nan, nan), False, u.prior)
+        for u in objective.unknowns
+    }
+    n = len(estimates)
+    return Fit(
+        law=objective.law.name,
+        converged=False,
+        message="; ".join(dict.fromkeys(term.failure for term in objective.terms)),
+        parameters=estimates,
+        correlation=np.full((n, n), nan),
+        undetermined=(),
+        chi2=nan,
+        dof=0,
+        p_value=nan,
+        log_likelihood=nan,
+        aicc=nan,
+        bic=nan,
+        observables={},
+        residuals=(),
+        optima=(),
+        warnings=(),
+        objective=objective,
+    )
+
+
+def described_fit(
+    objective: Objective, minima: Sequence[tuple[Float, float]], *, profile: bool
+) -> Fit:
+    """The fit at the lowest of the minima.
+
+    Parameters
+    ----------
+    objective : Objective
+    minima : sequence of (array, float)
+        Coordinates and chi-squared, best first.
+    profile : bool
+        Intervals by profile likelihood.
+    """
+    u, chi2 = minima[0]
+    r, J = objective.residuals(u)
+    data = objective.data_residuals(u)
+    assert data is not None  # the law has a solution at the minimum
+    information = J.T @ J
+    covariance, missing = inverse_information(information)
+    sd = np.sqrt(np.diag(covariance))
+    gradient = J.T @ r
+    # The minimum that the parabola would have without the bounds.
+    unbounded = u - covariance @ gradient
+    informed = inverse_information(np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0))[0]
+    undetermined = tuple(
+        unknown.name
+        for i, unknown in enumerate(objective.unknowns)
+        if not unknown.nuisance
+        and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > _UNDETERMINED)
+    )
+    estimates = {}
+    for i, unknown in enumerate(objective.unknowns):
+        low, high = unknown.bounds
+        at_bound = min(u[i] - low, high - u[i]) < _AT_BOUND * max(sd[i], 1e-12)
+        narrow, wide = (
+            _interval(objective, i, (u, chi2), unbounded[i], covariance, level, profile, missing[i])
+            for level in (math.erf(1 / math.sqrt(2)), 0.95)
+        )
+        value = float(unknown.to_value(u[i]))
+        estimates[unknown.name] = Estimate(
+            unknown.name,
+            unknown.parameter.unit,
+            value,
+            math.inf if missing[i] else abs(unknown.slope(value)) * float(sd[i]),
+            narrow,
+            wide,
+            bool(at_bound),
+            unknown.prior,
+        )
+    n = sum(d.values.size for d in data)
+    k = len(objective.unknowns) + sum(term.profiled for term in objective.terms)
+    priors = sum(1 for unknown in objective.unknowns if unknown.prior is not None)
+    dof = n + priors - k
+    deviance = -2 * float(sum(log_density(d) for d in data))
+    p_value = float(chi_squared.sf(chi2, dof)) if dof > 0 else math.nan
+    found = Fit(
+        law=objective.law.name,
+        converged=True,
+        message="converged",
+        parameters=estimates,
+        correlation=covariance / np.outer(sd, sd),
+        undetermined=undetermined,
+        chi2=chi2,
+        dof=dof,
+        p_value=p_value,
+        log_likelihood=-deviance / 2,
+        aicc=deviance + 2 * k + (2 * k * (k + 1) / (n - k - 1) if n > k + 1 else math.inf),
+        bic=deviance + k * math.log(n),
+        observables=_observables(data),
+        residuals=tuple(data),
+        optima=_rivals(objective, minima),
+        warnings=(),
+        objective=objective,
+    )
+    return _with_warnings(found)
+
+
+def _observables(data: Sequence[Residuals]) -> dict[str, tuple[float, int]]:
+    """chi-squared and number of data of each observable, over all terms."""
+    values = np.concatenate([d.values for d in data])
+    names = np.concatenate([d.observable for d in data])
+    return {
+        str(name): (float(np.sum(values[names == name] ** 2)), int((names == name).sum()))
+        for name in dict.fromkeys(names)
+    }
+
+
+def inverse_information(information: Float) -> tuple[Float, NDArray[np.bool_]]:
+    """Inverse of an information matrix, and which coordinates it leaves without bound."""
+    scale = np.sqrt(np.diag(information))
+    blind = ~(scale > 0)
+    scale = np.where(blind, 1.0, scale)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    null = values < 1e-13 * max(values.max(), 1.0)
+    loose = (np.abs(vectors[:, null]) > 1e-3).any(1) | blind
+    inverse = (vectors / np.where(null, np.inf, values)) @ vectors.T
+    covariance = inverse / np.outer(scale, scale)
+    return covariance + np.diag(np.where(loose, 1e12, 0.0)), loose
+
+
+def _interval(
+    objective: Objective,
+    i: int,
+    minimum: tuple[Float, float],
+    unbounded: float,
+    covariance: Float,
+    level: float,
+    profile: bool,
+    loose: bool,
+) -> Interval:
+    """Confidence interval of a parameter in SI."""
+    unknown = objective.unknowns[i]
+    low, high = unknown.bounds
+    if profile:
+        from asperity.inference.profile import profile_interval
+
+        ends = profile_interval(objective, i, *minimum, covariance, level)
+    elif loose:
+        ends = (low, high)
+    else:
+        ends = bounded_interval(unbounded, float(np.sqrt(covariance[i, i])), level, low, high)
+    return unknown.end(ends[0]), unknown.end(ends[1])
+
+
+def _rivals(objective: Objective, minima: Sequence[tuple[Float, float]]) -> tuple[Optimum, ...]:
+    kept = [minima[0]]
+    for u, chi2 in minima[1:]:
+        if chi2 - minima[0][1] > _RIVAL:
+            continue
+        if all(
+            abs(chi2 - other) > _SAME_CHI2 or np.abs(u - v).max() > _SAME_COORDINATE
+            for v, other in kept
+        ):
+            kept.append((u, chi2))
+    return tuple(Optimum(chi2, objective.named(u)) for u, chi2 in kept[1:])
+
+
+def _with_warnings(found: Fit) -> Fit:
+    """The fit with what its user must know beside the numbers."""
+    said = []
+    if found.dof > 0 and found.p_value < _MISFIT:
+        worst = max(found.observables, key=lambda n: _excess(*found.observables[n]))
+        said.append(
+            f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom (p = "
+            f"{found.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
+            f"for {worst}; intervals do not hold then"
+        )
+    if found.dof > 5 and found.p_value > 1 - _MISFIT / 10:
+        said.append(
+            f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom is too small: the "
+            "uncertainties are too large, and so are the intervals"
+        )
+    for term, residuals in zip(found.objective.terms, found.residuals, strict=True):
+        said += term.warnings(residuals)
+    for name in found.undetermined:
+        said.append(_why_undetermined(found, name))
+    for name, estimate in found.parameters.items():
+        if estimate.at_bound:
+            said.append(f"{name} is at its bound {estimate.value:.4g} {estimate.unit}".rstrip())
+    if found.optima:
+        said.append(
+            f"{len(found.optima)} more minimum of chi-squared lies within 3 standard deviations; "
+            "see optima"
+        )
+    return replace(found, warnings=tuple(said))
+
+
+def _excess(chi2: float, n: int) -> float:
+    return (chi2 - n) / math.sqrt(2 * n)
+
+
+def _why_undetermined(found: Fit, name: str) -> str:
+    names = list(found.parameters)
+    i = names.index(name)
+    partners = [
+        other for j, other in enumerate(names) if j != i and abs(found.correlation[i, j]) > 0.98
+    ]
+    if partners:
+        return (
+            f"{name} is not determined by these data beside {' and '.join(partners)}: they change "
+            "the predictions together; fix one, give a prior, or measure what tells them apart"
+        )
+    return f"{name} is not determined by these data; fix it or give a prior"

@@ -1,0 +1,202 @@
+"""Points that exclude a law: chi-squared of the rival, refitted, is as large as it can be.
+
+With the rival's predictions made linear at its last fit, the optimal shares are a concave problem.
+The rival is then refitted at these shares, and the shares are accepted as far as its chi-squared
+really grows. The general equivalence theorem at the last fit bounds what a better design could
+reach (Atkinson and Fedorov, 1975), whatever the way to it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.inference.design.candidates import Candidates
+from asperity.inference.design.criteria import Misfit
+from asperity.inference.design.plan import DesignPlan, Hypothesis
+from asperity.inference.design.predictions import PointModel, Whitened, repeated
+from asperity.inference.design.refit import Refitted, prior_terms, refit
+from asperity.inference.design.weights import Shares, optimal_shares, whole_readings
+from asperity.inference.table import LockInTable
+from asperity.orbit import Outcome, response_function
+
+Float = NDArray[np.float64]
+Bool = NDArray[np.bool_]
+
+_ROUNDS = 15
+#: Efficiency at which the search ends.
+_ENOUGH = 0.99
+#: Parts of the way to the proposed shares that are tried.
+_PARTS = (1.0, 0.5, 0.25, 0.1)
+_NEGLIGIBLE = 1e-4
+#: Rounds of exchanges of whole readings, each at the rival's last fit.
+_EXCHANGES = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """Shares of the budget, the whole readings, and the rival that comes nearest to them.
+
+    Attributes
+    ----------
+    shares : Shares
+    readings : int array, shape (candidates,)
+    chi2, chi2_shares : float
+        Of the rival refitted to the expected readings, for whole readings and for the shares.
+    values : mapping of str to float
+        Its parameters there.
+    criterion : Misfit
+        At that fit.
+    unseen : int
+        Candidates at which the rival had no response in the end, so that they were not judged.
+    """
+
+    shares: Shares
+    readings: NDArray[np.int64]
+    chi2: float
+    chi2_shares: float
+    values: dict[str, float]
+    criterion: Misfit
+    unseen: int
+
+
+class RivalFit:
+    """Refits of the rival to expected readings at candidates.
+
+    Parameters
+    ----------
+    plan : DesignPlan
+    rival : Hypothesis
+    candidates : Candidates
+    expected : LockInTable
+        Readings at all candidates by the other law.
+    """
+
+    def __init__(
+        self, plan: DesignPlan, rival: Hypothesis, candidates: Candidates, expected: LockInTable
+    ) -> None:
+        self.plan, self.rival, self.expected = plan, rival, expected
+        self.points = dict(candidates.points)
+        self.slow = candidates.slow | _slow(plan, rival, candidates)
+
+    def at(self, rows: NDArray[np.intp]) -> tuple[PointModel, LockInTable]:
+        """Model and readings at some candidates."""
+        keep = np.zeros(len(self.slow), bool)
+        keep[rows] = True
+        some = {n: v[keep] for n, v in self.points.items()}
+        model = PointModel(self.plan, self.rival, some, self.slow[keep])
+        return model, self.expected.without(~keep)
+
+    def everywhere(self, u: Float) -> Whitened:
+        """Differences at all candidates with the coordinates u."""
+        model = PointModel(self.plan, self.rival, self.points, self.slow)
+        values = {k.name: k.to_value(x) for k, x in zip(self.rival.unknowns, u, strict=True)}
+        return model.whitened(self.expected, values)
+
+    def fitted(self, n: Float, starts: Float) -> Refitted:
+        """The best of the fits from several starts, as one set."""
+        rows = np.flatnonzero(n > 0)
+        model, expected = self.at(rows)
+        found = refit(model, repeated(expected, len(starts)), n[rows], starts)
+        k = [int(np.argmin(found.chi2))]
+        return Refitted(found.coordinates[k], found.chi2[k], found.converged[k])
+
+    def criterion(self, u: Float) -> tuple[Misfit, Bool]:
+        """Misfit linear at the coordinates u, and the candidates at which there is a response."""
+        found = self.everywhere(u)
+        seen = np.asarray(np.isfinite(found.values).all(axis=-1))
+        prior, slopes = prior_terms(self.rival, u[None])
+        blank = np.where(seen[:, None], found.values, 0.0)
+        jacobian = np.where(seen[:, None, None], found.jacobian, 0.0)
+        return Misfit(blank, jacobian, prior[0], slopes[0]), seen
+
+
+def _slow(plan: DesignPlan, rival: Hypothesis, candidates: Candidates) -> Bool:
+    """Candidates at which the fast method does not solve the rival, with its expected values."""
+    if plan.inertia or plan.radiation_damping:
+        return np.ones(candidates.size, bool)
+    from asperity.inference.design.candidates import parameters_at
+
+    quick = response_function(rival.law, search=False)
+    given = parameters_at(rival, candidates.points, rival.values)
+    outcome = quick({n: given[n] for n in quick.parameters}).outcome
+    return np.asarray(outcome) != Outcome.CONVERGED
+
+
+def separation(
+    fits: RivalFit, cost: Float, total: float, progress: Callable[[int, int, str], None]
+) -> Separation:
+    """Shares and whole readings at which the refitted rival's chi-squared is largest.
+
+    Parameters
+    ----------
+    fits : RivalFit
+    cost : array, shape (candidates,)
+        Of a reading.
+    total : float
+        Budget.
+    progress : callable
+    """
+    readings = total / cost
+    u = fits.rival.coordinates
+    nominal = u
+    criterion, seen = fits.criterion(u)
+    shares = np.full(criterion.size, 1 / criterion.size)
+    shares = optimal_shares(criterion, readings).shares
+    best = fits.fitted(_cleaned(shares) * readings, np.array([u]))
+    shares, efficiency = _cleaned(shares), 0.0
+    for round_ in range(_ROUNDS):
+        progress(round_, _ROUNDS, "refits of the rival")
+        u, chi2 = best.coordinates[0], float(best.chi2[0])
+        criterion, seen = fits.criterion(u)
+        slope = criterion.gradient(shares * readings) * readings
+        gap = float(slope.max() - shares @ slope)
+        efficiency = criterion.least_efficiency(gap, chi2)
+        if efficiency >= _ENOUGH:
+            break
+        proposed = _cleaned(optimal_shares(criterion, readings, start=_mixed(shares)).shares)
+        for part in _PARTS:
+            tried = _cleaned((1 - part) * shares + part * proposed)
+            found = fits.fitted(tried * readings, np.array([u, nominal]))
+            if found.chi2[0] > chi2 * (1 + 1e-6):
+                shares, best = tried, found
+                break
+        else:
+            break
+    chi2_shares = float(best.chi2[0])
+    n = whole_readings(criterion, cost, total, shares)
+    fitted = fits.fitted(n.astype(float), np.array([best.coordinates[0], nominal]))
+    for _ in range(_EXCHANGES):
+        progress(_ROUNDS, _ROUNDS, "whole readings")
+        linear, _ = fits.criterion(fitted.coordinates[0])
+        changed = whole_readings(linear, cost, total, n * cost / total)
+        again = fits.fitted(changed.astype(float), np.array([fitted.coordinates[0], nominal]))
+        if again.chi2[0] <= fitted.chi2[0] * (1 + 1e-6):
+            break
+        n, fitted = changed, again
+    last, seen = fits.criterion(fitted.coordinates[0])
+    values = {
+        k.name: float(k.to_value(x))
+        for k, x in zip(fits.rival.unknowns, fitted.coordinates[0], strict=True)
+    }
+    return Separation(
+        Shares(shares, efficiency),
+        n,
+        float(fitted.chi2[0]),
+        chi2_shares,
+        values,
+        last,
+        int((~seen).sum()),
+    )
+
+
+def _cleaned(shares: Float) -> Float:
+    kept = np.where(shares > _NEGLIGIBLE, shares, 0.0)
+    return np.asarray(kept / kept.sum())
+
+
+def _mixed(shares: Float) -> Float:
+    return 0.9 * shares + 0.1 / shares.size

@@ -1,0 +1,202 @@
+"""Fit of a friction law to data: maximum likelihood from several starts.
+
+The likelihood is normal: each residual of a `DataTerm` has unit variance. The minimum of
+chi-squared is found by `scipy.optimize.least_squares` with the exact Jacobian.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.inference.description import described_fit, failed_fit
+from asperity.inference.forward import Forward, LockInTerm
+from asperity.inference.inputs import fixed_values, require_enough, start_values
+from asperity.inference.minima import minima_of, with_noise
+from asperity.inference.objective import DataTerm, Objective
+from asperity.inference.result import Fit
+from asperity.inference.runs.assembly import (
+    RunOptions,
+    require_newtons,
+    require_seen,
+    run_terms,
+    shared_stiffness,
+    usual_ranges,
+)
+from asperity.inference.runs.run import RecordedRun, run_of
+from asperity.inference.table import LockInTable, joined
+from asperity.inference.unknowns import Prior, material_priors, unknowns_of
+from asperity.laws import Law, get_law
+from asperity.materials import Material
+from asperity.recording import Trace
+
+Data = LockInTable | RecordedRun | Trace
+
+
+def fit(
+    data: Data | Iterable[Data],
+    law: str | type[Law],
+    free: Sequence[str],
+    *,
+    fixed: Mapping[str, Any] | None = None,
+    material: Material | None = None,
+    prior: Material | Mapping[str, Prior] | None = None,
+    start: Mapping[str, Any] | None = None,
+    inertia: bool = False,
+    radiation_damping: bool = False,
+    runs: RunOptions | None = None,
+    profile: bool = False,
+    starts: int = 64,
+    seed: int = 0,
+    progress: Callable[[int], None] | None = None,
+) -> Fit:
+    """Fit a friction law to lock-in readings and recordings.
+
+    Parameters
+    ----------
+    data : LockInTable, RecordedRun or Trace, or several
+        All in one likelihood.
+    law : str or type of Law
+        Rate-dependent.
+    free : sequence of str
+        Free parameters: the law's, K, W0, M, eta, and eps_ratio = eps_eff/eps. The stiffness of a
+        recording is free whether it is named or not, for each run by itself unless it is named.
+    fixed : mapping, optional
+        Values of other parameters, in SI or as texts with units; before columns of the data, which
+        come before the material.
+    material : Material, optional
+        Fixes what is neither free nor given otherwise, and gives a start.
+    prior : Material or mapping of str to Prior, optional
+        Normal priors of free parameters: published uncertainties of a material, or your own.
+    start : mapping of str to float, optional
+        Start values in SI; further starts are drawn.
+    inertia, radiation_damping : bool
+        Whether M and eta count.
+    runs : RunOptions, optional
+        How recordings are compared with the motion.
+    profile : bool
+        Intervals by profile likelihood rather than by the normal approximation.
+    starts : int
+        Starts that are drawn and evaluated besides the given one; the best are followed.
+    seed : int
+        Of the starts.
+    progress : callable, optional
+        Called with the number of minimisations finished since the last call.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    InputError
+        If a name or value is wrong, numbers are missing, there are fewer data than parameters, or
+        a parameter cannot be seen in the data.
+    """
+    chosen = get_law(law) if isinstance(law, str) else law
+    if not chosen.rate_dependent:
+        raise InputError(
+            f"law must depend on the velocity, got {chosen.name}; its one number follows from the "
+            "mean friction"
+        )
+    several = listed_data(data)
+    tables = [d for d in several if isinstance(d, LockInTable)]
+    recordings = [d for d in several if isinstance(d, RecordedRun)]
+    table = joined(tables)[0] if tables else None
+    objective = _objective(
+        chosen,
+        table,
+        recordings,
+        list(free),
+        fixed=fixed or {},
+        material=material,
+        prior=prior,
+        start=start,
+        options=runs or RunOptions(),
+        motion={"inertia": inertia, "radiation_damping": radiation_damping},
+    )
+    minima = minima_of(objective, seed, progress or (lambda _: None), drawn=starts)
+    if not minima:
+        return failed_fit(objective)
+    if recordings:
+        minima, agreed = with_noise(objective, minima)
+        if not math.isfinite(minima[0][1]):
+            return failed_fit(objective)
+        found = described_fit(objective, minima, profile=profile)
+        said = "the noise and the parameters did not agree after several rounds"
+        return found if agreed else replace(found, warnings=(*found.warnings, said))
+    return described_fit(objective, minima, profile=profile)
+
+
+def listed_data(data: Data | Iterable[Data]) -> list[LockInTable | RecordedRun]:
+    """One set of data or several as a list, recordings made ready."""
+    several = [data] if isinstance(data, LockInTable | RecordedRun | Trace) else list(data)
+    return [d if isinstance(d, LockInTable) else run_of(d) for d in several]
+
+
+def _objective(
+    law: type[Law],
+    table: LockInTable | None,
+    recordings: Sequence[RecordedRun],
+    free: list[str],
+    *,
+    fixed: Mapping[str, Any],
+    material: Material | None,
+    prior: Material | Mapping[str, Prior] | None,
+    start: Mapping[str, Any] | None,
+    options: RunOptions,
+    motion: Mapping[str, bool],
+) -> Objective:
+    """The function to minimise, with everything that can be refused before computing refused."""
+    if recordings and table is None:
+        require_seen(recordings, free)
+    # The stiffness of a recording is free, shared by all data if it is named.
+    shared = "K" in free
+    if table is not None and (shared or "K" in fixed):
+        require_newtons(recordings)
+    named = [name for name in free if not (name == "K" and recordings and table is None)]
+    priors = material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
+    begun = start_values(law, free, start, material, runs=recordings)
+    constants = fixed_values(law, table, free, fixed, material, runs=recordings)
+    largest = 0.0 if table is None else float(table.points["epsilon"].max())
+    unknowns = list(
+        unknowns_of(
+            law,
+            named,
+            largest_epsilon=largest,
+            start=begun,
+            priors=priors,
+            usual=usual_ranges(recordings) if recordings else None,
+        )
+    )
+    terms: list[DataTerm] = []
+    if table is not None:
+        require_enough(table, unknowns)
+        terms.append(LockInTerm(table, Forward(law, table, constants, **motion)))
+    if recordings:
+        if shared and table is None:
+            unknowns.append(shared_stiffness(recordings, begun, priors))
+        if "mu0" in free and table is None:
+            options = replace(options, linear=tuple(n for n in options.linear if n != "offset"))
+        own, nuisances = run_terms(
+            recordings,
+            law,
+            {n: v for n, v in constants.items() if np.ndim(v) == 0},
+            beside_table=table is not None,
+            shared_stiffness=shared,
+            fixed_stiffness=fixed.get("K"),
+            start=begun,
+            priors=priors,
+            options=options,
+            **motion,
+        )
+        terms += own
+        unknowns += nuisances
+    return Objective(
+        tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
+    )

@@ -1,0 +1,264 @@
+"""Lock-in readings in the likelihood: predictions at the rows of a table, exact derivatives."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from asperity.inference.outliers import outlying_rows, standardised
+from asperity.inference.residuals import Prediction, Residuals, Weights, residuals_of, weights_of
+from asperity.inference.table import LockInTable
+from asperity.inference.unknowns import Unknown
+from asperity.laws import Law
+from asperity.orbit import Outcome, response_function
+from asperity.parameters import law_parameters
+
+Float = NDArray[np.float64]
+
+#: Points that are predicted together.
+_BATCH = 4096
+#: Largest share of readings that are named as outliers.
+_FEW = 0.05
+
+
+class LockInTerm:
+    """A table of lock-in readings as a `DataTerm` of an objective.
+
+    Parameters
+    ----------
+    table : LockInTable
+    forward : Forward
+        Predictions at the rows of the table.
+    """
+
+    nuisances: tuple[Unknown, ...] = ()
+    profiled = 0
+    failure = (
+        "no start has a periodic orbit at every operating point; give start values, or fix "
+        "parameters for which sliding is stable"
+    )
+
+    def __init__(self, table: LockInTable, forward: Forward) -> None:
+        self.table, self.forward = table, forward
+        self._weights: Weights | None = None
+
+    @property
+    def name(self) -> str:
+        """Name of the table."""
+        return self.table.name
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """What the table reports."""
+        return self.table.observables
+
+    @property
+    def noise(self) -> dict[str, Any]:
+        """Independent normal errors, as the table gives them."""
+        count = sum(int(np.isfinite(v).sum()) for v in self.table.values.values())
+        kind = "correlated within a row" if self.table.covariances else "independent"
+        return {"model": f"{kind}, normal, as given", "effective_samples": count}
+
+    @property
+    def weights(self) -> Weights:
+        """Residuals as linear functions of predictions."""
+        if self._weights is None:
+            self._weights = weights_of(self.table)
+        return self._weights
+
+    def residuals(
+        self, values: Mapping[str, float], *, search: bool | None = None
+    ) -> Residuals | None:
+        """Residuals in standard uncertainties; None if a row has no periodic orbit."""
+        predicted, derivatives, outcome = self.forward(values, search=search)
+        if not all_converged(outcome):
+            return None
+        return residuals_of(self.weights, predicted, derivatives)
+
+    def search_from_now_on(self) -> None:
+        """Search for the orbits that the fast method does not find, at every call."""
+        self.forward.search_from_now_on()
+
+    def warnings(self, residuals: Residuals) -> list[str]:
+        """Outliers, and amplitudes without a phase that are small beside their uncertainty."""
+        said = list(self.table.remarks)
+        outliers = outlying_rows(residuals)
+        if outliers:
+            named = " and ".join(str(self.table.row_names[row]) for row in outliers)
+            said.append(
+                f"without {named} chi-squared would be as it should be: "
+                f"{'that is an outlier' if len(outliers) == 1 else 'those are outliers'}, which "
+                "may shift every estimate; check the measurement, or fit without it"
+            )
+        expected = norm.isf(0.005 / residuals.values.size)
+        apart = np.abs(standardised(residuals))
+        beyond = np.flatnonzero(apart > expected)
+        # So many are no outliers: the law or the uncertainties are wrong, as chi-squared says.
+        few = beyond if beyond.size <= max(1, _FEW * apart.size) else beyond[:0]
+        if outliers:
+            # Others are off because the fit follows these.
+            few = beyond[np.isin(residuals.row[beyond], outliers)]
+        for j in sorted(few, key=lambda j: -apart[j])[:5]:
+            said.append(
+                f"{residuals.observable[j]} of {self.table.row_names[residuals.row[j]]} is "
+                f"{apart[j]:.3g} standard uncertainties off, more than chance allows; check that "
+                "reading"
+            )
+        for n in (1, 2):
+            name = f"mu{n}"
+            if name in self.table.values and f"phase{n}" not in self.table.values:
+                weak = self.table.values[name] < 3 * self.table.errors[name]
+                if weak.any():
+                    said.append(
+                        f"{int(weak.sum())} readings of {name} are below three standard "
+                        f"uncertainties and have no phase{n}: an amplitude so small is biased "
+                        "upwards"
+                    )
+        return said
+
+
+class Forward:
+    """Periodic responses of a law at the rows of a table as a function of parameters.
+
+    Parameters
+    ----------
+    law : type of Law
+    table : LockInTable
+    fixed : mapping of str to array, shape () or (rows,)
+        All parameters that are not free, in SI.
+    inertia, radiation_damping : bool
+        What counts in the equation of motion.
+
+    Attributes
+    ----------
+    uses_search : bool
+        Whether every call searches for the orbits that the fast method does not find.
+    """
+
+    def __init__(
+        self,
+        law: type[Law],
+        table: LockInTable,
+        fixed: Mapping[str, Any],
+        *,
+        inertia: bool = False,
+        radiation_damping: bool = False,
+    ) -> None:
+        self.law, self.table = law, table
+        self.inertia, self.radiation_damping = inertia, radiation_damping
+        self.fixed = {
+            n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
+        }
+        whole = partial(
+            response_function, law, inertia=inertia, radiation_damping=radiation_damping
+        )
+        self._quick, self._whole = whole(search=False), whole(search="direct")
+        self.uses_search = False
+
+    def __call__(
+        self, free: Mapping[str, float], *, search: bool | None = None
+    ) -> tuple[Prediction, dict[str, Prediction], NDArray[np.int64]]:
+        """Prediction, its derivatives to the free parameters, and the outcome of every row.
+
+        Parameters
+        ----------
+        free : mapping of str to float
+        search : bool, optional
+            Whether points that the fast method does not find are searched for; by default where
+            the fast method alone has failed before.
+        """
+        search = self.uses_search if search is None else search
+        applied = self.fixed["epsilon"]
+        ratio = free.get("eps_ratio", self.fixed.get("eps_ratio", np.ones(1)))
+        given = {n: v for n, v in self.fixed.items() if n != "eps_ratio"}
+        given |= {n: np.full(self.table.rows, v) for n, v in free.items() if n != "eps_ratio"}
+        given["epsilon"] = applied * ratio
+        function = self._whole if search else self._quick
+        given = {n: v for n, v in given.items() if n in function.parameters}
+        values, slopes = function.value_and_jacobian(given)
+        mu_ss, mu_slopes = _steady(self.law, given)
+        predicted = Prediction(
+            np.asarray(values.mean_friction), mu_ss, np.asarray(values.harmonics)
+        )
+        derivatives = {}
+        none = Prediction(
+            np.zeros(self.table.rows),
+            np.zeros(self.table.rows),
+            np.zeros((self.table.rows, 2), complex),
+        )
+        for name in free:
+            source, factor = ("epsilon", applied) if name == "eps_ratio" else (name, 1.0)
+            if source not in slopes:
+                derivatives[name] = none  # a parameter of other data
+                continue
+            slope = slopes[source]
+            derivatives[name] = Prediction(
+                np.asarray(slope.mean_friction) * factor,
+                mu_slopes.get(name, np.zeros(self.table.rows)),
+                np.asarray(slope.harmonics) * np.reshape(factor, (-1, 1)),
+            )
+        return predicted, derivatives, np.asarray(values.outcome)
+
+    def predicted(
+        self, free: Mapping[str, Float], repeats: int
+    ) -> tuple[Prediction, NDArray[np.int64]]:
+        """Predictions of many sets of parameters, without derivatives or search.
+
+        Parameters
+        ----------
+        free : mapping of str to array, shape (repeats * rows,)
+            Each set repeated for all rows.
+        repeats : int
+            Number of sets.
+        """
+        fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
+        given = {n: v for n, v in (fixed | dict(free)).items() if n != "eps_ratio"}
+        given["epsilon"] = fixed["epsilon"] * (fixed | dict(free)).get("eps_ratio", 1.0)
+        given = {n: v for n, v in given.items() if n in self._quick.parameters}
+        parts = []
+        for start in range(0, repeats * self.table.rows, _BATCH):
+            part = {n: v[start : start + _BATCH] for n, v in given.items()}
+            values, mu_ss = self._quick(part), _steady(self.law, part)[0]
+            parts.append((values.mean_friction, mu_ss, values.harmonics, values.outcome))
+        mean, steady, harmonics, outcome = (
+            np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
+        )
+        return Prediction(mean, steady, harmonics), outcome
+
+    def search_from_now_on(self) -> None:
+        """Search for the points that the fast method does not find, at every call."""
+        self.uses_search = True
+
+
+def all_converged(outcome: NDArray[np.int64]) -> bool:
+    """Whether every row has an orbit."""
+    return bool((outcome == Outcome.CONVERGED).all())
+
+
+def _steady(law: type[Law], given: Mapping[str, Float]) -> tuple[Float, dict[str, Float]]:
+    """mu_ss(V) at each row and its derivatives to the law's parameters."""
+    own = {p: given[p] for p in law_parameters(law)}
+    value, slopes = _steady_friction(own, given["V"], law=law)
+    return np.asarray(value), {n: np.asarray(s) for n, s in slopes.items()}
+
+
+@partial(jax.jit, static_argnames=("law",))
+def _steady_friction(
+    own: Mapping[str, Array], V: Array, *, law: type[Law]
+) -> tuple[Array, dict[str, Array]]:
+    fields = {f.rstrip("_"): f for f in law.__dataclass_fields__}
+
+    def mu(values: Mapping[str, Array]) -> Array:
+        return law(**{fields[n]: v for n, v in values.items()}).mu_ss(V)
+
+    # Rows do not depend on each other: the sum's gradient is each row's own derivative.
+    value, pull = jax.vjp(mu, dict(own))
+    return value, pull(jnp.ones_like(value))[0]

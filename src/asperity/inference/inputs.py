@@ -1,0 +1,139 @@
+"""Numbers of a fit that are given: start values, fixed parameters, and whether data suffice."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.inference.runs.run import RecordedRun
+from asperity.inference.table import LockInTable
+from asperity.inference.unknowns import EPS_RATIO, MissingNumberError, Unknown
+from asperity.laws import Law
+from asperity.materials import Material
+from asperity.parameters import MODULATION, point_parameters
+
+
+def start_values(
+    law: type[Law],
+    free: Sequence[str],
+    start: Mapping[str, Any] | None,
+    material: Material | None,
+    *,
+    runs: Sequence[RecordedRun] = (),
+) -> dict[str, Any]:
+    """Start values by name in SI, from the user and a material.
+
+    Raises
+    ------
+    InputError
+        If a name is not free or a value is wrong.
+    """
+    known = {
+        name: material[name].si
+        for name in free
+        if not (name == "K" and runs)
+        if material is not None and name in material and material[name].value is not None
+    }
+    for name, value in (start or {}).items():
+        if name not in free and not (name.startswith("K") and runs):
+            raise InputError(
+                f"start must be of free parameters, got '{name}'; free it or leave it out"
+            )
+        # A stiffness is read with the run that it belongs to.
+        known[name] = value if name.startswith("K") else float(_checked(law, name, value))
+    return known
+
+
+def fixed_values(
+    law: type[Law],
+    table: LockInTable | None,
+    free: Sequence[str],
+    fixed: Mapping[str, Any] | None,
+    material: Material | None,
+    *,
+    runs: Sequence[RecordedRun] = (),
+) -> dict[str, Any]:
+    """Values of all parameters that are not free, by name in SI.
+
+    Without a table, what only its operating points need is left out, and runs give their load,
+    their friction at the begin as mu0, and their first velocity as V0.
+
+    Raises
+    ------
+    InputError
+        If a name or value is wrong, or a number is missing.
+    """
+    known = {n: p for n, p in point_parameters(law).items() if n not in MODULATION}
+    points: Mapping[str, Any] = {} if table is None else table.points
+    if table is None:
+        known = {
+            n: p for n, p in known.items() if n not in ("V", "epsilon", "frequency", "K", "W0")
+        }
+    assumed = {}
+    if runs and table is None:
+        first = runs[0]
+        assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}
+    given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
+    for name in given:
+        if name in free:
+            raise InputError(f"{name} must be free or fixed, got both; leave one out")
+        if name in MODULATION:
+            raise InputError(
+                f"fixed must be parameters of a harmonic load, got '{name}'; leave it out: fits "
+                "take no other load"
+            )
+        if name not in known and name != "eps_ratio":
+            raise InputError(
+                f"fixed must be parameters of {law.name}, got '{name}'; leave it out or choose "
+                "another law"
+            )
+    found: dict[str, Any] = {}
+    missing = []
+    for name, parameter in known.items():
+        if name in free or name == "inertia":
+            continue
+        if name in given:
+            found[name] = _checked(law, name, given[name])
+        elif name in points and np.isfinite(points[name]).all():
+            found[name] = points[name]
+        elif material is not None and name in material and material[name].value is not None:
+            found[name] = material[name].si
+        elif name in assumed:
+            found[name] = assumed[name]
+        elif parameter.default is not None:
+            found[name] = parameter.default
+        else:
+            missing.append(name)
+    if missing:
+        raise MissingNumberError(
+            f"{law.name} must have all its numbers, got none for {', '.join(missing)}; free or fix "
+            "them, add columns, or name a material"
+        )
+    if "eps_ratio" not in free:
+        found["eps_ratio"] = ratio = float(_checked(law, "eps_ratio", given.get("eps_ratio", 1.0)))
+        largest = ratio * float(np.max(points.get("epsilon", 0.0)))
+        if largest >= 1:
+            raise InputError(
+                f"eps_ratio times epsilon must be below 1, got {largest:g}; contact would be lost"
+            )
+    return found
+
+
+def _checked(law: type[Law], name: str, value: Any) -> Any:
+    """A value in SI; a text has its unit."""
+    known = {**point_parameters(law), EPS_RATIO.name: EPS_RATIO}
+    return known[name].check(value)
+
+
+def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
+    """Refuse fewer data than free parameters."""
+    count = int(sum(np.isfinite(v).sum() for v in table.values.values()))
+    needed = sum(1 for u in unknowns if u.prior is None)
+    if count < max(needed, 1):
+        raise InputError(
+            f"{table.name} must hold at least as many data as free parameters, got {count} for "
+            f"{len(unknowns)} ({', '.join(u.name for u in unknowns)}); free fewer or measure more"
+        )

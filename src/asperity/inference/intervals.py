@@ -1,0 +1,96 @@
+"""Confidence intervals of a normal estimate whose parameter cannot pass a bound.
+
+Near a bound the interval of the likelihood ratio with the usual thresholds covers too often or too
+rarely. The thresholds of Feldman and Cousins (Phys. Rev. D 57, 3873, 1998) hold the coverage, and
+turn from a two-sided interval to an upper limit by themselves.
+"""
+
+from __future__ import annotations
+
+import math
+
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+Interval = tuple[float, float]
+
+#: Standard deviations from a bound beyond which it has no influence.
+_FAR = 8.0
+
+
+def bounded_threshold(distance: float, level: float) -> float:
+    """Largest -2 ln of the likelihood ratio that an interval contains.
+
+    Parameters
+    ----------
+    distance : float
+        Of the tested value from the bound, in standard deviations.
+    level : float
+        Coverage, in (0, 1).
+
+    Notes
+    -----
+    For an estimate x that is normal about mu >= 0 with unit variance, the ratio to the best
+    allowed value is (x - mu)^2 where x >= 0 and mu^2 - 2 x mu elsewhere.
+    """
+    far = float(norm.isf((1 - level) / 2)) ** 2
+    if distance > _FAR:
+        return far
+    if distance <= 0:
+        # Every negative estimate has the ratio 0 there; half of all estimates.
+        return float(norm.isf(1 - level)) ** 2 if level > 0.5 else 0.0
+
+    def covered(threshold: float) -> float:
+        root = math.sqrt(threshold)
+        lowest = distance - root
+        if lowest < 0:
+            lowest = (distance**2 - threshold) / (2 * distance)
+        return float(norm.cdf(root) - norm.cdf(lowest - distance)) - level
+
+    return float(brentq(covered, 0.0, far + 1e-9, xtol=1e-12)) if covered(far) > 0 else far
+
+
+def bounded_interval(
+    estimate: float, sd: float, level: float, lower: float, upper: float
+) -> Interval:
+    """Interval of a normal estimate with a bound on one side or on both.
+
+    Parameters
+    ----------
+    estimate : float
+        The unbounded one; it may lie beyond a bound.
+    sd : float
+        Standard deviation of the estimate.
+    level : float
+        Coverage.
+    lower, upper : float
+        Bounds; infinite where there is none. They are treated one by one, so that they should be
+        several standard deviations apart.
+
+    Returns
+    -------
+    (float, float)
+    """
+    root = float(norm.isf((1 - level) / 2))
+    low, high = estimate - root * sd, estimate + root * sd
+    if (estimate - lower) < _FAR * sd:
+        low, high = _above(estimate, sd, level, lower)
+    if (upper - estimate) < _FAR * sd:
+        mirrored = _above(-estimate, sd, level, -upper)
+        high = -mirrored[0]
+        low = max(low, -mirrored[1]) if (estimate - lower) < _FAR * sd else -mirrored[1]
+    return max(low, lower), min(high, upper)
+
+
+def _above(estimate: float, sd: float, level: float, bound: float) -> Interval:
+    x = (estimate - bound) / sd
+
+    def inside(mu: float) -> float:
+        ratio = (x - mu) ** 2 if x >= 0 else mu**2 - 2 * x * mu
+        return bounded_threshold(mu, level) - ratio
+
+    best = max(x, 0.0)
+    far = best + 12.0
+    high = float(brentq(inside, best, far)) if inside(best) > 0 else best
+    low = 0.0 if inside(0.0) >= 0 else float(brentq(inside, 0.0, best))
+    return bound + sd * low, bound + sd * high

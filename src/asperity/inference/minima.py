@@ -1,0 +1,141 @@
+"""Search for the minima of an objective from a given start and from drawn ones."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats.qmc import Sobol
+
+from asperity.inference.forward import LockInTerm
+from asperity.inference.objective import Objective
+from asperity.inference.runs.term import RunTerm
+
+Float = NDArray[np.float64]
+
+#: The best of the drawn starts that are followed to their minimum.
+_FOLLOWED = 3
+#: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
+_ROUNDS, _STILL = 8, 0.03
+#: Minima nearer than this in every coordinate are one.
+_SAME = 1e-3
+
+#: Minimisations that have stopped short and go on with the slower method.
+_SEARCHED = 2
+#: Decrease of chi-squared that is worth that method, and as a share of it: less would change no
+#: verdict on a law that is far off.
+_GAIN, _LARGE_GAIN = 1.0, 0.1
+#: A coordinate nearer to its bound is there.
+_AT_BOUND = 1e-6
+#: Parameters that laws extend others by: without them they are another law.
+_EXTENSIONS = ("lambda", "alpha")
+#: Their coordinate there, and the starts that are tried with it.
+_NEARLY_ZERO, _TRIED = 1e-4, 16
+
+
+def minima_of(
+    objective: Objective, seed: int, progress: Callable[[int], None], *, drawn: int = 64
+) -> list[tuple[Float, float]]:
+    """Minima from the given start and from the best of many drawn ones, best first."""
+    unknowns = objective.unknowns
+    starts: list[Float] = []
+    middle = np.array([float(u.to_coordinate(u.middle)) for u in unknowns])
+    low = np.array([u.to_coordinate(u.start[0]) for u in unknowns])
+    high = np.array([u.to_coordinate(u.start[1]) for u in unknowns])
+    shares = Sobol(len(unknowns), seed=seed).random(drawn)
+    candidates = [middle, *(low + (high - low) * shares)]
+    chi2 = np.array([objective.chi2(u) for u in candidates])
+    searched = not np.isfinite(chi2).any()
+    if searched:
+        objective.search_from_now_on()
+        candidates = candidates[:8]
+        chi2 = np.array([objective.chi2(u) for u in candidates])
+    order = [i for i in np.argsort(chi2) if math.isfinite(chi2[i])]
+    starts = [candidates[i] for i in dict.fromkeys([*(i for i in order if i == 0), *order])]
+    found: list[tuple[Float, float]] = []
+    for start in [*starts[: _FOLLOWED + 1], *_special_cases(objective, starts)]:
+        found.append(objective.minimise(start))
+        progress(1)
+    found.sort(key=lambda pair: pair[1])
+    if found and not searched and _blocked(objective, *found[0]):
+        best = found[0][1]
+        objective.search_from_now_on()
+        found += [objective.minimise(u) for u, _ in found[:_SEARCHED]]
+        if min(value for _, value in found) > best - _GAIN:
+            _search_no_more(objective)
+    return sorted(found, key=lambda pair: pair[1])
+
+
+def with_noise(
+    objective: Objective, minima: list[tuple[Float, float]]
+) -> tuple[list[tuple[Float, float]], bool]:
+    """Minima once the noise is that of the residual, and whether the two agree.
+
+    The noise of each `RunTerm` is estimated from the residual at the best minimum, the minima are
+    followed under it, and so on until the best one stays where it is.
+    """
+    noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
+    for _ in range(_ROUNDS):
+        begin = minima[0][0]
+        for term in noisy:
+            term.update_noise(objective.named(begin))
+        objective.forget()
+        starts = [minima[0][0]]
+        for u, _ in minima[1:]:
+            if min(np.abs(u - v).max() for v in starts) > _SAME:
+                starts.append(u)
+        minima = sorted((objective.minimise(u) for u in starts), key=lambda pair: pair[1])
+        _, jacobian = objective.residuals(minima[0][0])
+        away = jacobian @ (minima[0][0] - begin)
+        # chi-squared of the change, under the noise as it is now.
+        if float(away @ away) < _STILL**2:
+            return minima, True
+    return minima, False
+
+
+def _blocked(objective: Objective, u: Float, value: float) -> bool:
+    """Whether chi-squared still falls where a minimisation has stopped.
+
+    It does where the fast method has no solution farther on. Without this question the fit would
+    report a wrong minimum, with a law that describes the data as its victim.
+    """
+    tables = any(isinstance(term, LockInTerm) for term in objective.terms)
+    if not tables or not math.isfinite(value):
+        return False
+    r, J = objective.residuals(u)
+    gradient = J.T @ r
+    low, high = np.array([k.bounds for k in objective.unknowns]).T
+    outwards = np.where(gradient > 0, u - low, high - u) < _AT_BOUND
+    J, gradient = J[:, ~outwards], gradient[~outwards]
+    decrease = float(gradient @ np.linalg.pinv(J.T @ J, hermitian=True) @ gradient)
+    return decrease > max(_GAIN, _LARGE_GAIN * value)
+
+
+def _search_no_more(objective: Objective) -> None:
+    """The fast method again, where the slower one has found nothing better."""
+    for term in objective.terms:
+        if isinstance(term, LockInTerm):
+            term.forward.uses_search = False
+
+
+def _special_cases(objective: Objective, starts: list[Float]) -> list[Float]:
+    """Starts at which a parameter that may be zero nearly is, best first of each.
+
+    Laws have others as special cases, elasto-plastic Rice-Ruina for lambda = 0: data of the special
+    case have their minimum there, and others away from it.
+    """
+    found = []
+    for i, unknown in enumerate(objective.unknowns):
+        if unknown.logarithmic or unknown.name not in _EXTENSIONS:
+            continue
+        trials: list[tuple[float, int, Float]] = []
+        for start in starts[:_TRIED]:
+            trial = start.copy()
+            trial[i] = _NEARLY_ZERO
+            trials.append((objective.chi2(trial), len(trials), trial))
+        chi2, _, best = min(trials, default=(math.inf, 0, starts[0] if starts else None))
+        if math.isfinite(chi2) and best is not None:
+            found.append(best)
+    return found

@@ -1,0 +1,260 @@
+"""The function that a fit minimises: data, law and free parameters, whatever the data are.
+
+Every set of data is a `DataTerm`. It turns values of the parameters into residuals that have unit
+variance and no correlation if the law is right, so that a sum of squares is chi-squared. The
+likelihood is the product over the terms; priors are normal in the parameter itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from asperity.inference.residuals import Residuals
+from asperity.inference.unknowns import Unknown
+from asperity.laws import Law
+
+Float = NDArray[np.float64]
+
+
+class DataTerm(Protocol):
+    """One set of data in the likelihood.
+
+    Attributes
+    ----------
+    name : str
+        What messages call the data.
+    observables : tuple of str
+        What the data report; the `observable` of each residual is one of them.
+    nuisances : tuple of Unknown
+        Free parameters of this set of data alone, such as the offset of a gauge.
+    profiled : int
+        Parameters that the term itself fits at given values of the others: they count in AICc,
+        BIC and degrees of freedom.
+    noise : mapping of str to object
+        Model of the noise and `effective_samples`, plain numbers and texts for JSON.
+    failure : str
+        Why the residuals may not exist, and what to do: the message of a fit that failed.
+    """
+
+    @property
+    def name(self) -> str:
+        """What messages call the data."""
+        ...
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """What the data report."""
+        ...
+
+    @property
+    def nuisances(self) -> tuple[Unknown, ...]:
+        """Free parameters of this set of data alone."""
+        ...
+
+    @property
+    def profiled(self) -> int:
+        """Parameters that the term itself fits."""
+        ...
+
+    @property
+    def noise(self) -> Mapping[str, Any]:
+        """Model of the noise and number of effective samples."""
+        ...
+
+    @property
+    def failure(self) -> str:
+        """Why the residuals may not exist, and what to do."""
+        ...
+
+    def residuals(
+        self, values: Mapping[str, float], *, search: bool | None = None
+    ) -> Residuals | None:
+        """Whitened residuals; None where the law has no solution.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            All free parameters and nuisances of the fit, in SI. Columns of the Jacobian are the
+            derivatives to these, in this order; a column of zeros where the term does not depend.
+        search : bool, optional
+            Whether a slower method is tried where the fast one finds no solution.
+        """
+        ...
+
+    def search_from_now_on(self) -> None:
+        """Try the slower method at every call."""
+        ...
+
+    def warnings(self, residuals: Residuals) -> Sequence[str]:
+        """What a reader must know of these data, with the residuals at the estimate."""
+        ...
+
+
+@dataclass
+class Objective:
+    """Residuals, likelihood and prior as functions of the coordinates u of the free parameters.
+
+    Attributes
+    ----------
+    terms : tuple of DataTerm
+    law : type of Law
+    unknowns : tuple of Unknown
+        Free parameters of the law and the machine, then the nuisances of the terms.
+    fixed : mapping of str to float or array
+        Parameters that are not free, in SI.
+    tolerance : float
+        Relative change of the coordinates at which a minimum is reached.
+    """
+
+    terms: tuple[DataTerm, ...]
+    law: type[Law]
+    unknowns: tuple[Unknown, ...]
+    fixed: Mapping[str, Any]
+    tolerance: float = 1e-10
+    _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, repr=False)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the free parameters, in the order of the coordinates."""
+        return tuple(k.name for k in self.unknowns)
+
+    def named(self, u: Float) -> dict[str, float]:
+        """Values by name at the coordinates u."""
+        return {k.name: float(k.to_value(x)) for k, x in zip(self.unknowns, u, strict=True)}
+
+    def coordinates(self, values: Mapping[str, float]) -> Float:
+        """Coordinates of values by name."""
+        return np.array([float(k.to_coordinate(values[k.name])) for k in self.unknowns])
+
+    def data_residuals(self, u: Float, *, search: bool | None = None) -> list[Residuals] | None:
+        """Residuals of each term, with the Jacobian to the coordinates; None without a solution."""
+        values = self.named(u)
+        slopes = np.array([k.slope(values[k.name]) for k in self.unknowns])
+        found = []
+        for term in self.terms:
+            residuals = term.residuals(values, search=search)
+            if residuals is None:
+                return None
+            found.append(residuals._replace(jacobian=residuals.jacobian * slopes))
+        return found
+
+    def residuals(self, u: Float) -> tuple[Float, Float]:
+        """Residuals of data and priors and their Jacobian; NaN without a solution."""
+        key = u.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = key, self._evaluate(u)
+        return self._last[1]
+
+    def _evaluate(self, u: Float) -> tuple[Float, Float]:
+        data = self.data_residuals(u)
+        if data is None:
+            return np.array([np.nan]), np.full((1, len(self.unknowns)), np.nan)
+        priors, slopes = self.prior_residuals(u)
+        return (
+            np.concatenate([*(d.values for d in data), priors]),
+            np.vstack([*(d.jacobian for d in data), slopes]),
+        )
+
+    def prior_residuals(self, u: Float) -> tuple[Float, Float]:
+        """(value - mean) / standard deviation of each prior, and the Jacobian."""
+        rows = [i for i, k in enumerate(self.unknowns) if k.prior is not None]
+        values, jacobian = np.zeros(len(rows)), np.zeros((len(rows), len(self.unknowns)))
+        for row, i in enumerate(rows):
+            unknown = self.unknowns[i]
+            prior = unknown.prior
+            assert prior is not None  # by the choice of rows
+            x = float(unknown.to_value(u[i]))
+            values[row] = (x - prior.mean) / prior.sd
+            jacobian[row, i] = unknown.slope(x) / prior.sd
+        return values, jacobian
+
+    def chi2(self, u: Float) -> float:
+        """chi-squared of data and priors; infinite without a solution."""
+        value = float(np.sum(self.residuals(u)[0] ** 2))
+        return value if math.isfinite(value) else math.inf
+
+    def log_likelihood(self, u: Float) -> float:
+        """Logarithm of the density of the data at u; minus infinity without a solution."""
+        data = self.data_residuals(u)
+        return -math.inf if data is None else float(sum(log_density(d) for d in data))
+
+    def log_posterior(self, u: Float) -> tuple[float, Float]:
+        """Logarithm of likelihood times prior, but for a constant, and its gradient.
+
+        Notes
+        -----
+        Priors are densities of the parameter itself, not of its coordinate: a sampler that walks
+        in u adds `log_volume`.
+        """
+        r, jacobian = self.residuals(u)
+        if not np.isfinite(r).all():
+            return -math.inf, np.full(u.shape, np.nan)
+        return -0.5 * float(r @ r), -jacobian.T @ r
+
+    def log_volume(self, u: Float) -> tuple[float, Float]:
+        """Logarithm of the volume dx/du of the coordinates with a prior, and its gradient.
+
+        Parameters without a prior are flat in their coordinate.
+        """
+        counted = np.array([k.logarithmic and k.prior is not None for k in self.unknowns], float)
+        return float(counted @ u), counted
+
+    def forget(self) -> None:
+        """Forget the last evaluation: a term has changed."""
+        self._last = None
+
+    def search_from_now_on(self) -> None:
+        """Let every term try its slower method."""
+        for term in self.terms:
+            term.search_from_now_on()
+
+    def minimise(self, u: Float, kept: Mapping[int, float] | None = None) -> tuple[Float, float]:
+        """Coordinates of the minimum that is reached from u, and its chi-squared.
+
+        Parameters
+        ----------
+        u : array, shape (n,)
+        kept : mapping of int to float, optional
+            Coordinates that stay at the given values.
+        """
+        kept = dict(kept or {})
+        moving = [i for i in range(len(u)) if i not in kept]
+        point = np.array(u, float)
+        for i, value in kept.items():
+            point[i] = value
+        if not moving or not math.isfinite(self.chi2(point)):
+            return point, self.chi2(point)
+
+        def whole(part: Float) -> Float:
+            full = point.copy()
+            full[moving] = part
+            return full
+
+        low, high = np.array([self.unknowns[i].bounds for i in moving]).T
+        inside = np.clip(point[moving], low + 1e-10, high - 1e-10)
+        result = least_squares(
+            lambda part: self.residuals(whole(part))[0],
+            inside,
+            jac=lambda part: self.residuals(whole(part))[1][:, moving],
+            bounds=(low, high),
+            x_scale="jac",
+            xtol=self.tolerance,
+            ftol=1e-2 * self.tolerance,
+            gtol=self.tolerance,
+            max_nfev=100,
+        )
+        found = whole(result.x)
+        return found, self.chi2(found)
+
+
+def log_density(data: Residuals) -> float:
+    """Logarithm of the normal density of the data of a term."""
+    n = data.values.size
+    return -0.5 * (float(np.sum(data.values**2)) + n * math.log(2 * math.pi)) - data.log_scale

@@ -1,0 +1,231 @@
+"""The posterior density of a fit to lock-in readings, as a compiled program needs it.
+
+The sampler walks in z, where the posterior is near a normal density of unit covariance about zero:
+q = mode + root @ z, with the unbounded coordinates q of `asperity.inference.posterior.coordinates`
+and a root of the covariance that the curvature at the mode stands for (Laplace).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from asperity.inference.forward import LockInTerm
+from asperity.inference.objective import Objective
+from asperity.inference.posterior.coordinates import Coordinates
+from asperity.inference.prior_density import PriorDensity
+from asperity.inference.residuals import Prediction, columns_of
+from asperity.laws import Law
+from asperity.orbit import response_function
+from asperity.parameters import law_parameters
+
+Float = NDArray[np.float64]
+
+#: Steps to the mode, and the decrease of the log density at which it counts as reached.
+_STEPS, _REACHED = 60, 1e-6
+#: Standard deviations of q are looked for between these.
+_NARROWEST, _WIDEST = 1e-9, 3.0
+
+
+class DensityData(NamedTuple):
+    """Arrays that the density depends on; programs are compiled for their shapes.
+
+    Attributes
+    ----------
+    mode, root : array, shapes (n,) and (n, n)
+    coordinates : Coordinates
+    logarithmic : bool array, shape (n,)
+        Where the coordinate u is the logarithm of the parameter.
+    scale, prior_mean, prior_precision : array, shape (n,)
+    fixed : dict of str to array, shape (rows,)
+    matrix, target : array
+        As of `Weights`; rows that fill up have weights of 0.
+    """
+
+    mode: Any
+    root: Any
+    coordinates: Coordinates
+    logarithmic: Any
+    scale: Any
+    prior_mean: Any
+    prior_precision: Any
+    fixed: dict[str, Any]
+    matrix: Any
+    target: Any
+
+
+@dataclass(frozen=True)
+class LockInDensity:
+    """Logarithm of the posterior density of z, but for a constant.
+
+    Attributes
+    ----------
+    law : type of Law
+    names : tuple of str
+        Free parameters.
+    inertia, radiation_damping : bool
+    search : bool
+        Whether orbits that the fast method does not find are searched for, which takes long.
+    """
+
+    law: type[Law]
+    names: tuple[str, ...]
+    inertia: bool
+    radiation_damping: bool
+    search: bool
+
+    def __call__(self, z: Array, data: DensityData) -> Array:
+        """Log density at z, of shape (n,)."""
+        q = data.mode + data.root @ z
+        u = data.coordinates.to_u(q)
+        x = jnp.where(data.logarithmic, jnp.exp(u), u * data.scale)
+        prior = -0.5 * ((x - data.prior_mean) * data.prior_precision) ** 2
+        volume = jnp.where((data.prior_precision > 0) & data.logarithmic, u, 0.0)
+        columns = columns_of(self._predicted(x, data), jnp)
+        residuals = jnp.einsum("rsc,rc->rs", data.matrix, columns) - data.target
+        likelihood = -0.5 * jnp.sum(residuals**2)
+        return likelihood + jnp.sum(prior + volume + data.coordinates.log_slope(q))
+
+    def _predicted(self, x: Array, data: DensityData) -> Prediction:
+        free = dict(zip(self.names, x, strict=True))
+        given = {n: v for n, v in data.fixed.items() if n != "eps_ratio"}
+        applied = data.fixed["epsilon"]
+        ratio = free.get("eps_ratio", data.fixed.get("eps_ratio", 1.0))
+        given |= {n: v + 0 * applied for n, v in free.items() if n != "eps_ratio"}
+        given["epsilon"] = applied * ratio
+        function = _response(self.law, self.inertia, self.radiation_damping, self.search)
+        values = function({n: v for n, v in given.items() if n in function.parameters})
+        fields = {f.rstrip("_"): f for f in self.law.__dataclass_fields__}
+        own = self.law(**{fields[n]: given[n] for n in law_parameters(self.law)})
+        return Prediction(values.mean_friction, own.mu_ss(given["V"]), values.harmonics)
+
+
+@cache
+def _response(law: type[Law], inertia: bool, radiation_damping: bool, search: bool) -> Any:
+    return response_function(
+        law, inertia=inertia, radiation_damping=radiation_damping, search=search
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """A posterior in its whitened coordinates.
+
+    Attributes
+    ----------
+    objective : Objective
+    prior : PriorDensity
+    coordinates : Coordinates
+    mode, root : array
+        As of `DensityData`.
+    """
+
+    objective: Objective
+    prior: PriorDensity
+    coordinates: Coordinates
+    mode: Float
+    root: Float
+
+    @classmethod
+    def at(cls, objective: Objective, prior: PriorDensity, u: Float, sd: Float) -> Whitened:
+        """The posterior whitened at the mode that is reached from u."""
+        coordinates = Coordinates.of(list(zip(prior.low, prior.high, strict=True)))
+        start = coordinates.to_q(coordinates.inside(u, sd))
+        plain = cls(objective, prior, coordinates, start, np.eye(len(u)))
+        mode, information = plain._climbed(start)
+        return cls(objective, prior, coordinates, mode, _root(information))
+
+    def u_of(self, z: Float) -> Float:
+        """Coordinates of the fit at whitened ones, shapes (..., n)."""
+        return np.asarray(self.coordinates.to_u(self.mode + z @ self.root.T))
+
+    def log_density(self, z: Float) -> tuple[float, Float]:
+        """Log density and its gradient, by the solver of the fit."""
+        value, gradient, _ = self._evaluated(self.mode + self.root @ z)
+        return value, self.root.T @ gradient
+
+    def _evaluated(self, q: Float) -> tuple[float, Float, Float]:
+        """Log density of q, its gradient, and the information matrix."""
+        u = np.asarray(self.coordinates.to_u(q))
+        r, jacobian = self.objective.residuals(u)
+        if not np.isfinite(r).all():
+            return -np.inf, np.zeros_like(q), np.eye(q.size)
+        slope = np.exp(np.asarray(self.coordinates.log_slope(q)))
+        volume, along = self.objective.log_volume(u)
+        step = 1e-6
+        up, down = (np.asarray(self.coordinates.log_slope(q + s)) for s in (step, -step))
+        middle = np.asarray(self.coordinates.log_slope(q))
+        value = -0.5 * float(r @ r) + volume + float(middle.sum())
+        J = jacobian * slope
+        gradient = -J.T @ r + along * slope + (up - down) / (2 * step)
+        share = 1 / (1 + np.exp(-q))
+        curvature = np.where(self.coordinates.bounded_twice, 2 * share * (1 - share), 0.0)
+        return value, gradient, J.T @ J + np.diag(curvature)
+
+    def _climbed(self, q: Float) -> tuple[Float, Float]:
+        """The mode reached from q by damped Gauss-Newton steps, and the information there."""
+        value, gradient, information = self._evaluated(q)
+        damping = 1e-3
+        for _ in range(_STEPS):
+            lifted = information + damping * np.diag(np.diag(information) + 1e-12)
+            step = np.linalg.solve(lifted, gradient)
+            longest = np.abs(step).max()
+            step *= min(1.0, 2.0 / longest) if longest else 1.0
+            trial = self._evaluated(q + step)
+            if trial[0] > value:
+                gain = trial[0] - value
+                q, (value, gradient, information), damping = q + step, trial, damping / 10
+                if gain < _REACHED:
+                    break
+            else:
+                damping *= 10
+                if damping > 1e8:
+                    break
+        return q, information
+
+    def compiled(self) -> tuple[LockInDensity, DensityData]:
+        """The density as a compiled program evaluates it, and its data."""
+        (term,) = (t for t in self.objective.terms if isinstance(t, LockInTerm))
+        forward, weights = term.forward, term.weights
+        rows = term.table.rows
+        size = max(4, 1 << (rows - 1).bit_length())
+        more = ((0, size - rows),)
+        fixed = {n: np.pad(v, more, mode="edge") for n, v in forward.fixed.items()}
+        unknowns = self.objective.unknowns
+        data = DensityData(
+            self.mode,
+            self.root,
+            self.coordinates,
+            np.array([k.logarithmic for k in unknowns]),
+            np.array([k.scale for k in unknowns]),
+            self.prior.mean,
+            self.prior.precision,
+            fixed,
+            np.pad(weights.matrix, (*more, (0, 0), (0, 0))),
+            np.pad(weights.target, (*more, (0, 0))),
+        )
+        density = LockInDensity(
+            self.objective.law,
+            self.objective.names,
+            forward.inertia,
+            forward.radiation_damping,
+            forward.uses_search,
+        )
+        return density, data
+
+
+def _root(information: Float) -> Float:
+    """Root of the inverse of an information matrix, with standard deviations within limits."""
+    scale = np.sqrt(np.maximum(np.diag(information), _WIDEST**-2))
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    sd = np.clip(1 / np.sqrt(np.maximum(values, 1e-30)), _NARROWEST, _WIDEST / np.min(1 / scale))
+    root = (vectors * sd) / scale[:, None]
+    # No direction moves a coordinate farther than its widest.
+    longest = np.sqrt((root**2).sum(0))
+    return np.asarray(root * np.minimum(1.0, _WIDEST / longest))

@@ -1,0 +1,259 @@
+"""What a sampled posterior says: draws, intervals, and whether the chains can be believed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity._version import __version__
+from asperity.inference.forward import LockInTerm
+from asperity.inference.intervals import Interval
+from asperity.inference.posterior.density import Whitened
+from asperity.inference.posterior.nuts import Transitions
+from asperity.inference.result import Fit
+
+Float = NDArray[np.float64]
+
+#: Chains agree below this R-hat (Vehtari et al., 2021).
+_AGREE = 1.01
+#: Effective draws below which quantiles are not to be believed, for each chain (the same).
+_ENOUGH = 100.0
+#: Share of trajectories without a solution at an end that is worth a warning.
+_FEW_FAILED = 1e-3
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """The posterior of one parameter, in SI.
+
+    Attributes
+    ----------
+    name, unit : str
+    mean, sd, median : float
+    interval_68, interval_95 : (float, float)
+        Between quantiles of equal tails.
+    r_hat, ess_bulk, ess_tail : float
+        Rank-normalised split R-hat and effective sample sizes.
+    """
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+    median: float
+    interval_68: Interval
+    interval_95: Interval
+    r_hat: float
+    ess_bulk: float
+    ess_tail: float
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Draws from the posterior of a fit.
+
+    Attributes
+    ----------
+    fit : Fit
+        Whose posterior it is.
+    parameters : mapping of str to Marginal
+    draws : mapping of str to array, shape (chains, draws)
+        In SI.
+    log_density : array, shape (chains, draws)
+        But for a constant.
+    acceptance, energy : array, shape (chains, draws)
+    steps : int array, shape (chains, draws)
+        Evaluations of the gradient.
+    diverging, failed : bool array, shape (chains, draws)
+        Whether the energy of the trajectory was lost; whether it ended where the law has no
+        solution.
+    seed : int
+    prior : mapping
+        Prior of each parameter, as plain numbers.
+    warnings : tuple of str
+    """
+
+    fit: Fit
+    parameters: Mapping[str, Marginal]
+    draws: Mapping[str, Float]
+    log_density: Float
+    acceptance: Float
+    energy: Float
+    steps: NDArray[np.int64]
+    diverging: NDArray[np.bool_]
+    failed: NDArray[np.bool_]
+    seed: int
+    prior: Mapping[str, Any]
+    warnings: tuple[str, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether chains agree and there are effective draws enough."""
+        chains = self.log_density.shape[0]
+        return all(
+            p.r_hat <= _AGREE and min(p.ess_bulk, p.ess_tail) >= _ENOUGH * chains
+            for p in self.parameters.values()
+        )
+
+    def record(self) -> dict[str, Any]:
+        """Summary as plain numbers and texts, for JSON."""
+        chains, draws = self.log_density.shape
+        return {
+            "converged": self.converged,
+            "chains": chains,
+            "draws": draws,
+            "seed": self.seed,
+            "parameters": {
+                name: {
+                    "unit": p.unit,
+                    "mean": p.mean,
+                    "sd": p.sd,
+                    "median": p.median,
+                    "interval_68": list(p.interval_68),
+                    "interval_95": list(p.interval_95),
+                    "r_hat": _plain(p.r_hat),
+                    "ess_bulk": _plain(p.ess_bulk),
+                    "ess_tail": _plain(p.ess_tail),
+                    "prior": self.prior[name],
+                }
+                for name, p in self.parameters.items()
+            },
+            "divergences": int(self.diverging.sum()),
+            "failed": int(self.failed.sum()),
+            "mean_acceptance": float(self.acceptance.mean()),
+            "gradients": int(self.steps.sum()),
+            "warnings": list(self.warnings),
+        }
+
+    def to_datatree(self) -> Any:
+        """Groups posterior, sample_stats and observed_data, as ArviZ names and reads them."""
+        from arviz_base import from_dict
+
+        tree = from_dict(
+            {
+                "posterior": dict(self.draws),
+                "sample_stats": {
+                    "lp": self.log_density,
+                    "acceptance_rate": self.acceptance,
+                    "energy": self.energy,
+                    "n_steps": self.steps,
+                    "diverging": self.diverging,
+                    "failed": self.failed,
+                },
+                "observed_data": _observed(self.fit),
+            }
+        )
+        for name, p in self.parameters.items():
+            tree["posterior"][name].attrs["units"] = p.unit
+        tree.attrs |= {
+            "title": f"Posterior of {self.fit.law}",
+            "source": f"asperity {__version__}",
+            "seed": self.seed,
+        }
+        return tree
+
+    def to_netcdf(self, path: str | Path) -> None:
+        """Write the draws as NetCDF, which ``arviz.from_netcdf`` and ``xarray.open_datatree`` read.
+
+        Parameters
+        ----------
+        path : str or Path
+        """
+        self.to_datatree().to_netcdf(path, engine="h5netcdf")
+
+
+def posterior_of(
+    found: Fit, whitened: Whitened, runs: Sequence[Sequence[Transitions]], *, seed: int
+) -> Posterior:
+    """The posterior from the blocks of all chains, without their warm-up."""
+    # Untyped, and only there with the extra.
+    array_stats: Any = import_module("arviz_stats.base").array_stats
+    whole = [
+        Transitions(*(np.concatenate(part) for part in zip(*run, strict=True))) for run in runs
+    ]
+    stats = Transitions(*(np.stack(part) for part in zip(*whole, strict=True)))
+    u = whitened.u_of(stats.z)
+    draws, marginals = {}, {}
+    for i, unknown in enumerate(found.objective.unknowns):
+        x = np.asarray(unknown.to_value(u[..., i]))
+        draws[unknown.name] = x
+        quantiles = np.quantile(x, [0.5, *_tails(math.erf(math.sqrt(0.5))), *_tails(0.95)])
+        marginals[unknown.name] = Marginal(
+            unknown.name,
+            unknown.parameter.unit,
+            float(x.mean()),
+            float(x.std(ddof=1)),
+            float(quantiles[0]),
+            (float(quantiles[1]), float(quantiles[2])),
+            (float(quantiles[3]), float(quantiles[4])),
+            float(array_stats.rhat(x)),
+            float(array_stats.ess(x, method="bulk")),
+            float(array_stats.ess(x, method="tail", prob=(0.05, 0.95))),
+        )
+    return Posterior(
+        found,
+        marginals,
+        draws,
+        stats.log_density,
+        stats.acceptance,
+        stats.energy,
+        stats.steps,
+        stats.diverging,
+        stats.failed,
+        seed,
+        whitened.prior.record(),
+        tuple(_warnings(marginals, stats)),
+    )
+
+
+def _tails(level: float) -> tuple[float, float]:
+    return (1 - level) / 2, (1 + level) / 2
+
+
+def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str]:
+    said = []
+    chains = stats.log_density.shape[0]
+    for name, p in marginals.items():
+        if not p.r_hat <= _AGREE:
+            said.append(
+                f"chains disagree about {name} (R-hat {p.r_hat:.3f}); sample more draws, and look "
+                "for more than one maximum"
+            )
+        elif min(p.ess_bulk, p.ess_tail) < _ENOUGH * chains:
+            said.append(
+                f"draws of {name} are worth only {p.ess_bulk:.0f} independent ones (in the tails "
+                f"{p.ess_tail:.0f}); sample more"
+            )
+    failed, lost = int(stats.failed.sum()), int((stats.diverging & ~stats.failed).sum())
+    if lost:
+        said.append(
+            f"{lost} of {stats.diverging.size} trajectories diverged: the posterior bends more "
+            "sharply somewhere than the sampler can follow, and draws there are missing"
+        )
+    if failed > _FEW_FAILED * stats.failed.size:
+        said.append(
+            f"{failed} of {stats.failed.size} trajectories ended where the fast method finds no "
+            "periodic orbit at some row; the posterior is cut off there"
+        )
+    return said
+
+
+def _observed(found: Fit) -> dict[str, Float]:
+    terms = [t for t in found.objective.terms if isinstance(t, LockInTerm)]
+    return {
+        name: column
+        for term in terms
+        for columns in (term.table.points, term.table.values)
+        for name, column in columns.items()
+    }
+
+
+def _plain(x: float) -> float | None:
+    return x if math.isfinite(x) else None

@@ -1,0 +1,118 @@
+"""Fits and comparisons as plain numbers and texts, for JSON."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from asperity._version import __version__
+from asperity.inference.comparison import Comparison
+from asperity.inference.cross_validation import CrossValidation
+from asperity.inference.evidence import Evidence
+from asperity.inference.result import Estimate, Fit
+
+
+def fit_record(found: Fit) -> dict[str, Any]:
+    """Everything that a fit says; infinite and undefined numbers are None."""
+    return {
+        "law": found.law,
+        "converged": found.converged,
+        "message": found.message,
+        "parameters": {name: _estimate(p) for name, p in found.parameters.items()},
+        "correlation": {
+            "names": list(found.parameters),
+            "matrix": [[_plain(x) for x in row] for row in found.correlation.tolist()],
+        },
+        "undetermined": list(found.undetermined),
+        "chi2": _plain(found.chi2),
+        "dof": found.dof,
+        "p_value": _plain(found.p_value),
+        "log_likelihood": _plain(found.log_likelihood),
+        "aicc": _plain(found.aicc),
+        "bic": _plain(found.bic),
+        "observables": {
+            name: {"chi2": chi2, "n": n} for name, (chi2, n) in found.observables.items()
+        },
+        "noise": _noise(found),
+        "optima": [{"chi2": o.chi2, "values": dict(o.values)} for o in found.optima],
+        "warnings": list(found.warnings),
+        "data": " and ".join(term.name for term in found.objective.terms),
+        "asperity_version": __version__,
+    }
+
+
+def comparison_record(found: Comparison) -> dict[str, Any]:
+    """Everything that a comparison says."""
+    return {
+        "laws": {
+            name: {
+                **fit_record(judged.fit),
+                "excluded": judged.excluded,
+                "why": judged.why,
+                "weight": _plain(judged.weight),
+                "evidence": _evidence(judged.evidence),
+                "leave_one_run_out": _cross_validation(judged.cross_validation),
+            }
+            for name, judged in found.laws.items()
+        },
+        "left_out": list(found.left_out),
+        "not_compared": dict(found.not_compared),
+        "decided": found.decided,
+        "best": found.best,
+        "verdict": found.verdict,
+    }
+
+
+def _estimate(found: Estimate) -> dict[str, Any]:
+    prior = found.prior
+    return {
+        "value": _plain(found.value),
+        "unit": found.unit,
+        "se": _plain(found.se),
+        "interval_68": [_plain(x) for x in found.interval_68],
+        "interval_95": [_plain(x) for x in found.interval_95],
+        "at_bound": found.at_bound,
+        "prior": None
+        if prior is None
+        else {"mean": prior.mean, "sd": prior.sd, "source": prior.source},
+    }
+
+
+def _noise(found: Fit) -> dict[str, Any]:
+    """Noise of the data together, and of each set of data where there are several."""
+    parts = {term.name: dict(term.noise) for term in found.objective.terms}
+    if len(parts) == 1:
+        return next(iter(parts.values()))
+    models = list(dict.fromkeys(part["model"] for part in parts.values()))
+    return {
+        "model": "; ".join(models),
+        "effective_samples": sum(part["effective_samples"] for part in parts.values()),
+        "data": parts,
+    }
+
+
+def _evidence(found: Evidence | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "log": _plain(found.log),
+        "standard_error": _plain(found.standard_error),
+        "effective_samples": _plain(found.effective_samples),
+        "laplace": _plain(found.laplace),
+        "failed": found.failed,
+        "prior": found.prior,
+    }
+
+
+def _cross_validation(found: CrossValidation | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    return {
+        "log_density": _plain(found.log_density),
+        "runs": {name: _plain(value) for name, value in found.runs.items()},
+        "message": found.message,
+    }
+
+
+def _plain(x: float) -> float | None:
+    return float(x) if math.isfinite(x) else None

@@ -1,0 +1,128 @@
+"""What a fit says: estimates with intervals, the quality of the fit and its warnings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.inference.intervals import Interval
+from asperity.inference.objective import Objective
+from asperity.inference.residuals import Residuals
+from asperity.inference.unknowns import Prior
+from asperity.parameters.display import Displayed, SummaryLine
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter in SI.
+
+    Attributes
+    ----------
+    name, unit : str
+    value, se : float
+        Estimate and standard error of the normal approximation at the maximum.
+    interval_68, interval_95 : (float, float)
+        By the normal approximation in the coordinate of the fit, which is the logarithm of a
+        positive parameter, or by profile likelihood if that was asked for. Ends that data do not
+        bound are 0 or infinite.
+    at_bound : bool
+    prior : Prior or None
+    """
+
+    name: str
+    unit: str
+    value: float
+    se: float
+    interval_68: Interval
+    interval_95: Interval
+    at_bound: bool
+    prior: Prior | None
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """Another minimum of chi-squared."""
+
+    chi2: float
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Displayed):
+    """A law fitted to data.
+
+    Attributes
+    ----------
+    law : str
+    converged : bool
+    message : str
+        "converged", or why not; all numbers are NaN then.
+    parameters : mapping of str to Estimate
+    correlation : array, shape (n, n)
+        In the order of `parameters`, of the coordinates of the fit.
+    undetermined : tuple of str
+        Parameters of which these data say nothing: their standard error exceeds a factor of e.
+    chi2 : float
+        Of data and priors.
+    dof : int
+    p_value : float
+        Probability of a larger chi-squared if law and uncertainties are right.
+    log_likelihood, aicc, bic : float
+    observables : mapping of str to (float, int)
+        chi-squared and number of data of each.
+    residuals : tuple of Residuals
+        At the maximum, of each term of the objective, without priors; the Jacobian is the
+        derivative to the coordinates of the fit.
+    optima : tuple of Optimum
+        Other minima that the data do not exclude.
+    warnings : tuple of str
+    objective : Objective
+        Data, law and free parameters: the function that was minimised.
+    """
+
+    law: str
+    converged: bool
+    message: str
+    parameters: Mapping[str, Estimate]
+    correlation: Float
+    undetermined: tuple[str, ...]
+    chi2: float
+    dof: int
+    p_value: float
+    log_likelihood: float
+    aicc: float
+    bic: float
+    observables: Mapping[str, tuple[float, int]]
+    residuals: tuple[Residuals, ...]
+    optima: tuple[Optimum, ...]
+    warnings: tuple[str, ...]
+    objective: Objective
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimates by name, in SI."""
+        return {name: p.value for name, p in self.parameters.items()}
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Law and outcome, estimates with their 95 % intervals, quality and warnings."""
+        title = f"Fit of {self.law}"
+        if not self.converged:
+            return title, [SummaryLine("result", self.message)]
+        lines = [
+            SummaryLine(
+                name,
+                f"{p.value:.6g} {p.unit}".rstrip(),
+                f"95 %: {p.interval_95[0]:.4g} to {p.interval_95[1]:.4g}"
+                + (", at its bound" if p.at_bound else "")
+                + (", not determined by these data" if name in self.undetermined else ""),
+            )
+            for name, p in self.parameters.items()
+        ]
+        lines.append(SummaryLine("chi2", f"{self.chi2:.6g}", f"{self.dof} degrees of freedom"))
+        lines.append(SummaryLine("p_value", f"{self.p_value:.3g}", "probability of a larger chi2"))
+        return title, lines + [SummaryLine("warning", text) for text in self.warnings]

@@ -1,0 +1,272 @@
+"""Terms and free parameters of recorded runs, from what a user asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError, closest
+from asperity.inference.runs.run import RecordedRun
+from asperity.inference.runs.term import RunTerm, cut_delays
+from asperity.inference.unknowns import Prior, Unknown, unknown_of
+from asperity.laws import Law
+from asperity.parameters import MACHINE, Parameter
+
+#: Kind of quantity of K, by the unit of the load.
+_STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
+#: Where the stiffness over the load is looked for (1/m): what deformation apparatus and
+#: tribometers show.
+_USUAL_STIFFNESS = (5e2, 5e4)
+#: Samples that a run needs, per free parameter.
+_SAMPLES_PER_PARAMETER = 8
+LINEAR = ("offset", "trend", "bend", "drift")
+#: Standard deviations of the departures of the initial friction and states from steady sliding.
+_START_FORCE, _START_STATE = 0.05, 2.0
+
+
+@dataclass(frozen=True)
+class RunOptions:
+    """How recorded runs are compared with the motion.
+
+    Attributes
+    ----------
+    linear : tuple of str
+        Linear nuisances of each run, of "offset", "trend" (over slip), "bend" (over the square of
+        the slip) and "drift" (over time).
+    initial : {"steady", "free"}
+        Whether runs begin in steady sliding.
+    gauge : (int, float), optional
+        Order and corner frequency (Hz) of the low-pass of the force gauge.
+    order : int, optional
+        Of the noise; chosen by the data by default.
+    """
+
+    linear: tuple[str, ...] = ("offset", "trend")
+    initial: str = "steady"
+    gauge: tuple[int, float] | None = None
+    order: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in self.linear:
+            if name not in LINEAR:
+                raise InputError(
+                    f"linear must be of {', '.join(LINEAR)}, got '{name}'; {closest(name, LINEAR)}"
+                )
+        if self.initial not in ("steady", "free"):
+            raise InputError(f"initial must be steady or free, got '{self.initial}'; choose one")
+
+
+def stiffness(run: RecordedRun) -> Parameter:
+    """K in the unit of the run's load over a length."""
+    return replace(MACHINE["K"], kind=_STIFFNESS[run.load_unit])
+
+
+def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
+    """A stiffness, or one over the load as ``"0.003 1/um"``, in the unit of the run."""
+    parameter = stiffness(run)
+    if run.load_unit and isinstance(value, str):
+        try:
+            over_load = replace(parameter, kind="per_length").check(value, label)
+            return float(over_load) * run.W0
+        except InputError:
+            pass
+    return float(parameter.check(value, label))
+
+
+def usual_ranges(runs: Sequence[RecordedRun]) -> dict[str, tuple[float, float]]:
+    """Where the memory length is looked for: what sampling and slip of the runs can show."""
+    shortest, longest = np.inf, 0.0
+    for run in runs:
+        slips = np.abs(np.diff(np.interp(run.drive.edges, run.time, run.slip)))
+        longest = max(longest, 0.2 * float(slips.max()))
+        slowest = min(v for v in run.velocities if v > 0)
+        shortest = min(shortest, slowest * float(np.median(np.diff(run.time))))
+    low = max(shortest, 1e-8)
+    return {"D0": (low, max(longest, 10 * low))}
+
+
+def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
+    """Refuse parameters that none of the runs can show.
+
+    Raises
+    ------
+    InputError
+        If a parameter of load changes is free and the load is constant, one of velocity changes is
+        free and there is none, or there are too few samples.
+    """
+    names = ", ".join(run.name for run in runs)
+    for name in ("alpha", "eps_ratio"):
+        if name in free and not any(run.load_varies for run in runs):
+            raise InputError(
+                f"{name} must be seen in a change of the load, got a constant load in {names}; fix "
+                f"{name}, or add a recording with load steps or a modulated load"
+            )
+    if "M" in free:
+        return
+    for name in ("A", "B", "D0", "K"):
+        if name in free and not any(run.cuts or run.load_varies for run in runs):
+            raise InputError(
+                f"{name} must be seen in a change of the velocity or of the load, got neither in "
+                f"{names}; add a recording with velocity steps or holds, or give the steps"
+            )
+    for run in runs:
+        needed = _SAMPLES_PER_PARAMETER * (len(free) + len(run.cuts) + 2)
+        if run.time.size < needed:
+            raise InputError(
+                f"{run.name} must have at least {needed} samples for {len(free)} free parameters, "
+                f"got {run.time.size}; free fewer or give a longer window"
+            )
+
+
+def run_terms(
+    runs: Sequence[RecordedRun],
+    law: type[Law],
+    constants: Mapping[str, Any],
+    *,
+    beside_table: bool,
+    shared_stiffness: bool,
+    fixed_stiffness: Any,
+    start: Mapping[str, Any],
+    priors: Mapping[str, Prior],
+    options: RunOptions,
+    inertia: bool,
+    radiation_damping: bool,
+) -> tuple[list[RunTerm], list[Unknown]]:
+    """Terms of the runs, and their own free parameters.
+
+    Parameters
+    ----------
+    runs : sequence of RecordedRun
+    law : type of Law
+    constants : mapping of str to float
+        Parameters that are not free, without those of a run.
+    beside_table : bool
+        Whether lock-in readings are fitted together with the runs, whose K is that of the readings.
+    shared_stiffness : bool
+        Whether K is one parameter of all runs, which the caller has freed.
+    fixed_stiffness : str or float, optional
+        K where it is not free.
+    start, priors : mapping
+        By names of the nuisances, or K for that of every run.
+    options : RunOptions
+    inertia, radiation_damping : bool
+    """
+    if len({run.name for run in runs}) < len(runs):
+        twice = [run.name for run in runs]
+        raise InputError(
+            f"runs must have different names, got {', '.join(twice)}; give names, or each file once"
+        )
+    terms, unknowns = [], []
+    for run in runs:
+        suffix = f"[{run.name}]" if len(runs) > 1 or beside_table else ""
+        nuisances, own = cut_delays(run, suffix)
+        fixed = {name: value for name, value in constants.items() if name != "K"}
+        if fixed_stiffness is not None:
+            fixed["K"] = stiffness_in(run, fixed_stiffness)
+        elif not shared_stiffness:
+            K = free_stiffness(run, f"K{suffix}", start, priors)
+            nuisances += (K,)
+            own[K.name] = "K"
+        if options.initial == "free":
+            begin, names = _initial(run, law, suffix)
+            nuisances += begin
+            own |= names
+        terms.append(
+            RunTerm(
+                run,
+                law,
+                fixed,
+                linear=options.linear,
+                nuisances=nuisances,
+                own=own,
+                gauge=options.gauge,
+                inertia=inertia,
+                radiation_damping=radiation_damping,
+                order=options.order,
+            )
+        )
+        unknowns += list(nuisances)
+    return terms, unknowns
+
+
+def free_stiffness(
+    run: RecordedRun, name: str, start: Mapping[str, Any], priors: Mapping[str, Prior]
+) -> Unknown:
+    """The stiffness of a run as a free parameter."""
+    parameter = replace(stiffness(run), name=name)
+    given = start.get(name, start.get("K"))
+    usual = (_USUAL_STIFFNESS[0] * run.W0, _USUAL_STIFFNESS[1] * run.W0)
+    return unknown_of(
+        parameter,
+        None if given is None else stiffness_in(run, given, f"start.{name}"),
+        _prior_in(run, priors.get(name, priors.get("K"))),
+        usual,
+    )
+
+
+def _prior_in(run: RecordedRun, prior: Prior | None) -> Prior | None:
+    """A prior of the stiffness in the unit of a run."""
+    if prior is None or prior.unit in ("", run.stiffness_unit):
+        return prior
+    if prior.unit == "1/m":
+        return Prior(prior.mean * run.W0, prior.sd * run.W0, prior.source, run.stiffness_unit)
+    raise InputError(
+        f"prior of K must be in {run.stiffness_unit} or 1/m for {run.name}, got {prior.unit}; "
+        "convert it"
+    )
+
+
+def shared_stiffness(
+    runs: Sequence[RecordedRun], start: Mapping[str, Any], priors: Mapping[str, Prior]
+) -> Unknown:
+    """The stiffness of all runs as one free parameter.
+
+    Raises
+    ------
+    InputError
+        If their loads have different units.
+    """
+    units = list(dict.fromkeys(run.load_unit or "none" for run in runs))
+    if len(units) > 1:
+        raise InputError(
+            f"K must be one for all runs if it is named, got loads in {' and '.join(units)}; leave "
+            "K out of the free parameters: each run then has its own"
+        )
+    return free_stiffness(runs[0], "K", start, priors)
+
+
+def require_newtons(runs: Sequence[RecordedRun]) -> None:
+    """Refuse a stiffness that recordings share with a table where it has another unit.
+
+    Raises
+    ------
+    InputError
+        If the load of a recording is not in newtons.
+    """
+    for run in runs:
+        if run.load_unit != "N":
+            raise InputError(
+                f"K must be in {run.stiffness_unit} for {run.name}, got that of a table in N/m; "
+                "leave K out of the free and the fixed parameters, and give the table a column of K"
+            )
+
+
+def _initial(
+    run: RecordedRun, law: type[Law], suffix: str
+) -> tuple[tuple[Unknown, ...], dict[str, str]]:
+    found, own = [], {}
+    places = [("start_force", _START_FORCE)]
+    places += [(f"start_state_{i}", _START_STATE) for i in range(len(law.state_names))]
+    for inner, sd in places:
+        name = inner + suffix
+        meaning = "departure of the initial state from steady sliding"
+        parameter = Parameter(name, "dimensionless", "finite", meaning, place="drive")
+        prior = Prior(0.0, sd, "wide")
+        found.append(
+            Unknown(parameter, False, sd, -10 * sd, 10 * sd, (0.0, 0.0), 0.0, prior, nuisance=True)
+        )
+        own[name] = inner
+    return tuple(found), own

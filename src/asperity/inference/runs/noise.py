@@ -1,0 +1,219 @@
+"""Noise of a recording: autoregressive, of an order chosen by the data, and its whitening.
+
+The residual of a fit is a stretch of noise e_t with e_t = sum_k a_k e_(t-k) + s n_t, n_t normal and
+independent. Coefficients are estimated by Burg's method, which gives every lower order besides and
+a stationary process always; the order is that of the lowest AICc, since an order that is too low
+makes intervals too narrow, and one that is too high costs little. The first samples are predicted
+by the lower orders, so that the likelihood is that of all samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.stats import chi2
+
+Float = NDArray[np.float64]
+
+#: Highest order that is tried, as a number and as a share of the samples.
+_HIGHEST, _SHARE = 60, 0.05
+#: Lags of the test of whiteness, at least.
+_LAGS = 20
+
+
+@dataclass(frozen=True, eq=False)
+class Autoregression:
+    """A stationary autoregressive process.
+
+    Attributes
+    ----------
+    reflection : array, shape (p,)
+        Partial correlations; the process is stationary as all are inside (-1, 1).
+    variance : float
+        Of the process itself.
+    """
+
+    reflection: Float
+    variance: float
+
+    @property
+    def order(self) -> int:
+        """Number of coefficients."""
+        return self.reflection.size
+
+    @property
+    def innovation(self) -> float:
+        """Standard deviation of a sample if all before it are known."""
+        return math.sqrt(self.variance * float(np.prod(1 - self.reflection**2)))
+
+    def coefficients(self) -> list[Float]:
+        """Coefficients a_k of the predictors of every order up to that of the process."""
+        orders = [np.zeros(0)]
+        for k in self.reflection:
+            a = orders[-1]
+            orders.append(np.append(a - k * a[::-1], k))
+        return orders
+
+    def whiten(self, columns: Float) -> Float:
+        """Innovations of unit variance of samples along the first axis."""
+        x = np.asarray(columns, float)
+        orders = self.coefficients()
+        p = self.order
+        a = orders[-1]
+        # In place of the unknown samples before the first, lower orders predict.
+        out = lfilter(np.concatenate([[1.0], -a]), [1.0], x, axis=0) / self.innovation
+        scale = self.variance
+        for t in range(min(p, x.shape[0])):
+            b = orders[t]
+            known = x[t - 1 :: -1][:t] if t else x[:0]
+            out[t] = (x[t] - np.tensordot(b, known, axes=(0, 0))) / math.sqrt(scale)
+            scale *= 1 - self.reflection[t] ** 2
+        return np.asarray(out)
+
+    def log_scale(self, n: int) -> float:
+        """Sum of the logarithms of the standard deviations of the innovations of n samples."""
+        logs = np.log1p(-(self.reflection**2))
+        ahead = np.cumsum(np.concatenate([[0.0], logs]))
+        first = ahead[: min(n, self.order)]
+        rest = max(n - self.order, 0) * ahead[-1]
+        return 0.5 * (n * math.log(self.variance) + float(first.sum()) + float(rest))
+
+    def spectrum(self, frequency: Float) -> Float:
+        """Power per frequency in cycles a sample, two-sided; it integrates to the variance."""
+        a = self.coefficients()[-1]
+        k = np.arange(1, self.order + 1)
+        transfer = 1 - np.exp(-2j * np.pi * np.outer(frequency, k)) @ a
+        return np.asarray(self.innovation**2 / np.abs(transfer) ** 2)
+
+    def effective_samples(self, n: int) -> float:
+        """Independent samples whose mean is as uncertain as that of n samples of the process."""
+        return min(float(n), n * self.variance / float(self.spectrum(np.zeros(1))[0]))
+
+
+def fitted(
+    stretches: Sequence[Float], *, order: int | None = None, parameters: int = 0
+) -> Autoregression:
+    """Autoregressive process of one or more stretches of noise, by Burg's method.
+
+    Parameters
+    ----------
+    stretches : sequence of array
+        Noise without mean, evenly sampled, of one process.
+    order : int, optional
+        By default the order of the lowest AICc.
+    parameters : int
+        That were fitted to the same samples: the variance is larger than that of the residual.
+    """
+    n = sum(s.size for s in stretches)
+    highest = order if order is not None else min(_HIGHEST, int(_SHARE * n))
+    highest = min(highest, max(0, min(s.size for s in stretches) - 2))
+    variance = sum(float(s @ s) for s in stretches) / n
+    forward = [s.copy() for s in stretches]
+    backward = [s.copy() for s in stretches]
+    reflection: list[float] = []
+    criteria = [n * math.log(max(variance, 1e-300)) + 2]
+    rest = variance
+    for _ in range(highest):
+        ahead = [f[1:] for f in forward]
+        behind = [b[:-1] for b in backward]
+        power = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
+        if power <= 0:
+            break
+        k = 2 * sum(float(f @ b) for f, b in zip(ahead, behind, strict=True)) / power
+        k = min(max(k, -1 + 1e-9), 1 - 1e-9)
+        forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
+        backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
+        reflection.append(k)
+        rest *= 1 - k * k
+        k = len(reflection) + 1
+        penalty = 2 * k + 2 * k * (k + 1) / max(n - k - 1, 1)
+        criteria.append(n * math.log(max(rest, 1e-300)) + penalty)
+    best = len(reflection) if order is not None else int(np.argmin(criteria))
+    chosen = np.array(reflection[:best])
+    found = Autoregression(chosen, variance)
+    # The variance of the likelihood: innovations of unit mean square.
+    white = np.concatenate([found.whiten(s) for s in stretches])
+    left = max(n - parameters - best, 1)
+    return Autoregression(chosen, variance * float(white @ white) / left)
+
+
+@dataclass(frozen=True)
+class Whiteness:
+    """Tests of whether innovations are white.
+
+    Attributes
+    ----------
+    portmanteau : float
+        Probability of larger autocorrelations by chance (Ljung and Box, 1978).
+    periodogram : float
+        Probability of a larger departure of the cumulative periodogram from a line (Bartlett).
+    line : float
+        Probability of a higher peak of the periodogram (Fisher, 1929).
+    """
+
+    portmanteau: float
+    periodogram: float
+    line: float
+
+    @property
+    def p_value(self) -> float:
+        """Of the three tests together, by Bonferroni."""
+        return min(1.0, 3 * min(self.portmanteau, self.periodogram, self.line))
+
+
+def whiteness(innovations: Sequence[Float], fitted_order: int) -> Whiteness:
+    """Test stretches of innovations.
+
+    Parameters
+    ----------
+    innovations : sequence of array
+    fitted_order : int
+        Coefficients that were estimated from the same samples.
+    """
+    n = sum(x.size for x in innovations)
+    lags = min(max(_LAGS, 2 * fitted_order), n // 4)
+    power = sum(float(x @ x) for x in innovations)
+    q = 0.0
+    for k in range(1, lags + 1):
+        r = sum(float(x[k:] @ x[:-k]) for x in innovations if x.size > k) / power
+        q += r * r / (n - k)
+    portmanteau = float(chi2.sf(n * (n + 2) * q, max(lags - fitted_order, 1)))
+    worst = peak = 1.0
+    for x in innovations:
+        spectrum = np.abs(np.fft.rfft(x))[1 : (x.size - 1) // 2 + 1] ** 2
+        m = spectrum.size
+        if m < 8:
+            continue
+        rise = np.cumsum(spectrum) / spectrum.sum()
+        line = np.arange(1, m + 1) / m
+        largest = float(np.max(np.abs(rise - line))) * math.sqrt(m - 1)
+        j = np.arange(1, 101)
+        chance = float(
+            np.clip(2 * np.sum((-1.0) ** (j - 1) * np.exp(-2 * (j * largest) ** 2)), 0, 1)
+        )
+        worst = min(worst, 1.0 if largest < 0.2 else chance)
+        peak = min(peak, -math.expm1(m * math.log1p(-math.exp(-spectrum.max() / spectrum.mean()))))
+    count = len(innovations)
+    return Whiteness(portmanteau, min(1.0, worst * count), min(1.0, peak * count))
+
+
+def strongest_peak(innovations: Float) -> tuple[float, float]:
+    """Frequency of the highest peak of white noise (cycles a sample), and its chance.
+
+    Parameters
+    ----------
+    innovations : array, shape (n,)
+    """
+    n = innovations.size
+    spectrum = np.abs(np.fft.rfft(innovations, 8 * n)) ** 2
+    inside = slice(8, 4 * n - 8)
+    k = int(np.argmax(spectrum[inside])) + 8
+    # Frequencies between those of the periodogram make some four times as many chances.
+    height = spectrum[k] / spectrum[inside].mean()
+    chance = -math.expm1(2 * n * math.log1p(-math.exp(-height)))
+    return k / (8 * n), chance

@@ -1,0 +1,296 @@
+"""A recording as data of a fit: friction over time, and the drive that it was recorded under."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.inference.runs.motion import Drive
+from asperity.measurement.sliding.segments import displacement_noise, partition, partition_at
+from asperity.measurement.sliding.signals import sliding_signals
+from asperity.recording import Trace
+from asperity.recording.readers import read
+
+Float = NDArray[np.float64]
+
+#: A load that varies by less than this share of its mean is taken as constant.
+_CONSTANT_LOAD = 1e-3
+#: The load is followed to this many standard deviations of its noise.
+_LOAD_NOISE = 5.0
+#: A segment stands still that moves by less than so many standard deviations of the displacement's
+#: noise, or by less than this share of the fastest velocity.
+_STILL_NOISE, _STILL_SHARE = 6.0, 5e-3
+#: Samples of a stretch of one sampling rate, at least, and the change of the interval that ends it.
+_SHORTEST, _OTHER_RATE = 16, 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRun:
+    """A recording with its drive.
+
+    Attributes
+    ----------
+    name : str
+        What messages and names of nuisances call the run.
+    time, friction : array, shape (n,)
+        Seconds from the first sample, and F/W.
+    slip : array, shape (n,)
+        Displacement of the load point from the first sample (m), of the drive.
+    drive : Drive
+    cuts : tuple of int
+        Edges of the drive at which the pulling velocity changes.
+    cut_uncertainty : tuple of float
+        Standard uncertainty of the time of each (s).
+    velocity : float
+        Pulling velocity of the first segment (m/s).
+    velocities : tuple of float
+        Of all segments (m/s); 0 in a hold.
+    W0 : float
+        Load at the first sample, in `load_unit`.
+    load_unit : str
+        "N", "Pa", or "" where no load was recorded: K then is the stiffness over the load (1/m).
+    load_varies : bool
+    stretches : tuple of (int, int)
+        First sample and the one after the last of each stretch of one sampling rate.
+    doubts : tuple of str
+        Sentences on what about the drive is open.
+    """
+
+    name: str
+    time: Float
+    friction: Float
+    slip: Float
+    drive: Drive
+    cuts: tuple[int, ...]
+    cut_uncertainty: tuple[float, ...]
+    velocity: float
+    velocities: tuple[float, ...]
+    W0: float
+    load_unit: str
+    load_varies: bool
+    stretches: tuple[tuple[int, int], ...]
+    doubts: tuple[str, ...]
+
+    @property
+    def stiffness_unit(self) -> str:
+        """Unit of K: that of the load over a length."""
+        return {"N": "N/m", "Pa": "Pa/m"}.get(self.load_unit, "1/m")
+
+
+def recorded_run(
+    recording: Trace | str | os.PathLike[str],
+    *,
+    name: str | None = None,
+    window: tuple[float, float] | None = None,
+    steps: Sequence[float] | None = None,
+    velocities: Sequence[float] | None = None,
+    load: str = "W",
+    force: str = "F",
+) -> RecordedRun:
+    """Friction and drive of a recording, ready for `asperity.inference.fit`.
+
+    Parameters
+    ----------
+    recording : Trace or path
+        What `asperity.read` returns, or a file that it can read without being told more.
+    name : str, optional
+        By default the name of the file.
+    window : (float, float), optional
+        First and last time (s).
+    steps : sequence of float, optional
+        Times (s) at which the pulling velocity changes; found in the displacement by default.
+    velocities : sequence of float, optional
+        Pulling velocities (m/s) of the segments, one more than `steps`, 0 in a hold; measured by
+        default.
+    load, force : str
+        Channels, by name or role.
+
+    Returns
+    -------
+    RecordedRun
+
+    Raises
+    ------
+    InputError
+        If channels are missing, the recording begins with a hold, the direction turns, or the load
+        is not positive.
+    """
+    trace = recording if isinstance(recording, Trace) else read(recording)
+    shown = name or str(trace.provenance.get("file", "") or "run")
+    shown = Path(shown).stem if name is None else name
+    signals = sliding_signals(trace, load, force, window)
+    time, friction = signals.time, signals.friction
+    if velocities is not None:
+        if steps is None or len(velocities) != len(steps) + 1:
+            raise InputError(
+                f"{shown}.velocities must be one more than the steps, got {len(velocities)} for "
+                f"{len(steps or ())}; give both"
+            )
+        found = partition_at(time, None, np.array(steps))
+        speeds = [float(v) for v in velocities]
+        holds = [v == 0 for v in speeds]
+    elif signals.displacement is None:
+        raise InputError(
+            f"{shown} must have the displacement or velocity of the drive, got none: "
+            f"{signals.no_motion}; name a channel, or give steps and velocities"
+        )
+    else:
+        found = (
+            partition(time, signals.displacement, friction)
+            if steps is None
+            else partition_at(time, signals.displacement, np.array(steps))
+        )
+        speeds, holds = list(found.velocities), list(found.holds)
+        noise = displacement_noise(time, signals.displacement)
+        fastest = max(abs(v) for v in speeds)
+        spans = np.diff([time[0], *(c.time for c in found.cuts), time[-1]])
+        holds = [
+            hold or abs(v) * t < _STILL_NOISE * noise or abs(v) < _STILL_SHARE * fastest
+            for hold, v, t in zip(holds, speeds, spans, strict=True)
+        ]
+    moving = [v for v, hold in zip(speeds, holds, strict=True) if not hold]
+    if not moving or holds[0]:
+        raise InputError(
+            f"{shown} must begin with sliding at a constant velocity, got "
+            f"{'no sliding' if not moving else 'a hold'}; give a window that does"
+        )
+    sign = float(np.sign(moving[0]))
+    if any(sign * v <= 0 for v in moving):
+        raise InputError(
+            f"{shown} must slide in one direction, got a reversal; give a window without"
+        )
+    speeds = [0.0 if hold else sign * v for v, hold in zip(speeds, holds, strict=True)]
+    origin = float(time[0])
+    # A hold that was cut in two is one.
+    kept = [k for k in range(len(found.cuts)) if speeds[k] or speeds[k + 1]]
+    cut_times = [found.cuts[k].time - origin for k in kept]
+    speeds = [speeds[0], *(speeds[k + 1] for k in kept)]
+    times = time - origin
+    W, unit, varies, knots, load_values = _load(trace, load, shown, time, signals.load_unit)
+    drive, cuts = _drive(times, cut_times, speeds, knots - origin, load_values / W)
+    slip = np.interp(
+        times,
+        [0.0, *cut_times, times[-1]],
+        np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
+    )
+    uncertain = []
+    for at in cut_times:
+        i = int(np.clip(np.searchsorted(times, at), 1, times.size - 1))
+        uncertain.append(float(np.median(np.diff(times[max(0, i - 3) : i + 3]))))
+    doubts = list(found.doubts)
+    if signals.left_out:
+        doubts.append(
+            f"{signals.left_out} samples are left out, where a value is no number or time does not "
+            "go on"
+        )
+    return RecordedRun(
+        name=shown,
+        time=times,
+        friction=friction,
+        slip=slip,
+        drive=drive,
+        cuts=tuple(cuts),
+        cut_uncertainty=tuple(uncertain),
+        velocity=speeds[0],
+        velocities=tuple(speeds),
+        W0=W,
+        load_unit=unit,
+        load_varies=varies,
+        stretches=_stretches(times),
+        doubts=tuple(doubts),
+    )
+
+
+def _load(
+    trace: Trace, load: str, name: str, time: Float, unit: str
+) -> tuple[float, str, bool, Float, Float]:
+    """Load at the first sample, its unit, whether it varies, and its line over time."""
+    ends = np.array([time[0], time[-1]])
+    try:
+        channel = trace.channel(load)
+    except InputError:
+        if load != "W":
+            raise
+        return 1.0, "", False, ends, np.ones(2)
+    good = np.isfinite(channel.values) & np.isfinite(trace.time)
+    good &= (trace.time >= time[0]) & (trace.time <= time[-1])
+    t, W = trace.time[good], channel.values[good]
+    if t.size < 2:
+        return 1.0, "", False, ends, np.ones(2)
+    if not (W > 0).all():
+        raise InputError(
+            f"{name} must be under a positive load, got {W.min():.4g} {unit}; give a window in "
+            "which the slider is in contact"
+        )
+    order = np.argsort(t, kind="stable")
+    t, W = t[order], W[order]
+    mean = float(W.mean())
+    noise = float(np.median(np.abs(np.diff(W, 2)))) / 0.6745 / np.sqrt(6.0) if W.size > 4 else 0.0
+    knots = _line_knots(t, W, max(_LOAD_NOISE * noise, _CONSTANT_LOAD * mean))
+    if len(knots) == 2 and abs(W[0] - W[-1]) < _CONSTANT_LOAD * mean + _LOAD_NOISE * noise:
+        return mean, unit, False, ends, np.full(2, mean)
+    at = t[knots]
+    basis = np.stack([np.interp(t, at, row) for row in np.eye(len(knots))], axis=1)
+    values: Float = np.asarray(np.linalg.lstsq(basis, W, rcond=None)[0], np.float64)
+    at[0], at[-1] = time[0], time[-1]
+    return float(values[0]), unit, True, at, values
+
+
+def _line_knots(t: Float, y: Float, tolerance: float) -> list[int]:
+    """Samples at the corners of a line through y within a tolerance (Ramer, Douglas, Peucker)."""
+    kept = {0, t.size - 1}
+    parts = [(0, t.size - 1)]
+    while parts:
+        a, b = parts.pop()
+        if b - a < 2:
+            continue
+        chord = y[a] + (y[b] - y[a]) * (t[a : b + 1] - t[a]) / max(t[b] - t[a], 1e-300)
+        away = np.abs(y[a : b + 1] - chord)
+        k = int(np.argmax(away))
+        if away[k] > tolerance:
+            kept.add(a + k)
+            parts += [(a, a + k), (a + k, b)]
+    return sorted(kept)
+
+
+def _drive(
+    times: Float, cut_times: Sequence[float], speeds: Sequence[float], knots: Float, load: Float
+) -> tuple[Drive, list[int]]:
+    """Pieces between all changes, and the edges at which the velocity changes."""
+    edges = np.unique(np.concatenate([[0.0, times[-1]], cut_times, knots]))
+    middle = (edges[1:] + edges[:-1]) / 2
+    piece = np.searchsorted(np.asarray(cut_times), middle)
+    pull = np.asarray(speeds)[piece] / speeds[0]
+    at_edges = np.interp(edges, knots, load)
+    slope = np.diff(at_edges) / np.diff(edges)
+    cuts = [int(np.searchsorted(edges, c)) for c in cut_times]
+    return Drive(edges, pull, np.zeros_like(pull), at_edges[:-1], slope), cuts
+
+
+def _stretches(times: Float) -> tuple[tuple[int, int], ...]:
+    """Stretches of one sampling rate."""
+    from scipy.ndimage import median_filter
+
+    steps = np.log(median_filter(np.diff(times), 7, mode="nearest"))
+    bounds = [0]
+    level = steps[0]
+    for i, step in enumerate(steps):
+        if abs(step - level) > np.log(_OTHER_RATE):
+            if i - bounds[-1] >= _SHORTEST:
+                bounds.append(i)
+            level = step
+    if times.size - bounds[-1] < _SHORTEST and len(bounds) > 1:
+        bounds.pop()
+    return tuple(zip(bounds, [*bounds[1:], times.size], strict=True))
+
+
+def run_of(data: Any) -> RecordedRun:
+    """A run from what a user may give: a run, a trace or a path."""
+    return data if isinstance(data, RecordedRun) else recorded_run(data)

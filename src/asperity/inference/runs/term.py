@@ -1,0 +1,311 @@
+"""A recording in the likelihood of a fit."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.inference.residuals import Residuals
+from asperity.inference.runs.motion import RunMotion
+from asperity.inference.runs.noise import Autoregression, fitted, strongest_peak, whiteness
+from asperity.inference.runs.run import RecordedRun
+from asperity.inference.unknowns import Prior, Unknown
+from asperity.laws import Law
+from asperity.parameters import Parameter, law_parameters
+from asperity.tribometer.filters import between, filtered, low_pass
+
+Float = NDArray[np.float64]
+
+#: Below this probability the innovations are not white: the model of the noise fails.
+_NOT_WHITE = 1e-3
+#: A peak of the innovations less probable than this is a line; so many are removed.
+_LINE, _LINES = 1e-4, 6
+#: Times of velocity changes are known to this many sampling intervals.
+_CUT_INTERVALS = 2.0
+#: Samples that the quickest part of the gauge's response is resolved by.
+_FILTER_SAMPLES = 8.0
+
+
+class RunTerm:
+    """A recorded run as a `DataTerm` of an objective.
+
+    Nuisances that enter linearly, such as the offset of the gauge and a trend over slip, are
+    eliminated by projection: residuals are those of their best values, under flat priors. Lines of
+    the mains or a servo that the noise model does not hold are removed in the same way.
+
+    Parameters
+    ----------
+    run : RecordedRun
+    law : type of Law
+    fixed : mapping of str to float
+        Parameters of the law and the machine that are not free, in SI.
+    linear : tuple of str
+        Linear nuisances: "offset", "trend" (over slip), "bend" (over the square of the slip),
+        "drift" (over time).
+    nuisances : tuple of Unknown
+        Delays of the velocity changes, and departures of the initial states.
+    gauge : (int, float), optional
+        Order and corner frequency (Hz) of the low-pass of the force gauge.
+    inertia, radiation_damping : bool
+    order : int, optional
+        Of the noise; chosen by the data by default.
+    """
+
+    failure = (
+        "no start gives a motion through the whole recording: sliding is unstable, or too fast to "
+        "compute; give start values with a stiffness above the critical one, or a shorter window"
+    )
+    observables = ("friction",)
+
+    def __init__(
+        self,
+        run: RecordedRun,
+        law: type[Law],
+        fixed: Mapping[str, float],
+        *,
+        linear: tuple[str, ...] = ("offset", "trend"),
+        nuisances: tuple[Unknown, ...] = (),
+        own: Mapping[str, str] | None = None,
+        gauge: tuple[int, float] | None = None,
+        inertia: bool = False,
+        radiation_damping: bool = False,
+        order: int | None = None,
+    ) -> None:
+        self.run, self.law, self.fixed = run, law, dict(fixed)
+        self.linear, self.nuisances = linear, nuisances
+        self._own = dict(own or {})
+        self._gauge, self._order = gauge, order
+        self.motion = RunMotion(
+            law, run.velocity, inertia=inertia, radiation_damping=radiation_damping
+        )
+        self._known = {*law_parameters(law), "K", "W0", "M", "eta", "eps_ratio"}
+        self._columns = _linear_columns(run, linear)
+        self._whiteness = math.nan
+        self._lines: list[float] = []
+        self._models = [self._first_noise(a, b) for a, b in run.stretches]
+        self._prepare()
+
+    @property
+    def name(self) -> str:
+        """Name of the run."""
+        return self.run.name
+
+    @property
+    def profiled(self) -> int:
+        """Parameters beyond the coordinates: linear nuisances and the noise."""
+        return self._columns.shape[1] + sum(m.order + 1 for m in self._models)
+
+    @property
+    def noise(self) -> dict[str, Any]:
+        """Order, standard deviation and effective samples of the noise."""
+        sizes = [b - a for a, b in self.run.stretches]
+        orders = [m.order for m in self._models]
+        return {
+            "model": "AR(" + ", ".join(map(str, orders)) + ")",
+            "samples": int(sum(sizes)),
+            "effective_samples": round(
+                sum(m.effective_samples(n) for m, n in zip(self._models, sizes, strict=True)), 1
+            ),
+            "lines_removed": list(self._lines),
+            "whiteness_p": self._whiteness,
+            "standard_deviation": [math.sqrt(m.variance) for m in self._models],
+        }
+
+    def search_from_now_on(self) -> None:
+        """Let the motion take more steps."""
+        self.motion.allow_more_steps()
+
+    def residuals(
+        self, values: Mapping[str, float], *, search: bool | None = None
+    ) -> Residuals | None:
+        """Innovations of the noise; None where the motion cannot be computed."""
+        raw = self.departures(values)
+        if raw is None:
+            return None
+        difference, jacobian = raw
+        white = self._whitened(np.column_stack([difference, jacobian]))
+        white -= self._basis @ (self._basis.T @ white)
+        n = difference.size
+        scale = sum(
+            m.log_scale(b - a) for m, (a, b) in zip(self._models, self.run.stretches, strict=True)
+        )
+        return Residuals(
+            white[:, 0], white[:, 1:], np.full(n, "friction"), np.arange(n, dtype=np.intp), scale
+        )
+
+    def departures(self, values: Mapping[str, float]) -> tuple[Float, Float] | None:
+        """Computed less recorded friction without linear nuisances, and the derivatives."""
+        given = {**self.fixed, "W0": self.run.W0}
+        free = []
+        for name in values:
+            inner = self._inner(name)
+            if inner is not None:
+                given[inner] = values[name]
+                free.append(name)
+        inner_names = tuple(str(self._inner(name)) for name in free)
+        at = self.run.time
+        if self._gauge is not None:
+            at, rate = self._filter_times()
+        computed = self.motion(given, inner_names, self.run.drive, at)
+        if computed is None:
+            return None
+        whole = np.column_stack([computed.friction, computed.derivatives])
+        if self._gauge is not None:
+            poles = low_pass(*self._gauge)
+            whole = np.column_stack(
+                [between(filtered(c, rate, *poles), rate, self.run.time) for c in whole.T]
+            )
+        jacobian = np.zeros((self.run.time.size, len(values)))
+        for j, name in enumerate(values):
+            if name in free:
+                jacobian[:, j] = whole[:, 1 + free.index(name)]
+        return whole[:, 0] - self.run.friction, jacobian
+
+    def update_noise(self, values: Mapping[str, float]) -> bool:
+        """Estimate the noise from the residual at `values`; False if there is no motion."""
+        raw = self.departures(values)
+        if raw is None:
+            return False
+        while True:
+            left = raw[0] + self._columns @ self._coefficients(raw[0])
+            count = self._columns.shape[1] + int(np.any(raw[1], axis=0).sum())
+            self._models = [
+                fitted(
+                    [left[a:b] - left[a:b].mean()],
+                    order=self._order,
+                    parameters=round(count * (b - a) / left.size),
+                )
+                for a, b in self.run.stretches
+            ]
+            self._prepare()
+            left = raw[0] + self._columns @ self._coefficients(raw[0])
+            white = self._whitened(left[:, None])[:, 0]
+            if self._order == 0 or not self._add_line(white):
+                break
+        innovations = [white[a:b] for a, b in self.run.stretches]
+        self._whiteness = whiteness(innovations, max(m.order for m in self._models)).p_value
+        return True
+
+    def _add_line(self, white: Float) -> bool:
+        """Remove the strongest line that the innovations hold, if there is one."""
+        if len(self._lines) >= _LINES:
+            return False
+        for a, b in self.run.stretches:
+            if b - a < 64:
+                continue
+            frequency, chance = strongest_peak(white[a:b])
+            if chance < _LINE:
+                at = self.run.time[a:b]
+                hertz = frequency / float(np.median(np.diff(at)))
+                columns = np.zeros((white.size, 2))
+                angle = 2 * np.pi * hertz * at
+                columns[a:b] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+                self._columns = np.column_stack([self._columns, columns])
+                self._lines.append(hertz)
+                self._prepare()
+                return True
+        return False
+
+    def linear_estimates(self, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
+        """Linear nuisances with the standard uncertainties that they have beside fixed others."""
+        raw = self.departures(values)
+        if raw is None:
+            return {}
+        found = self._coefficients(raw[0])
+        inverse = np.linalg.inv(self._triangle.T @ self._triangle)
+        return {
+            name: (float(found[i]), float(np.sqrt(inverse[i, i])))
+            for i, name in enumerate(self.linear)
+        }
+
+    def warnings(self, residuals: Residuals) -> list[str]:
+        """What the residual says about the noise."""
+        said = []
+        if self._whiteness < _NOT_WHITE:
+            said.append(
+                f"the noise of {self.name} is not the autoregressive process that was fitted (p = "
+                f"{self._whiteness:.2g} of its innovations being white): the intervals may be too "
+                "narrow; look at the residual, leave out stretches, or give a window"
+            )
+        effective = float(self.noise["effective_samples"])
+        if effective < 3 * (len(self.linear) + 4):
+            said.append(
+                f"{self.name} has {effective:.3g} independent samples only, its noise is so slow; "
+                "a longer window would help"
+            )
+        said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
+        return said
+
+    def _inner(self, name: str) -> str | None:
+        """Name of a parameter in the motion; None if this run does not depend on it."""
+        if name in self._own:
+            return self._own[name]
+        return name if name in self._known and name not in self._own.values() else None
+
+    def _first_noise(self, a: int, b: int) -> Autoregression:
+        steps = np.diff(self.run.friction[a:b])
+        return Autoregression(np.zeros(0), max(float(steps @ steps) / (2 * steps.size), 1e-300))
+
+    def _prepare(self) -> None:
+        white = self._whitened(self._columns)
+        self._basis, self._triangle = np.linalg.qr(white)
+        self._white_columns = white
+
+    def _whitened(self, columns: Float) -> Float:
+        return np.concatenate(
+            [
+                m.whiten(columns[a:b])
+                for m, (a, b) in zip(self._models, self.run.stretches, strict=True)
+            ]
+        )
+
+    def _coefficients(self, difference: Float) -> Float:
+        white = self._whitened(difference[:, None])[:, 0]
+        return np.asarray(-np.linalg.solve(self._triangle, self._basis.T @ white))
+
+    def _filter_times(self) -> tuple[Float, float]:
+        assert self._gauge is not None  # asked for by the caller
+        time = self.run.time
+        rate = max(1 / float(np.median(np.diff(time))), _FILTER_SAMPLES * self._gauge[1])
+        count = math.ceil(time[-1] * rate) + 1
+        return np.minimum(np.arange(count) / rate, time[-1]), rate
+
+
+def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
+    known = {
+        "offset": np.ones_like(run.slip),
+        "trend": run.slip,
+        "bend": run.slip * (run.slip - run.slip[-1]),
+        "drift": run.time,
+    }
+    return np.stack([known[n] for n in names], axis=1) if names else np.zeros((run.time.size, 0))
+
+
+def cut_delays(run: RecordedRun, suffix: str) -> tuple[tuple[Unknown, ...], dict[str, str]]:
+    """Delays of the velocity changes as nuisances, and their names in the motion."""
+    found, own = [], {}
+    for k, (edge, sd) in enumerate(zip(run.cuts, run.cut_uncertainty, strict=True), start=1):
+        name = f"step_time_{k}{suffix}"
+        sd = _CUT_INTERVALS * sd
+        near = np.diff(run.drive.edges)[max(edge - 1, 0) : edge + 1].min()
+        limit = min(20 * sd, 0.9 * float(near))
+        parameter = Parameter(name, "time", "finite", "delay of a velocity change", place="drive")
+        found.append(
+            Unknown(
+                parameter,
+                logarithmic=False,
+                scale=sd,
+                lower=-limit,
+                upper=limit,
+                start=(0.0, 0.0),
+                given=0.0,
+                prior=Prior(0.0, sd, "sampling interval"),
+                nuisance=True,
+            )
+        )
+        own[name] = f"shift_{edge}"
+    return tuple(found), own

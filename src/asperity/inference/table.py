@@ -1,0 +1,537 @@
+"""Tables of lock-in readings: what was measured at each operating point, and how surely.
+
+A table is a text file of one operating point a row, what ``asperity measure`` writes for many
+recordings, or what ``asperity measure --json`` prints for one.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from asperity.errors import InputError
+from asperity.laws import registered
+from asperity.parameters import MODULATION, all_parameters, canonical_name
+from asperity.units import to_si
+
+Float = NDArray[np.float64]
+
+#: What a row may report, in the order of residuals. Convention: F/W0 = mean_friction + sum of
+#: mu_n cos(n w t + phase_n), delta_mu = mean_friction - mu_ss(V).
+OBSERVABLES = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2")
+#: Columns of a table of responses that say nothing about the measurement.
+_OF_RESPONSES = ("floquet_max", "stable", "converged", "result", "law")
+_OPERATING = ("V", "epsilon", "frequency")
+_DELIMITERS = (",", ";", "\t")
+#: Columns of texts: which run a row belongs to, the first of them that is there; what a campaign
+#: says of a row; the unit of its loads.
+_RUN, _KIND, _REASON, _UNIT = ("run", "file"), "kind", "reason", "unit"
+_TEXTS = (*_RUN, _KIND, _REASON, _UNIT)
+#: Smallest eigenvalue of the correlations of a row.
+_SMALLEST_EIGENVALUE = 1e-9
+#: Probability below which mean_friction and delta_mu are too alike to have errors of their own.
+_SAME_NOISE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class LockInTable:
+    """Observables with standard uncertainties, one operating point a row.
+
+    Attributes
+    ----------
+    name : str
+        What messages call the table.
+    points : mapping of str to array, shape (rows,)
+        Parameters of the rows by name, in SI: at least V, epsilon and frequency. `epsilon` is
+        the amplitude that was applied; contacts carry ``eps_ratio`` of it.
+    values : mapping of str to array, shape (rows,)
+        Observables by name; NaN where a row does not report one.
+    errors : mapping of str to array, shape (rows,)
+        Standard uncertainties of the same; phases in rad.
+    covariances : mapping of (str, str) to array, shape (rows,)
+        Of pairs of observables of a row, in SI and rad; NaN where there is none.
+    run : array of str, shape (rows,)
+        Run that each row was measured in: its file, or what a column `run` says.
+    remarks : tuple of str
+        What a reader must know of how the table was read.
+    row_names : array of str, shape (rows,)
+        What messages call the rows, such as "row 3" of the file.
+    """
+
+    name: str
+    points: Mapping[str, Float]
+    values: Mapping[str, Float]
+    errors: Mapping[str, Float]
+    covariances: Mapping[tuple[str, str], Float] = field(default_factory=dict)
+    run: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=str))
+    remarks: tuple[str, ...] = ()
+    row_names: NDArray[np.str_] = field(default_factory=lambda: np.array([], dtype=str))
+
+    def __post_init__(self) -> None:
+        if self.run.size == 0:
+            object.__setattr__(self, "run", np.full(self.rows, self.name))
+        if self.row_names.size == 0:
+            names = np.array([f"row {i}" for i in range(1, self.rows + 1)])
+            object.__setattr__(self, "row_names", names)
+
+    @property
+    def rows(self) -> int:
+        """Number of operating points."""
+        return len(self.points["V"])
+
+    @property
+    def observables(self) -> tuple[str, ...]:
+        """What the table reports."""
+        return tuple(self.values)
+
+    def correlations(self) -> Float:
+        """Correlations of the observables of each row, shape (rows, n, n), n = len(OBSERVABLES)."""
+        size = len(OBSERVABLES)
+        found = np.broadcast_to(np.eye(size), (self.rows, size, size)).copy()
+        for (first, second), column in self.covariances.items():
+            if first not in self.values or second not in self.values:
+                continue
+            i, j = OBSERVABLES.index(first), OBSERVABLES.index(second)
+            both = np.isfinite(self.values[first]) & np.isfinite(self.values[second])
+            errors = np.where(both, self.errors[first] * self.errors[second], 1.0)
+            value = np.where(both, np.nan_to_num(column) / errors, 0.0)
+            found[:, i, j] = found[:, j, i] = value
+        return found
+
+    def without(self, rows: NDArray[np.bool_]) -> LockInTable:
+        """The table without some of its rows."""
+        keep = ~rows
+
+        def cut(columns: Mapping[Any, Float]) -> dict[Any, Float]:
+            return {name: column[keep] for name, column in columns.items()}
+
+        return replace(
+            self,
+            points=cut(self.points),
+            values=cut(self.values),
+            errors=cut(self.errors),
+            covariances=cut(self.covariances),
+            run=self.run[keep],
+            row_names=self.row_names[keep],
+        )
+
+
+def read_table(path: str | Path, given: Mapping[str, Any] | None = None) -> LockInTable:
+    """Read a table from a text file.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV with ``,``, ``;`` or tab. Columns: V (m/s), epsilon, frequency (Hz), any other parameter
+        of an operating point in SI, and observables with their standard uncertainties in
+        ``<name>_err`` or ``<name>_uncertainty``. Cells of observables may be empty. Covariances
+        of observables of a row are in ``<name>_<name>_cov``. A column ``run`` or ``file`` says
+        which rows were measured together. Or the JSON of ``asperity measure --json``.
+    given : mapping, optional
+        V, epsilon and frequency of all rows, in SI or as texts with units, where the table has
+        no such column.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column or cell is wrong, an uncertainty is missing, zero or
+        negative, or a row occurs twice.
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except (OSError, UnicodeDecodeError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "not text in UTF-8"
+        raise InputError(
+            f"data must be a readable table, got '{path}': {reason}; give a CSV file"
+        ) from None
+    if path.suffix.lower() == ".json":
+        return table_of(_given(_reading(path.name, "\n".join(lines)), given), name=path.name)
+    lines = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    if len(lines) < 2:
+        raise InputError(
+            f"{path.name} must have a header and rows, got {len(lines)} lines; give one "
+            "operating point a row"
+        )
+    delimiter = max(_DELIMITERS, key=lines[0].count)
+    header, *rows = csv.reader(lines, delimiter=delimiter)
+    names = [cell.strip() for cell in header]
+    for name in names:
+        if names.count(name) > 1:
+            raise InputError(
+                f"{path.name} must have each column once, got '{name}' {names.count(name)} times; "
+                "remove all but one"
+            )
+    for number, row in enumerate(rows, start=1):
+        if len(row) != len(names):
+            raise InputError(
+                f"{path.name} must have {len(names)} cells in each row, got {len(row)} in row "
+                f"{number}; correct the separators"
+            )
+    places = {name: i for i, name in enumerate(names) if name not in _OF_RESPONSES}
+    texts = {n: [row[places[n]].strip() for row in rows] for n in _TEXTS if n in places}
+    lost = [i for i in range(len(rows)) if _not_a_reading(texts, i)]
+    remarks = []
+    if lost:
+        if len(lost) == len(rows):
+            raise InputError(
+                f"{path.name} must have lock-in readings, got none: every row is another kind of "
+                "measurement or has a reason why it could not be measured; measure a modulated "
+                "recording"
+            )
+        remarks.append(
+            f"{len(lost)} rows of {path.name} are no lock-in readings and are left out, the first "
+            f"of them row {lost[0] + 1}"
+        )
+    kept = [row for i, row in enumerate(rows) if i not in set(lost)]
+    texts = {n: [t for i, t in enumerate(c) if i not in set(lost)] for n, c in texts.items()}
+    columns: dict[str, Any] = {
+        name: _numbers(path.name, name, i, kept) for name, i in places.items() if name not in _TEXTS
+    }
+    if _UNIT in texts and "W0" in columns:
+        columns["W0"] = _loads_in_si(path.name, columns["W0"], texts[_UNIT])
+    run = next((texts[name] for name in _RUN if name in texts), None)
+    table = table_of(_given(columns, given), name=path.name, run=run, remarks=remarks)
+    places_in_file = [i for i in range(1, len(rows) + 1) if i - 1 not in set(lost)]
+    return replace(table, row_names=np.array([f"row {i}" for i in places_in_file]))
+
+
+def _not_a_reading(texts: Mapping[str, Sequence[str]], row: int) -> bool:
+    """Whether a campaign says that a row is no lock-in reading."""
+    kind = texts[_KIND][row] if _KIND in texts else ""
+    return bool(texts[_REASON][row] if _REASON in texts else "") or kind not in ("", "amplitude")
+
+
+def _loads_in_si(table: str, loads: Float, units: Sequence[str]) -> Float:
+    """W0 in N of a campaign, whose loads are in the unit of the channels."""
+    return np.array(
+        [
+            to_si(f"{load!r} {unit}", "force", f"{table}.W0") if unit else load
+            for load, unit in zip(loads.tolist(), units, strict=True)
+        ]
+    )
+
+
+def _given(columns: dict[str, Any], given: Mapping[str, Any] | None) -> dict[str, Any]:
+    """Columns with what is given for all rows where the table has no such column."""
+    known = _known()
+    have = {canonical_name(name, known) for name in columns}
+    more = {n: known[n].check(v) for n, v in (given or {}).items() if n not in have}
+    return columns | more
+
+
+def _reading(shown: str, text: str) -> dict[str, Any]:
+    """Columns of one reading, from the JSON of ``asperity measure``."""
+    wrong = InputError(
+        f"{shown} must be what 'asperity measure --json' prints for a modulated recording, got "
+        "something else; give that or a CSV file"
+    )
+    try:
+        record = json.loads(text)
+        modulated = record["mode"] == "modulated"
+        errors, unit = record["uncertainties"], record["unit"]
+        columns = {name: float(record[name]) for name in ("epsilon", "frequency", "W0")}
+        observed = [n for n in OBSERVABLES if record.get(n) is not None]
+        columns |= {n: float(record[n]) for n in observed}
+        columns |= {f"{n}_err": float(errors[n]) for n in observed}
+        joint = record.get("observable_covariance", {"names": [], "matrix": []})
+        for i, first in enumerate(joint["names"]):
+            for j, second in enumerate(joint["names"][:i]):
+                columns[f"{second}_{first}_cov"] = float(joint["matrix"][i][j])
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError):
+        raise wrong from None
+    if not modulated:
+        raise wrong
+    columns["W0"] = float(_loads_in_si(shown, np.array([columns["W0"]]), [unit])[0])
+    return columns
+
+
+def _numbers(shown: str, name: str, place: int, rows: Sequence[Sequence[str]]) -> Float:
+    values = []
+    for number, row in enumerate(rows, start=1):
+        cell = row[place].strip()
+        try:
+            values.append(float(cell) if cell else math.nan)
+        except ValueError:
+            if canonical_name(name, _known()) is None and _observable_of(name) is None:
+                values.append(math.nan)  # a column of the user's own
+                continue
+            raise InputError(
+                f"{shown} must have numbers in SI without unit in column {name}, got '{cell}' in "
+                f"row {number}; write it with a decimal point"
+            ) from None
+    return np.array(values)
+
+
+def table_of(
+    columns: Mapping[str, Any],
+    *,
+    name: str = "data",
+    run: Sequence[str] | None = None,
+    remarks: Sequence[str] = (),
+) -> LockInTable:
+    """A table from columns in memory.
+
+    Parameters
+    ----------
+    columns : mapping of str to array, shape (rows,), or number
+        As the columns of `read_table`; numbers hold for all rows.
+    name : str
+        What messages call the table.
+    run : sequence of str, shape (rows,), optional
+        Run that each row was measured in; by default all in one.
+    remarks : sequence of str
+        What is known of the table already, for its readers.
+
+    Raises
+    ------
+    InputError
+        As `read_table`.
+    """
+    known = _known()
+    arrays = {
+        key: np.atleast_1d(np.asarray(column, dtype=float))
+        for key, column in columns.items()
+        if key not in _OF_RESPONSES
+    }
+    rows = max((a.size for a in arrays.values()), default=0)
+    points: dict[str, Float] = {}
+    observed: dict[str, Float] = {}
+    covariances: dict[tuple[str, str], Float] = {}
+    for key, column in arrays.items():
+        if column.ndim != 1 or column.size not in (1, rows):
+            raise InputError(
+                f"{name}.{key} must have one value or {rows}, got an array of shape "
+                f"{column.shape}; give columns of one length"
+            )
+        column = np.broadcast_to(column, (rows,)).copy()
+        parameter = canonical_name(key, known)
+        pair = _pair_of(key)
+        if parameter in MODULATION:
+            _refuse_modulated(name, key, column)
+        elif parameter is not None:
+            points[parameter] = _checked(name, parameter, column)
+        elif pair is not None:
+            covariances[pair] = column
+        elif (plain := _observable_of(key)) is not None:
+            if plain in observed:
+                raise InputError(
+                    f"{name} must have one column for {plain}, got '{key}' as a second one; remove "
+                    "one of them"
+                )
+            observed[plain] = column
+    missing = [p for p in _OPERATING if p not in points]
+    if missing:
+        raise InputError(
+            f"{name} must have the columns {', '.join(_OPERATING)}, got none for "
+            f"{', '.join(missing)}; add them in SI, or fix them where they are the same for all "
+            "rows"
+        )
+    values, errors = _observables(name, observed)
+    runs = np.full(rows, name) if run is None else np.array([str(r) or name for r in run])
+    table = LockInTable(name, points, values, errors, covariances, runs, tuple(remarks))
+    _refuse_duplicates(table)
+    _refuse_impossible(table)
+    return _without_copies(table)
+
+
+def _observable_of(column: str) -> str | None:
+    """``mu1`` and ``mu1_err`` as they are, ``mu1_uncertainty`` as ``mu1_err``; else None."""
+    stem = column.removesuffix("_err").removesuffix("_uncertainty")
+    if stem not in OBSERVABLES:
+        return None
+    return stem if stem == column else f"{stem}_err"
+
+
+def _pair_of(column: str) -> tuple[str, str] | None:
+    """The two observables of a column of covariances, in the order of `OBSERVABLES`."""
+    if not column.endswith("_cov"):
+        return None
+    stem = column.removesuffix("_cov")
+    for i, first in enumerate(OBSERVABLES):
+        for second in OBSERVABLES[i + 1 :]:
+            if stem in (f"{first}_{second}", f"{second}_{first}"):
+                return first, second
+    return None
+
+
+def _refuse_modulated(table: str, parameter: str, column: Float) -> None:
+    """Refuse rows of another than a harmonic load; 0 and an empty cell say that it is harmonic."""
+    if np.any(np.nan_to_num(column)):
+        raise InputError(
+            f"{table}.{parameter} must be 0, since fits are to a harmonic load, got "
+            f"{column[np.nan_to_num(column) != 0][0]:g}; leave those rows out"
+        )
+
+
+def _known() -> Mapping[str, Any]:
+    return all_parameters(registered().values())
+
+
+def _checked(table: str, parameter: str, column: Float) -> Float:
+    known = _known()[parameter]
+    for number, value in enumerate(column, start=1):
+        if not math.isfinite(value):
+            raise InputError(
+                f"{table}.{parameter} must be a finite number, got '{value}' in row {number}; fill "
+                "the cell in or leave the row out"
+            )
+    return np.asarray(known.check(column, f"{table}.{parameter}"))
+
+
+def _observables(
+    table: str, observed: Mapping[str, Float]
+) -> tuple[dict[str, Float], dict[str, Float]]:
+    values = {n: observed[n] for n in OBSERVABLES if n in observed}
+    if not values:
+        raise InputError(
+            f"{table} must report at least one of {', '.join(OBSERVABLES)}, got none; name the "
+            "columns so"
+        )
+    errors = {}
+    for name, column in values.items():
+        if f"{name}_err" not in observed:
+            raise InputError(
+                f"{table} must have the standard uncertainty of {name}, got no column {name}_err; "
+                "add it: a fit without it cannot say how sure it is"
+            )
+        error = observed[f"{name}_err"]
+        bad = np.isfinite(column) & ~(np.isfinite(error) & (error > 0))
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            raise InputError(
+                f"{table}.{name}_err must be positive, got {error[row]:g} in row {row + 1}; give "
+                "the standard uncertainty"
+            )
+        errors[name] = error
+    for harmonic in (1, 2):
+        phase, amplitude = f"phase{harmonic}", f"mu{harmonic}"
+        if phase in values and amplitude not in values:
+            raise InputError(
+                f"{table} must have {amplitude} where it has {phase}, got no such column; a phase "
+                "weighs as much as its amplitude"
+            )
+        if phase in values:
+            alone = np.isfinite(values[phase]) & ~np.isfinite(values[amplitude])
+            if alone.any():
+                raise InputError(
+                    f"{table} must have {amplitude} where it has {phase}, got an empty cell in row "
+                    f"{np.flatnonzero(alone)[0] + 1}; a phase weighs as much as its amplitude"
+                )
+    return values, errors
+
+
+def _refuse_impossible(table: LockInTable) -> None:
+    """Refuse covariances of pairs that are not there, or that no measurement can have."""
+    if not table.covariances:
+        return
+    for pair in table.covariances:
+        absent = [n for n in pair if n not in table.values]
+        if absent:
+            raise InputError(
+                f"{table.name} must report both observables of {'_'.join(pair)}_cov, got no column "
+                f"{absent[0]}; add it or remove the covariance"
+            )
+    correlation = table.correlations()
+    smallest = np.linalg.eigvalsh(correlation)[:, 0]
+    bad = np.flatnonzero(smallest < _SMALLEST_EIGENVALUE)
+    if bad.size:
+        row = int(bad[0])
+        upper = np.triu(np.abs(correlation[row]), 1)
+        i, j = np.unravel_index(int(np.argmax(upper)), upper.shape)
+        raise InputError(
+            f"{table.name} must have a positive definite covariance of the observables of a row, "
+            f"got one of row {row + 1} that is not, with a correlation of "
+            f"{correlation[row, i, j]:.4g} between {OBSERVABLES[i]} and {OBSERVABLES[j]}; check "
+            "the covariances against the squares of the uncertainties"
+        )
+
+
+def _without_copies(table: LockInTable) -> LockInTable:
+    """The table without readings of delta_mu that repeat those of mean_friction.
+
+    Their difference is mu_ss(V). If both have errors of their own, it scatters about a smooth
+    function of ln V by those errors; if one was computed from the other, it does not scatter.
+    """
+    if not {"mean_friction", "delta_mu"} <= set(table.values):
+        return table
+    if ("mean_friction", "delta_mu") in table.covariances:
+        return table
+    steady = table.values["mean_friction"] - table.values["delta_mu"]
+    both = np.isfinite(steady)
+    x = np.log(table.points["V"][both])
+    degree = min(2, np.unique(x).size - 1)
+    dof = int(both.sum()) - degree - 1
+    if dof < 1:
+        return table
+    doubt = np.hypot(table.errors["mean_friction"][both], table.errors["delta_mu"][both])
+    columns = np.vander(x - x.mean(), degree + 1) / doubt[:, None]
+    y = steady[both] / doubt
+    left = y - columns @ np.linalg.lstsq(columns, y)[0]
+    if chi2.cdf(float(left @ left), dof) > _SAME_NOISE:
+        return table
+    kept = np.where(both, np.nan, table.values["delta_mu"])
+    values = {**table.values, "delta_mu": kept}
+    if not np.isfinite(kept).any():
+        del values["delta_mu"]
+    remark = (
+        f"mean_friction and delta_mu of {table.name} differ by a smooth mu_ss(V) without scatter: "
+        "they are one measurement, which counts once; delta_mu is left out where both are given"
+    )
+    return replace(table, values=values, remarks=(*table.remarks, remark))
+
+
+def _refuse_duplicates(table: LockInTable) -> None:
+    columns = np.column_stack([*table.points.values(), *table.values.values()])
+    _, first, inverse = np.unique(
+        np.nan_to_num(columns, nan=np.inf), axis=0, return_index=True, return_inverse=True
+    )
+    twice = np.flatnonzero(first[inverse.ravel()] != np.arange(table.rows))
+    if twice.size:
+        raise InputError(
+            f"{table.name} must have each reading once, got row {twice[0] + 1} equal to row "
+            f"{first[inverse.ravel()[twice[0]]] + 1}; remove the copy: it would count twice"
+        )
+
+
+def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, NDArray[np.intp]]:
+    """Several tables as one, and the number of the table of each row.
+
+    A parameter that only some tables have must have a fixed value for the others, which is not
+    known here: it is NaN there.
+    """
+    tables = list(tables)
+    run = np.concatenate([np.full(t.rows, i) for i, t in enumerate(tables)])
+
+    def stacked(field: str) -> dict[Any, Float]:
+        names = dict.fromkeys(n for t in tables for n in getattr(t, field))
+        return {
+            n: np.concatenate([getattr(t, field).get(n, np.full(t.rows, np.nan)) for t in tables])
+            for n in names
+        }
+
+    whole = LockInTable(
+        " and ".join(t.name for t in tables),
+        stacked("points"),
+        stacked("values"),
+        stacked("errors"),
+        stacked("covariances"),
+        np.concatenate([t.run for t in tables]),
+        tuple(r for t in tables for r in t.remarks),
+        np.concatenate(
+            [
+                t.row_names if len(tables) == 1 else [f"{n} of {t.name}" for n in t.row_names]
+                for t in tables
+            ]
+        ),
+    )
+    return whole, run

@@ -1,0 +1,259 @@
+"""Free parameters of a fit: their coordinates, bounds, priors and ranges of start values."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError, closest
+from asperity.laws import Law
+from asperity.materials import Material
+from asperity.parameters import Parameter, point_parameters
+
+Float = NDArray[np.float64]
+
+#: Share of the applied modulation that the contacts carry; no parameter of an operating point.
+EPS_RATIO = Parameter(
+    "eps_ratio",
+    "dimensionless",
+    "positive",
+    "share of the modulation that the contacts carry, eps_eff/eps",
+    r"\varepsilon_{\rm eff}/\varepsilon",
+    "load",
+    default=1.0,
+    label="eps_ratio",
+)
+
+#: Where starts are looked for if nothing better is known, in SI: what contacts of rock, polymers
+#: and metals show (Marone, 1998; Baumberger and Caroli, 2006), widened.
+_USUAL = {
+    "mu0": (0.2, 1.0),
+    "A": (0.003, 0.05),
+    "B": (0.003, 0.06),
+    "D0": (1e-7, 2e-5),
+    "lambda": (1e-7, 5e-6),
+    "alpha": (0.01, 0.5),
+    "eps_ratio": (0.2, 1.0),
+}
+#: A positive parameter is looked for within this factor of its starts.
+_FARTHEST = 1e6
+#: Never free: only its product with others is seen.
+_REFERENCES = ("V0",)
+
+
+class MissingNumberError(InputError):
+    """A law without one of its numbers: a comparison goes on without that law."""
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A normal prior in the parameter itself, cut off where the parameter's rule says.
+
+    Attributes
+    ----------
+    mean, sd : float
+        In SI.
+    source : str
+    unit : str
+        SI unit of both where it is not that of the parameter: a stiffness of a recording may be
+        given over the load, in 1/m. Empty for that of the parameter.
+    """
+
+    mean: float
+    sd: float
+    source: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A free parameter and its coordinate u: ln x where x is positive, x/scale otherwise.
+
+    Attributes
+    ----------
+    parameter : Parameter
+    logarithmic : bool
+    scale : float
+        Of a coordinate that is no logarithm.
+    lower, upper : float
+        Bounds of x, in SI.
+    start : (float, float)
+        Range in which starts are drawn.
+    given : float or None
+        A start by the user or a material.
+    prior : Prior or None
+    nuisance : bool
+        Whether it belongs to one set of data alone and is no number of the law.
+    """
+
+    parameter: Parameter
+    logarithmic: bool
+    scale: float
+    lower: float
+    upper: float
+    start: tuple[float, float]
+    given: float | None
+    prior: Prior | None
+    nuisance: bool = False
+
+    @property
+    def middle(self) -> float:
+        """Start value: the given one, or the middle of the range."""
+        if self.given is not None:
+            return self.given
+        low, high = self.start
+        return math.sqrt(low * high) if low > 0 else (low + high) / 2
+
+    @property
+    def name(self) -> str:
+        """Name of the parameter."""
+        return self.parameter.name
+
+    def to_coordinate(self, x: Any) -> Any:
+        """Coordinate of a value."""
+        return np.log(x) if self.logarithmic else np.asarray(x) / self.scale
+
+    def to_value(self, u: Any) -> Any:
+        """Value at a coordinate."""
+        return np.exp(u) if self.logarithmic else np.asarray(u) * self.scale
+
+    def slope(self, x: float) -> float:
+        """dx/du."""
+        return x if self.logarithmic else self.scale
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Bounds of the coordinate; of a logarithm a factor of a million off the starts."""
+        if self.logarithmic:
+            low, high = self.start[0] / _FARTHEST, min(self.start[1] * _FARTHEST, self.upper)
+            return math.log(low), math.log(high)
+        return self.lower / self.scale, self.upper / self.scale
+
+    def end(self, u: float) -> float:
+        """Value at the end of an interval; 0 or infinite where the search ended before."""
+        low, high = self.bounds
+        if self.logarithmic and u <= low + _FARTHEST**-1:
+            return 0.0
+        if self.logarithmic and u >= high - _FARTHEST**-1 and not math.isfinite(self.upper):
+            return math.inf
+        return float(self.to_value(u)) if math.isfinite(u) else u
+
+
+def unknowns_of(
+    law: type[Law],
+    free: Sequence[str],
+    *,
+    largest_epsilon: float,
+    start: Mapping[str, float],
+    priors: Mapping[str, Prior],
+    usual: Mapping[str, tuple[float, float]] | None = None,
+) -> tuple[Unknown, ...]:
+    """The free parameters of a fit.
+
+    Parameters
+    ----------
+    law : type of Law
+    free : sequence of str
+    largest_epsilon : float
+        Of the data; eps_ratio times it stays below 1.
+    start : mapping of str to float
+        Values known beforehand.
+    priors : mapping of str to Prior
+    usual : mapping of str to (float, float), optional
+        Ranges of start values that the data suggest, before those of contacts in general.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, occurs twice or cannot be free.
+    """
+    known = {**point_parameters(law), "eps_ratio": EPS_RATIO}
+    fittable = [n for n, p in known.items() if p.place != "drive" and n not in _REFERENCES]
+    fittable = [n for n in fittable if n not in ("epsilon", "inertia")]
+    for name in free:
+        if name in _REFERENCES:
+            raise InputError(
+                f"free must be parameters that data can determine, got '{name}': a change of it is "
+                "one of mu0; free mu0 instead"
+            )
+        if name not in fittable:
+            raise InputError(
+                f"free must be parameters of {law.name}, got '{name}'; {closest(name, fittable)}"
+            )
+        if list(free).count(name) > 1:
+            raise InputError(f"free must name each parameter once, got '{name}' twice; drop one")
+    ranges = {**_USUAL, **(usual or {})}
+    return tuple(
+        unknown_of(
+            known[n],
+            start.get(n),
+            priors.get(n),
+            ranges.get(n),
+            upper=0.999 / largest_epsilon if n == "eps_ratio" and largest_epsilon > 0 else math.inf,
+        )
+        for n in free
+    )
+
+
+def unknown_of(
+    parameter: Parameter,
+    given: float | None,
+    prior: Prior | None,
+    usual: tuple[float, float] | None,
+    *,
+    upper: float = math.inf,
+    nuisance: bool = False,
+) -> Unknown:
+    """A free parameter with its coordinate, bounds and range of starts.
+
+    Raises
+    ------
+    InputError
+        If nothing says where to look for it.
+    """
+    name = parameter.name
+    positive = parameter.rule == "positive"
+    middle = given if given else prior.mean if prior else None
+    if usual is not None:
+        low, high = usual
+    elif middle:
+        low, high = middle / 3, middle * 3
+    else:
+        raise MissingNumberError(
+            f"start must hold a value for the free parameter {name}, got none; give one, or fix it"
+        )
+    if middle:
+        low, high = min(low, middle / 3), max(high, middle * 3)
+    if prior:
+        low, high = max(low, prior.mean - 3 * prior.sd), min(high, prior.mean + 3 * prior.sd)
+        low = max(low, prior.mean / 10)
+    high = min(high, upper)
+    scale = 1.0 if positive else (middle or math.sqrt(low * high))
+    lower = 0.0 if parameter.rule in ("positive", "not negative") else -math.inf
+    return Unknown(parameter, positive, scale, lower, upper, (low, high), given, prior, nuisance)
+
+
+def material_priors(material: Material, names: Sequence[str]) -> dict[str, Prior]:
+    """Normal priors from the published uncertainties of a material.
+
+    Raises
+    ------
+    InputError
+        If the material has no number with an uncertainty for any of the names.
+    """
+    priors = {}
+    for name in names:
+        if name in material and material[name].uncertainty:
+            number = material[name]
+            priors[name] = Prior(number.si, float(number.si_uncertainty or 0), material.name)
+    if not priors:
+        raise InputError(
+            "prior must be a material with uncertainties of free parameters, got "
+            f"'{material.name}', which has none for {', '.join(names)}; leave the prior out"
+        )
+    return priors

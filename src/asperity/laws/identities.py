@@ -1,0 +1,251 @@
+"""Identities that every friction law obeys, checked on one law by one call.
+
+    from asperity.laws.identities import check_law
+
+    check_law(MyLaw(mu0=0.5, A=0.013, B=0.026, D0="0.4 um", V0="1 um/s"))
+
+The checks use nothing but the law: steady sliding is a zero of the rates, friction there is mu_ss,
+`log_velocity` inverts `friction`, derivatives agree with finite differences, every method acts on
+each element of an array for itself, and a change of the units of length, time and force changes
+nothing. What a publication says of its law (the slope of mu_ss, a step of the load) can be given,
+and is checked too.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.test_util import check_grads
+
+from asperity.laws.law import Law
+
+#: Round-off, with room for the cancellation of terms some 1e3 times the result.
+EXACT = 1e-12
+
+#: Velocities (m/s) at which the identities are tried.
+SPEEDS = (1e-9, 1e-6, 2e-5, 1e-3)
+
+#: Exponents of (length, time, force) in the units of a parameter.
+_DIMENSIONS = {
+    "dimensionless": (0, 0, 0),
+    "length": (1, 0, 0),
+    "time": (0, 1, 0),
+    "velocity": (1, -1, 0),
+    "frequency": (0, -1, 0),
+    "angular_frequency": (0, -1, 0),
+    "area": (2, 0, 0),
+    "viscosity": (-2, 1, 1),
+    "temperature": (0, 0, 0),
+    "force": (0, 0, 1),
+    "stiffness": (-1, 0, 1),
+    "pressure": (-2, 0, 1),
+    "mass": (-1, 2, 1),
+    "damping": (-1, 1, 1),
+}
+
+#: Units of length, time and force that the unit check changes to, in SI.
+_UNITS = (1e6, 60.0, 1e-3)
+
+#: Slope d mu_ss / d ln v at a velocity (m/s).
+Slope = Callable[[float], float]
+
+#: F/W after the load has jumped by a factor at constant velocity and continuous states, from F/W
+#: before, W/W0 before and the factor.
+LoadStep = Callable[[Array, Array, float], Array]
+
+
+class BrokenIdentityError(AssertionError):
+    """A law breaks some identities; the message has a paragraph for each.
+
+    Attributes
+    ----------
+    broken : dict of str to str
+        What was found, by the name of the identity.
+    """
+
+    def __init__(self, law: Law, broken: dict[str, str]) -> None:
+        self.broken = broken
+        found = "\n\n".join(f"{name}: {message.strip()}" for name, message in broken.items())
+        super().__init__(f"{type(law).name} breaks {len(broken)} identities\n\n{found}")
+
+
+def check_law(
+    law: Law, *, slope: Slope | None = None, load_step: LoadStep | None = None
+) -> tuple[str, ...]:
+    """Check a law with its parameters against all identities.
+
+    Parameters
+    ----------
+    law : Law
+    slope : callable, optional
+        The published d mu_ss / d ln v as a function of the velocity (m/s).
+    load_step : callable, optional
+        The published F/W after a step of the load: from F/W and W/W0 before it and the factor by
+        which the load jumps. Linker and Dieterich: ``lambda f, w, k: f - alpha * log(k)``.
+
+    Returns
+    -------
+    tuple of str
+        Names of the identities, all of which the law obeys.
+
+    Raises
+    ------
+    BrokenIdentityError
+        With every identity that it breaks.
+    """
+    checks: dict[str, Callable[[], None]] = {
+        "steady sliding": lambda: steady_sliding(law),
+        "element-wise": lambda: element_wise(law),
+        "derivatives": lambda: derivatives(law),
+        "units": lambda: units(law),
+    }
+    if law.rate_dependent:
+        checks["inverse"] = lambda: inverse(law)
+    if slope is not None:
+        checks["slope"] = lambda: slope_of_steady_friction(law, slope)
+    if load_step is not None:
+        checks["load step"] = lambda: step_of_load(law, load_step)
+    broken: dict[str, str] = {}
+    for name, check in checks.items():
+        try:
+            check()
+        except AssertionError as error:
+            broken[name] = str(error)
+        except Exception as error:  # a law may fail in any way
+            broken[name] = f"{type(error).__name__}: {error}"
+    if broken:
+        raise BrokenIdentityError(law, broken)
+    return tuple(checks)
+
+
+def sample(law: Law, seed: int = 0) -> tuple[Array, tuple[Array, ...], Array]:
+    """Velocities (m/s), states near steady sliding, and loads W/W0, each of shape (4,)."""
+    rng = np.random.default_rng(seed)
+    speeds = jnp.array(SPEEDS)
+    v = speeds * rng.uniform(0.5, 2.0, speeds.shape)
+    state = tuple(s + rng.normal(0, 0.5, speeds.shape) for s in law.steady_state(v))
+    return v, state, jnp.asarray(rng.uniform(0.3, 1.7, speeds.shape))
+
+
+def steady_sliding(law: Law) -> None:
+    """`steady_state` is a zero of the rates at every velocity, and friction there is mu_ss."""
+    speeds = jnp.array(SPEEDS)
+    one = jnp.ones_like(speeds)
+    steady = law.steady_state(speeds)
+    assert len(steady) == len(law.state_names), (
+        f"steady_state has {len(steady)} states, state_names {len(law.state_names)}"
+    )
+    rates = law.state_rate(speeds, speeds, steady, one)
+    faster = law.state_rate(2 * speeds, 2 * speeds, steady, one)
+    for name, rest, moving in zip(law.state_names, rates, faster, strict=True):
+        assert np.all(np.abs(rest) <= EXACT * np.abs(moving)), (
+            f"the rate of {name} in steady sliding is {rest}, and {moving} at twice the velocity"
+        )
+    np.testing.assert_allclose(law.friction(speeds, steady, one), law.mu_ss(speeds), rtol=EXACT)
+
+
+def inverse(law: Law) -> None:
+    """`log_velocity` inverts `friction`, and agrees with the general Newton's method."""
+    v, state, w = sample(law)
+    friction = law.friction(v, state, w)
+    for found in (law.log_velocity(friction, state, w), Law.log_velocity(law, friction, state, w)):
+        np.testing.assert_allclose(found, jnp.log(v), rtol=0, atol=1e-11)
+    np.testing.assert_allclose(law.velocity(friction, state, w), v, rtol=1e-11)
+
+
+def element_wise(law: Law) -> None:
+    """Each element of an array gives what it gives alone."""
+    v, state, w = sample(law)
+    friction, rates = law.friction(v, state, w), law.state_rate(v, v, state, w)
+    for i in range(len(SPEEDS)):
+        one = (v[i], tuple(s[i] for s in state), w[i])
+        np.testing.assert_allclose(friction[i], law.friction(*one), rtol=EXACT)
+        alone = law.state_rate(one[0], one[0], *one[1:])
+        for rate, single in zip(rates, alone, strict=True):
+            np.testing.assert_allclose(rate[i], single, rtol=EXACT)
+
+
+def derivatives(law: Law) -> None:
+    """First and second derivatives with respect to every argument against finite differences."""
+    v, state, w = (jax.tree.map(lambda x: x[1], part) for part in sample(law))
+    names = [f.name for f in dataclasses.fields(law)]
+    middle = law.friction(v, state, w)
+
+    def changed(logs: dict[str, Array]) -> Law:
+        """The law with its parameters multiplied: steps in units of their own."""
+        return type(law)(**{n: getattr(law, n) * jnp.exp(logs[n]) for n in names})
+
+    def friction(logs: Any, log_v: Array, state: Any, w: Array) -> Array:
+        return changed(logs).friction(jnp.exp(log_v), state, w)
+
+    def rates(logs: Any, log_v: Array, state: Any, w: Array) -> Any:
+        return changed(logs).state_rate(jnp.exp(log_v), jnp.exp(log_v), state, w)
+
+    def inverses(logs: Any, force: Array, state: Any, w: Array) -> Any:
+        other, at = changed(logs), (middle + 0.01 * force, state, w)
+        return other.log_velocity(*at), jnp.log(other.velocity(*at))
+
+    unchanged = dict.fromkeys(names, 0.0)
+    options = {"order": 2, "modes": ["fwd", "rev"], "rtol": 1e-5, "atol": 1e-6, "eps": 1e-4}
+    check_grads(friction, (unchanged, jnp.log(v), state, w), **options)
+    if law.state_names:
+        check_grads(rates, (unchanged, jnp.log(v), state, w), **options)
+    if law.rate_dependent:
+        check_grads(inverses, (unchanged, 0.0, state, w), **options | {"eps": 1e-5})
+
+
+def units(law: Law) -> None:
+    """The same law in other units of length, time and force has the same friction and states.
+
+    Parameters are converted by the kinds with which they are declared; a number with a hidden unit
+    in an equation shows.
+    """
+
+    def converted(value: Any, kind: str) -> Any:
+        dimensions = _DIMENSIONS[kind]
+        return value * np.prod([u**d for u, d in zip(_UNITS, dimensions, strict=True)])
+
+    other = type(law)(
+        **{
+            f.name: converted(getattr(law, f.name), f.metadata["parameter"].kind)
+            for f in dataclasses.fields(law)
+        }
+    )
+    v, state, w = sample(law)
+    faster = converted(v, "velocity")
+    steady = law.steady_state(v), other.steady_state(faster)
+    for here, there in zip(*steady, strict=True):
+        np.testing.assert_allclose(there, here, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(
+        other.friction(faster, state, w), law.friction(v, state, w), rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        other.elastic_length, converted(jnp.asarray(law.elastic_length), "length"), rtol=EXACT
+    )
+    # Exponents of some tens multiply round-off.
+    for here, there in zip(
+        law.state_rate(v, 1.5 * v, state, w),
+        other.state_rate(faster, 1.5 * faster, state, w),
+        strict=True,
+    ):
+        np.testing.assert_allclose(there, converted(here, "frequency"), rtol=1e-9)
+
+
+def slope_of_steady_friction(law: Law, slope: Slope) -> None:
+    """D mu_ss / d ln v is what the publication says."""
+    for v in SPEEDS:
+        found = jax.grad(lambda log_v: law.mu_ss(jnp.exp(log_v)))(jnp.log(v))
+        np.testing.assert_allclose(found, slope(v), rtol=1e-10, atol=EXACT)
+
+
+def step_of_load(law: Law, load_step: LoadStep, factor: float = 1.3) -> None:
+    """F/W after a step of the load at constant velocity and continuous states."""
+    v, state, w = sample(law)
+    before, after = law.friction(v, state, w), law.friction(v, state, factor * w)
+    np.testing.assert_allclose(after, load_step(before, w, factor), rtol=1e-11)

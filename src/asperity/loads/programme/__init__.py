@@ -1,0 +1,1 @@
+"""Programmes of load and drive: steps, ramps, holds, modulation, recorded signals."""

@@ -1,0 +1,158 @@
+"""Programmes of load and drive: what an experimenter does, one step after the other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.errors import InputError
+from asperity.loads.programme.segments import Segment
+from asperity.loads.programme.steps import Level, Step
+from asperity.parameters.arguments import number
+
+#: Relative distance to a break point within which a time counts as the break point itself: sums of
+#: durations and multiples of a sampling interval are not the same doubles.
+BREAK = 1e-12
+
+
+@dataclass(frozen=True, eq=False, init=False)
+class Programme:
+    """Steps that follow steady sliding under a load and at a velocity.
+
+    Between its break points the programme is smooth; at them load and velocity may jump, and
+    every integration stops and starts anew.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+    level : Level
+        Load (N) and pulling velocity (m/s) before the first step.
+    segments : tuple of Segment
+        What the steps amount to.
+    starts : ndarray, shape (segments + 1,)
+        Break points (s): beginning of every segment, and the end.
+    last : Level
+        Load and velocity after the last step.
+    """
+
+    steps: tuple[Step, ...]
+    level: Level
+    segments: tuple[Segment, ...]
+    starts: np.ndarray
+    last: Level
+
+    def __init__(
+        self, *steps: Step, load: float | str, velocity: float | str, name: str = "programme"
+    ) -> None:
+        """Lay the steps out one after the other.
+
+        Parameters
+        ----------
+        *steps : Step
+            `Hold`, `Slide`, `StepLoad`, ... from `asperity.loads`.
+        load : float or str
+            Normal load (N) before the first step, positive.
+        velocity : float or str
+            Pulling velocity (m/s) before the first step; 0 for a slider at rest, which needs
+            its initial states given.
+        name : str
+            What messages call the programme.
+
+        Raises
+        ------
+        InputError
+            If a value breaks its rule or the steps take no time.
+        """
+        level = Level(
+            number(load, f"{name}.load", "force", "positive"),
+            number(velocity, f"{name}.velocity", "velocity"),
+        )
+        segments: list[Segment] = []
+        reached = level
+        for i, step in enumerate(steps):
+            if not isinstance(step, Step):
+                raise InputError(
+                    f"{name}.steps[{i}] must be a step, got a {type(step).__name__}; "
+                    "take one of asperity.loads, such as Slide('10 s')"
+                )
+            new, reached = step.lay_out(reached, f"{name}.steps[{i}]")
+            segments.extend(new)
+        if not segments:
+            raise InputError(
+                f"{name}.steps must take time, got {len(steps)} steps of no duration; "
+                "add one such as Slide('10 s')"
+            )
+        durations = [float(s.duration) for s in segments]
+        # Frozen: attributes are set once, here.
+        object.__setattr__(self, "steps", steps)
+        object.__setattr__(self, "level", level)
+        object.__setattr__(self, "segments", tuple(segments))
+        object.__setattr__(self, "starts", np.concatenate([[0.0], np.cumsum(durations)]))
+        object.__setattr__(self, "last", reached)
+
+    def __repr__(self) -> str:
+        steps = "".join(f"{step}, " for step in self.steps)
+        return f"Programme({steps}load={self.level.load!r}, velocity={self.level.velocity!r})"
+
+    @property
+    def duration(self) -> float:
+        """Seconds."""
+        return float(self.starts[-1])
+
+    @property
+    def fastest_pull(self) -> float:
+        """Largest size of the pulling velocity (m/s), before the first step included."""
+        return max(abs(self.level.velocity), *(s.fastest_pull for s in self.segments))
+
+    def load(self, t: ArrayLike) -> np.ndarray:
+        """W (N) at times `t` (s); at a break point that after it."""
+        return self._evaluate(t, _load)
+
+    def velocity(self, t: ArrayLike) -> np.ndarray:
+        """Pulling velocity (m/s) at times `t` (s); at a break point that after it."""
+        return self._evaluate(t, _pull)
+
+    def position(self, t: ArrayLike) -> np.ndarray:
+        """Way of the far end of the spring since t = 0 (m) at times `t` (s)."""
+        ways = [float(_position(s, s.duration)) for s in self.segments]
+        return self._evaluate(t, _position, np.concatenate([[0.0], np.cumsum(ways)]))
+
+    def _evaluate(
+        self,
+        t: ArrayLike,
+        read: Callable[[Segment, Any], Any],
+        before: np.ndarray | None = None,
+    ) -> np.ndarray:
+        times = np.asarray(t, float)
+        values = np.empty(times.shape)
+        index = np.searchsorted(self.starts[1:-1] * (1 - BREAK), times, side="right")
+        for k, segment in enumerate(self.segments):
+            inside = index == k
+            if inside.any():
+                x = np.maximum(times[inside] - self.starts[k], 0.0)
+                # Padded to a power of two: few programs for any number of times.
+                room = (0, (1 << int(x.size - 1).bit_length()) - x.size)
+                part = np.asarray(read(segment, np.pad(x, room, mode="edge")))[: x.size]
+                values[inside] = part if before is None else before[k] + part
+        return values
+
+
+@jax.jit
+def _load(segment: Segment, t: Array) -> Array:
+    return segment.load(t)[0]
+
+
+@jax.jit
+def _pull(segment: Segment, t: Array) -> Array:
+    return segment.pull(t)
+
+
+@jax.jit
+def _position(segment: Segment, t: Array) -> Array:
+    return segment.position(t)

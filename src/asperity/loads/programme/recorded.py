@@ -1,0 +1,127 @@
+"""Segments that follow a recording: load and its rate from one interpolant."""
+
+from __future__ import annotations
+
+import math
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.loads.programme.segments import Scalar, Segment
+
+
+class Curve(eqx.Module):
+    """Cubic pieces between knots, padded to a power of two.
+
+    Parameters
+    ----------
+    knots : array, shape (pieces,)
+        Where each piece begins (s); inf where padded.
+    coefficients : array, shape (4, pieces)
+        Of falling powers of the time since the knot.
+    integral : array, shape (pieces,)
+        Integral up to the knot.
+    """
+
+    knots: Array
+    coefficients: Array
+    integral: Array
+
+    @classmethod
+    def of(cls, knots: np.ndarray, coefficients: np.ndarray) -> Curve:
+        """From `knots` with the last end, shape (pieces + 1,), and coefficients."""
+        pieces = coefficients.shape[1]
+        room = 2 ** max(4, math.ceil(math.log2(pieces)))
+        powers = np.array([4, 3, 2, 1])[:, None]
+        parts = (coefficients / powers * np.diff(knots) ** powers).sum(0)
+        integral = np.concatenate([[0.0], np.cumsum(parts)[:-1]])
+        padding = (0, room - pieces)
+        return cls(
+            jnp.asarray(np.pad(knots[:-1], padding, constant_values=np.inf)),
+            jnp.asarray(np.pad(coefficients, ((0, 0), padding))),
+            jnp.asarray(np.pad(integral, padding)),
+        )
+
+    def _piece(self, t: ArrayLike) -> tuple[Array, Array, Array]:
+        i = jnp.clip(jnp.searchsorted(self.knots, t, side="right") - 1, 0)
+        return t - self.knots[i], self.coefficients[:, i], self.integral[i]
+
+    def following(self, t: ArrayLike) -> Array:
+        """The next knot, inf where there is none."""
+        i = jnp.searchsorted(self.knots, t, side="right")
+        return jnp.where(i < self.knots.size, self.knots[i], jnp.inf)
+
+    def value(self, t: ArrayLike) -> tuple[Array, Array]:
+        """Value and slope."""
+        x, (a, b, c, d), _ = self._piece(t)
+        return ((a * x + b) * x + c) * x + d, (3 * a * x + 2 * b) * x + c
+
+    def primitive(self, t: ArrayLike) -> Array:
+        """Integral from the first knot."""
+        x, (a, b, c, d), before = self._piece(t)
+        return before + (((a / 4 * x + b / 3) * x + c / 2) * x + d) * x
+
+
+class Recorded(Segment):
+    """Load and pulling velocity as they were recorded.
+
+    Parameters
+    ----------
+    duration : array
+        Seconds.
+    load_curve, pull_curve : Curve
+        W (N) and V (m/s) over the time of the segment.
+    spacing : array
+        Time between samples (s).
+    smooth : array
+        Whether second derivatives are continuous; where not, steps end at the samples.
+    lowest, fastest : array
+        Bounds of the load (N) and of the velocity (m/s).
+    """
+
+    duration: Scalar = eqx.field(converter=jnp.asarray)
+    load_curve: Curve
+    pull_curve: Curve
+    spacing: Scalar = eqx.field(converter=jnp.asarray)
+    smooth: Scalar = eqx.field(converter=jnp.asarray)
+    lowest: Scalar = eqx.field(converter=jnp.asarray)
+    fastest: Scalar = eqx.field(converter=jnp.asarray)
+
+    def load(self, t: ArrayLike) -> tuple[Array, Array]:
+        """W and dW/dt of one interpolant."""
+        return self.load_curve.value(t)
+
+    def shear(self, t: ArrayLike) -> tuple[float, float]:
+        """None."""
+        return 0.0, 0.0
+
+    def pull(self, t: ArrayLike) -> Array:
+        """V."""
+        return self.pull_curve.value(t)[0]
+
+    def position(self, t: ArrayLike) -> Array:
+        """Integral of the interpolant."""
+        return self.pull_curve.primitive(t)
+
+    def next_kink(self, t: ArrayLike) -> Array:
+        """The next sample, if the interpolant is not smooth there."""
+        following = jnp.minimum(self.load_curve.following(t), self.pull_curve.following(t))
+        return jnp.where(self.smooth, jnp.inf, following)
+
+    @property
+    def lowest_load(self) -> float:
+        """Of the pieces."""
+        return float(self.lowest)
+
+    @property
+    def fastest_pull(self) -> float:
+        """Of the pieces."""
+        return float(self.fastest)
+
+    @property
+    def longest_step(self) -> float:
+        """Four samples."""
+        return 4 * float(self.spacing)

@@ -1,0 +1,97 @@
+"""Pieces of a load and drive programme between two break points, as compiled programs read them.
+
+Every number of a segment is an array, never part of the program's structure: two protocols made of
+the same kinds of segment run the same compiled program. Times are counted from the beginning of the
+segment, so that phases keep their digits in long programmes.
+"""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import Any, TypeAlias
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity._jax import configure
+from asperity.loads.excitation import Excitation
+
+configure()  # double precision, before any segment makes an array
+
+#: What a number of a segment is: an array of shape ().
+Scalar: TypeAlias = Any
+
+
+def number(default: float) -> Any:
+    """Declare a field of a segment that need not be given."""
+    # Arrays, and never Python numbers: those would have programs of their own.
+    return eqx.field(converter=jnp.asarray, default=default)
+
+
+class Segment(eqx.Module):
+    """Load, shear force and pulling velocity over a length of time.
+
+    Attributes
+    ----------
+    duration : array, shape ()
+        Seconds, positive.
+    """
+
+    duration: eqx.AbstractVar[Scalar]
+
+    @abstractmethod
+    def load(self, t: ArrayLike) -> tuple[Array, Array]:
+        """W (N) and dW/dt (N/s) at the time `t` (s) of the segment."""
+
+    @abstractmethod
+    def shear(self, t: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
+        """Force along the pulling direction besides the spring's (N), and its rate (N/s)."""
+
+    @abstractmethod
+    def pull(self, t: ArrayLike) -> Array:
+        """Velocity of the far end of the spring (m/s)."""
+
+    @abstractmethod
+    def position(self, t: ArrayLike) -> Array:
+        """Way of the far end of the spring since the beginning of the segment (m)."""
+
+    @property
+    @abstractmethod
+    def lowest_load(self) -> float:
+        """A lower bound of W (N), exact where it is positive or nearly so."""
+
+    def surely_above(self, load: float) -> float:
+        """A time (s) up to which W is larger than `load` (N) for certain."""
+        return 0.0
+
+    @property
+    @abstractmethod
+    def fastest_pull(self) -> float:
+        """An upper bound of the size of the pulling velocity (m/s)."""
+
+    @property
+    @abstractmethod
+    def longest_step(self) -> float:
+        """Time over which nothing that the programme does can be missed (s)."""
+
+    def next_kink(self, t: ArrayLike) -> ArrayLike:
+        """The next time after `t` at which no step should lie astride (s)."""
+        return jnp.inf
+
+    @property
+    def period(self) -> float | None:
+        """Period of what is driven (s), None where it does not repeat itself."""
+        return None
+
+    @property
+    def constant(self) -> bool:
+        """Whether load and pulling velocity stay as they are."""
+        return False
+
+    def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
+        """Values over `W0` and `V`; slopes are derivatives with respect to time."""
+        W, W_rate = self.load(t)
+        S, S_rate = self.shear(t)
+        return Excitation(W / W0, W_rate / W0, S / W0, S_rate / W0, self.pull(t) / V)

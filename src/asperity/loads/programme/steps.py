@@ -1,0 +1,272 @@
+"""The steps of a programme, as an experimenter names them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from asperity.errors import InputError
+from asperity.loads.modulation import Modulation
+from asperity.loads.programme.cycles import Cycles
+from asperity.loads.programme.interpolants import interpolated
+from asperity.loads.programme.levels import Levels
+from asperity.loads.programme.recorded import Recorded
+from asperity.loads.programme.segments import Segment
+from asperity.parameters.arguments import instance, number
+from asperity.units import to_si
+
+#: A number in SI, or a text with its unit.
+Given: TypeAlias = float | str
+
+
+class Level(NamedTuple):
+    """Load (N) and pulling velocity (m/s) that a step finds and leaves."""
+
+    load: float
+    velocity: float
+
+
+class Step(ABC):
+    """One thing that an experimenter does."""
+
+    @abstractmethod
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """Segments of the step, and the level it leaves.
+
+        Raises
+        ------
+        InputError
+            If a value of the step, which messages call `name`, breaks its rule.
+        """
+
+
+@dataclass(frozen=True)
+class Hold(Step):
+    """Stop the drive for `duration`; afterwards it goes on as before."""
+
+    duration: Given
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """One segment at rest."""
+        return [Levels(_duration(self.duration, name), level.load, 0.0)], level
+
+
+@dataclass(frozen=True)
+class Slide(Step):
+    """Pull for `duration`, at `velocity` from now on, or as before."""
+
+    duration: Given
+    velocity: Given | None = None
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """One segment."""
+        level = level._replace(velocity=_velocity(self.velocity, level, name))
+        return [Levels(_duration(self.duration, name), level.load, level.velocity)], level
+
+
+@dataclass(frozen=True)
+class StepLoad(Step):
+    """Change the load to `to` at once."""
+
+    to: Given
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """No segment: a break point. Friction is defined under a positive load only."""
+        return [], level._replace(load=_positive(self.to, "force", f"{name}.to"))
+
+
+@dataclass(frozen=True)
+class RampLoad(Step):
+    """Change the load to `to` at a constant rate within `duration`."""
+
+    to: Given
+    duration: Given
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """One segment."""
+        to, duration = number(self.to, f"{name}.to", "force"), _duration(self.duration, name)
+        rate = (to - level.load) / duration
+        segment = Levels(duration, level.load, level.velocity, load_rate=rate)
+        return [segment], level._replace(load=to)
+
+
+@dataclass(frozen=True)
+class RampVelocity(Step):
+    """Change the pulling velocity to `to` at a constant rate within `duration`."""
+
+    to: Given
+    duration: Given
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """One segment."""
+        to, duration = number(self.to, f"{name}.to", "velocity"), _duration(self.duration, name)
+        rate = (to - level.velocity) / duration
+        segment = Levels(duration, level.load, level.velocity, pull_rate=rate)
+        return [segment], level._replace(velocity=to)
+
+
+@dataclass(frozen=True)
+class Modulate(Step):
+    """Modulate the load, W = W1 (1 + eps cos(2 pi f t + phase)), for `duration`.
+
+    Parameters
+    ----------
+    duration : float or str
+        Seconds, `rise` and `fall` included.
+    epsilon : float or str
+        Relative amplitude. From 1 on contact is lost.
+    frequency : float or str
+        Hz.
+    rise, fall : float or str
+        Time (s) over which the amplitude comes and goes smoothly; 0 is sudden.
+    phase : float
+        Phase at the beginning (rad); at 0 a sudden beginning is a step of the load by eps.
+    velocity : float or str, optional
+        Pulling velocity (m/s) from now on; as before by default.
+    epsilon_v : float or str
+        Relative amplitude of the pulling velocity, in phase with the load, without rise or fall.
+    shear_ratio : float
+        Shear force per modulated normal force, of an exciter at an angle.
+    """
+
+    duration: Given
+    epsilon: Given
+    frequency: Given
+    rise: Given = 0.0
+    fall: Given = 0.0
+    phase: float = 0.0
+    velocity: Given | None = None
+    epsilon_v: Given = 0.0
+    shear_ratio: float = 0.0
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """Up to three segments: rise, modulation, fall."""
+        whole = _duration(self.duration, name)
+        rise = _at_least_zero(self.rise, "time", f"{name}.rise")
+        fall = _at_least_zero(self.fall, "time", f"{name}.fall")
+        if rise + fall > whole:
+            raise InputError(
+                f"{name}.duration must be at least rise and fall together, {rise + fall:g} s, "
+                f"got {whole:g} s; lengthen it or shorten them"
+            )
+        epsilon = _at_least_zero(self.epsilon, "dimensionless", f"{name}.epsilon")
+        frequency = _positive(self.frequency, "frequency", f"{name}.frequency")
+        level = level._replace(velocity=_velocity(self.velocity, level, name))
+        common: dict[str, Any] = {
+            "load1": level.load,
+            "pull1": level.velocity,
+            "frequency": frequency,
+            "epsilon_v": number(self.epsilon_v, f"{name}.epsilon_v", "dimensionless"),
+            "shear_ratio": number(self.shear_ratio, f"{name}.shear_ratio", "dimensionless"),
+        }
+        segments: list[Segment] = []
+        begin = 0.0
+        for duration, first, last, change in (
+            (rise, 0.0, epsilon, rise),
+            (whole - rise - fall, epsilon, epsilon, 0.0),
+            (fall, epsilon, 0.0, fall),
+        ):
+            if duration > 0:
+                turns = (frequency * begin) % 1.0
+                phase = number(self.phase, f"{name}.phase", "dimensionless") + 2 * np.pi * turns
+                segments.append(
+                    Levels(
+                        duration,
+                        epsilon1=first,
+                        epsilon2=last,
+                        rise=change,
+                        phase=phase,
+                        **common,
+                    )
+                )
+            begin += duration
+        return segments, level
+
+
+@dataclass(frozen=True)
+class Cycle(Step):
+    """A periodic modulation of any form, over the load and velocity of the moment.
+
+    Parameters
+    ----------
+    duration : float or str
+        Seconds.
+    modulation : Modulation
+        Such as `Periodic`, of load, shear force and pulling velocity.
+    frequency : float or str
+        Hz.
+    """
+
+    duration: Given
+    modulation: Modulation
+    frequency: Given
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """One segment."""
+        frequency = _positive(self.frequency, "frequency", f"{name}.frequency")
+        duration = _duration(self.duration, name)
+        advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
+        modulation = instance(self.modulation, Modulation, f"{name}.modulation", advice)
+        return [Cycles(duration, modulation, frequency, level.load, level.velocity)], level
+
+
+@dataclass(frozen=True, eq=False)
+class Follow(Step):
+    """Follow a recording from its first sample to its last.
+
+    Parameters
+    ----------
+    time : array, shape (n,)
+        Seconds, rising; the first sample is the beginning of the step.
+    load : array, shape (n,), optional
+        W (N); as before by default.
+    velocity : array, shape (n,), optional
+        V (m/s); as before by default.
+    interpolant : {"pchip", "spline"}
+        Cubic pieces through all samples, from which both W and dW/dt come: those that never
+        overshoot, or those with a continuous second derivative,
+        which long steps can go over.
+    """
+
+    time: ArrayLike
+    load: ArrayLike | None = None
+    velocity: ArrayLike | None = None
+    interpolant: str = "pchip"
+
+    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+        """One segment."""
+        time = np.asarray(to_si(self.time, "time", f"{name}.time"), float)
+        load, W = interpolated(time, self.load, level.load, "force", self.interpolant, name)
+        pull, V = interpolated(
+            time, self.velocity, level.velocity, "velocity", self.interpolant, name
+        )
+        segment = Recorded(
+            time[-1] - time[0],
+            load,
+            pull,
+            spacing=np.median(np.diff(time)),
+            smooth=self.interpolant == "spline",
+            lowest=W.min(),
+            fastest=np.abs(V).max(),
+        )
+        return [segment], Level(float(W[-1]), float(V[-1]))
+
+
+def _velocity(given: Given | None, level: Level, name: str) -> float:
+    return level.velocity if given is None else number(given, f"{name}.velocity", "velocity")
+
+
+def _duration(given: Given, name: str) -> float:
+    return _positive(given, "time", f"{name}.duration")
+
+
+def _positive(given: Given, kind: str, name: str) -> float:
+    return number(given, name, kind, "positive")
+
+
+def _at_least_zero(given: Given, kind: str, name: str) -> float:
+    return number(given, name, kind, "not negative")

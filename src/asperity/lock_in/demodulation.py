@@ -1,0 +1,228 @@
+"""Lock-in reading: harmonics of the shear force against the phase of the measured load.
+
+The load and the shear force are fitted, by least squares, with drift terms and harmonics of one
+frequency, which is itself a parameter of the load's fit. The force's harmonics are then rotated by
+the phase of the load's fundamental, in the convention of the package::
+
+    W/W0 = 1 + eps cos phi + ...,      F/W0 = mean + sum of mu_n cos(n phi + phase_n).
+
+Windows need not hold whole periods, nor the clock be even. Every number comes with its
+covariance: noise is estimated at the frequency where it acts (`asperity.lock_in.noise`), and the
+noise of the load is propagated through frequency, phase, amplitude and mean.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.lock_in.basis import Basis
+from asperity.lock_in.blocks import BlockSums, even_step, sums
+from asperity.lock_in.noise import local_noise, residual_sums, sum_covariance
+from asperity.lock_in.normal_equations import inverted
+from asperity.lock_in.reading import LockInReading, reading_of
+from asperity.lock_in.reference import (
+    around,
+    fit_frequency,
+    frequency_direction,
+    require_modulated,
+    strongest_line,
+    window_basis,
+)
+from asperity.lock_in.retune import retuned_to_load
+
+Array = NDArray[np.float64]
+
+#: Approximate number of blocks of a window.
+BLOCKS = 1024
+#: From so many samples on, a pass over all of them is avoided.
+_LONG = 1 << 17
+DRIFTS = {"none": 0, "linear": 1, "quadratic": 2}
+
+
+def lock_in(
+    time: Array,
+    load: Array,
+    force: Array,
+    *,
+    frequency: float | None = None,
+    harmonics: int = 4,
+    detrend: str = "linear",
+    refine: bool = True,
+) -> LockInReading:
+    """Measure the harmonics of a force against the phase of the load that modulates it.
+
+    Parameters
+    ----------
+    time, load, force : array, (n,)
+        Seconds and two forces, or stresses, in equal units; finite, time rising.
+    frequency : float, optional
+        Initial guess (Hz); None takes the strongest line of the load.
+    harmonics : int
+        Number of harmonics.
+    detrend : {"none", "linear", "quadratic"}
+        Drift that is fitted together with the harmonics, for both channels.
+    refine : bool
+        Fit the frequency. If not, `frequency` is taken to be exact.
+
+    Returns
+    -------
+    LockInReading
+
+    Raises
+    ------
+    InputError
+        If there are too few samples, the clock does not rise, or the frequency is not resolved.
+    """
+    degree = _degree(detrend)
+    _check(time, load, force, harmonics, degree)
+    if frequency is None and not refine:
+        raise InputError(
+            "lock_in.frequency must be given with refine=False, got None; give it in Hz"
+        )
+    if refine:
+        line = strongest_line(time, load, between=around(frequency))
+        require_modulated(line, load)
+        start = line.frequency
+    else:
+        start = float(frequency or 0.0)
+    _check_resolved(time, start, harmonics)
+    step = even_step(time, 2 * np.pi * start * harmonics)
+    if step is None:
+        _check_clock(time)
+    shares = (1.0,) if time.size < _LONG else (0.125, 1.0)
+    for share in shares if refine else ():
+        start = fit_frequency(
+            time, load, start, harmonics=harmonics, degree=degree, step=step, share=share
+        )
+        _check_resolved(time, start, harmonics)
+        if share < 1:
+            # The remaining correction of the frequency from the sums, if they allow it.
+            basis = window_basis(time, 2 * np.pi * start, harmonics, degree)
+            near = _check_finite(sums(basis, time, [load, force], blocks=BLOCKS, step=step))
+            if (tuned := retuned_to_load(near)) is not None:
+                return read(tuned)
+    basis = window_basis(time, 2 * np.pi * start, harmonics, degree)
+    blocks = _check_finite(sums(basis, time, [load, force], blocks=BLOCKS, step=step))
+    return read(blocks, refine=refine)
+
+
+def read(blocks: BlockSums, *, refine: bool = True) -> LockInReading:
+    """The reading from the sums of load and force, in this order.
+
+    Parameters
+    ----------
+    blocks : BlockSums
+        Of one recording, or joined from its parts.
+    refine : bool
+        Correct the frequency to first order, from the sums.
+    """
+    basis, linear = blocks.basis, blocks.basis.linear
+    gram, moments = blocks.totals()
+    inner = inverted(gram[:linear, :linear])
+    beta = inner @ moments[:linear]
+    own = _own_columns(basis, beta[:, 0], refine)
+    outer = inverted(own.T @ gram @ own)
+    slope, change = np.zeros(linear), 0.0
+    if refine:
+        solution = outer @ (own.T @ moments[:, 0])
+        change = float(solution[linear])
+        slope = -inner @ (gram @ frequency_direction(basis, beta[:, 1]))[:linear]
+        beta = np.stack([solution[:linear], beta[:, 1] + slope * change], axis=1)
+    residual = residual_sums(blocks, _on_basis(basis, beta, change))
+    noise = local_noise(blocks, residual, _white(blocks, residual))
+    plain = np.eye(basis.size)[:, :linear]
+    disturbed = sum_covariance(basis, gram, noise, (own, plain))
+    # Errors of (beta of the load, omega, beta of the force) are linear in the sums of the noise.
+    size = own.shape[1]
+    errors = np.zeros((size + linear, size + linear))
+    errors[:size, :size], errors[size:, size:] = outer, inner
+    if refine:
+        errors[size:, :size] = np.outer(slope, outer[linear])
+    covariance = errors @ disturbed @ errors.T
+    omega = basis.omega + change
+    return reading_of(blocks, beta, omega, covariance, noise, residual, fitted=refine)
+
+
+def _own_columns(basis: Basis, load: Array, refine: bool) -> Array:
+    """Columns of the fit of the load, the frequency last; (size, linear + refine)."""
+    own = np.eye(basis.size)[:, : basis.linear + refine]
+    if refine:
+        own[:, basis.linear] = frequency_direction(basis, load)
+    return own
+
+
+def _on_basis(basis: Basis, beta: Array, change: float) -> Array:
+    """Coefficients of both fits on the whole basis, the frequency changed to first order."""
+    full = np.zeros((basis.size, 2))
+    full[: basis.linear] = beta
+    for c in (0, 1):
+        full[:, c] += change * frequency_direction(basis, beta[:, c])
+    return full
+
+
+def _white(blocks: BlockSums, residual: NDArray[np.complex128]) -> Array:
+    """Covariance of the residual if it is white, from its sums over the blocks."""
+    total = residual[:, 0].real
+    return total.T @ total / max(float(blocks.count.sum()) - blocks.basis.linear - 1, 1.0)
+
+
+def _degree(detrend: str) -> int:
+    if detrend not in DRIFTS:
+        raise InputError(
+            f"lock_in.detrend must be none, linear or quadratic, got '{detrend}'; choose one"
+        )
+    return DRIFTS[detrend]
+
+
+def _check(time: Array, load: Array, force: Array, harmonics: int, degree: int) -> None:
+    if harmonics < 1:
+        raise InputError(
+            f"lock_in.harmonics must be at least 1, got {harmonics}; ask for 1 or more"
+        )
+    if not time.size == load.size == force.size:
+        raise InputError(
+            f"lock_in.time, load and force must have one length, got {time.size}, {load.size} and "
+            f"{force.size}; cut them to the same samples"
+        )
+    least = 2 * (degree + 1 + 2 * harmonics) + 2
+    if time.size < least:
+        raise InputError(
+            f"lock_in.time must hold at least {least} samples for {harmonics} harmonics, got "
+            f"{time.size}; give a longer window or fewer harmonics"
+        )
+
+
+def _check_finite(blocks: BlockSums) -> BlockSums:
+    """Refuse samples that are not finite: their sums are not either."""
+    if not np.isfinite(blocks.moments).all():
+        raise InputError(
+            "lock_in.load and force must be finite, got values that are not; leave out "
+            "their samples, as asperity.measurement.measure does"
+        )
+    return blocks
+
+
+def _check_clock(time: Array) -> None:
+    if not (time[1:] > time[:-1]).all():
+        raise InputError(
+            "lock_in.time must rise from sample to sample, got equal or decreasing times; sort "
+            "or cut the recording"
+        )
+
+
+def _check_resolved(time: Array, frequency: float, harmonics: int) -> None:
+    span = float(time[-1] - time[0])
+    # Gaps do not lower the rate at which the rest is sampled.
+    rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
+    if not frequency > 0 or frequency * span < 1:
+        raise InputError(
+            f"lock_in.frequency must have at least one period in the window, got {frequency:.6g} "
+            f"Hz in {span:.6g} s; give a longer window or another frequency"
+        )
+    if 2 * harmonics * frequency >= rate:
+        raise InputError(
+            f"lock_in.harmonics must lie below half the sampling rate, got {harmonics} harmonics "
+            f"of {frequency:.6g} Hz at {rate:.6g} samples per second; ask for fewer"
+        )

@@ -1,0 +1,205 @@
+"""Noise of a reading, from the residual's own spectrum around each harmonic.
+
+The error of the amplitude at a frequency is the noise at that frequency. The variance of the
+coefficient of a column is therefore the mean of the periodogram of the residual over the nearest
+lines that are free of fitted columns, and not the mean square of the residual: both are the same
+for white noise, and only the former is right for coloured noise. Each averaged line counts as two
+degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.lock_in.basis import Basis
+from asperity.lock_in.blocks import BlockSums
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Lines averaged around a harmonic and next to zero frequency.
+_AROUND_HARMONIC = 20
+_NEXT_TO_ZERO = 6
+#: Lines above zero frequency to which a power law is fitted.
+_ABOVE_ZERO = 48
+#: With fewer lines than this, noise is assumed to be white.
+_FEWEST = 4
+
+
+@dataclass(frozen=True)
+class LocalNoise:
+    """Variance of the white noise that is as strong as the noise at k f.
+
+    Attributes
+    ----------
+    spectra : complex array, (n + 1, channels, channels)
+        Hermitian, for k = 0..n; in the channels' units squared.
+    dof : array, (n + 1,)
+        Degrees of freedom.
+    """
+
+    spectra: Complex
+    dof: Array
+
+
+def residual_sums(blocks: BlockSums, beta: Array) -> Complex:
+    """Sums of residual times e^(-i k phi) over each block.
+
+    Parameters
+    ----------
+    blocks : BlockSums
+    beta : array, (size, channels)
+        Fitted coefficients.
+
+    Returns
+    -------
+    complex array, (blocks, n + 1, channels)
+    """
+    n, first = blocks.basis.harmonics, blocks.basis.drift
+    left = blocks.moments - blocks.gram @ beta
+    cosine, sine = left[:, first : first + n], left[:, first + n : first + 2 * n]
+    return np.concatenate([left[:, :1].astype(complex), cosine - 1j * sine], axis=1)
+
+
+def local_noise(blocks: BlockSums, residual: Complex, white: Array) -> LocalNoise:
+    """Noise around each harmonic.
+
+    Parameters
+    ----------
+    blocks : BlockSums
+    residual : complex array, (blocks, n + 1, channels)
+        From `residual_sums`.
+    white : array, (channels, channels)
+        Covariance of the residual, used where the window is too short to resolve lines.
+    """
+    basis, samples = blocks.basis, float(blocks.count.sum())
+    periods = basis.omega * basis.half_width / np.pi
+    # Each block stands at its middle, in units of the window's length.
+    at = (blocks.middle - basis.centre) / (2 * basis.half_width)
+    spectra = np.empty((basis.harmonics + 1, white.shape[0], white.shape[0]), dtype=complex)
+    dof = np.empty(basis.harmonics + 1)
+    for k in range(basis.harmonics + 1):
+        lines = free_lines(k, periods, basis, samples, blocks.count.size)
+        if lines.size < 2 * _FEWEST:
+            spectra[k], dof[k] = white, max(samples - basis.linear - 1, 1.0)
+            continue
+        angle = 2 * np.pi * (lines[:, None] - k * periods) * at
+        turned = (np.cos(angle) - 1j * np.sin(angle)) @ residual[:, k]
+        near = turned if k else turned[: 2 * _NEXT_TO_ZERO]
+        spectra[k] = near.T @ near.conj() / (near.shape[0] * samples)
+        # Two numbers per line; half-integer lines carry no independent information.
+        dof[k] = near.shape[0]
+        if not k:
+            grown = np.sqrt(_growth(lines, turned))
+            spectra[k] *= grown[:, None] * grown
+    return LocalNoise(spectra, dof)
+
+
+def _growth(lines: Array, turned: Complex) -> Array:
+    """Ratio of the noise that acts on the mean to that of the lowest lines; (channels,).
+
+    1/f noise is stronger below the lowest line than in it. Its power law is extrapolated down to a
+    third of a line, which corresponds to noise that started a few windows ago.
+    """
+    away = np.log(lines) - np.log(lines).mean()
+    lever = max(float(away @ away), 1e-300)
+    exponent = -(away @ np.log(np.maximum(np.abs(turned) ** 2, 1e-300))) / lever
+    # The logarithm of a periodogram has standard deviation 1.28; half of the lines are independent.
+    scatter = 1.28 * np.sqrt(2.0 / lever)
+    # Exponents of white noise are zero within scatter; steeper than 1/f is drift, not noise.
+    exponent = np.where(exponent > 2.5 * scatter, np.minimum(exponent, 1.0), 0.0)
+    lowest = lines[: 2 * _NEXT_TO_ZERO, None]
+    return np.asarray((1 / 3.0) ** -exponent / np.mean(lowest**-exponent, axis=0))
+
+
+def free_lines(k: int, periods: float, basis: Basis, samples: float, blocks: int) -> Array:
+    """Numbers of the spectral lines next to a harmonic that are free of fitted columns.
+
+    Parameters
+    ----------
+    k : int
+        Harmonic, 0 for the mean.
+    periods : float
+        Number of modulation periods in the window.
+    basis : Basis
+    samples : float
+        Number of samples; the Nyquist frequency is half of it.
+    blocks : int
+        Number of blocks; lines farther from the harmonic than an eighth of it are averaged out.
+    """
+    wanted = _AROUND_HARMONIC if k else _ABOVE_ZERO
+    # Most lines between harmonics are free, unless there are few periods.
+    reach = min(blocks / 8, 3.0 * wanted + (2.0 * basis.harmonics * periods if periods < 64 else 0))
+    first = max(1.0 + (basis.degree > 0), k * periods - reach)
+    last = min(samples / 2 - 1, k * periods + reach)
+    # Half-integer lines too: a distant line such as hum leaks into these or the integer ones just
+    # as it leaks into the harmonic or its derivative, and could vanish in either set alone.
+    away = np.arange(np.ceil(2 * (first - k * periods)), 2 * (last - k * periods) + 1e-9) / 2
+    lines = k * periods + away
+    nearest = np.clip(np.rint(lines / periods), 0, basis.harmonics)
+    near = 0.9 if periods < 8 else 1.2
+    free = (np.abs(lines - periods * nearest) > near) | (lines < periods / 2)
+    lines = lines[free]
+    return lines[np.argsort(np.abs(lines - k * periods), kind="stable")[: 2 * wanted]]
+
+
+def column_harmonics(basis: Basis) -> NDArray[np.intp]:
+    """Harmonic of each column of the basis, 0 for the drift; (size,)."""
+    k = np.arange(1, basis.harmonics + 1)
+    return np.concatenate([np.zeros(basis.drift, dtype=np.intp), k, k, k, k])
+
+
+def quadrature(basis: Basis) -> Array:
+    """The matrix that maps cos to sin and sin to -cos, (size, size); 0 for the drift."""
+    n = basis.harmonics
+    turn = np.zeros((basis.size, basis.size))
+    for first in (basis.drift, basis.linear):
+        k = first + np.arange(n)
+        turn[k + n, k] = 1.0
+        turn[k, k + n] = -1.0
+    return turn
+
+
+def sum_covariance(
+    basis: Basis, gram: Array, noise: LocalNoise, columns: tuple[Array, Array]
+) -> Array:
+    """Covariance of the sums of noise times columns, for two channels.
+
+    Parameters
+    ----------
+    basis : Basis
+    gram : array, (size, size)
+        Of the whole window.
+    noise : LocalNoise
+    columns : (array (size, p), array (size, q))
+        Coefficients of the columns of each channel; each column belongs to one harmonic.
+
+    Returns
+    -------
+    array, (p + q, p + q)
+    """
+    of_column = column_harmonics(basis)
+    k = [of_column[np.argmax(np.abs(c), axis=0)] for c in columns]
+    turned = quadrature(basis)
+    rows = []
+    for a in (0, 1):
+        row = []
+        for b in (0, 1):
+            product = columns[a].T @ gram @ columns[b]
+            if a == b:
+                level = np.sqrt(noise.spectra[k[a], a, a].real)
+                row.append(level[:, None] * product * level)
+                continue
+            # Noise of two channels is correlated within one harmonic only: in phase by the real
+            # part of the cross-spectrum, in quadrature by the imaginary one.
+            cross = noise.spectra[k[a], a, b][:, None]
+            across = (turned @ columns[a]).T @ gram @ columns[b]
+            same = k[a][:, None] == k[b]
+            row.append(np.where(same, cross.real * product + cross.imag * across, 0.0))
+        rows.append(np.hstack(row))
+    whole = np.vstack(rows)
+    # Symmetrised: with incomplete periods the columns overlap.
+    return (whole + whole.T) / 2

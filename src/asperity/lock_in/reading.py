@@ -1,0 +1,266 @@
+"""Result of a lock-in: harmonics, their covariance, and the residual."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError, closest
+from asperity.lock_in.blocks import BlockSums
+from asperity.lock_in.noise import LocalNoise
+from asperity.lock_in.phasor import Phasor
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_SCALARS = ("W0", "epsilon", "frequency", "mean_force", "mean_friction")
+
+
+@dataclass(frozen=True, eq=False)
+class LockInReading:
+    """Harmonics of F/W0 against the measured load, with their joint covariance.
+
+    Attributes
+    ----------
+    W0, mean_force : float
+        Means over the window, in the unit of the channels; with drift, of the fitted drift.
+    epsilon : float
+        Relative peak amplitude of the load at the fundamental.
+    frequency : float
+        Hz.
+    mean_friction : float
+        mean_force/W0.
+    harmonics : complex array, (n,)
+        c_1 ... c_n of F/W0; mu_n is the modulus, phase_n the argument.
+    load_harmonics : complex array, (n,)
+        Harmonics of W/W0; the first is epsilon, real.
+    names : tuple of str
+        Names of the rows of `covariance`: W0, epsilon, frequency, mean_force, mean_friction, then
+        re1, im1, ... of the force and load_re2, load_im2, ... of the load.
+    covariance : array, (len(names), len(names))
+    dof : array, (n + 1,)
+        Degrees of freedom of the noise near k f, k = 0..n.
+    drift : array, (2, degree)
+        Change of load and force from the first to the last sample, by each drift term.
+    start, end : float
+        First and last time (s) of the window.
+    samples : int
+    phase : float
+        Phase of the load at the middle of the window (rad).
+    noise : LocalNoise
+    blocks : BlockSums
+    residual : complex array, (blocks, n + 1, 2)
+        Sums of the residuals of load and force times e^(-ik phi), over each block.
+    """
+
+    W0: float
+    epsilon: float
+    frequency: float
+    mean_force: float
+    mean_friction: float
+    harmonics: Complex
+    load_harmonics: Complex
+    names: tuple[str, ...]
+    covariance: Array
+    dof: Array
+    drift: Array
+    start: float
+    end: float
+    samples: int
+    phase: float
+    noise: LocalNoise
+    blocks: BlockSums
+    residual: Complex
+
+    @property
+    def periods(self) -> float:
+        """Number of modulation periods in the window."""
+        return (self.end - self.start) * self.frequency
+
+    def uncertainty(self, name: str) -> float:
+        """Standard uncertainty of a number; one of `names`, mu1, phase1, mu2, ...
+
+        Raises
+        ------
+        InputError
+            For any other name.
+        """
+        for kind in ("mu", "phase"):
+            if name.startswith(kind) and name[len(kind) :].isdigit():
+                phasor = self.phasor(int(name[len(kind) :]))
+                if kind == "mu":
+                    return phasor.amplitude_uncertainty
+                return phasor.phase_uncertainty
+        if name not in self.names:
+            raise InputError(
+                f"LockInReading.uncertainty must name a number, got '{name}'; "
+                f"{closest(name, self.names)}"
+            )
+        at = self.names.index(name)
+        return math.sqrt(max(float(self.covariance[at, at]), 0.0))
+
+    def phasor(self, n: int) -> Phasor:
+        """Harmonic n of F/W0 with its uncertainty."""
+        if not 1 <= n <= self.harmonics.size:
+            raise InputError(
+                f"LockInReading.phasor must be one of 1 to {self.harmonics.size}, got {n}; "
+                "ask for more harmonics"
+            )
+        at = [self.names.index(f"re{n}"), self.names.index(f"im{n}")]
+        return Phasor(
+            complex(self.harmonics[n - 1]),
+            self.covariance[np.ix_(at, at)],
+            float(min(self.dof[n], self.dof[1])),
+        )
+
+    def load_phasor(self, n: int) -> Phasor:
+        """Harmonic n >= 2 of W/W0 with its uncertainty."""
+        at = [self.names.index(f"load_re{n}"), self.names.index(f"load_im{n}")]
+        return Phasor(
+            complex(self.load_harmonics[n - 1]),
+            self.covariance[np.ix_(at, at)],
+            float(min(self.dof[n], self.dof[1])),
+        )
+
+    def half_width(self, name: str, level: float = 0.95) -> float:
+        """Half width of the confidence interval of a number, by Student's t.
+
+        For a phase it is pi where the amplitude of its harmonic is compatible with zero.
+
+        Parameters
+        ----------
+        name : str
+            As in `uncertainty`.
+        level : float
+            Probability.
+        """
+        from scipy.special import stdtrit
+
+        if name.startswith("phase") and not self.phasor(int(name[5:])).excludes(0, level):
+            return math.pi
+        digits = "".join(filter(str.isdigit, name.removeprefix("W0")))
+        at = {"W0": 0, "mean_force": 0, "mean_friction": 0}.get(name, int(digits or 1))
+        quantile = stdtrit(min(self.dof[at], self.dof[min(at, 1)]), 0.5 + level / 2)
+        return float(quantile) * self.uncertainty(name)
+
+
+def reading_of(
+    blocks: BlockSums,
+    beta: Array,
+    omega: float,
+    covariance: Array,
+    noise: LocalNoise,
+    residual: Complex,
+    *,
+    fitted: bool,
+) -> LockInReading:
+    """The reading that follows from the coefficients of load and force.
+
+    Parameters
+    ----------
+    blocks : BlockSums
+    beta : array, (linear, 2)
+        Coefficients of load and force.
+    omega : float
+        Angular frequency (rad/s).
+    covariance : array
+        Of (beta of the load, omega if `fitted`, beta of the force).
+    noise, residual
+        As in `LockInReading`.
+    fitted : bool
+        Whether omega was fitted.
+    """
+    basis = blocks.basis
+    n, first, linear = basis.harmonics, basis.drift, basis.linear
+    # Amplitudes of cos and sin are the real part and minus the imaginary one of a phasor.
+    phasors = beta[first : first + n] - 1j * beta[first + n : linear]
+    average = 1 / np.arange(1, first + 1) * (np.arange(first) % 2 == 0)
+    mean_load, mean_force = average @ beta[:first]
+    if not mean_load:
+        raise InputError(
+            "lock_in.load must have a mean to be relative to, got 0; give the load and not its "
+            "change"
+        )
+    # Phase of W/W0: a load that is recorded as negative has a positive amplitude too.
+    phase = float(np.angle(phasors[0, 0] / mean_load))
+    turn = np.exp(-1j * phase * np.arange(1, n + 1))
+    relative = phasors * turn[:, None] / mean_load
+    jacobian = _jacobian(basis.drift, average, phasors, relative, mean_load, mean_force, fitted)
+    names = (
+        *_SCALARS,
+        *(f"{part}{k}" for k in range(1, n + 1) for part in ("re", "im")),
+        *(f"load_{part}{k}" for k in range(2, n + 1) for part in ("re", "im")),
+    )
+    powers = np.arange(1, first)
+    return LockInReading(
+        W0=float(mean_load),
+        epsilon=float(abs(relative[0, 0])),
+        frequency=omega / (2 * math.pi),
+        mean_force=float(mean_force),
+        mean_friction=float(mean_force / mean_load),
+        harmonics=relative[:, 1],
+        load_harmonics=relative[:, 0],
+        names=names,
+        covariance=jacobian @ covariance @ jacobian.T,
+        dof=noise.dof,
+        drift=(beta[1:first] * (1 - (-1.0) ** powers)[:, None]).T,
+        start=basis.centre - basis.half_width,
+        end=basis.centre + basis.half_width,
+        samples=int(blocks.count.sum()),
+        phase=phase,
+        noise=noise,
+        blocks=blocks,
+        residual=residual,
+    )
+
+
+def _jacobian(
+    first: int,
+    average: Array,
+    phasors: Complex,
+    relative: Complex,
+    mean_load: float,
+    mean_force: float,
+    fitted: bool,
+) -> Array:
+    """Derivatives of the numbers of a reading by (beta of the load, omega, beta of the force)."""
+    n = phasors.shape[0]
+    linear = first + 2 * n
+    size = 2 * linear + fitted
+    k = np.arange(n)
+
+    def phasor_rows(at: int) -> Complex:
+        rows = np.zeros((n, size), dtype=complex)
+        rows[k, at + first + k] = 1.0
+        rows[k, at + first + n + k] = -1j
+        return rows
+
+    load, force = phasor_rows(0), phasor_rows(linear + fitted)
+    level, mean = np.zeros(size), np.zeros(size)
+    level[:first] = average / mean_load
+    mean[linear + fitted :][:first] = average
+    # Relative change of the load's fundamental: real part amplitude, imaginary part phase.
+    own = load[0] / phasors[0, 0]
+    order = np.arange(1, n + 1)[:, None]
+    turn = np.exp(-1j * np.angle(phasors[0, 0] / mean_load) * order) / mean_load
+    lost = 1j * order * own.imag + level
+    force_rows = turn * force - relative[:, 1:] * lost
+    load_rows = turn * load - relative[:, :1] * lost
+    frequency = np.zeros(size)
+    if fitted:
+        frequency[linear] = 1 / (2 * math.pi)
+    friction = mean_force / mean_load
+    return np.vstack(
+        [
+            level * mean_load,
+            abs(relative[0, 0]) * (own.real - level),
+            frequency,
+            mean,
+            mean / mean_load - friction * level,
+            np.stack([force_rows.real, force_rows.imag], axis=1).reshape(-1, size),
+            np.stack([load_rows.real, load_rows.imag], axis=1).reshape(-1, size)[2:],
+        ]
+    )

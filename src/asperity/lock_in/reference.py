@@ -1,0 +1,285 @@
+"""The reference of the lock-in: frequency of the load's modulation, from the load itself.
+
+An error of 1e-4 of the frequency is 0.38 rad after 10 s at 60 Hz, so the frequency is a parameter
+of the least-squares fit and not a setting. The fit starts from the strongest line of a spectrum,
+in a window short enough for that start, and is repeated in windows four times as long up to the
+whole one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.lock_in.basis import Basis
+from asperity.lock_in.blocks import even_step, sums
+from asperity.lock_in.normal_equations import solved
+
+Array = NDArray[np.float64]
+
+#: Samples of the spectrum in which the line is searched.
+_SPECTRUM = 1 << 16
+#: With fewer periods the maximum of the line is too inaccurate: the residual of the fit is scanned.
+_FEW_PERIODS = 8.0
+#: Largest last step, as phase (rad) at the ends of the window. Its square is the remaining error,
+#: and the square of that after the step that `asperity.lock_in.demodulation.read` makes.
+CONVERGED = 1e-3
+_MOST_STEPS = 12
+
+
+class SpectralLine(NamedTuple):
+    """The strongest line of a spectrum: frequency (Hz), amplitude, and its background there."""
+
+    frequency: float
+    amplitude: float
+    background: float
+
+
+def strongest_line(
+    time: Array, values: Array, *, between: tuple[float, float] | None = None
+) -> SpectralLine:
+    """The strongest line of the spectrum of a signal.
+
+    Its background is the median amplitude of the spectrum between half and twice its
+    frequency.
+
+    Parameters
+    ----------
+    time, values : array, (n,)
+        Even or not; gaps are bridged by straight lines for this search only.
+    between : (float, float), optional
+        Range of the search (Hz), widened to two lines of the spectrum.
+
+    Raises
+    ------
+    InputError
+        If the recording is too short to hold the frequency.
+    """
+    step, thinned = _evenly(time, values, _SPECTRUM)
+    if not np.isfinite([step, thinned.sum()]).all():
+        raise InputError(
+            "lock_in.load must be finite, got values that are not; leave out their samples, as "
+            "asperity.measurement.measure does"
+        )
+    spectra = [_spectrum(step, thinned)]
+    if time.size > _SPECTRUM:
+        # Averages over several samples hide fast lines: these are searched in a part.
+        at = (time.size - _SPECTRUM) // 2
+        piece = slice(at, at + _SPECTRUM)
+        spectra.append(_spectrum(*_evenly(time[piece], values[piece], _SPECTRUM)))
+    lines = [_top(*spectrum, between) for spectrum in spectra]
+    found = [line for line in lines if line is not None]
+    if not found:
+        where = "" if between is None else f" about {sum(between) / 2:.6g} Hz"
+        raise InputError(
+            f"reference.frequency must lie within what the recording resolves, got {time.size} "
+            f"samples in {time[-1] - time[0]:.6g} s{where}; give another frequency or a longer "
+            "window"
+        )
+    return max(found, key=lambda line: line.amplitude)
+
+
+def require_modulated(line: SpectralLine, load: Array) -> None:
+    """Refuse a load that is constant; noise alone is not refused.
+
+    Raises
+    ------
+    InputError
+        If the line is rounding error.
+    """
+    if not line.amplitude > 1e-13 * abs(float(load[0])):
+        raise InputError(
+            f"lock_in.load must be modulated, got a constant of {float(load[0]):.6g}; name another "
+            "column, or measure without modulation"
+        )
+
+
+def around(frequency: float | None) -> tuple[float, float] | None:
+    """Range of the search for an approximately known frequency: 5 % to either side."""
+    return None if frequency is None else (0.95 * frequency, 1.05 * frequency)
+
+
+def fit_frequency(
+    time: Array,
+    load: Array,
+    start: float,
+    *,
+    harmonics: int,
+    degree: int,
+    step: float | None,
+    share: float = 1.0,
+) -> float:
+    """Frequency (Hz) by nonlinear least squares on a load.
+
+    Parameters
+    ----------
+    time, load : array, (n,)
+    start : float
+        Hz, accurate to a fraction of a cycle over a few periods.
+    harmonics : int
+        Fitted together with the fundamental, so that they do not bias it.
+    degree : int
+        Degree of the drift.
+    step : float, optional
+        Sampling interval (s) of an even clock.
+    share : float
+        Fraction of the load that is used, its middle part.
+    """
+    omega = 2 * np.pi * start
+    most = int(share * time.size)
+    span = float(time[-1] - time[0])
+    size = time.size
+    if span * start < _FEW_PERIODS:
+        omega = _scanned(time, load, omega, degree)
+    else:
+        # An error of half a cycle over the first window, with a factor of safety.
+        size = int(min(size, max(_FEW_PERIODS / (start * span) * size, size / 64)))
+    while True:
+        at = (time.size - size) // 2
+        window = slice(at, at + size)
+        omega = _converged(time[window], load[window], omega, harmonics, degree, step)
+        if size >= most:
+            return omega / (2 * np.pi)
+        size = min(4 * size, most)
+
+
+def frequency_direction(basis: Basis, beta: Array) -> Array:
+    """Derivative of a fit with respect to omega, as coefficients on the basis.
+
+    Parameters
+    ----------
+    basis : Basis
+    beta : array, (linear,)
+        Coefficients of the drift and of the harmonics.
+
+    Returns
+    -------
+    array, (size,)
+    """
+    n = basis.harmonics
+    k = np.arange(1, n + 1) * basis.half_width
+    cosine, sine = beta[basis.drift :][:n], beta[basis.drift :][n:]
+    direction = np.zeros(basis.size)
+    direction[basis.linear :][:n] = k * sine
+    direction[basis.linear :][n:] = -k * cosine
+    return direction
+
+
+def window_basis(time: Array, omega: float, harmonics: int, degree: int) -> Basis:
+    """The basis of a window, its time counted from the middle."""
+    half = float(time[-1] - time[0]) / 2
+    return Basis(omega, harmonics, degree, float(time[0]) + half, half)
+
+
+def _converged(
+    time: Array, load: Array, omega: float, harmonics: int, degree: int, step: float | None
+) -> float:
+    for _ in range(_MOST_STEPS):
+        basis = window_basis(time, omega, harmonics, degree)
+        gram, moments = sums(basis, time, [load], step=step).totals()
+        change = frequency_step(basis, gram, moments[:, 0])
+        # Beyond a radian at the ends the linearisation is not valid.
+        change = float(np.clip(change, -1 / basis.half_width, 1 / basis.half_width))
+        omega += change
+        if abs(change) * basis.half_width < CONVERGED:
+            break
+    return omega
+
+
+def frequency_step(basis: Basis, gram: Array, moments: Array) -> float:
+    """Gauss-Newton step of omega.
+
+    Parameters
+    ----------
+    basis : Basis
+    gram, moments : array, (size, size) and (size,)
+        Normal equations of the load.
+    """
+    linear = basis.linear
+    beta = solved(gram[:linear, :linear], moments[:linear])
+    columns = np.eye(basis.size)[:, : linear + 1]
+    columns[:, linear] = frequency_direction(basis, beta)
+    return float(solved(columns.T @ gram @ columns, columns.T @ moments)[linear])
+
+
+def _scanned(time: Array, load: Array, omega: float, degree: int) -> float:
+    """The frequency around a start whose fit has the smallest residual."""
+    span = float(time[-1] - time[0])
+    width = min(0.5 * omega, 2 * np.pi / span)
+    tried = omega + np.linspace(-width, width, 41)
+    thin = slice(None, None, max(1, time.size // 512))
+    level = load - load.mean()
+
+    def residual(w: float) -> float:
+        # The fundamental alone: with harmonics, half the frequency would fit as well.
+        basis = window_basis(time[thin], w, 1, degree)
+        columns = basis.columns(time[thin])[: basis.linear]
+        beta = np.linalg.lstsq(columns.T, level[thin])[0]
+        return float(np.sum((level[thin] - beta @ columns) ** 2))
+
+    return float(tried[np.argmin([residual(w) for w in tried])])
+
+
+def _evenly(time: Array, values: Array, most: int) -> tuple[float, Array]:
+    """Step and values on an even grid of at most so many points, averaged where it is coarser."""
+    together = -(-time.size // most)
+    if together > 1:
+        whole = time.size // together * together
+        # The time of the sample in the middle is accurate enough for the search.
+        time = time[together // 2 : whole : together]
+        values = values[:whole].reshape(-1, together).mean(1)
+    span = float(time[-1] - time[0])
+    if even_step(time, np.pi * time.size / span) is None:
+        grid = np.linspace(time[0], time[-1], min(4 * time.size, most))
+        values = np.interp(grid, time, values)
+    return span / (values.size - 1), values
+
+
+def _spectrum(step: float, values: Array) -> tuple[Array, Array]:
+    """Frequencies and amplitudes of lines, without mean and slope, in a Hann window."""
+    # Lengths with large prime factors cost many times as much.
+    values = values[: _smooth(values.size)]
+    u = np.linspace(-1, 1, values.size)
+    level = values - values.mean()
+    level = level - u * (3 * np.mean(u * level))
+    hann = np.cos(np.pi / 2 * u) ** 2
+    amplitude = np.abs(np.fft.rfft(level * hann)) * (2 / hann.sum())
+    frequency = np.asarray(np.fft.rfftfreq(values.size, step), dtype=np.float64)
+    return frequency, amplitude
+
+
+def _top(
+    frequency: Array, amplitude: Array, between: tuple[float, float] | None
+) -> SpectralLine | None:
+    allowed = np.ones(amplitude.size, dtype=bool)
+    allowed[:2] = allowed[-1:] = False
+    if between is not None:
+        middle, half = sum(between) / 2, (between[1] - between[0]) / 2
+        allowed &= np.abs(frequency - middle) <= max(half, 2 * frequency[1])
+    if not allowed.any():
+        return None
+    at = int(np.argmax(np.where(allowed, amplitude, -1.0)))
+    left, top, right = np.log(np.maximum(amplitude[at - 1 : at + 2], 1e-300))
+    bend = left - 2 * top + right
+    # A line at the edge of the allowed range may have a higher neighbour outside.
+    offset = float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5)) if bend < 0 else 0.0
+    around = amplitude[max(1, at // 2) : 2 * at + 2]
+    return SpectralLine(
+        float(frequency[1] * (at + offset)), float(amplitude[at]), float(np.median(around))
+    )
+
+
+def _smooth(size: int) -> int:
+    """The largest length up to this one without prime factors above 5."""
+    best = 1
+    for fives in range(12):
+        for threes in range(18):
+            odd = 5**fives * 3**threes
+            if odd > size:
+                break
+            best = max(best, odd << int(math.log2(size // odd)))
+    return best

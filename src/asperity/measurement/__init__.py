@@ -1,0 +1,1 @@
+"""From a recording to numbers with uncertainties and verdicts: windows, segments, levels."""

@@ -1,0 +1,322 @@
+"""Many recordings measured alike: one table, a row for each amplitude, velocity step and hold.
+
+Files are measured in processes of their own. What is finished is kept beside the output as lines of
+JSON, so that an interrupted campaign goes on where it stopped; at the end the table is written as
+CSV or NetCDF. A file that cannot be measured is a row with its reason.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from asperity.errors import InputError
+from asperity.measurement.record import observable_covariance
+from asperity.outputs import Interrupted, UnfinishedText, output_file, written_file
+
+if TYPE_CHECKING:
+    from asperity.measurement.measure import Measurement
+    from asperity.measurement.sliding.measure import SlidingMeasurement
+
+Row = dict[str, Any]
+
+#: Columns that stand first; the others follow in the order of their first row.
+_FIRST = ("file", "part", "kind", "start", "end", "verdict", "reason")
+#: Columns of steps and holds that the table has, besides their uncertainties.
+_STEP = (
+    "velocity_before",
+    "velocity_after",
+    "change",
+    "noise_uncertainty",
+    "choice_uncertainty",
+    "rate_dependence",
+    "rate_uncertainty",
+    "rate_interval_95",
+    "peak",
+    "trend",
+    "settling_slip",
+)
+_HOLD = (
+    "hold_time",
+    "velocity",
+    "level",
+    "level_uncertainty",
+    "relaxation",
+    "relaxation_uncertainty",
+    "peak",
+    "healing",
+    "healing_uncertainty",
+    "interval_95",
+    "reload_slope",
+)
+
+
+@dataclass(frozen=True)
+class CampaignSummary:
+    """What became of a campaign.
+
+    Attributes
+    ----------
+    files, rows, failed : int
+        Files measured, rows of the table, and rows without result among them.
+    out : Path
+    """
+
+    files: int
+    rows: int
+    failed: int
+    out: Path
+
+
+def run_campaign(
+    files: Sequence[Path],
+    rows_of: Callable[[Path], list[Row]],
+    out: Path,
+    *,
+    inputs: Mapping[str, Any],
+    resume: bool = False,
+    jobs: int = 1,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> CampaignSummary:
+    """Measure files one by one and write their rows as one table.
+
+    Parameters
+    ----------
+    files : sequence of Path
+    rows_of : callable
+        Rows of one file; it can be sent to another process, and lets no `InputError` out.
+    out : Path
+        ``.csv`` or ``.nc``.
+    inputs : mapping
+        All that the rows depend on besides the files, as JSON values.
+    resume : bool
+        Go on after an interruption.
+    jobs : int
+        Processes.
+    progress : callable, optional
+        Called with files done, all files, and the name of the last.
+
+    Raises
+    ------
+    InputError
+        If `out` cannot be written, or what an interrupted campaign has left belongs to others.
+    Interrupted
+        On Ctrl-C.
+    """
+    if out.suffix.lower() not in (".csv", ".nc"):
+        raise InputError(
+            f"--out must be a CSV or a NetCDF file, got '{out}'; write it like --out campaign.csv"
+        )
+    out = output_file(
+        out, "--out", example="campaign.csv", inputs={f"recording '{f}'": f for f in files}
+    )
+    report = progress or (lambda done, total, label: None)
+    unfinished = UnfinishedText(out, {**inputs, "files": {str(f): _stamp(f) for f in files}})
+    done = int(unfinished.start(resume).get("files", 0))
+    report(done, len(files), "")
+    try:
+        for path, rows in _measured(files[done:], rows_of, jobs):
+            text = "".join(f"{json.dumps(row)}\n" for row in rows)
+            failed = sum(bool(row["reason"]) for row in rows)
+            unfinished.append(text, len(rows), files=1, failed=failed)
+            done += 1
+            report(done, len(files), path.name)
+        table = [json.loads(line) for line in unfinished.text().splitlines()]
+        with written_file(out, "--out") as file:
+            (write_csv if out.suffix.lower() == ".csv" else _write_netcdf)(file, table)
+        unfinished.discard()
+    except KeyboardInterrupt:
+        raise Interrupted(f"{done} of {len(files)} files" if done else "") from None
+    finally:
+        unfinished.discard_if_empty()
+    return CampaignSummary(len(files), len(table), sum(bool(r["reason"]) for r in table), out)
+
+
+def _stamp(path: Path) -> str:
+    """Size and time of change of a file; what is not there has none."""
+    try:
+        status = path.stat()
+    except OSError:
+        return "missing"
+    return f"{status.st_size} bytes, {status.st_mtime_ns}"
+
+
+def _measured(
+    files: Sequence[Path], rows_of: Callable[[Path], list[Row]], jobs: int
+) -> Iterator[tuple[Path, list[Row]]]:
+    jobs = min(jobs, len(files))
+    if jobs <= 1:
+        for path in files:
+            yield path, rows_of(path)
+        return
+    # Fresh processes: a fork of one that runs threads may hang.
+    context = multiprocessing.get_context("spawn")
+    pool = ProcessPoolExecutor(jobs, mp_context=context, initializer=_ignore_interrupts)
+    try:
+        yield from zip(files, pool.map(rows_of, files), strict=True)
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _ignore_interrupts() -> None:
+    """Ctrl-C is the main process's to answer."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def failed_row(path: Path, part: int, reason: str) -> Row:
+    """The row of what could not be measured."""
+    return {"file": str(path), "part": part, "kind": "", "verdict": "", "reason": reason}
+
+
+def modulated_rows(path: Path, found: Iterable[Measurement | InputError]) -> list[Row]:
+    """Rows of the amplitudes of one recording, in their order.
+
+    Parameters
+    ----------
+    path : Path
+    found : iterable of Measurement or InputError
+        From `asperity.measurement.measure.measure_amplitudes`.
+    """
+    rows = []
+    for part, measurement in enumerate(found, 1):
+        if isinstance(measurement, InputError):
+            rows.append(failed_row(path, part, str(measurement)))
+            continue
+        reading = measurement.reading
+        row: Row = {
+            "file": str(path),
+            "part": part,
+            "kind": "amplitude",
+            "start": reading.start,
+            "end": reading.end,
+            "verdict": measurement.verdict,
+            "reason": "",
+        }
+        names = ["W0", "epsilon", "frequency", "mean_force", "mean_friction"]
+        row |= {name: float(getattr(reading, name)) for name in names}
+        for n in range(1, reading.harmonics.size + 1):
+            phasor = reading.phasor(n)
+            row |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
+            names += [f"mu{n}", f"phase{n}"]
+        row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in names}
+        row |= {
+            "static_friction": measurement.static_friction,
+            "delta_mu": measurement.delta_mu,
+            "delta_mu_uncertainty": measurement.delta_mu_uncertainty,
+            "delta_mu_interval_95": measurement.delta_mu_interval_95,
+            "unit": measurement.samples.unit,
+            "checks": _named(measurement.checks),
+        }
+        observed, covariance = observable_covariance(measurement)
+        row |= {
+            f"{first}_{second}_cov": float(covariance[i, j])
+            for j, second in enumerate(observed)
+            for i, first in enumerate(observed[:j])
+        }
+        rows.append(row)
+    return rows
+
+
+def sliding_rows(path: Path, found: SlidingMeasurement) -> list[Row]:
+    """Rows of the velocity steps and holds of one recording; of its mean friction without any."""
+    common = {"file": str(path), "verdict": found.verdict, "reason": ""}
+    rows: list[Row] = []
+    for step in found.steps:
+        row = {"kind": "step", "start": step.time, "end": step.time}
+        row |= {name: getattr(step, name) for name in _STEP}
+        rows.append(row | {"change_uncertainty": step.uncertainty})
+    for hold in found.holds:
+        row = {"kind": "hold", "start": hold.start, "end": hold.end}
+        rows.append(row | {name: getattr(hold, name) for name in _HOLD})
+    rows.sort(key=lambda row: row["start"])
+    friction = found.friction
+    if not rows:
+        rows = [{"kind": "level", "start": friction.start, "end": friction.end}]
+    more = {
+        "mean_friction": friction.value,
+        "mean_friction_uncertainty": friction.uncertainty,
+        "healing_per_decade": found.healing.per_decade if found.healing else math.nan,
+        "healing_per_decade_uncertainty": found.healing.uncertainty if found.healing else math.nan,
+        "checks": _named(found.checks),
+    }
+    return [common | {"part": k} | row | more for k, row in enumerate(rows, 1)]
+
+
+def _named(checks: Iterable[Any]) -> str:
+    """Checks that are not ok, as ``name: verdict; ...``."""
+    return "; ".join(f"{c.name}: {c.verdict}" for c in checks if c.verdict != "ok")
+
+
+def _columns(table: list[Row]) -> list[str]:
+    names = dict.fromkeys(_FIRST)
+    for row in table:
+        names |= dict.fromkeys(row)
+    names.pop("checks", None)
+    return [*names, "checks"]
+
+
+def write_csv(path: Path, table: list[Row]) -> None:
+    """Write rows as a table with a column for each of their fields.
+
+    Parameters
+    ----------
+    path : Path
+    table : list of dict
+        From `modulated_rows` and `sliding_rows`.
+    """
+    names = _columns(table)
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(names)
+        for row in table:
+            writer.writerow([_cell(row.get(name, "")) for name in names])
+
+
+def _cell(value: Any) -> Any:
+    """What is not known is an empty cell."""
+    return "" if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _write_netcdf(path: Path, table: list[Row]) -> None:
+    import numpy as np
+    import xarray as xr
+
+    variables: dict[str, Any] = {}
+    for name in _columns(table):
+        values = [row.get(name) for row in table]
+        if all(isinstance(v, int | float) or v is None for v in values):
+            numbers = np.array([np.nan if v is None else v for v in values], dtype=float)
+            variables[name] = ("row", numbers, {"units": _unit(name)})
+        else:
+            variables[name] = (
+                "row",
+                np.array(["" if v is None else str(v) for v in values], object),
+            )
+    data = xr.Dataset(variables, attrs={"title": "asperity measure: one row a file and part"})
+    data.to_netcdf(path, engine="h5netcdf")
+
+
+def _unit(name: str) -> str:
+    """SI unit of a column; W0 and mean_force are in the column 'unit'."""
+    stem = name.removesuffix("_uncertainty").removesuffix("_interval_95")
+    units = {
+        "start": "s",
+        "end": "s",
+        "hold_time": "s",
+        "frequency": "Hz",
+        "settling_slip": "m",
+        "reload_slope": "1/m",
+    }
+    if stem.startswith("velocity"):
+        return "m/s"
+    if stem.startswith("phase"):
+        return "rad"
+    return units.get(stem, "" if stem in ("W0", "mean_force") else "1")

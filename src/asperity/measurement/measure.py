@@ -1,0 +1,439 @@
+"""From a recording to a reading with its verdicts: what `asperity measure` does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from asperity.errors import InputError
+from asperity.lock_in.demodulation import DRIFTS, lock_in
+from asperity.lock_in.reading import LockInReading
+from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
+from asperity.measurement.pauses import under_the_same_load
+from asperity.measurement.samples import Samples, about_window, usable
+from asperity.measurement.series import MeanLevel, block_means, mean_level, settled_from
+from asperity.measurement.verdicts import (
+    checks,
+    instrument,
+    interference,
+    plausible,
+    steadiness,
+)
+from asperity.measurement.verdicts.shift import shifting_response
+from asperity.measurement.verdicts.verdict import Check, Verdict, worst
+from asperity.measurement.window import (
+    Stretch,
+    clean_run,
+    settled,
+    stretches,
+    whole_periods,
+)
+from asperity.parameters.display import Displayed, SummaryLine
+
+if TYPE_CHECKING:
+    from asperity.recording.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: A line this often above its background is a modulation.
+_LINE = 8.0
+#: Pieces of a long recording that are searched for the modulation, and their samples.
+_PIECES, _PIECE = 32, 1 << 15
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Measurement(Displayed):
+    """A reading of one modulated stretch, what was around it, and what is to be thought of it.
+
+    Attributes
+    ----------
+    reading : LockInReading
+    before, after : MeanLevel or None
+        F(0): force without modulation next to the stretch, in the channels' unit.
+    static_friction : float
+        F(0)/W0 of the unmodulated load, mean of before and after; NaN if neither was recorded.
+    delta_mu, delta_mu_uncertainty, delta_mu_interval_95 : float
+        mean_friction - static_friction, its standard uncertainty, and half of its 95 % interval.
+    checks : tuple of Check
+        Every question with number, limits and sentence.
+    stretches : tuple of Stretch
+        Modulated and unmodulated parts of the whole recording.
+    samples : Samples
+        What could be used of it.
+    window : (int, int)
+        Samples that were read, as a slice of `samples`.
+    chosen_by : {"program", "user"}
+        Who chose the window.
+    """
+
+    reading: LockInReading
+    before: MeanLevel | None
+    after: MeanLevel | None
+    static_friction: float
+    delta_mu: float
+    delta_mu_uncertainty: float
+    delta_mu_interval_95: float
+    checks: tuple[Check, ...]
+    stretches: tuple[Stretch, ...]
+    samples: Samples
+    window: tuple[int, int]
+    chosen_by: str
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """The window, its observables, and the checks that are not good."""
+        reading = self.reading
+        lines = [
+            SummaryLine("window", f"{reading.start:.6g} to {reading.end:.6g}", "s"),
+            SummaryLine("epsilon", f"{reading.epsilon:.6g}"),
+            SummaryLine("frequency", f"{reading.frequency:.9g}", "Hz"),
+            SummaryLine("mean_friction", f"{reading.mean_friction:.6g}"),
+            SummaryLine(
+                "delta_mu",
+                f"{self.delta_mu:.4g} +- {self.delta_mu_uncertainty:.1g}"
+                if math.isfinite(self.delta_mu)
+                else "none",
+            ),
+            *(
+                SummaryLine(f"mu{n}", f"{abs(c):.4g}")
+                for n, c in enumerate(reading.harmonics[:2], 1)
+            ),
+            SummaryLine("verdict", str(self.verdict)),
+        ]
+        doubts = [SummaryLine(c.name, str(c.verdict), c.sentence) for c in self.checks]
+        return "Measurement", lines + [d for d in doubts if d.value in ("suspicious", "bad")]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The gravest of all."""
+        return worst(self.checks)
+
+
+def measure(
+    trace: Trace,
+    *,
+    load: str = "W",
+    force: str = "F",
+    frequency: float | None = None,
+    harmonics: int = 4,
+    window: tuple[float, float] | None = None,
+    detrend: str = "linear",
+    only_whole_periods: bool = False,
+    refine: bool = True,
+) -> Measurement:
+    """Read the response to a modulated load out of a recording, and judge it.
+
+    Parameters
+    ----------
+    trace : Trace
+    load, force : str
+        Channels, by name or role.
+    frequency : float, optional
+        Hz, to start from; None finds it.
+    harmonics : int
+    window : (float, float), optional
+        First and last time (s) to read. None takes the longest modulated stretch, without what has
+        not settled, and away from gaps and saturation where the rest is long enough.
+    detrend : {"none", "linear", "quadratic"}
+    only_whole_periods : bool
+        Cut the window to whole periods. The fit does not need it.
+    refine : bool
+        Fit the frequency. If not, `frequency` is taken to be exact.
+
+    Returns
+    -------
+    Measurement
+
+    Raises
+    ------
+    InputError
+        If channels, window or frequency do not fit the recording, or no modulation stands out and
+        no frequency is given.
+    """
+    recording = _prepared(trace, load, force, frequency, detrend, refine)
+    return _measured(
+        recording, None, harmonics, window, detrend, only_whole_periods=only_whole_periods
+    )
+
+
+def measure_amplitudes(
+    trace: Trace,
+    *,
+    load: str = "W",
+    force: str = "F",
+    frequency: float | None = None,
+    harmonics: int = 4,
+    detrend: str = "linear",
+    only_whole_periods: bool = False,
+    refine: bool = True,
+) -> list[Measurement | InputError]:
+    """Read every modulated stretch of a recording, in their order.
+
+    Parameters
+    ----------
+    trace, load, force, frequency, harmonics, detrend, only_whole_periods, refine
+        As in `measure`.
+
+    Returns
+    -------
+    list of Measurement or InputError
+        The error of a stretch that cannot be read, such as one that is too short.
+
+    Raises
+    ------
+    InputError
+        As `measure` where the recording as a whole cannot be read.
+    """
+    recording = _prepared(trace, load, force, frequency, detrend, refine)
+    found: list[Measurement | InputError] = []
+    for part in recording.parts:
+        if not part.modulated:
+            continue
+        try:
+            found.append(
+                _measured(
+                    recording, part, harmonics, None, detrend, only_whole_periods=only_whole_periods
+                )
+            )
+        except InputError as error:
+            found.append(error)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """A recording with its modulation, before any of it is read."""
+
+    samples: Samples
+    parts: list[Stretch]
+    frequency: float
+    refine: bool
+
+
+def _prepared(
+    trace: Trace, load: str, force: str, frequency: float | None, detrend: str, refine: bool
+) -> _Prepared:
+    if detrend not in DRIFTS:
+        raise InputError(
+            f"measure.detrend must be none, linear or quadratic, got '{detrend}'; choose one"
+        )
+    samples = usable(trace, load, force)
+    line = modulation_line(samples.time, samples.load, frequency)
+    require_modulated(line, samples.load)
+    if frequency is None and line.amplitude < _LINE * line.background:
+        raise InputError(
+            f"measure.load must be modulated, got its strongest line, at {line.frequency:.4g} Hz, "
+            f"at {line.amplitude / line.background:.2g} times its surroundings; give the frequency "
+            "if you know it, or measure without modulation"
+        )
+    start = frequency if frequency is not None and not refine else line.frequency
+    return _Prepared(samples, _parts(samples, line, start), start, refine)
+
+
+def _measured(
+    recording: _Prepared,
+    part: Stretch | None,
+    harmonics: int,
+    window: tuple[float, float] | None,
+    detrend: str,
+    *,
+    only_whole_periods: bool,
+) -> Measurement:
+    """One stretch; the longest modulated one, or that of the window, if none is given."""
+    samples, parts, start = recording.samples, recording.parts, recording.frequency
+    if window is None:
+        chosen = part or max(
+            (p for p in parts if p.modulated), key=lambda part: part.stop - part.first
+        )
+        first, stop = _chosen(samples, chosen, start, DRIFTS[detrend])
+    else:
+        first, stop = _given(samples.time, window)
+        # F(0) is that beside the stretch that is read, and not beside a longer one.
+        chosen = max(parts, key=lambda p: (min(p.stop, stop) - max(p.first, first), p.modulated))
+    if only_whole_periods:
+        stop = first + whole_periods(samples.time[first:stop], start)
+    cut = slice(first, stop)
+    time, force_values = samples.time[cut], samples.force[cut]
+    reading = lock_in(
+        time,
+        samples.load[cut],
+        force_values,
+        frequency=start,
+        harmonics=harmonics,
+        detrend=detrend,
+        refine=recording.refine,
+    )
+    before, after = _around(samples, parts, chosen, reading.W0)
+    answers = (
+        *_asked(reading, time, samples.load[cut], force_values),
+        *_about_the_instrument(reading, samples, parts, cut),
+        checks.drift(reading, *(b[0] if b else None for b in (before, after))),
+        *checks.findings(
+            about_window(samples, float(time[0]), float(time[-1])),
+            time.size,
+            float(time[-1] - time[0]),
+        ),
+    )
+    static = _static_friction([b for b in (before, after) if b])
+    doubt = reading.uncertainty("mean_friction")
+    dof = _effective_dof([(doubt, float(reading.dof[0])), (static[1], static[2])])
+    whole = float(np.hypot(doubt, static[1]))
+    return Measurement(
+        reading=reading,
+        before=before[0] if before else None,
+        after=after[0] if after else None,
+        static_friction=static[0],
+        delta_mu=reading.mean_friction - static[0],
+        delta_mu_uncertainty=whole,
+        delta_mu_interval_95=float(stdtrit(dof, 0.975)) * whole,
+        checks=answers,
+        stretches=tuple(parts),
+        samples=samples,
+        window=(first, stop),
+        chosen_by="program" if window is None else "user",
+    )
+
+
+def _effective_dof(parts: list[tuple[float, float]]) -> float:
+    """Degrees of freedom of a sum of squared uncertainties (Welch and Satterthwaite)."""
+    whole = sum(doubt**2 for doubt, _ in parts)
+    each = sum(doubt**4 / max(dof, 1.0) for doubt, dof in parts)
+    return whole**2 / each if each > 0 else np.inf
+
+
+def _asked(reading: LockInReading, time: Array, load: Array, force: Array) -> tuple[Check, ...]:
+    """What is asked of every window."""
+    rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
+    return (
+        checks.modulation(reading),
+        checks.periods(reading),
+        checks.signal(reading),
+        plausible.contact(reading),
+        plausible.friction(reading),
+        plausible.response(reading),
+        plausible.aliasing(reading, rate),
+        steadiness.leakage(reading),
+        steadiness.steady_load(reading, time, load),
+        steadiness.steady_force(reading, time, force),
+        steadiness.steady_response(reading),
+        checks.transient(reading),
+        checks.stick_slip(reading, time, force),
+        checks.load_harmonics(reading),
+        checks.resolution(reading, load, force),
+    )
+
+
+def _about_the_instrument(
+    reading: LockInReading, samples: Samples, parts: list[Stretch], cut: slice
+) -> tuple[Check, ...]:
+    time, load, force = samples.time[cut], samples.load[cut], samples.force[cut]
+    return (
+        *instrument.made_force(reading, samples, time, load, force),
+        instrument.held_samples(reading, load, force),
+        instrument.dropouts(load, force),
+        instrument.flat_top(reading, time, load),
+        interference.mains(reading, samples, parts),
+        *interference.lines_in_the_pauses(reading, samples, parts),
+        interference.hum(reading, time, force),
+        shifting_response(reading, time, force),
+    )
+
+
+def modulation_line(time: Array, load: Array, near: float | None = None) -> SpectralLine:
+    """The modulation of a load, be it in only a part of the recording.
+
+    Parameters
+    ----------
+    time, load : array, (n,)
+    near : float, optional
+        Hz, within 5 %.
+    """
+    lines = [strongest_line(time, load, between=around(near))]
+    if time.size > 2 * _PIECE:
+        for at in np.linspace(0, time.size - _PIECE, _PIECES).astype(int):
+            piece = slice(at, at + _PIECE)
+            # A slow modulation that fits no piece is found in the whole.
+            if near is None or near * (time[at + _PIECE - 1] - time[at]) > 4:
+                lines.append(strongest_line(time[piece], load[piece], between=around(near)))
+    return max(lines, key=lambda line: line.amplitude)
+
+
+def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[Stretch]:
+    whole = Stretch(0, samples.time.size, line.amplitude)
+    if line.amplitude < _LINE * line.background:
+        return [whole]
+    found = stretches(samples.time, samples.load, frequency)
+    return found if any(part.modulated for part in found) else [whole]
+
+
+def _chosen(samples: Samples, part: Stretch, frequency: float, degree: int) -> tuple[int, int]:
+    first, stop = clean_run(part.first, part.stop, samples.defects)
+    inside = slice(first, stop)
+    return first + settled(samples.time[inside], samples.force[inside], frequency, degree), stop
+
+
+def _given(time: Array, window: tuple[float, float]) -> tuple[int, int]:
+    start, end = window
+    first, stop = np.searchsorted(time, [start, end], side="left")
+    stop = int(np.searchsorted(time, end, side="right"))
+    if not start < end or stop - int(first) < 16:
+        raise InputError(
+            f"measure.window must enclose at least 16 samples, got {start:g} s to {end:g} s; the "
+            f"recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+        )
+    return int(first), stop
+
+
+def _around(
+    samples: Samples, parts: list[Stretch], chosen: Stretch, mean_load: float
+) -> tuple[tuple[MeanLevel, MeanLevel] | None, tuple[MeanLevel, MeanLevel] | None]:
+    """Force and load without modulation, before and after the stretch that is read."""
+    at, most = parts.index(chosen), chosen.stop - chosen.first
+    sides: list[tuple[MeanLevel, MeanLevel] | None] = []
+    for step in (-1, 1):
+        beside = parts[at + step] if 0 <= at + step < len(parts) else None
+        if beside is None or beside.modulated or beside.stop - beside.first < 16:
+            sides.append(None)
+            continue
+        first, stop = beside.first, beside.stop
+        # What is much later, or much earlier, says little.
+        if step > 0:
+            stop = min(stop, first + 2 * most)
+        else:
+            first = max(first, stop - most)
+        if step > 0 or any(part.modulated for part in parts[: at - 1]):
+            # The force has to find back from the modulation before.
+            means = block_means(samples.force[first:stop], 100)
+            first += settled_from(means, 1) * max(1, (stop - first) // 100)
+        first, stop = under_the_same_load(samples.load, first, stop, mean_load, before=step < 0)
+        if stop - first < 16:
+            sides.append(None)
+            continue
+        cut = slice(first, stop)
+        sides.append(
+            (
+                mean_level(samples.time[cut], samples.force[cut]),
+                mean_level(samples.time[cut], samples.load[cut]),
+            )
+        )
+    return sides[0], sides[1]
+
+
+def _static_friction(
+    sides: list[tuple[MeanLevel, MeanLevel]],
+) -> tuple[float, float, float]:
+    """F(0)/W0, its standard uncertainty, drift between the sides included, and its dof."""
+    if not sides:
+        return np.nan, np.nan, 1.0
+    ratios = [force.value / load.value for force, load in sides]
+    doubts = [force.uncertainty / abs(load.value) / len(sides) for force, load in sides]
+    # A drift is somewhere between its ends: an even distribution about the mean.
+    drifted = abs(ratios[-1] - ratios[0]) / np.sqrt(12)
+    dof = _effective_dof(
+        [*((d, f.dof) for d, (f, _) in zip(doubts, sides, strict=True)), (float(drifted), 30.0)]
+    )
+    return float(np.mean(ratios)), float(np.hypot(np.linalg.norm(doubts), drifted)), dof

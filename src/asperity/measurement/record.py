@@ -1,0 +1,185 @@
+"""A measurement as plain numbers and texts, for JSON and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from math import isfinite
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from asperity.measurement.measure import Measurement
+    from asperity.measurement.series import MeanLevel
+    from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.verdicts.verdict import Check
+
+CONVENTIONS = (
+    "W/W0 = 1 + epsilon cos phi + ..., F/W0 = mean_friction + sum of mu_n cos(n phi + phase_n); "
+    "peak amplitudes, phases in (-pi, pi]; uncertainties are standard uncertainties"
+)
+SLIDING_CONVENTIONS = (
+    "rate_dependence = A - B = d mu_ss/d ln V, positive where friction rises with velocity; "
+    "change = level after less level before, both extrapolated to the step; "
+    "healing = peak after a hold less level before it; uncertainties are standard uncertainties"
+)
+_SCALARS = ("W0", "epsilon", "frequency", "mean_force", "mean_friction")
+
+
+def modulated_record(found: Measurement) -> dict[str, Any]:
+    """Everything that a reading says.
+
+    Parameters
+    ----------
+    found : Measurement
+
+    Returns
+    -------
+    dict
+        Of numbers, texts, lists and dicts, in SI.
+    """
+    reading = found.reading
+    orders = range(1, reading.harmonics.size + 1)
+    values = {name: float(getattr(reading, name)) for name in _SCALARS}
+    for n in orders:
+        phasor = reading.phasor(n)
+        values |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
+    doubts = {name: reading.uncertainty(name) for name in values}
+    intervals = {name: reading.half_width(name) for name in values}
+    joint = observable_covariance(found)
+    if isfinite(found.delta_mu_interval_95):
+        intervals["delta_mu"] = found.delta_mu_interval_95
+    return {
+        "mode": "modulated",
+        "verdict": found.verdict,
+        **values,
+        "static_friction": found.static_friction,
+        "delta_mu": found.delta_mu,
+        "uncertainties": {**doubts, "delta_mu": found.delta_mu_uncertainty},
+        "intervals_95": intervals,
+        "harmonics": _pairs(reading.harmonics),
+        "load_harmonics": _pairs(reading.load_harmonics),
+        "covariance": {"names": list(reading.names), "matrix": reading.covariance.tolist()},
+        "observable_covariance": {
+            "names": list(joint[0]),
+            "matrix": joint[1].tolist(),
+        },
+        "F0_before": _level(found.before),
+        "F0_after": _level(found.after),
+        "window": {
+            "start": reading.start,
+            "end": reading.end,
+            "samples": reading.samples,
+            "periods": reading.periods,
+            "chosen_by": found.chosen_by,
+        },
+        "stretches": [
+            {
+                "start": float(found.samples.time[part.first]),
+                "end": float(found.samples.time[part.stop - 1]),
+                "amplitude": part.amplitude,
+            }
+            for part in found.stretches
+        ],
+        "checks": checks_record(found.checks),
+        "findings": [asdict(finding) for finding in found.samples.findings],
+        "channels": {"W": found.samples.names[0], "F": found.samples.names[1]},
+        "unit": found.samples.unit,
+        "dropped_samples": found.samples.dropped,
+        "conventions": CONVENTIONS,
+    }
+
+
+def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+    """Joint covariance of what fits compare: mean_friction, delta_mu, mu1, phase1, mu2, phase2.
+
+    Parameters
+    ----------
+    found : Measurement
+
+    Returns
+    -------
+    names : tuple of str
+        Without delta_mu where the force at constant load was not recorded.
+    covariance : array, shape (len(names), len(names))
+        Of amplitudes and phases (rad) to first order: the parts of a harmonic along its measured
+        phasor, and across it over the amplitude. Its diagonal are the squares of the reported
+        uncertainties.
+    """
+    reading = found.reading
+    at = reading.names.index
+    names, rows = ["mean_friction"], [np.eye(len(reading.names))[at("mean_friction")]]
+    if isfinite(found.delta_mu_uncertainty):
+        names.append("delta_mu")
+        rows.append(rows[0])
+    for n in range(1, min(reading.harmonics.size, 2) + 1):
+        phasor = reading.phasor(n)
+        if not phasor.amplitude:
+            continue
+        along, across = np.zeros((2, len(reading.names)))
+        direction = phasor.value / phasor.amplitude
+        along[[at(f"re{n}"), at(f"im{n}")]] = direction.real, direction.imag
+        across[[at(f"re{n}"), at(f"im{n}")]] = -direction.imag, direction.real
+        names += [f"mu{n}", f"phase{n}"]
+        rows += [along, across / phasor.amplitude]
+    J = np.array(rows)
+    covariance = J @ reading.covariance @ J.T
+    if "delta_mu" in names:
+        # The level at constant load has errors of its own, which nothing else shares.
+        covariance[1, 1] = found.delta_mu_uncertainty**2
+    # Phases that may be any have a bound on what is reported of them.
+    doubts = [
+        found.delta_mu_uncertainty if n == "delta_mu" else reading.uncertainty(n) for n in names
+    ]
+    # A variance of zero may come out a round-off below it.
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale = np.divide(doubts, spread, out=np.zeros_like(spread), where=spread > 0)
+    covariance *= np.outer(scale, scale)
+    return tuple(names), covariance
+
+
+def sliding_record(found: SlidingMeasurement) -> dict[str, Any]:
+    """Everything that a recording without modulation says.
+
+    Parameters
+    ----------
+    found : SlidingMeasurement
+
+    Returns
+    -------
+    dict
+        As of `modulated_record`.
+    """
+    return {
+        "mode": "sliding",
+        "verdict": found.verdict,
+        "friction": _level(found.friction),
+        "load": _level(found.load),
+        "unit": found.load_unit,
+        "rates": [{"rate": rate, "share": share} for rate, share in found.rates],
+        "samples": int(found.time.size),
+        "velocity_from": found.velocity_from,
+        "detrend": found.detrend,
+        "chosen_by": found.chosen_by,
+        "segments": [{**asdict(s), "steady": _level(s.steady)} for s in found.segments],
+        "steps": [asdict(step) for step in found.steps],
+        "holds": [asdict(hold) for hold in found.holds],
+        "healing": None if found.healing is None else asdict(found.healing),
+        "checks": checks_record(found.checks),
+        "conventions": SLIDING_CONVENTIONS,
+    }
+
+
+def checks_record(checks: Iterable[Check]) -> list[dict[str, Any]]:
+    """Checks as a list of dicts."""
+    return [asdict(check) for check in checks]
+
+
+def _level(level: MeanLevel | None) -> dict[str, float] | None:
+    return None if level is None else level._asdict()
+
+
+def _pairs(values: Any) -> list[list[float]]:
+    return [[float(c.real), float(c.imag)] for c in values]

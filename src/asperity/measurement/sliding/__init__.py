@@ -1,0 +1,1 @@
+"""Recordings without modulation: segments of constant velocity, velocity steps, holds."""

@@ -1,0 +1,301 @@
+"""Slide-hold-slide: relaxation during a hold, peak on sliding again, healing and its rate.
+
+Healing is the peak of friction after a hold less the sliding level before it (Dieterich, J.
+Geophys. Res. 77, 3690, 1972; Marone, Nature 391, 69, 1998); the level is extrapolated to the hold
+through the trend of the sliding before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from asperity.measurement.sliding.trend import bin_means, columns, fit_trend
+
+Array = NDArray[np.float64]
+
+#: Share of the sliding before a hold that may still be settling from the hold before it.
+_SETTLING = 0.3
+#: Friction between these shares of the rise on sliding again gives the stiffness.
+_RISE = (0.1, 0.5)
+#: The top of a peak: where smoothed friction is within this share of the peak's height.
+_TOP = 0.15
+
+
+@dataclass(frozen=True)
+class HoldReading:
+    """One hold between two slidings.
+
+    Attributes
+    ----------
+    start, end : float
+        Of the hold (s).
+    hold_time : float
+        Its length (s).
+    velocity : float
+        Of sliding again (m/s); NaN where no motion is recorded.
+    level, level_uncertainty : float
+        Sliding friction before the hold, extrapolated to its beginning.
+    relaxation, relaxation_uncertainty : float
+        Level less friction at the end of the hold; positive where friction falls.
+    peak, peak_time : float
+        Highest friction after the hold, and when (s).
+    healing, healing_uncertainty : float
+        Peak less level.
+    dof : float
+        Degrees of freedom of the uncertainties.
+    interval_95 : float
+        Half of the 95 % interval of `healing`.
+    reload_slope, reload_uncertainty : float
+        Slope of friction over load-point displacement on sliding again (1/m), which is the
+        machine's stiffness over the normal load while the contact does not slip; NaN without
+        displacement or with fewer than four samples on the rise.
+    """
+
+    start: float
+    end: float
+    hold_time: float
+    velocity: float
+    level: float
+    level_uncertainty: float
+    relaxation: float
+    relaxation_uncertainty: float
+    peak: float
+    peak_time: float
+    healing: float
+    healing_uncertainty: float
+    dof: float
+    interval_95: float
+    reload_slope: float
+    reload_uncertainty: float
+
+
+@dataclass(frozen=True)
+class HealingRate:
+    """Healing over the decimal logarithm of the hold time.
+
+    Attributes
+    ----------
+    per_decade, uncertainty : float
+        Slope and its standard uncertainty, the scatter of the holds about the line included.
+    dof : float
+    interval_95 : float
+        Half of the 95 % interval of `per_decade`.
+    at_one_second : float
+        Healing of the line at a hold of 1 s.
+    holds : int
+    """
+
+    per_decade: float
+    uncertainty: float
+    dof: float
+    interval_95: float
+    at_one_second: float
+    holds: int
+
+
+def read_hold(
+    time: Array,
+    friction: Array,
+    displacement: Array | None,
+    bounds: tuple[int, int, int, int],
+    edges: tuple[float, float],
+    velocity: float,
+    *,
+    degree: int,
+    settling: bool,
+) -> HoldReading:
+    """Read one hold.
+
+    Parameters
+    ----------
+    time, friction, displacement : array, (n,)
+        Of the recording; displacement None if it is not recorded.
+    bounds : (int, int, int, int)
+        Samples: sliding before, hold, sliding after, its end.
+    edges : (float, float)
+        First and last time of the hold (s).
+    velocity : float
+        Of sliding again, m/s.
+    degree : int
+        Of the trend before the hold: 0 or 1.
+    settling : bool
+        Whether the sliding before begins with the transient of something earlier.
+    """
+    first, held, again, stop = bounds
+    begin = first + int(_SETTLING * (held - first)) * settling
+    slid, mu = bin_means(time[begin:held] - edges[0], friction[begin:held])
+    fit = fit_trend(columns(slid, min(degree, 1)), mu)
+    level = float(fit.beta[0])
+    doubt = float(np.sqrt(fit.variance * fit.inverse[0, 0]))
+    quick = _quick_noise(friction[begin:held])
+    rested = friction[max(held, again - max(3, (again - held) // 50)) : again]
+    low = float(rested.mean()) if rested.size else np.nan
+    low_doubt = quick / np.sqrt(max(rested.size, 1))
+    peak, peak_doubt, at = _peak(time, friction, again, stop, level, quick)
+    half = float(stdtrit(fit.dof, 0.975))
+    healing_doubt = float(np.hypot(doubt, peak_doubt))
+    slope, slope_doubt = _reload(time, friction, displacement, again, at, edges[1], low, peak)
+    return HoldReading(
+        start=edges[0],
+        end=edges[1],
+        hold_time=edges[1] - edges[0],
+        velocity=velocity,
+        level=level,
+        level_uncertainty=doubt,
+        relaxation=level - low,
+        relaxation_uncertainty=float(np.hypot(doubt, low_doubt)),
+        peak=peak,
+        peak_time=float(time[at]),
+        healing=peak - level,
+        healing_uncertainty=healing_doubt,
+        dof=float(fit.dof),
+        interval_95=half * healing_doubt,
+        reload_slope=slope,
+        reload_uncertainty=slope_doubt,
+    )
+
+
+def healing_rate(holds: list[HoldReading]) -> HealingRate | None:
+    """Slope of healing per decade of hold time; None with fewer than two different hold times.
+
+    Parameters
+    ----------
+    holds : list of HoldReading
+        Each counts by its uncertainty, and by the scatter about the line where that is larger.
+    """
+    decades = np.log10([h.hold_time for h in holds]) if holds else np.empty(0)
+    if len(holds) < 2 or np.ptp(decades) < 0.1:
+        return None
+    healing = np.array([h.healing for h in holds])
+    doubt = np.array([h.healing_uncertainty for h in holds])
+    weight = 1 / np.maximum(doubt, max(1e-3 * float(np.median(doubt)), 1e-12)) ** 2
+    matrix = np.stack([np.ones_like(decades), decades], axis=1)
+    inverse = np.linalg.inv(matrix.T @ (weight[:, None] * matrix))
+    beta = inverse @ (matrix.T @ (weight * healing))
+    free = len(holds) - 2
+    excess = float(weight @ (healing - matrix @ beta) ** 2) / free if free else 1.0
+    uncertainty = float(np.sqrt(inverse[1, 1] * max(excess, 1.0)))
+    # Scatter that exceeds the uncertainties is known from the few holds only.
+    dof = float(free) if excess > 1 and free else min(h.dof for h in holds)
+    return HealingRate(
+        per_decade=float(beta[1]),
+        uncertainty=uncertainty,
+        dof=dof,
+        interval_95=float(stdtrit(dof, 0.975)) * uncertainty,
+        at_one_second=float(beta[0]),
+        holds=len(holds),
+    )
+
+
+def _quick_noise(values: Array) -> float:
+    """Standard deviation of what changes from sample to sample."""
+    if values.size < 3:
+        return 0.0
+    return 1.4826 * float(np.median(np.abs(np.diff(values)))) / np.sqrt(2)
+
+
+def _peak(
+    time: Array, friction: Array, again: int, stop: int, level: float, quick: float
+) -> tuple[float, float, int]:
+    """Top of the peak after a hold, its uncertainty, and its sample.
+
+    The largest of many noisy samples is too high: a parabola is fitted to the samples about the
+    top of smoothed friction instead.
+    """
+    values = friction[again:stop]
+    # The peak is over within half of the sliding.
+    values = values[: max(8, values.size // 2)]
+    rise = float(values.max()) - float(values[0])
+    wide = 1
+    while wide < values.size // 8:
+        smooth = _smoothed(values, wide)
+        if float(smooth.max()) - level > 10 * quick / np.sqrt(wide) or quick < 0.02 * rise:
+            break
+        wide = 2 * wide + 1
+    smooth = _smoothed(values, wide)
+    top = int(np.argmax(smooth))
+    height = max(
+        float(smooth[top]) - max(level, float(values[0])), 3 * quick / np.sqrt(wide), 0.2 * rise
+    )
+    edge = float(smooth[top]) - max(_TOP * height, 2 * quick / np.sqrt(wide))
+    left, right = top, top
+    while left > 0 and smooth[left - 1] > edge:
+        left -= 1
+    while right < values.size - 1 and smooth[right + 1] > edge:
+        right += 1
+    at = time[again + left : again + right + 1]
+    tops = values[left : right + 1]
+    if tops.size < 6:
+        near = values[max(top - wide // 2, 0) : top + wide // 2 + 1]
+        return float(near.mean()), quick / np.sqrt(near.size), again + top
+    scale = max(float(at[-1] - at[0]) / 2, 1e-300)
+    u = (at - at.mean()) / scale
+    matrix = np.stack([np.ones_like(u), u, u**2], axis=1)
+    beta, *_ = np.linalg.lstsq(matrix, tops)
+    residual = tops - matrix @ beta
+    where = (
+        float(np.clip(-beta[1] / (2 * beta[2]), -1, 1))
+        if beta[2] < 0
+        else float(u[np.argmax(tops)])
+    )
+    row = np.array([1.0, where, where**2])
+    inverse = np.linalg.pinv(matrix.T @ matrix, hermitian=True)
+    spread = float(np.sum(residual**2)) / max(tops.size - 3, 1)
+    # What neighbours share of the noise does not average out.
+    doubt = float(np.sqrt(spread * (row @ inverse @ row) * _inflation(residual)))
+    return (
+        float(row @ beta),
+        doubt,
+        again + int(np.clip(left + round((where + 1) / 2 * (right - left)), 0, values.size - 1)),
+    )
+
+
+def _inflation(residual: Array) -> float:
+    """Inflation of a variance by neighbours that resemble each other."""
+    power = float(residual @ residual)
+    if power <= 0:
+        return 1.0
+    share = float(residual[1:] @ residual[:-1]) / power
+    return (1 + min(max(share, 0.0), 0.95)) / (1 - min(max(share, 0.0), 0.95))
+
+
+def _smoothed(values: Array, wide: int) -> Array:
+    if wide <= 1:
+        return values
+    padded = np.pad(values, wide // 2, mode="edge")
+    return np.convolve(padded, np.ones(wide) / wide, mode="valid")[: values.size]
+
+
+def _reload(
+    time: Array,
+    friction: Array,
+    displacement: Array | None,
+    again: int,
+    top: int,
+    resumed: float,
+    low: float,
+    peak: float,
+) -> tuple[float, float]:
+    """Slope of friction over displacement on the rise, and its uncertainty."""
+    if displacement is None or not np.isfinite(low) or top - again < 4:
+        return np.nan, np.nan
+    mu = friction[again : top + 1]
+    above, below = low + _RISE[0] * (peak - low), low + _RISE[1] * (peak - low)
+    begin = int(np.argmax(mu > above))
+    end = int(np.argmax(mu > below))
+    if end - begin < 4:
+        return np.nan, np.nan
+    x, y = displacement[again + begin : again + end], mu[begin:end]
+    away = np.abs(x - x[0])
+    away = away - away.mean()
+    power = float(away @ away)
+    if power <= 0:
+        return np.nan, np.nan
+    slope = float(away @ y) / power
+    residual = y - y.mean() - slope * away
+    spread = float(residual @ residual) / max(y.size - 2, 1) * _inflation(residual)
+    return slope, float(np.sqrt(spread / power))

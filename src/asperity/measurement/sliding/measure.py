@@ -1,0 +1,455 @@
+"""Recordings without modulation: what steady sliding, velocity steps and holds say."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.lock_in.demodulation import DRIFTS
+from asperity.lock_in.reference import strongest_line
+from asperity.measurement.samples import about_channels
+from asperity.measurement.series import MeanLevel, block_means, mean_level, steady_from
+from asperity.measurement.sliding.holds import HealingRate, HoldReading, healing_rate, read_hold
+from asperity.measurement.sliding.segments import Partition, partition, partition_at
+from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
+from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
+from asperity.measurement.verdicts.checks import findings
+from asperity.measurement.verdicts.verdict import Check, Verdict, judged, worst
+from asperity.parameters.display import Displayed, SummaryLine
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from asperity.recording.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: Where suspicious and bad begin.
+LIMITS = {
+    "load": (0.005, 0.02),
+    "drift": (0.02, 0.15),
+    "oscillation": (0.002, 0.02),
+    "segments": (0.0, np.inf),
+    "choice": (2.0, np.inf),
+    "settling": (0.3, np.inf),
+}
+_LINE = 8.0
+#: Samples on each side that a step needs, and in a hold's surroundings.
+_FEWEST = 16
+
+
+@dataclass(frozen=True)
+class SlidingSegment:
+    """A stretch of constant pulling velocity, or a hold.
+
+    Attributes
+    ----------
+    start, end : float
+        Seconds.
+    velocity : float
+        m/s; NaN if neither velocity nor displacement is recorded.
+    hold : bool
+        Whether the pulling stands still.
+    steady : MeanLevel
+        Friction once it has settled.
+    slope : float
+        Of the steady friction over time (1/s).
+    scatter : float
+        Standard deviation of the steady friction about that slope.
+    highest, lowest : float
+        Extremes of friction, smoothed over five samples.
+    """
+
+    start: float
+    end: float
+    velocity: float
+    hold: bool
+    steady: MeanLevel
+    slope: float
+    scatter: float
+    highest: float
+    lowest: float
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlidingMeasurement(Displayed):
+    """What a recording without modulation says.
+
+    Attributes
+    ----------
+    friction : MeanLevel
+        Mean of F/W over the window.
+    load : MeanLevel or None
+        Mean load, in its unit; None if it is not in the recording.
+    load_unit : str
+        SI.
+    segments : tuple of SlidingSegment
+    steps : tuple of VelocityStep
+        Between sliding segments that follow each other.
+    holds : tuple of HoldReading
+        Between sliding segments.
+    healing : HealingRate or None
+        None with fewer than two different hold times.
+    rates : tuple of (float, float)
+        Sampling rates (Hz), each with the share of the samples that has it.
+    time, values : array, (n,)
+        Friction over time, as used.
+    velocity_from : str
+        The channel that velocities come from; empty if there is none.
+    detrend : {"none", "linear", "quadratic"}
+    chosen_by : {"program", "user"}
+        Who chose where the recording is cut.
+    unread : int
+        Findings about channels that were not read.
+    checks : tuple of Check
+    """
+
+    friction: MeanLevel
+    load: MeanLevel | None
+    load_unit: str
+    segments: tuple[SlidingSegment, ...]
+    steps: tuple[VelocityStep, ...]
+    holds: tuple[HoldReading, ...]
+    healing: HealingRate | None
+    rates: tuple[tuple[float, float], ...]
+    time: Array
+    values: Array
+    velocity_from: str
+    detrend: str
+    chosen_by: str
+    unread: int
+    checks: tuple[Check, ...]
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Mean friction, and what was found."""
+        friction = self.friction
+        lines = [
+            SummaryLine("friction", f"{friction.value:.6g} +- {friction.uncertainty:.1g}"),
+            SummaryLine("segments", str(len(self.segments))),
+            SummaryLine("steps", str(len(self.steps))),
+            SummaryLine("holds", str(len(self.holds))),
+        ]
+        doubts = [SummaryLine(c.name, str(c.verdict), c.sentence) for c in self.checks]
+        return "SlidingMeasurement", lines + [d for d in doubts if d.value in ("suspicious", "bad")]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The gravest of all."""
+        return worst(self.checks)
+
+
+def measure_sliding(
+    trace: Trace,
+    *,
+    load: str = "W",
+    force: str = "F",
+    window: tuple[float, float] | None = None,
+    detrend: str = "linear",
+    steps: Sequence[float] | None = None,
+    holds: Sequence[tuple[float, float]] | None = None,
+) -> SlidingMeasurement:
+    """Friction, its velocity steps and its holds in a recording without modulation.
+
+    Friction is F/W where both are recorded, and otherwise the recorded friction coefficient.
+    Segments are cut where the displacement, or the velocity, changes its rate.
+
+    Parameters
+    ----------
+    trace : Trace
+    load, force : str
+        Channels, by name or role.
+    window : (float, float), optional
+        First and last time (s).
+    detrend : {"none", "linear", "quadratic"}
+        Trend over slip through which levels are extrapolated to a step or a hold.
+    steps : sequence of float, optional
+        Times (s) of the velocity steps, in place of those that the program finds.
+    holds : sequence of (float, float), optional
+        First and last times (s) of the holds, in place of those that the program finds.
+
+    Returns
+    -------
+    SlidingMeasurement
+
+    Raises
+    ------
+    InputError
+        If neither force and load nor friction is recorded, the window holds too little, or a given
+        time lies outside of it.
+    """
+    if detrend not in DRIFTS:
+        raise InputError(
+            f"measure.detrend must be none, linear or quadratic, got '{detrend}'; choose one"
+        )
+    signals = sliding_signals(trace, load, force, window)
+    time, friction = signals.time, signals.friction
+    given = _given_cuts(time, steps, holds)
+    if given is None:
+        cut = partition(time, signals.displacement, friction)
+    else:
+        cut = partition_at(time, signals.displacement, np.array(given))
+        cut = _with_holds(cut, time, holds)
+    bounds = [0, *(c.sample for c in cut.cuts), time.size]
+    segments = tuple(
+        _segment(time[a:b], friction[a:b], v, hold)
+        for (a, b), v, hold in zip(pairwise(bounds), cut.velocities, cut.holds, strict=True)
+    )
+    read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend])
+    read_holds = _holds(signals, cut, bounds, DRIFTS[detrend])
+    doubts = [*cut.doubts, *unread]
+    if given is None and signals.displacement is None:
+        doubts.append(f"no segments without motion: {signals.no_motion}")
+    checks = _checks(signals, segments, read_steps, doubts)
+    about = about_channels(trace, signals.names)
+    checks += findings(list(about), len(trace), float(time[-1] - time[0]))
+    borne = signals.load
+    return SlidingMeasurement(
+        friction=mean_level(time, friction),
+        load=None if borne is None else mean_level(time[: borne.size], borne),
+        load_unit=signals.load_unit,
+        segments=segments,
+        steps=tuple(read_steps),
+        holds=tuple(read_holds),
+        healing=healing_rate(read_holds),
+        rates=_rates(time),
+        time=time,
+        values=friction,
+        velocity_from=signals.motion,
+        detrend=detrend,
+        chosen_by="program" if given is None else "user",
+        unread=len(trace.findings) - len(about),
+        checks=tuple(checks),
+    )
+
+
+def _given_cuts(
+    time: Array,
+    steps: Sequence[float] | None,
+    holds: Sequence[tuple[float, float]] | None,
+) -> list[float] | None:
+    """Times of all cuts that the user has given, in rising order; None if none are."""
+    if steps is None and holds is None:
+        return None
+    cuts = sorted([*(steps or ()), *(edge for hold in holds or () for edge in hold)])
+    for what, (start, end) in (("holds", hold) for hold in holds or ()):
+        if not start < end:
+            raise InputError(
+                f"measure.{what} must end after they begin, got {start:g} s to {end:g} s; write "
+                "them like 100:110"
+            )
+    for at in cuts:
+        if not time[0] < at < time[-1]:
+            raise InputError(
+                f"measure.{'steps' if steps else 'holds'} must lie inside the recording, got "
+                f"{at:.10g} s; it runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+            )
+    samples = [0, *np.searchsorted(time, cuts).tolist(), time.size]
+    for (a, b), at in zip(pairwise(samples), [*cuts, time[-1]], strict=True):
+        if b - a < 4:
+            raise InputError(
+                f"measure.{'steps' if steps else 'holds'} must have at least 4 samples between "
+                f"them, got {b - a} before {at:.10g} s; leave one out"
+            )
+    return cuts
+
+
+def _with_holds(
+    cut: Partition, time: Array, holds: Sequence[tuple[float, float]] | None
+) -> Partition:
+    """The same cuts, with the user's holds as the only ones."""
+    if holds is None:
+        return cut
+    starts = {start for start, _ in holds}
+    edges = [float(time[0]), *(c.time for c in cut.cuts)]
+    return Partition(cut.cuts, cut.velocities, tuple(e in starts for e in edges), cut.doubts)
+
+
+def _segment(time: Array, friction: Array, velocity: float, hold: bool) -> SlidingSegment:
+    means = block_means(friction, 100)
+    settled = steady_from(means, 1) * max(1, friction.size // 100)
+    late, values = time[settled:], friction[settled:]
+    away = late - late.mean()
+    power = float(away @ away)
+    slope = float(away @ (values - values.mean())) / power if power else 0.0
+    smooth = np.convolve(friction, np.ones(5) / 5, mode="valid") if friction.size > 5 else friction
+    return SlidingSegment(
+        start=float(time[0]),
+        end=float(time[-1]),
+        velocity=velocity,
+        hold=hold,
+        steady=mean_level(late, values),
+        slope=slope,
+        scatter=float(np.std(values - values.mean() - slope * away)),
+        highest=float(smooth.max()),
+        lowest=float(smooth.min()),
+    )
+
+
+def _steps(
+    signals: SlidingSignals,
+    cut: Partition,
+    bounds: list[int],
+    segments: tuple[SlidingSegment, ...],
+    degree: int,
+) -> tuple[list[VelocityStep], list[str]]:
+    """Every change between two sliding segments, and sentences on those that cannot be read."""
+    found: list[VelocityStep] = []
+    unread: list[str] = []
+    # The first segment may begin with the loading.
+    first = segments[0]
+    speed = abs(first.velocity) if np.isfinite(first.velocity) and first.velocity else 1.0
+    settling = speed * (first.steady.start - first.start)
+    for k, change in enumerate(cut.cuts):
+        a, b, c = bounds[k : k + 3]
+        if cut.holds[k] or cut.holds[k + 1]:
+            # The slip after which a hold is forgotten is not known: a third of what follows.
+            settling = np.inf
+            continue
+        if min(b - a, c - b) < _FEWEST:
+            unread.append(f"the step at {change.time:.6g} s has too few samples beside it")
+            settling = np.inf
+            continue
+        sides = []
+        for (low, high), velocity in (((a, b), cut.velocities[k]), ((b, c), cut.velocities[k + 1])):
+            part = signals.friction[low:high]
+            # Friction is counted against the motion, whatever its direction.
+            turned = -1.0 if np.median(part) < 0 else 1.0
+            sides.append((signals.time[low:high], turned * part, velocity))
+        step = read_step(change.time, sides[0], sides[1], degree=degree, first_settling=settling)
+        if step is None:
+            unread.append(f"the step at {change.time:.6g} s does not settle in what was recorded")
+            settling = np.inf
+            continue
+        found.append(step)
+        settling = step.settling_slip
+    return found, unread
+
+
+def _holds(
+    signals: SlidingSignals, cut: Partition, bounds: list[int], degree: int
+) -> list[HoldReading]:
+    found = []
+    for k, hold in enumerate(cut.holds):
+        if not hold or k in (0, len(cut.holds) - 1):
+            continue
+        a, b, c, d = bounds[k - 1 : k + 3]
+        if min(b - a, d - c) < _FEWEST or c - b < 2:
+            continue
+        found.append(
+            read_hold(
+                signals.time,
+                signals.friction,
+                signals.displacement,
+                (a, b, c, d),
+                (cut.cuts[k - 1].time, cut.cuts[k].time),
+                cut.velocities[k + 1],
+                degree=degree,
+                settling=k > 1,
+            )
+        )
+    return found
+
+
+def _rates(time: Array) -> tuple[tuple[float, float], ...]:
+    """Sampling rates in use, commonest first."""
+    steps = np.diff(time)
+    # Two figures tell rates apart, and jitter not.
+    digit = 10.0 ** (np.floor(np.log10(steps) + 1e-9) - 1)
+    values, counts = np.unique(np.rint(steps / digit) * digit, return_counts=True)
+    order = np.argsort(-counts)[:5]
+    return tuple((float(1 / values[i]), float(counts[i] / steps.size)) for i in order)
+
+
+def _checks(
+    signals: SlidingSignals,
+    segments: tuple[SlidingSegment, ...],
+    steps: list[VelocityStep],
+    doubts: list[str],
+) -> list[Check]:
+    checks = []
+    time, friction, borne = signals.time, signals.friction, signals.load
+    mean = max(abs(float(friction.mean())), 1e-300)
+    if borne is not None and borne.size:
+        spread = float(borne.std() / abs(borne.mean())) if borne.mean() else np.inf
+        checks.append(
+            judged(
+                "load",
+                spread,
+                LIMITS["load"],
+                f"the load's standard deviation is {100 * spread:.2g} % of its mean",
+            )
+        )
+    sliding = [s for s in segments if not s.hold] or list(segments)
+    drift = max(abs(p.slope * (p.end - p.steady.start)) for p in sliding) / mean
+    checks.append(
+        judged(
+            "drift",
+            drift,
+            LIMITS["drift"],
+            f"within its steady parts friction drifts by up to {100 * drift:.2g} % of its mean",
+        )
+    )
+    longest = max(sliding, key=lambda part: part.end - part.steady.start)
+    inside = (time >= longest.steady.start) & (time <= longest.end)
+    if inside.sum() >= 32:
+        line = strongest_line(time[inside], friction[inside])
+        share = line.amplitude / mean
+        checks.append(
+            judged(
+                "oscillation",
+                share,
+                LIMITS["oscillation"],
+                f"the strongest line of steady friction, at {line.frequency:.4g} Hz, is "
+                f"{100 * share:.2g} % of the mean",
+                significant=line.amplitude > _LINE * line.background,
+            )
+        )
+    if signals.turned:
+        checks.append(
+            judged("sign", 1.0, (0.5, np.inf), "friction is recorded as negative, and was turned")
+        )
+    checks.append(
+        judged(
+            "segments",
+            float(len(doubts)),
+            LIMITS["segments"],
+            "; ".join(doubts) or "the recording can be cut in one way only",
+        )
+    )
+    return checks + _step_checks(steps)
+
+
+def _step_checks(steps: list[VelocityStep]) -> list[Check]:
+    if not steps:
+        return []
+    open_to_choice = max(steps, key=_openness)
+    number = _openness(open_to_choice)
+    all_changes = [c.change for c in open_to_choice.choices]
+    slow = max(steps, key=lambda s: s.settling_slip / s.choices[0].window)
+    share = slow.settling_slip / slow.choices[0].window
+    return [
+        judged(
+            "choice",
+            number,
+            LIMITS["choice"],
+            f"by the choice of trend and window the change at {open_to_choice.time:.6g} s is "
+            f"{min(all_changes):.3g} to {max(all_changes):.3g}; their spread, which is in the "
+            f"uncertainty, is {number:.2g} times that of noise",
+        ),
+        judged(
+            "settling",
+            share,
+            LIMITS["settling"],
+            f"after the step at {slow.time:.6g} s the transient takes {100 * share:.2g} % of the "
+            "slip that can be compared; a slower one cannot be told from the trend",
+        ),
+    ]
+
+
+def _openness(step: VelocityStep) -> float:
+    return step.choice_uncertainty / max(step.noise_uncertainty, 1e-300)

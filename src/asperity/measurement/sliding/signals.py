@@ -1,0 +1,201 @@
+"""The signals of sliding: friction, load and slip over time, from the channels of a recording."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.recording.roles import candidates, words
+
+if TYPE_CHECKING:
+    from asperity.recording.trace import Channel, Trace
+
+Array = NDArray[np.float64]
+
+_FEWEST = 32
+#: Names of the displacement that the machine imposes.
+_LOAD_POINT = re.compile(r"\b(load ?point|lp|lpd|ram|vertical|axial|actuator)\b")
+
+
+@dataclass(frozen=True, eq=False)
+class SlidingSignals:
+    """Samples at which friction and motion are numbers and time goes on.
+
+    Attributes
+    ----------
+    time : array, (n,)
+        Seconds.
+    friction : array, (n,)
+        F/W, or the recorded friction coefficient; of the sign in which most of it is positive.
+    displacement : array, (n,), or None
+        Metres, as recorded or as the integral of the velocity; None where neither is recorded.
+    load : array, (m,), or None
+        Load at the samples where it is a number.
+    load_unit : str
+        SI unit of the load.
+    motion : str
+        Name of the channel that the displacement comes from; empty if there is none.
+    no_motion : str
+        Why there is none; empty if there is one.
+    names : tuple of str
+        Channels that were read.
+    turned : bool
+        Whether the recorded friction was multiplied by -1.
+    left_out : int
+        Samples within the window at which something is no number or time does not go on.
+    """
+
+    time: Array
+    friction: Array
+    displacement: Array | None
+    load: Array | None
+    load_unit: str
+    motion: str
+    no_motion: str
+    names: tuple[str, ...]
+    turned: bool
+    left_out: int
+
+
+def sliding_signals(
+    trace: Trace, load: str, force: str, window: tuple[float, float] | None
+) -> SlidingSignals:
+    """Choose the channels, and the samples that can be used.
+
+    Parameters
+    ----------
+    trace : Trace
+    load, force : str
+        Channels, by name or role.
+    window : (float, float), optional
+        First and last time (s).
+
+    Raises
+    ------
+    InputError
+        If neither force and load nor friction is recorded, or fewer than 32 samples are left.
+    """
+    if window is not None:
+        _check_window(window, trace)
+    friction, weight, unit, read = _friction(trace, load, force)
+    moved, is_velocity, no_motion = _motion(trace)
+    motion = None if moved is None else moved.values
+    read = [*read, *([] if moved is None else [moved])]
+    names = tuple(key for key, c in trace.channels.items() if any(c is used for used in read))
+    name = "" if moved is None else moved.recorded_name or names[-1]
+    time = trace.time
+    use = np.isfinite(time) & np.isfinite(friction)
+    if motion is not None:
+        use &= np.isfinite(motion)
+    latest = np.maximum.accumulate(np.where(use, time, -np.inf))
+    use[1:] &= time[1:] > latest[:-1]
+    outside = np.zeros(time.size, bool)
+    if window is not None:
+        outside = (time < window[0]) | (time > window[1])
+        use &= ~outside
+    left_out = int((~use & ~outside).sum())
+    if use.sum() < _FEWEST:
+        raise InputError(
+            f"measure.trace must hold at least {_FEWEST} usable samples, got {int(use.sum())}; "
+            "give a longer recording or window"
+        )
+    time, friction = time[use], friction[use]
+    slip = None
+    if motion is not None:
+        slip = motion[use]
+        if is_velocity:
+            mean = (slip[1:] + slip[:-1]) / 2
+            slip = np.concatenate([[0.0], np.cumsum(mean * np.diff(time))])
+    turned = bool(np.median(friction) < 0)
+    return SlidingSignals(
+        time=time,
+        friction=-friction if turned else friction,
+        displacement=slip,
+        load=None if weight is None else weight[use & np.isfinite(weight)],
+        load_unit=unit,
+        motion=name,
+        no_motion=no_motion,
+        names=names,
+        turned=turned,
+        left_out=left_out,
+    )
+
+
+def _check_window(window: tuple[float, float], trace: Trace) -> None:
+    if not window[0] < window[1]:
+        raise InputError(
+            f"measure.window must end after it begins, got {window[0]:g} s to {window[1]:g} s; the "
+            f"recording runs from {trace.time[0]:.10g} s to {trace.time[-1]:.10g} s"
+        )
+
+
+def _friction(
+    trace: Trace, load: str, force: str
+) -> tuple[Array, Array | None, str, list[Channel]]:
+    """Friction, load, the load's unit, and the channels that they come from."""
+    weight, unit = None, ""
+    read: list[Channel] = []
+    try:
+        W = trace.channel(load)
+        weight, unit, read = W.values, W.unit, [W]
+    except InputError as missing:
+        if load != "W":
+            raise
+        no_load = missing
+    try:
+        F = trace.channel(force)
+    except InputError as missing:
+        if force != "F":
+            raise
+        try:
+            friction = trace.channel("friction")
+            return friction.values, weight, unit, [*read, friction]
+        except InputError:
+            raise missing from None
+    if F.kind == "dimensionless":
+        return F.values, weight, unit, [*read, F]
+    if weight is None:
+        raise no_load
+    if trace.channel(load).kind != F.kind:
+        raise InputError(
+            f"measure.force must have the dimension of the load, got '{F.unit}' for '{force}' and "
+            f"'{unit}' for '{load}'; name the units when reading"
+        )
+    # NaN where undefined; the caller leaves these samples out.
+    with np.errstate(invalid="ignore", over="ignore"):
+        return F.values / np.where(weight == 0, np.nan, weight), weight, unit, [*read, F]
+
+
+def _motion(trace: Trace) -> tuple[Channel | None, bool, str]:
+    """Displacement or velocity, whether it is a velocity, and why there is none.
+
+    Of several displacements that of the load point is taken: it is what the machine imposes. A
+    channel whose unit is unknown gives no velocity in m/s.
+    """
+    reasons = []
+    for role, kind in (("displacement", "length"), ("velocity", "velocity")):
+        kinds = {key: c.kind for key, c in trace.channels.items()}
+        fitting = [n for n in candidates(role, kinds) if kinds[n] == kind]
+        imposed = [n for n in fitting if _LOAD_POINT.search(" ".join(words(n)))]
+        try:
+            channel = trace.channel(role)
+        except InputError:
+            # One that can be converted is better than several of which only it can.
+            only = fitting if len(fitting) == 1 else imposed
+            if len(only) == 1:
+                return trace.channels[only[0]], role == "velocity", ""
+            if len(fitting) > 1:
+                listed = " or ".join(f"'{n}'" for n in fitting)
+                reasons.append(f"the {role} can be {listed}; choose one")
+            continue
+        if channel.kind == kind:
+            return channel, role == "velocity", ""
+        reasons.append(
+            f"'{channel.recorded_name or role}' has no known unit of a {kind}; give it one"
+        )
+    return None, False, reasons[0] if reasons else "neither displacement nor velocity is recorded"

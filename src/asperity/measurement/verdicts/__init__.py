@@ -1,0 +1,1 @@
+"""Verdicts on a reading: every doubt as a number, a threshold and a sentence."""

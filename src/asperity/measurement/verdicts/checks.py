@@ -1,0 +1,236 @@
+"""The questions that are put to a lock-in reading, each with its limits."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.lock_in.reading import LockInReading
+from asperity.measurement.series import MeanLevel
+from asperity.measurement.verdicts.oscillation import slow_line
+from asperity.measurement.verdicts.verdict import Check, judged
+from asperity.recording.finding import Finding
+
+Array = NDArray[np.float64]
+
+#: Where suspicious and bad begin.
+LIMITS: dict[str, tuple[float, float]] = {
+    "modulation": (20.0, 5.0),
+    "periods": (5.0, 2.0),
+    "signal": (10.0, 3.0),
+    "drift": (0.005, 0.02),
+    "transient": (0.001, 0.01),
+    "stick-slip": (0.0005, 0.005),
+    "load harmonics": (0.05, 0.3),
+    "resolution": (0.1, 1.0),
+    "saturation": (0.0, 0.01),
+    "spike": (0.0, 0.001),
+    "repeated time": (0.0, 0.05),
+    "nan": (0.0, 0.25),
+    "infinite": (0.0, 0.25),
+    "gap": (0.0, 0.25),
+    "uneven sampling": (20.0, 1000.0),
+}
+
+#: Decay times of transients that are tried, in windows.
+_DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
+#: A line this often above its background is no accident of a spectrum of 1e5 lines.
+_LINE = 6.0
+
+
+def modulation(reading: LockInReading) -> Check:
+    """Whether the load is modulated at all."""
+    number = abs(reading.epsilon) / max(reading.uncertainty("epsilon"), 1e-300)
+    return judged(
+        "modulation",
+        number,
+        LIMITS["modulation"],
+        f"the load's amplitude is {_times(number)} its uncertainty, epsilon = "
+        f"{reading.epsilon:.4g} at {reading.frequency:.6g} Hz",
+    )
+
+
+def periods(reading: LockInReading) -> Check:
+    """Whether the window holds enough of them."""
+    number = reading.periods
+    return judged(
+        "periods",
+        number,
+        LIMITS["periods"],
+        f"the window holds {number:.5g} periods; below five, harmonics and drift are hard to tell "
+        "apart",
+    )
+
+
+def signal(reading: LockInReading) -> Check:
+    """Whether the first harmonic stands out of the noise."""
+    phasor = reading.phasor(1)
+    number = phasor.amplitude / max(phasor.amplitude_uncertainty, 1e-300)
+    return judged(
+        "signal",
+        number,
+        LIMITS["signal"],
+        f"mu1 is {_times(number)} its standard uncertainty; below three its amplitude is "
+        "biased and its phase unknown",
+    )
+
+
+def load_harmonics(reading: LockInReading) -> Check:
+    """How much of mu2 can come from a second harmonic of the load."""
+    if reading.harmonics.size < 2:
+        return judged("load harmonics", 0.0, LIMITS["load harmonics"], "mu2 was not asked for")
+    second, own = reading.load_phasor(2), reading.phasor(2)
+    share = second.amplitude
+    effect = reading.phasor(1).amplitude / abs(reading.epsilon) * share
+    number = effect / max(own.amplitude, 1e-300)
+    return judged(
+        "load harmonics",
+        number,
+        LIMITS["load harmonics"],
+        f"the load's second harmonic is {share:.3g} W0; answered as the first is, it makes "
+        f"{effect:.2g} of mu2 = {own.amplitude:.3g}, and at most "
+        f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once",
+        significant=share > 4 * second.amplitude_uncertainty and effect > own.amplitude_uncertainty,
+    )
+
+
+def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | None) -> Check:
+    """Whether F(0) is the same after the modulation as before it."""
+    if before is not None and after is not None:
+        change = after.value - before.value
+        doubt = float(np.hypot(before.uncertainty, after.uncertainty))
+        share = change / _nonzero(before.value)
+        told = f"F(0) after the modulation differs by {_percent(share)} from F(0) before it"
+        significant = abs(change) > 3 * doubt
+    else:
+        change = float(reading.drift[1].sum())
+        share = change / _nonzero(reading.mean_force)
+        told = (
+            f"the force drifts by {_percent(share)} over the window; F(0) before and after is not "
+            "in the recording"
+        )
+        significant = abs(change) > 10 * reading.uncertainty("mean_force")
+    return judged("drift", abs(share), LIMITS["drift"], told, significant=significant)
+
+
+def transient(reading: LockInReading) -> Check:
+    """Whether the mean force is still settling."""
+    blocks = reading.blocks
+    together = max(1, blocks.count.size // 128)
+    cuts = np.arange(0, blocks.count.size, together)
+    count = np.add.reduceat(blocks.count, cuts)
+    left = np.add.reduceat(reading.residual[:, 0, 1].real, cuts) / count
+    at = np.add.reduceat(blocks.middle * blocks.count, cuts) / count
+    u = (at - reading.start) / (reading.end - reading.start)
+    drifts = np.polynomial.legendre.legvander(2 * u - 1, blocks.basis.degree)
+    best, height = 0.0, 0.0
+    mean = abs(reading.mean_force)
+    for decay in _DECAYS:
+        shape = np.exp(-u / decay)
+        inside = shape - drifts @ np.linalg.lstsq(drifts, shape)[0]
+        norm = float(inside @ inside)
+        if norm < 1e-12 * u.size:
+            continue
+        amplitude = float(inside @ left) / norm
+        rest = left - amplitude * inside
+        doubt = np.sqrt(rest @ rest / max(u.size - 4, 1) * _correlation(rest) / norm)
+        score = abs(amplitude) / max(float(doubt), 1e-300)
+        if score > best:
+            best, height = score, amplitude
+    number = float(abs(height)) / mean if mean else 0.0
+    return judged(
+        "transient",
+        number,
+        LIMITS["transient"],
+        f"a decay of {_percent(number)} of the mean force fits the beginning of the window best",
+        significant=best > 5.0,
+    )
+
+
+def stick_slip(reading: LockInReading, time: Array, force: Array) -> Check:
+    """Whether the force oscillates slowly, by itself."""
+    line = slow_line(reading, time, force)
+    number, told, seen = 0.0, "no slow oscillation stands out", False
+    if line is not None:
+        number = line.amplitude / max(abs(reading.mean_force), 1e-300)
+        seen = line.amplitude > _LINE * line.background
+        if seen:
+            told = (
+                f"the force oscillates at {line.frequency:.4g} Hz, no harmonic, by "
+                f"{_percent(number)} of its mean"
+            )
+    return judged("stick-slip", number, LIMITS["stick-slip"], told, significant=seen)
+
+
+def resolution(reading: LockInReading, load: Array, force: Array) -> Check:
+    """Whether the steps of the recorder are small against the first harmonics.
+
+    Noise of half a step smooths them; without it a harmonic below a step is no harmonic.
+    """
+    heights = (reading.epsilon, reading.phasor(1).amplitude)
+    found = []
+    for c, (name, values) in enumerate((("load", load), ("force", force))):
+        steps = np.diff(np.unique(values[: 1 << 14]))
+        step = float(steps.min()) if steps.size else 0.0
+        noise = float(np.sqrt(reading.noise.spectra[1:, c, c].real.mean()))
+        number = step / max(heights[c] * abs(reading.W0), 1e-300)
+        found.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))
+    seen, number, name, noisy = max(found)
+    return judged(
+        "resolution",
+        number,
+        LIMITS["resolution"],
+        f"the {name} is recorded in steps of {number:.2g} of its first harmonic, with noise of "
+        f"{noisy:.2g} steps",
+        significant=seen,
+    )
+
+
+def findings(found: list[Finding], samples: int, span: float) -> list[Check]:
+    """What the reader and the checks of the recording say about the window.
+
+    Parameters
+    ----------
+    found : list of Finding
+    samples : int
+        In the window.
+    span : float
+        Its length (s).
+    """
+    return [_finding(finding, samples, span) for finding in found]
+
+
+def _finding(found: Finding, samples: int, span: float) -> Check:
+    told = found.sentence.rstrip(".") + (f" ({found.where})" if found.where else "")
+    # Shares of the window, where the number of the finding can be made one.
+    shares = {
+        "saturation": 1.0,
+        **dict.fromkeys(("spike", "repeated time", "nan", "infinite"), 1 / samples),
+        "gap": 1 / span,
+    }
+    if found.name in shares:
+        return judged(found.name, found.number * shares[found.name], LIMITS[found.name], told)
+    if found.name in LIMITS:
+        return judged(found.name, found.number, LIMITS[found.name], told)
+    grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[found.severity]
+    return judged(found.name, 1.0, grave, told)
+
+
+def _correlation(series: Array) -> float:
+    """Inflation of a variance by neighbours that resemble each other."""
+    power = float(series @ series)
+    neighbour = float(series[1:] @ series[:-1]) / power if power else 0.0
+    neighbour = min(max(neighbour, 0.0), 0.95)
+    return (1 + neighbour) / (1 - neighbour)
+
+
+def _nonzero(value: float) -> float:
+    return value or 1e-300
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _times(number: float) -> str:
+    return f"{number:.3g} times" if number < 1e6 else "more than a million times"

@@ -1,0 +1,239 @@
+"""One operating point from numbers by name: law, machine and drive as tables write them.
+
+The names are those of `asperity.parameters`: the parameters of the law, ``K, W0, M, eta`` of the
+machine, ``V, epsilon, frequency`` of the drive, ``inertia`` (1 includes the mass), and
+`asperity.parameters.MODULATION` where more than a harmonic load is modulated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.laws import Law, get_law, registered
+from asperity.loads.modulated import contact_lost, modulated
+from asperity.orbit import PeriodicResponse, periodic_response
+from asperity.parameters import (
+    MODULATION,
+    Parameter,
+    all_parameters,
+    canonical_name,
+    known_name,
+    point_parameters,
+    required,
+)
+from asperity.parameters.arguments import shown
+from asperity.slider.named import slider_from
+
+if TYPE_CHECKING:
+    from asperity.materials import Material
+
+
+@dataclass(frozen=True)
+class SourcedNumber:
+    """A value in SI and its source."""
+
+    value: float
+    origin: str
+
+
+def known_parameters(law: str | None = None) -> dict[str, Parameter]:
+    """Parameters of an operating point with any registered law.
+
+    Parameters
+    ----------
+    law : str, optional
+        The law that is used where several have a parameter of the same name.
+    """
+    laws = list(registered().values())
+    return all_parameters(laws if law is None else [get_law(law), *laws])
+
+
+def sourced_numbers(
+    given: Mapping[str, Any],
+    material: Material | None,
+    origin: str = "given",
+    law: str | None = None,
+) -> dict[str, SourcedNumber]:
+    """Numbers by name: the given ones, and those of the material for the rest.
+
+    Parameters
+    ----------
+    given : mapping of str to str, float or SourcedNumber
+        Texts with units; numbers are SI.
+    material : Material or None
+    origin : str
+        Name of the source of the given numbers.
+    law : str, optional
+        The law that they are for.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown or occurs twice, or a value has the wrong unit or sign.
+    """
+    known = known_parameters(law)
+    numbers: dict[str, SourcedNumber] = {}
+    for written, value in given.items():
+        name = known_name(written, known)
+        if name in numbers:
+            raise InputError(f"{name} must be given once, got it as '{written}' too; leave one out")
+        if isinstance(value, SourcedNumber):
+            numbers[name] = value
+            continue
+        found = known[name].check(value)
+        if np.ndim(found):
+            raise InputError(
+                f"{known[name].label} must be one number, got {shown(value)}; give a single value"
+            )
+        numbers[name] = SourcedNumber(float(found), origin)
+    if material is None:
+        return numbers
+    offered = {
+        n: SourcedNumber(material[n].si, material.name)
+        for n in known
+        # A material says nothing about the modulation, even where a number of it has such a name.
+        if n not in MODULATION
+        and n in material
+        and material[n].value is not None
+        and material[n].dimension == known[n].kind
+    }
+    return offered | numbers
+
+
+def numbers_for(law_name: str, numbers: Mapping[str, SourcedNumber]) -> dict[str, SourcedNumber]:
+    """The numbers of a point with this law, selected from `numbers`.
+
+    Raises
+    ------
+    InputError
+        If the law is unknown or numbers are missing; the message lists all of them.
+    """
+    law = get_law(law_name)
+    known = point_parameters(law)
+    missing = [name for name in required(law) if name not in numbers]
+    if missing:
+        example = f"{missing[0]}={known[missing[0]].example}"
+        raise InputError(
+            f"{law_name} must have all its numbers, got none for {', '.join(missing)}; "
+            f"name a material that has them or give each one, like '{example}'"
+        )
+    return {name: numbers[name] for name in known if name in numbers}
+
+
+def refuse_foreign(law_name: str, given: Mapping[str, Any]) -> None:
+    """Raise `InputError` if a given parameter belongs to other laws only."""
+    own = point_parameters(get_law(law_name))
+    for name in given:
+        owners = [
+            n for n, law in registered().items() if canonical_name(name, point_parameters(law))
+        ]
+        if canonical_name(name, own) is None and owners:
+            raise InputError(
+                f"{law_name} must be given its own parameters, got '{name}', which belongs to "
+                f"{', '.join(owners)}; leave it out or choose another law"
+            )
+
+
+def respond(
+    law: type[Law],
+    values: Mapping[str, Any],
+    progress: Callable[[int, int], None] | None = None,
+    **options: Any,
+) -> PeriodicResponse:
+    """Periodic response at one or many points.
+
+    Parameters
+    ----------
+    law : type of Law
+    values : mapping of str to number or array
+        SI values by the names of `point_parameters`. Inertia, damping and elastic asperities
+        must be present at all points or at none: see `motions`. The load is harmonic unless one of
+        `asperity.parameters.MODULATION` is not 0 at some point.
+    progress : callable, optional
+        See `periodic_response`.
+    **options
+        ``methods`` and ``workers`` of `periodic_response`.
+
+    Raises
+    ------
+    InputError
+        If the load of a point does not stay positive: see `without_contact`.
+    """
+    harmonic = not _more_modulated(values).any()
+    damped = np.any(np.asarray(values.get("eta", 0.0)) > 0)
+    return periodic_response(
+        slider_from(law, values),
+        velocity=values["V"],
+        epsilon=values["epsilon"] if harmonic else None,
+        frequency=values["frequency"],
+        modulation=None
+        if harmonic
+        else modulated(
+            values["epsilon"],
+            load=_further_harmonics(values),
+            **{name: values.get(name, 0.0) for name in ("pull", "pull_phase", "tilt")},
+        ),
+        inertia=bool(np.any(values.get("inertia", 0.0))),
+        radiation_damping=values["eta"] if damped else None,
+        progress=progress,
+        **options,
+    )
+
+
+def motions(values: Mapping[str, NDArray[np.float64]]) -> list[NDArray[np.intp]]:
+    """Groups of points with one equation of motion and one kind of load, as indices.
+
+    The load is harmonic, even in time, which the fast method solves too, or any other.
+
+    Parameters
+    ----------
+    values : mapping of str to array, shape (points,)
+        As for `respond`.
+    """
+    rows = len(values["V"])
+    traits = [np.asarray(values.get(n, np.zeros(rows))) > 0 for n in ("inertia", "eta", "lambda")]
+    kinds = sum(trait * 2**i for i, trait in enumerate(traits))
+    # Without inertia and damping elastic and rigid asperities share their equation.
+    kinds = np.where(kinds % 4 == 0, 0, kinds)
+    kinds = kinds + 8 * (_more_modulated(values) + 1 * _not_even(values))
+    return [np.flatnonzero(kinds == kind) for kind in np.unique(kinds)]
+
+
+def without_mass(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.bool_]:
+    """Points with inertia and no mass."""
+    return (np.asarray(values["inertia"]) > 0) & ~(np.asarray(values["M"]) > 0)
+
+
+def without_contact(values: Mapping[str, NDArray[np.float64]]) -> list[str]:
+    """Why the contact is lost within the period at each point; empty where it is not."""
+    harmonics = _further_harmonics(values)
+    # A harmonic load stays positive by the rule of epsilon.
+    return contact_lost(values["epsilon"], harmonics) if harmonics else [""] * len(values["V"])
+
+
+def _more_modulated(values: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Points with a modulation beyond the first harmonic of the load."""
+    amplitudes = ("epsilon2", "epsilon3", "pull", "tilt")
+    return sum((np.asarray(values.get(n, 0.0)) != 0 for n in amplitudes), np.asarray(False))
+
+
+def _not_even(values: Mapping[str, Any]) -> NDArray[np.bool_]:
+    """Points at which one of the modulated quantities is not even in time."""
+    pairs = [(np.asarray(values.get(n, 0.0)), np.asarray(values.get(f"{n}_phase", 0.0)))
+             for n in ("epsilon2", "epsilon3", "pull")]  # fmt: skip
+    return sum(((size != 0) & (phase != 0) for size, phase in pairs), np.asarray(False))
+
+
+def _further_harmonics(values: Mapping[str, Any]) -> dict[int, tuple[Any, Any]]:
+    """Harmonics of the load from the second on that any point has."""
+    return {
+        n: (values[f"epsilon{n}"], values.get(f"epsilon{n}_phase", 0.0))
+        for n in (2, 3)
+        if np.any(values.get(f"epsilon{n}", 0.0))
+    }

@@ -1,0 +1,27 @@
+"""Periodic orbits: found by several methods, with Floquet multipliers and derivatives."""
+
+from asperity.orbit.averaged import averaged_response
+from asperity.orbit.differentiable import (
+    ResponseFunction,
+    response_function,
+)
+from asperity.orbit.gradient.program import ResponseValues
+from asperity.orbit.outcome import Outcome
+from asperity.orbit.period import Period, over_a_period
+from asperity.orbit.periodic import periodic_response
+from asperity.orbit.response import PeriodicResponse
+from asperity.orbit.sensitivity import Sensitivities, sensitivities
+
+__all__ = [
+    "Outcome",
+    "Period",
+    "PeriodicResponse",
+    "ResponseFunction",
+    "ResponseValues",
+    "Sensitivities",
+    "averaged_response",
+    "over_a_period",
+    "periodic_response",
+    "response_function",
+    "sensitivities",
+]

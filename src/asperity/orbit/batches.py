@@ -1,0 +1,65 @@
+"""Running a compiled function over many operating points in chunks of a fixed shape.
+
+One shape means one compilation, and bounded memory whatever the number of points. Chunks run one
+after the other: programs of XLA's CPU backend that are called from several threads at once can
+wait for each other for ever. More cores are used by more processes, see `asperity.orbit.processes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity._jax import spare_mappings
+
+Indices = NDArray[np.intp]
+
+
+def take(tree: Any, index: Indices) -> Any:
+    """The points `index` of a pytree whose arrays carry the points along the last axis."""
+    return jax.tree.map(lambda a: a[..., index], tree)
+
+
+def put(tree: Any, index: Indices, values: Any) -> None:
+    """Write `values` for the points `index` into a pytree of NumPy arrays."""
+
+    def write(target: np.ndarray, value: np.ndarray) -> None:
+        target[..., index] = value
+
+    jax.tree.map(write, tree, values)
+
+
+def run_chunks(
+    function: Callable[[Any], Any], inputs: Any, index: Indices, chunk: int
+) -> Iterator[tuple[Indices, Any]]:
+    """Apply `function` to the points `index` of `inputs`.
+
+    Parameters
+    ----------
+    function : callable
+        Compiled; takes a pytree with `chunk` points along the last axis of every
+        array, returns another.
+    inputs : pytree of NumPy arrays
+    index : array of int
+        The points to work on.
+    chunk : int
+        Points per call; the last chunk is filled up with copies of its last point.
+
+    Yields
+    ------
+    indices, outputs
+        As NumPy arrays without the filling.
+    """
+
+    def work(part: Indices) -> tuple[Indices, Any]:
+        filled = np.concatenate([part, np.full(chunk - len(part), part[-1])])
+        outputs = function(take(inputs, filled))
+        return part, jax.tree.map(lambda a: np.asarray(a)[..., : len(part)], outputs)
+
+    for start in range(0, len(index), chunk):
+        spare_mappings()
+        yield work(index[start : start + chunk])

@@ -1,0 +1,388 @@
+"""The periodic response as a function that JAX programs call, with derivatives of every order.
+
+A call finds the orbits and then evaluates them. Orbits are found without derivatives: by the fast
+method within the compiled program, and by the search of `asperity.orbit.search` where the fast
+method does not converge or does not resolve the orbit. Derivatives come from the implicit-function
+rule at the orbit, whichever method found it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import Any, Literal
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity._jax import jit_large, spare_mappings
+from asperity.errors import InputError, closest
+from asperity.laws import Law, get_law
+from asperity.loads import Modulation
+from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
+from asperity.orbit.gradient.mesh_values import mesh_orbits, mesh_values
+from asperity.orbit.gradient.parametrised import (
+    ParametrisedProblem,
+    coefficients_of,
+    load_values,
+)
+from asperity.orbit.gradient.program import (
+    Parameters,
+    Program,
+    ResponseValues,
+    by_point,
+    chosen,
+)
+from asperity.orbit.gradient.search import MeshOrbits, search_mesh_orbits
+from asperity.orbit.outcome import Outcome
+from asperity.parameters import obeying
+from asperity.parameters.arguments import instance, switch, whole_number
+from asperity.slider import QuasiStatic
+from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
+from asperity.slider.radiating import Radiating
+
+#: Smallest number of points that a program is compiled for; others are powers of two.
+_FEWEST = 4
+
+
+class ResponseFunction:
+    """Mean, harmonics and multipliers as a function of named parameters; see `response_function`.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Names of the parameters.
+    """
+
+    def __init__(self, program: Program, defaults: Mapping[str, Any]) -> None:
+        self._program = program
+        self._defaults = dict(defaults)
+
+    @classmethod
+    def of(
+        cls, equations: ParametrisedProblem, *, harmonics: int, multipliers: bool
+    ) -> ResponseFunction:
+        """The response of given equations of motion; see `response_function`."""
+        law = equations.law
+        if not law.rate_dependent:
+            raise InputError(
+                f"law must depend on the velocity, got {law.name}, whose force follows the load; "
+                "choose another law"
+            )
+        return cls(Program(equations, harmonics, multipliers, search=True), {})
+
+    @property
+    def equations(self) -> ParametrisedProblem:
+        """Equations of motion and load as functions of the parameters."""
+        return self._program.equations
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of the parameters, those that have no influence included."""
+        return self._program.equations.names
+
+    def __repr__(self) -> str:
+        return f"response_function of {', '.join(self.parameters)}"
+
+    def __call__(self, parameters: Mapping[str, ArrayLike]) -> ResponseValues:
+        """Response at one or many points.
+
+        Parameters
+        ----------
+        parameters : mapping of str to array
+            Every parameter by name, each a number or of shape (points,); in SI, or a text
+            with its unit.
+
+        Returns
+        -------
+        ResponseValues
+            Without the axis of points if all parameters are numbers.
+
+        Raises
+        ------
+        InputError
+            If a name is unknown or missing, a shape is wrong, or a value that is not traced breaks
+            its rule. Where a traced value breaks it, the outcome is `Outcome.INVALID`.
+        """
+        padded, points = self._padded(parameters)
+        orbits = _orbits(self._program, jax.lax.stop_gradient(padded))
+        return _cut(_evaluate(padded, *orbits, program=self._program), points)
+
+    def value_and_jacobian(
+        self, parameters: Mapping[str, ArrayLike]
+    ) -> tuple[ResponseValues, dict[str, ResponseValues]]:
+        """Response, and its derivative to every parameter at every point.
+
+        Parameters
+        ----------
+        parameters : mapping of str to array
+            As for a call.
+
+        Returns
+        -------
+        values : ResponseValues
+        derivatives : dict of str to ResponseValues
+            By parameter, of the shapes of `values`: at each point to that point's own value. The
+            derivative to a parameter that all points share is the sum over the points.
+        """
+        padded, points = self._padded(parameters)
+        orbits = _orbits(self._program, jax.lax.stop_gradient(padded))
+        whole, table = _differentiate(padded, *orbits, program=self._program)
+        values = _cut(whole, points)
+        columns: Any = table if isinstance(table, jax.core.Tracer) else np.asarray(table)
+        columns = columns[:, 0] if points is None else columns[:, :points]
+        names = self._program.equations.names
+        return values, {n: _derivative(c, values) for n, c in zip(names, columns, strict=True)}
+
+    def _padded(self, parameters: Mapping[str, ArrayLike]) -> tuple[Parameters, int | None]:
+        """All parameters with as many points as a program is compiled for, and those asked for."""
+        equations = self._program.equations
+        given = self._defaults | dict(parameters)
+        for name in given:
+            if name not in equations.names:
+                raise InputError(
+                    f"parameters must have known names, got '{name}'; "
+                    f"{closest(name, equations.names)}"
+                )
+        missing = [n for n in equations.names if n not in given and n not in equations.optional]
+        if missing:
+            raise InputError(
+                f"parameters must be complete, got none for {', '.join(missing)}; give them in SI"
+            )
+        table = equations.table()
+        given = {
+            n: obeying(given.get(n, 0.0), f"parameters['{n}']", p.kind, p.rule)
+            for n, p in table.items()
+        }
+        traced = any(isinstance(v, jax.core.Tracer) for v in given.values())
+        shapes = {n: np.shape(v) for n, v in given.items()}
+        long = {s for s in shapes.values() if s}
+        if len(long) > 1 or any(len(s) > 1 or s[0] == 0 for s in long):
+            got = ", ".join(f"{n} {s}" for n, s in shapes.items() if s)
+            raise InputError(
+                f"parameters must be numbers or arrays of one shape (points,), got {got}; "
+                "flatten grids first"
+            )
+        (count,) = next(iter(long), (1,))
+        size = max(_FEWEST, 1 << (count - 1).bit_length())
+        lay_out = partial(_laid_out, count=count, size=size, module=jnp if traced else np)
+        padded = {n: lay_out(v) for n, v in given.items()}
+        return padded, count if long else None
+
+
+def _laid_out(value: Any, *, count: int, size: int, module: Any) -> Any:
+    """A parameter of `count` points, the last one repeated up to `size`."""
+    flat = module.broadcast_to(module.asarray(value, dtype=float), (count,))
+    return module.concatenate([flat, module.broadcast_to(flat[-1:], (size - count,))])
+
+
+def _cut(values: ResponseValues, points: int | None) -> ResponseValues:
+    """Without the points that fill the program up; NumPy arrays where nothing is traced."""
+
+    def cut(a: Array) -> Any:
+        whole = a if isinstance(a, jax.core.Tracer) else np.asarray(a)
+        return whole[0] if points is None else whole[:points]
+
+    return jax.tree.map(cut, values)
+
+
+def response_function(
+    law: str | type[Law],
+    *,
+    inertia: bool = False,
+    radiation_damping: bool = False,
+    harmonics: int = 2,
+    multipliers: bool = False,
+    modulation: Modulation | None = None,
+    search: bool | Literal["direct"] = True,
+) -> ResponseFunction:
+    """The periodic response as a function of named parameters, for fits, samplers and designs.
+
+    The function that is returned maps a dictionary of named parameters, each a number or an array
+    over the operating points, to mean, harmonics and multipliers. It may be called within
+    `jax.jit`, and `jax.jvp`, `jax.vjp`, `jax.grad`, `jax.jacfwd`, `jax.jacrev` and `jax.hessian`
+    differentiate it. Programs are compiled once for each power of two that the number of points
+    is filled up to.
+
+    Parameters
+    ----------
+    law : str or type of Law
+        A rate-dependent law, by name or as a class.
+    inertia : bool
+        Whether the mass M counts.
+    radiation_damping : bool
+        Whether there is a radiation damping eta (N s/m).
+    harmonics : int
+        Number of harmonics of the force, at least 1.
+    multipliers : bool
+        Whether to compute the logarithms of the Floquet multipliers.
+    modulation : Modulation, optional
+        In place of the harmonic load with its parameter epsilon: a load of `asperity.loads`, whose
+        Fourier coefficients, "load_cos_1", "load_sin_1", "shear_cos_1", "pull_cos_1", ..., become
+        parameters with the coefficients of `modulation` as defaults.
+    search : bool or "direct"
+        Whether to search for orbits that the fast method does not find. Without it they are not
+        converged, and programs are smaller. "direct" leaves out what follows branches, which may
+        take a minute for one point; within `jax.jit` it is as True.
+
+    Returns
+    -------
+    ResponseFunction
+        Its attribute `parameters` has the names of the parameters: those of the law, then K, W0,
+        M, V, frequency (Hz), eta and epsilon, all in SI.
+
+    Raises
+    ------
+    InputError
+        If the law is unknown or does not depend on the velocity.
+
+    Notes
+    -----
+    Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). With D the equations of an orbit
+    Y for parameters p, D(p, Y) = 0, its derivative is -D_Y^-1 D_p.
+
+    Where the search is needed within `jax.jit`, a process of its own does it, which takes some
+    seconds to start. Multipliers with inertia or radiation damping need it at every point.
+    """
+    law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
+    inertia = switch(inertia, "inertia")
+    radiation_damping = switch(radiation_damping, "radiation_damping")
+    multipliers = switch(multipliers, "multipliers")
+    search = search if search == "direct" else switch(search, "search")
+    harmonics = whole_number(harmonics, "harmonics", least=1)
+    if modulation is not None:
+        advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
+        modulation = instance(modulation, Modulation, "modulation", advice)
+    if not law_type.rate_dependent:
+        raise InputError(
+            f"law must depend on the velocity, got {law_type.name}; its force follows the load"
+        )
+    motion: type = QuasiStatic
+    if inertia or radiation_damping:
+        elastic = law_type.elastic_length is not Law.elastic_length
+        kinds = (Inertial, StiffInertial) if inertia else (RadiatingAsperities, Radiating)
+        motion = kinds[0] if elastic else kinds[1]
+    coefficients = None if modulation is None else coefficients_of(modulation)
+    equations = ParametrisedProblem(law_type, motion, radiation_damping, coefficients)
+    defaults = {} if modulation is None or coefficients is None else load_values(modulation)
+    return ResponseFunction(Program(equations, harmonics, multipliers, search), defaults)
+
+
+def _orbits(
+    program: Program, parameters: Parameters
+) -> tuple[FastOrbits | None, MeshOrbits | None]:
+    """Orbits of all points, of no derivative: by the fast method, and by the search."""
+    spare_mappings()
+    fast = None
+    if has_fast_method(program):
+        fast = fast_orbits(parameters, program=program)
+        wanted = fast.valid & ~fast.converged
+    else:
+        wanted = program.equations.valid(parameters)
+    if not program.search:
+        return fast, None
+    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((parameters, wanted))):
+        return fast, mesh_orbits(program, parameters, wanted)
+    rows = np.asarray(wanted)
+    if fast is not None and not rows.any():
+        return fast, None
+    values = {n: np.asarray(v) for n, v in parameters.items()}
+    direct = program.search == "direct"
+    return fast, search_mesh_orbits(program.equations, program.harmonics, values, rows, direct)
+
+
+def _values(
+    parameters: Parameters,
+    fast: FastOrbits | None,
+    meshed: MeshOrbits | None,
+    program: Program,
+) -> ResponseValues:
+    """Response of orbits that were found, with its derivatives to the parameters."""
+    valid = program.equations.valid(parameters)
+    count = program.harmonics, program.states if program.multipliers else 0
+    points = valid.shape[0]
+    outcome = jnp.where(valid, int(Outcome.NO_ORBIT), int(Outcome.INVALID))
+    values = ResponseValues(
+        jnp.zeros(points),
+        jnp.zeros((points, count[0]), dtype=complex),
+        jnp.zeros((points, count[1]), dtype=complex),
+        outcome,
+    )
+    if meshed is not None:
+        values = mesh_values(parameters, meshed, program)
+        values = values._replace(outcome=jnp.where(valid, values.outcome, outcome))
+    if fast is not None:
+        values = chosen(fast.converged, fast_values(parameters, fast, program), values)
+    # A product, so that the derivatives are NaN as well.
+    known = jnp.where(values.outcome == Outcome.CONVERGED, 1.0, jnp.nan)
+    mean, harmonics, logs = (by_point(known, a) * a for a in values[:3])
+    return ResponseValues(mean, harmonics, logs, values.outcome)
+
+
+_evaluate = jit_large(_values, static_argnames=("program",))
+
+
+@partial(jit_large, static_argnames=("program",))
+def _differentiate(
+    parameters: Parameters,
+    fast: FastOrbits | None,
+    meshed: MeshOrbits | None,
+    *,
+    program: Program,
+) -> tuple[ResponseValues, Array]:
+    """Values, and derivatives at each point to its own parameters.
+
+    The derivatives are of shape (parameters, points, columns), with a column for the mean, columns
+    for the real and the imaginary parts of the harmonics, and the same for the multipliers.
+    """
+
+    def evaluate(parameters: Parameters) -> tuple[Any, ResponseValues]:
+        values = _values(parameters, fast, meshed, program)
+        return tuple(_real(a) for a in values[:3]), values
+
+    names = program.equations.names
+    points = parameters[names[0]].shape[0]
+    shapes, values = jax.eval_shape(evaluate, parameters)
+    count = sum(s.shape[1] for s in shapes)
+    # Of the equations on meshes, reverse mode takes several times as long to compile.
+    if meshed is None and count < len(names):
+        _, pull, values = jax.vjp(evaluate, parameters, has_aux=True)
+        unit = _split(jnp.broadcast_to(jnp.eye(count)[:, None], (count, points, count)), shapes)
+        (gradients,) = jax.vmap(pull)(unit)
+        columns = {n: g.T for n, g in gradients.items()}
+    else:
+        _, push, values = jax.linearize(evaluate, parameters, has_aux=True)
+        ones, zeros = jnp.ones(points), jnp.zeros(points)
+        basis = {n: jnp.stack([ones if n == m else zeros for m in names]) for n in names}
+        tangents = jnp.concatenate(jax.vmap(push)(basis), axis=-1)
+        columns = dict(zip(names, tangents, strict=True))
+    known = jnp.where(values.outcome == Outcome.CONVERGED, 1.0, jnp.nan)
+    # In one array: each that leaves a compiled program costs time of its own.
+    return values, known[:, None] * jnp.stack([columns[n] for n in names])
+
+
+def _real(a: Array) -> Array:
+    """Real columns, (points, columns)."""
+    flat = a.reshape(a.shape[0], -1)
+    return jnp.concatenate([flat.real, flat.imag], axis=1) if jnp.iscomplexobj(a) else flat
+
+
+def _split(a: Array, shapes: Any) -> tuple[Array, ...]:
+    ends = np.cumsum([s.shape[1] for s in shapes])[:-1]
+    return tuple(jnp.split(a, ends, axis=-1))
+
+
+def _derivative(columns: Any, values: ResponseValues) -> ResponseValues:
+    """Real columns, (points, columns) or (columns,), as a derivative of `values`."""
+    count = values.harmonics.shape[-1]
+    harmonics, logs = columns[..., 1 : 2 * count + 1], columns[..., 2 * count + 1 :]
+    states = logs.shape[-1] // 2
+    return ResponseValues(
+        columns[..., 0],
+        harmonics[..., :count] + 1j * harmonics[..., count:],
+        logs[..., :states] + 1j * logs[..., states:],
+        values.outcome,
+    )

@@ -1,0 +1,138 @@
+"""Floquet multipliers from a monodromy matrix, with their logarithms where they overflow.
+
+Sign and order: a perturbation of the orbit is multiplied by a multiplier each period of the
+modulation; they are sorted by falling modulus, and the orbit is stable if all moduli are below 1.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+#: Logarithm from which a multiplier overflows a double. Its argument, a small difference of large
+#: phases, is then not known either.
+LARGEST_LOG = 709.0
+
+Complex = NDArray[np.complex128]
+Float = NDArray[np.float64]
+
+
+def log_multipliers(monodromy: Float, log_scale: Float, log_determinant: Float) -> Complex:
+    """Natural logarithms ln|m| + i arg m of the multipliers.
+
+    Parameters
+    ----------
+    monodromy : array, shape (n, n, points)
+        Divided by exp(log_scale).
+    log_scale : array, shape (points,)
+    log_determinant : array, shape (points,)
+        Logarithm of the determinant of the whole monodromy matrix, by Liouville's formula.
+
+    Returns
+    -------
+    array, shape (n, points), sorted by falling real part
+    """
+    n = monodromy.shape[0]
+    with np.errstate(all="ignore"):
+        if n == 1:
+            return log_determinant[None].astype(complex)
+        if n == 2:
+            return _log_pair(monodromy, log_scale, log_determinant)
+        finite = np.where(np.isfinite(monodromy), monodromy, 0.0)
+        values = np.log(np.linalg.eigvals(np.moveaxis(finite, -1, 0)).T.astype(complex))
+        logs = values + log_scale
+    order = np.argsort(-logs.real, axis=0, kind="stable")
+    return np.take_along_axis(logs, order, axis=0)
+
+
+def log_multipliers_of_exponent(exponent: Float, log_determinant: Float) -> Complex:
+    """The same from a matrix whose exponential is the monodromy matrix.
+
+    Of multipliers near 1 the monodromy matrix knows the distance from 1 only to round-off of 1.
+
+    Parameters
+    ----------
+    exponent : array, shape (n, n, points)
+    log_determinant : array, shape (points,)
+        Trace of `exponent`, free of cancellation.
+    """
+    n = exponent.shape[0]
+    if n == 1:
+        return log_determinant[None].astype(complex)
+    if n == 2:
+        (a, b), (c, d) = exponent
+        root = np.sqrt(0.25 * (a - d) ** 2 + b * c + 0j)
+        logs = 0.5 * log_determinant + np.stack([root, -root])
+    else:
+        logs = np.linalg.eigvals(np.moveaxis(exponent, -1, 0)).T.astype(complex)
+    # Arguments in (-pi, pi].
+    logs.imag -= 2 * np.pi * np.ceil(logs.imag / (2 * np.pi) - 0.5)
+    order = np.argsort(-logs.real, axis=0, kind="stable")
+    return np.take_along_axis(logs, order, axis=0)
+
+
+def _log_pair(monodromy: Float, log_scale: Float, log_determinant: Float) -> Complex:
+    """Two multipliers from trace and determinant.
+
+    The larger comes from the trace; the smaller one, lost in the round-off of the matrix when
+    they differ by many orders of magnitude, is the determinant over the larger.
+    """
+    half_trace = 0.5 * (monodromy[0, 0] + monodromy[1, 1])
+    determinant = np.exp(log_determinant - 2 * log_scale)
+    square = half_trace**2 - determinant
+    sign = np.where(half_trace < 0, -1.0, 1.0)
+    real = square >= 0
+    larger = half_trace + sign * np.sqrt(np.where(real, square, 0.0))
+    first = np.where(
+        real,
+        np.log(np.abs(larger)) + log_scale + 1j * np.where(sign < 0, np.pi, 0.0),
+        0.5 * log_determinant + 1j * np.arctan2(np.sqrt(np.where(real, 0.0, -square)), half_trace),
+    )
+    second = np.where(real, log_determinant - first.real + 1j * first.imag, np.conj(first))
+    # Hadamard: entries of this size allow no larger determinant; the transfer maps missed growth.
+    missed = determinant > 4 * np.abs(monodromy).max((0, 1)) ** 2
+    return np.where(missed, np.nan, np.stack([first, second]))
+
+
+def from_logs(logs: Complex) -> Complex:
+    """Multipliers from their logarithms; a modulus beyond the range of doubles is inf or 0."""
+    with np.errstate(over="ignore", under="ignore", invalid="ignore"):
+        modulus = np.exp(logs.real)
+        angle = np.where(np.isnan(logs.imag) & ~np.isnan(logs.real), 0.0, logs.imag)
+        on_axis = (angle == 0) | (np.abs(angle) == np.pi)
+        # Not inf * 0: a real multiplier has no imaginary part however large it is.
+        imaginary = np.where(on_axis, 0.0, modulus * np.sin(angle))
+        return modulus * np.cos(angle) + 1j * imaginary
+
+
+#: What an orbit turns into where its leading multiplier leaves the unit circle.
+FOLD, PERIOD_DOUBLING, NEIMARK_SACKER = "fold", "period doubling", "Neimark-Sacker"
+
+#: Arguments (rad) below this, and as close to pi, are real multipliers.
+_REAL = 1e-12
+
+
+def kind_of_crossing(logs: Complex) -> NDArray[np.object_]:
+    """Bifurcation that a multiplier stands for, by its argument; "" where that is not known.
+
+    Real and positive: a fold. Real and negative: period doubling, a response that repeats only
+    after two periods. A complex pair: Neimark-Sacker, a slow oscillation on top of the modulation.
+
+    Parameters
+    ----------
+    logs : complex array
+        ln|m| + i arg m.
+    """
+    angle = np.abs(logs.imag)
+    kinds = np.full(logs.shape, NEIMARK_SACKER, dtype=object)
+    kinds[angle < _REAL] = FOLD
+    kinds[np.abs(angle - np.pi) < _REAL] = PERIOD_DOUBLING
+    kinds[np.isnan(angle) | np.isnan(logs.real)] = ""
+    return kinds
+
+
+def without_lost_arguments(logs: Complex) -> Complex:
+    """The same with NaN for the argument of a multiplier that overflows."""
+    kept = logs.copy()
+    kept.imag[logs.real > LARGEST_LOG] = np.nan
+    return kept

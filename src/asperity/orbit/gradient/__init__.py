@@ -1,0 +1,1 @@
+"""Derivatives of periodic orbits by the implicit function theorem."""

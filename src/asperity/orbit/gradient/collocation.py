@@ -1,0 +1,91 @@
+"""The collocation equations of an orbit on a given mesh, for the implicit-function rule.
+
+The linear system is condensed interval by interval to transfer maps as in Newton's method. Matrices
+are factorised once; right-hand sides, of which there is one for each direction, only multiply.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from asperity.algebra.cyclic import CyclicFactors, factorise_cyclic, solve_factorised
+from asperity.orbit.methods.collocation.condensation import condense, localise, transfer_maps
+from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.methods.collocation.scheme import STAGES
+from asperity.slider.problem import Problem
+
+
+def unknowns_of(orbit: Orbit) -> Array:
+    """The unknowns: states at the mesh points less the centre, before the slopes.
+
+    Returns
+    -------
+    array, shape (n, 1 + STAGES, intervals, points)
+        One array, since JAX transposes a linear solve only if every part of its right-hand side
+        depends on what is transposed.
+    """
+    return jnp.concatenate([orbit.nodes[:, None], orbit.slopes], axis=1)
+
+
+class _Prepared(NamedTuple):
+    widths: Array
+    weights: Array  # (STAGES,): of the slopes in the rise over an interval
+    response: Array  # (n, STAGES, n, intervals, points): slopes for a change at the left node
+    inverse: Array  # (n, STAGES, STAGES * n, intervals, points): slopes for a change of the rates
+    factors: CyclicFactors
+
+
+@dataclass(frozen=True)
+class CollocationEquations:
+    """Collocation on the mesh of a found orbit; the parameters are (problem, found orbit)."""
+
+    def orbit(self, parameters: tuple[Problem, Orbit], unknowns: Array) -> Orbit:
+        """The orbit that the unknowns describe."""
+        found = jax.lax.stop_gradient(parameters[1])
+        return found.moved(nodes=unknowns[:, 0], slopes=unknowns[:, 1:])
+
+    def prepare(self, parameters: tuple[Problem, Orbit], unknowns: Array) -> _Prepared:
+        """Condensed equations."""
+        problem, orbit = parameters[0], self.orbit(parameters, unknowns)
+        local = localise(*problem, orbit)
+        n = local.rates.shape[0]
+        unit = jnp.eye(n * STAGES).reshape(n * STAGES, n, STAGES, 1, 1)
+        columns = [column + jnp.zeros_like(local.rates) for column in unit]
+        response, *inverse = condense(local, orbit, *columns)
+        return _Prepared(
+            orbit.widths,
+            jnp.asarray(orbit.scheme.b),
+            response,
+            jnp.stack(inverse, axis=2),
+            factorise_cyclic(transfer_maps(response, orbit)),
+        )
+
+    def residual(self, parameters: tuple[Problem, Orbit], unknowns: Array, at: _Prepared) -> Array:
+        """Gaps at the ends of the intervals, and slopes less rates."""
+        (system, load), orbit = parameters[0], self.orbit(parameters, unknowns)
+        states = orbit.centre[:, None, None] + orbit.stage_deviations
+        rates = system.rates(states, load.at(orbit.stage_phases))
+        rise = orbit.widths * jnp.einsum("k,nkmb->nmb", orbit.scheme.b, orbit.slopes)
+        gap = jnp.roll(orbit.nodes, -1, axis=1) - orbit.nodes - rise
+        return jnp.concatenate([gap[:, None], orbit.slopes - rates], axis=1)
+
+    def solve(self, product: Callable[[Any], Any], right: Array, at: _Prepared) -> Array:
+        """Nodes from the condensed equations, slopes from the nodes."""
+        constant = jnp.einsum(
+            "nkcmb,cmb->nkmb", at.inverse, right[:, 1:].reshape(-1, *at.widths.shape)
+        )
+        rise = at.widths * jnp.einsum("k,nkmb->nmb", at.weights, constant)
+        nodes = solve_factorised(at.factors, right[:, 0] + rise)
+        slopes = jnp.einsum("nkcmb,cmb->nkmb", at.response, nodes) + constant
+        return jnp.concatenate([nodes[:, None], slopes], axis=1)
+
+    def solve_transposed(self, product: Callable[[Any], Any], right: Array, at: _Prepared) -> Array:
+        """The transpose of `solve`, which is linear in the right-hand side."""
+        (transposed,) = jax.linear_transpose(lambda b: self.solve(product, b, at), right)(right)
+        return transposed

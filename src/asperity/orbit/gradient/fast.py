@@ -1,0 +1,187 @@
+"""The fast methods within a compiled program: orbits without derivatives, then their response."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from asperity._jax import jit_large
+from asperity.orbit.compiled import (
+    deepest_unloading,
+    sharpness_of_slip,
+    stiffness_of_steady_sliding,
+)
+from asperity.orbit.gradient.fourier import (
+    FloquetEquations,
+    FourierEquations,
+    FourierUnknowns,
+    floquet_factor,
+    means,
+)
+from asperity.orbit.gradient.implicit import implicit_solution
+from asperity.orbit.gradient.multipliers import log_multipliers_of_exponent
+from asperity.orbit.gradient.program import Parameters, Program, ResponseValues
+from asperity.orbit.methods.fourier.balance import BalanceEquations, balanced_orbit
+from asperity.orbit.methods.fourier.observables import force_spectrum, orbit_error
+from asperity.orbit.methods.fourier.orbit import fourier_orbit, load_cycle
+from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
+from asperity.slider import QuasiStatic
+from asperity.slider.problem import Problem
+
+#: Grid of quasi-static orbits, and the sharpest slip pulse that it resolves.
+_NODES, _GRADING, _SHARPEST = 32, 0.3, 18.0
+#: Nodes with damping alone, and with inertia, in which the slider swings several times a period.
+_DAMPED_NODES, _INERTIAL_NODES = 32, 64
+#: Rate per radian above which the iterations cannot contract.
+_STIFFEST = 1.0
+#: Estimated error that must be reached.
+_ERROR = 1e-9
+_TOLERANCE, _MOST_STEPS = 1e-10, 40
+#: Tolerance with inertia or damping, where harmonics may be much smaller than the states'.
+_BALANCED_TOLERANCE = 1e-11
+
+
+class FastOrbits(NamedTuple):
+    """Orbits of the fast method; of no meaning where `converged` is False.
+
+    Attributes
+    ----------
+    unknowns : pytree
+        Of the equations of the method.
+    floquet : pytree or None
+        Of those of the Floquet factor, where multipliers are asked for.
+    prepared : tuple
+        What the linear systems of their derivatives need.
+    valid, converged : bool array, shape (points,)
+        Whether the parameters obey their rules, and whether the orbit is found and resolved.
+    """
+
+    unknowns: Any
+    floquet: Any
+    prepared: tuple
+    valid: Array
+    converged: Array
+
+
+def has_fast_method(program: Program) -> bool:
+    """Whether there is one; not of the multipliers with inertia or damping."""
+    return _quasi_static(program) or not program.multipliers
+
+
+def _quasi_static(program: Program) -> bool:
+    return program.equations.motion is QuasiStatic
+
+
+def _balance(program: Program) -> BalanceEquations:
+    nodes = _INERTIAL_NODES if program.equations.massive else _DAMPED_NODES
+    return BalanceEquations(nodes, _GRADING)
+
+
+@partial(jit_large, static_argnames=("program",))
+def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
+    """Orbits by Fourier collocation, checked for convergence and resolution."""
+    problem = program.equations.problem(parameters)
+    system, load = problem
+    valid = program.equations.valid(parameters)
+    sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
+    rate = stiffness_of_steady_sliding(sliding)
+    # Points out of range are left to the search, which says so.
+    good = valid & (rate >= SMALLEST_RATE) & (rate < _STIFFEST)
+    good &= deepest_unloading(sliding) <= LARGEST_UNLOADING
+    good &= sharpness_of_slip(sliding) <= _SHARPEST
+    solve = _fourier_orbits if _quasi_static(program) else _balanced_orbits
+    return solve(problem, program, valid, good)
+
+
+def fast_values(parameters: Parameters, fast: FastOrbits, program: Program) -> ResponseValues:
+    """Response of the orbits, with its derivatives to the parameters."""
+    problem = program.equations.problem(parameters)
+    evaluate = _fourier_values if _quasi_static(program) else _balanced_values
+    mean, harmonics, logs = evaluate(problem, fast, program)
+    outcome = jnp.where(fast.converged, int(Outcome.CONVERGED), int(Outcome.NO_ORBIT))
+    return ResponseValues(mean, harmonics.T, logs.T, outcome)
+
+
+def _fourier_orbits(problem: Problem, program: Program, valid: Array, good: Array) -> FastOrbits:
+    system, load = problem
+    orbit = fourier_orbit(
+        *problem,
+        valid.shape[0],
+        nodes=_NODES,
+        grading=_GRADING,
+        tolerance=_TOLERANCE,
+        max_steps=_MOST_STEPS,
+    )
+    cycle = load_cycle(load, _NODES, _GRADING)
+    good &= orbit_error(system, cycle, orbit, program.harmonics) < _ERROR
+    unknowns = FourierUnknowns(orbit.mean, orbit.rest)
+    floquet, more_steps = None, jnp.zeros_like(orbit.steps)
+    if program.multipliers:
+        J = _stretched(FourierEquations(_NODES, _GRADING), problem, unknowns)
+        floquet, converged, more_steps = floquet_factor(_NODES, J, _MOST_STEPS)
+        good &= converged
+        floquet = jax.tree.map(lambda a: jnp.where(good, a, 0.0), floquet)
+    # Elsewhere states at which the equations are finite, so that they harm no other point.
+    steady = system.steady()
+    mean = tuple(jnp.where(good, a, s) for a, s in zip(orbit.mean, steady, strict=True))
+    rest = tuple(jnp.where(good, a, 0.0) for a in orbit.rest)
+    return FastOrbits(FourierUnknowns(mean, rest), floquet, (orbit.steps, more_steps), valid, good)
+
+
+def _fourier_values(
+    problem: Problem, fast: FastOrbits, program: Program
+) -> tuple[Array, Array, Array]:
+    equations = FourierEquations(_NODES, _GRADING)
+    unknowns = implicit_solution(equations, (problem, fast.prepared[0]), fast.unknowns)
+    mean, harmonics = force_spectrum(
+        problem.system,
+        equations.cycle(problem),
+        unknowns.mean,
+        unknowns.rest,
+        program.harmonics,
+    )
+    logs = jnp.zeros((0, *mean.shape), dtype=complex)
+    if program.multipliers:
+        J = _stretched(equations, problem, unknowns)
+        floquet = FloquetEquations(_NODES)
+        q = implicit_solution(floquet, (J, fast.prepared[1]), fast.floquet)
+        exponent = jnp.stack([jnp.stack(row) for row in means(floquet.product(J, q))])
+        logs = log_multipliers_of_exponent(2 * jnp.pi * exponent)
+    return mean, harmonics, logs
+
+
+def _stretched(equations: FourierEquations, problem: Problem, unknowns: FourierUnknowns) -> Any:
+    """Derivatives of the rates per unit of tau."""
+    stretch = equations.cycle(problem).stretch[:, None]
+    return [[stretch * entry for entry in row] for row in equations.jacobian(problem, unknowns)]
+
+
+def _balanced_orbits(problem: Problem, program: Program, valid: Array, good: Array) -> FastOrbits:
+    equations = _balance(program)
+    orbit = balanced_orbit(
+        problem,
+        nodes=equations.nodes,
+        grading=equations.grading,
+        harmonics=program.harmonics,
+        tolerance=_BALANCED_TOLERANCE,
+        max_steps=_MOST_STEPS,
+    )
+    good &= orbit.error < _ERROR
+    # As above.
+    steady = equations.steady(problem)
+    unknowns = jax.tree.map(lambda a, s: jnp.where(good, a, s), orbit.unknowns, steady)
+    prepared = jax.tree.map(lambda a: jnp.where(good, a, 0.0), orbit.prepared)
+    return FastOrbits(unknowns, None, (prepared, orbit.steps), valid, good)
+
+
+def _balanced_values(
+    problem: Problem, fast: FastOrbits, program: Program
+) -> tuple[Array, Array, Array]:
+    equations = _balance(program)
+    unknowns = implicit_solution(equations, (problem, *fast.prepared), fast.unknowns)
+    mean, harmonics = equations.force_spectrum(problem, unknowns, program.harmonics)
+    return mean, harmonics, jnp.zeros((0, *mean.shape), dtype=complex)

@@ -1,0 +1,224 @@
+"""The equations of a Fourier orbit and of its Floquet factor, for the implicit-function rule.
+
+Both are fixed points of contractions, those of `asperity.orbit.methods.fourier`, so that their
+linear systems are solved by repeating a contraction, transposed or not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from asperity.algebra.contraction import contracted
+from asperity.algebra.small_systems import Matrix, inverse_points
+from asperity.orbit.methods.fourier.orbit import (
+    LoadCycle,
+    States,
+    advance,
+    grid,
+    jacobian,
+    load_cycle,
+    rates_on,
+    together,
+)
+from asperity.slider.problem import Problem
+
+#: Steps that a linear system is given beyond those that the orbit took.
+_MORE_STEPS = 2
+#: Last change of the Floquet factor.
+_FLOQUET_TOLERANCE = 1e-11
+
+
+class FourierUnknowns(NamedTuple):
+    """A Fourier orbit: mean states (points,) and zero-mean parts (nodes, points)."""
+
+    mean: States
+    rest: States
+
+
+class _Prepared(NamedTuple):
+    inverse: Matrix
+    jacobian: Matrix
+    steps: Array
+
+
+@dataclass(frozen=True)
+class FourierEquations:
+    """Orbit equations on a grid; the parameters are (problem, steps that the orbit took).
+
+    Parameters
+    ----------
+    nodes : int
+    grading : float
+    """
+
+    nodes: int
+    grading: float
+
+    def cycle(self, problem: Problem) -> LoadCycle:
+        """The load on the grid."""
+        return load_cycle(problem.load, self.nodes, self.grading)
+
+    def jacobian(self, problem: Problem, unknowns: FourierUnknowns) -> Matrix:
+        """Derivatives of the rates on the grid to the states, [i][j] of shape (nodes, points)."""
+        states = together(*unknowns)
+        _, push = jax.linearize(rates_on(problem.system, self.cycle(problem)), *states)
+        return jacobian(push, states)
+
+    def prepare(self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns) -> _Prepared:
+        """Jacobian, and the inverse of its mean."""
+        problem, steps = parameters
+        J = self.jacobian(problem, unknowns)
+        share = self.cycle(problem).share
+        inverse = inverse_points([[share @ entry for entry in row] for row in J])
+        return _Prepared(inverse, J, steps)
+
+    def residual(
+        self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns, at: _Prepared
+    ) -> FourierUnknowns:
+        """The unknowns less what a step of the iteration makes of them."""
+        problem, _ = parameters
+        cycle = self.cycle(problem)
+        rates = rates_on(problem.system, cycle)(*together(*unknowns))
+
+        def push(*change: Array) -> States:
+            return _times(at.jacobian, change)
+
+        mean, rest, _ = advance(cycle, at.inverse, unknowns.mean, rates, push)
+        return _less(unknowns, FourierUnknowns(mean, rest))
+
+    def solve(
+        self, product: Callable[[Any], Any], right: FourierUnknowns, at: _Prepared
+    ) -> FourierUnknowns:
+        """By the contraction that found the orbit."""
+        J, share, integral = self._transposed(at)
+
+        def contract(y: FourierUnknowns) -> FourierUnknowns:
+            states = tuple(m[:, None] + z for m, z in zip(y.mean, y.rest, strict=True))
+            rates = _times(J, states)
+            change = tuple(-c for c in _times(at.inverse, tuple(r @ share for r in rates)))
+            follow = _times(J, tuple(c[:, None] for c in change))
+            rest = tuple((r + f) @ integral for r, f in zip(rates, follow, strict=True))
+            return FourierUnknowns(together(y.mean, change), rest)
+
+        return _turned(
+            contracted(contract, _turned(right), at.steps + _MORE_STEPS, points_last=False)
+        )
+
+    def solve_transposed(
+        self, product: Callable[[Any], Any], right: FourierUnknowns, at: _Prepared
+    ) -> FourierUnknowns:
+        """By the transpose of that contraction."""
+        J, share, integral = self._transposed(at)
+        n = range(len(J))
+
+        def contract(y: FourierUnknowns) -> FourierUnknowns:
+            rest = tuple(z @ integral.T for z in y.rest)
+            change = [y.mean[j] + sum((J[i][j] * rest[i]).sum(1) for i in n) for j in n]
+            mean = [-sum(at.inverse[i][j] * change[i] for i in n) for j in n]
+            rates = [r + m[:, None] * share for r, m in zip(rest, mean, strict=True)]
+            states = tuple(sum(J[i][j] * rates[i] for i in n) for j in n)
+            means_too = tuple(m + s.sum(1) for m, s in zip(y.mean, states, strict=True))
+            return FourierUnknowns(means_too, states)
+
+        return _turned(
+            contracted(contract, _turned(right), at.steps + _MORE_STEPS, points_last=False)
+        )
+
+    def _transposed(self, at: _Prepared) -> tuple[Matrix, Any, Any]:
+        """Jacobian (points, nodes), weights of a mean, and the integral as a right factor.
+
+        With the nodes last, products with the integral need no transposition, however many
+        right-hand sides there are.
+        """
+        tau, integral = grid(self.nodes)
+        stretch = 1 + self.grading * np.cos(tau)
+        J = [[entry.T for entry in row] for row in at.jacobian]
+        return J, stretch / self.nodes, (integral * stretch).T
+
+
+@dataclass(frozen=True)
+class FloquetEquations:
+    """Equations of the periodic factor Q = 1 + q of the fundamental matrix, q of zero mean.
+
+        dq/dtau = J (1 + q) - (1 + q) L,     L = < J (1 + q) >.
+
+    The parameters are J, [i][j] of shape (nodes, points), per unit of tau, and the steps to take.
+    """
+
+    nodes: int
+
+    def product(self, J: Matrix, q: Matrix) -> Matrix:
+        """J (1 + q)."""
+        n = range(len(J))
+        return [[J[i][c] + sum(J[i][j] * q[j][c] for j in n) for c in n] for i in n]
+
+    def slope(self, J: Matrix, q: Matrix) -> Matrix:
+        """dq/dtau."""
+        n, P = range(len(J)), self.product(J, q)
+        L = means(P)
+        return [[P[i][c] - L[i][c] - sum(q[i][k] * L[k][c] for k in n) for c in n] for i in n]
+
+    def prepare(self, parameters: tuple[Matrix, Array], unknowns: Matrix) -> Array:
+        """The steps to take."""
+        return parameters[1]
+
+    def residual(self, parameters: tuple[Matrix, Array], unknowns: Matrix, at: Array) -> Matrix:
+        """Q less what a step of the iteration makes of it."""
+        integral = grid(self.nodes)[1]
+        slope = self.slope(parameters[0], unknowns)
+        return [
+            [q - integral @ s for q, s in zip(*rows, strict=True)]
+            for rows in zip(unknowns, slope, strict=True)
+        ]
+
+    def solve(self, product: Callable[[Any], Any], right: Any, at: Array) -> Any:
+        """By the contraction that found it."""
+        return contracted(lambda y: _less(y, product(y)), right, at + _MORE_STEPS, points_last=True)
+
+    def solve_transposed(self, product: Callable[[Any], Any], right: Any, at: Array) -> Any:
+        """The same: the transpose contracts as fast."""
+        return self.solve(product, right, at)
+
+
+def floquet_factor(nodes: int, J: Matrix, max_steps: int) -> tuple[Matrix, Array, Array]:
+    """q, whether it converged (points,), and the number of steps."""
+    equations, integral = FloquetEquations(nodes), grid(nodes)[1]
+    zero = [[jnp.zeros_like(entry) for entry in row] for row in J]
+
+    def body(carry: tuple) -> tuple:
+        q, _, steps = carry
+        new = [[integral @ s for s in row] for row in equations.slope(J, q)]
+        change = jnp.stack([jnp.abs(d).max(0) for d in jax.tree.leaves(_less(new, q))]).max(0)
+        return new, change, steps + 1
+
+    def unfinished(carry: tuple) -> Array:
+        _, change, steps = carry
+        return (steps < max_steps) & jnp.any((change > _FLOQUET_TOLERANCE) & (change < 1e3))
+
+    q, change, steps = jax.lax.while_loop(unfinished, body, (zero, jnp.ones(J[0][0].shape[1]), 0))
+    return q, change <= _FLOQUET_TOLERANCE, steps
+
+
+def means(entries: Matrix) -> Matrix:
+    """Means over tau, entries of shape (points,)."""
+    return [[entry.mean(0) for entry in row] for row in entries]
+
+
+def _less(a: Any, b: Any) -> Any:
+    return jax.tree.map(jnp.subtract, a, b)
+
+
+def _turned(tree: Any) -> Any:
+    """Transposed arrays."""
+    return jax.tree.map(jnp.transpose, tree)
+
+
+def _times(matrix: Matrix, vector: States) -> States:
+    return tuple(sum(a * b for a, b in zip(row, vector, strict=True)) for row in matrix)

@@ -1,0 +1,164 @@
+"""Equations of motion and load as functions of named parameters."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from typing import Any
+
+import jax.numpy as jnp
+from jax import Array
+
+from asperity.errors import InputError
+from asperity.laws import Law
+from asperity.loads import Harmonic, Modulation, Periodic
+from asperity.parameters import RULES, Parameter, law_parameters, point_parameters
+from asperity.slider import Motion, QuasiStatic, Slider
+from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
+from asperity.slider.problem import Problem
+
+#: Series of a `Periodic` load, as the names of their coefficients begin.
+_SERIES = ("load", "shear", "pull")
+
+
+@dataclasses.dataclass(frozen=True)
+class ParametrisedProblem:
+    """What the parameters of an operating point are, and the equations that they give.
+
+    Hashable and without arrays: programs are compiled once for each.
+
+    Attributes
+    ----------
+    law : type of Law
+    motion : type of Motion
+    damped : bool
+        Whether radiation damping eta is a parameter.
+    coefficients : tuple of int, optional
+        Harmonics of load, shear force and pulling velocity of a `Periodic` load; None for a
+        harmonic one.
+    """
+
+    law: type[Law]
+    motion: type[Motion]
+    damped: bool = False
+    coefficients: tuple[int, int, int] | None = None
+
+    @classmethod
+    def of(cls, problem: Problem) -> ParametrisedProblem:
+        """The one that a problem is an instance of."""
+        system, load = problem
+        damped = bool(jnp.any(jnp.asarray(system.damping) > 0))
+        return cls(type(system.slider.law), type(system), damped, coefficients_of(load))
+
+    @property
+    def massive(self) -> bool:
+        """Whether the mass counts."""
+        return self.motion in (Inertial, StiffInertial)
+
+    @property
+    def elastic(self) -> bool:
+        """Whether the equations need elastic asperities."""
+        return self.motion in (Inertial, RadiatingAsperities)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of all parameters: of the law, K, W0, M, V, frequency, eta, and of the load."""
+        eta = ("eta",) if self.damped else ()
+        own = law_parameters(self.law)
+        return (*own, "K", "W0", "M", "V", "frequency", *eta, *self.load_names)
+
+    @property
+    def load_names(self) -> tuple[str, ...]:
+        """Names of the parameters of the load."""
+        if self.coefficients is None:
+            return ("epsilon",)
+        return tuple(
+            f"{series}_{function}_{k}"
+            for series, count in zip(_SERIES, self.coefficients, strict=True)
+            for k in range(1, count + 1)
+            for function in ("cos", "sin")
+        )
+
+    @property
+    def optional(self) -> tuple[str, ...]:
+        """Names of parameters that have no influence, and need not be given."""
+        return () if self.massive else ("M",)
+
+    def table(self) -> dict[str, Parameter]:
+        """Kind, rule and meaning of each parameter, in the order of `names`."""
+        known = point_parameters(self.law)
+        positive = (("M",) if self.massive else ()) + (("lambda",) if self.elastic else ())
+        table = {n: known.get(n, Parameter(n, "dimensionless", "finite")) for n in self.names}
+        # Where the mass or the asperities are part of the equations they must not vanish.
+        return table | {n: dataclasses.replace(table[n], rule="positive") for n in positive}
+
+    def problem(self, parameters: Mapping[str, Any]) -> Problem:
+        """Equations and load.
+
+        Parameters
+        ----------
+        parameters : mapping of str to array, shape (points,)
+            All of `names`, in SI.
+        """
+        fields = {f.name: parameters[f.name.rstrip("_")] for f in dataclasses.fields(self.law)}
+        slider = Slider(
+            self.law(**fields),
+            spring=parameters["K"],
+            load=parameters["W0"],
+            mass=parameters["M"],
+        )
+        drive: tuple[Any, ...] = (slider, parameters["V"], 2 * jnp.pi * parameters["frequency"])
+        if self.motion is not QuasiStatic:
+            none = 0 * jnp.asarray(parameters["V"])
+            drive = (*drive, parameters["eta"] if self.damped else none)
+        return Problem(self.motion(*drive), self._load(parameters))
+
+    def _load(self, parameters: Mapping[str, Any]) -> Modulation:
+        if self.coefficients is None:
+            return Harmonic(parameters["epsilon"])
+        values = iter([parameters[name] for name in self.load_names])
+        series = [tuple((next(values), next(values)) for _ in range(n)) for n in self.coefficients]
+        return Periodic(*series)
+
+    def values(self, problem: Problem) -> dict[str, Any]:
+        """Parameters of a problem by name: the inverse of `problem`."""
+        system, load = problem
+        law = system.slider.law
+        values = {f.name.rstrip("_"): getattr(law, f.name) for f in dataclasses.fields(law)}
+        values |= {name: getattr(system.slider, name) for name in ("K", "W0", "M")}
+        values |= {"V": system.V, "frequency": system.omega / (2 * jnp.pi)}
+        if self.damped:
+            values["eta"] = system.eta
+        return values | load_values(load)
+
+    def valid(self, parameters: Mapping[str, Array]) -> Array:
+        """Whether all parameters of a point obey their rules, shape (points,)."""
+        good = [jnp.isfinite(parameters[name]) for name in self.names]
+        for name, parameter in self.table().items():
+            if parameter.rule != "finite":
+                good.append(RULES[parameter.rule].holds(parameters[name]))
+        return jnp.stack(good).all(0)
+
+
+def coefficients_of(load: Modulation) -> tuple[int, int, int] | None:
+    """Numbers of harmonics of a `Periodic` load; None for a harmonic one."""
+    if isinstance(load, Harmonic):
+        return None
+    if not isinstance(load, Periodic):
+        raise InputError(
+            f"modulation must be harmonic or periodic, got {type(load).__name__}; build it with "
+            "asperity.loads.modulated or asperity.loads.sampled"
+        )
+    return len(load.load), len(load.shear), len(load.pull)
+
+
+def load_values(load: Modulation) -> dict[str, Any]:
+    """Parameters of a load by name."""
+    if isinstance(load, Harmonic):
+        return {"epsilon": load.epsilon}
+    return {
+        f"{series}_{function}_{k}": value
+        for series in _SERIES
+        for k, pair in enumerate(getattr(load, series), start=1)
+        for function, value in zip(("cos", "sin"), pair, strict=True)
+    }

@@ -1,0 +1,1 @@
+"""Methods that find a periodic orbit: Fourier, series, shooting, collocation, branch following."""

@@ -1,0 +1,299 @@
+"""From steady sliding to the amplitude asked for, through folds and canards, in batches."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.orbit.instability import CHUNK, LARGEST_GROWTH
+from asperity.orbit.methods.branch_following.arclength import (
+    ContinuationPoint,
+    Tangent,
+    first_tangent,
+)
+from asperity.orbit.methods.branch_following.moving_mesh import (
+    MovingMeshStep,
+    PointPair,
+    growth_within,
+    moving_step,
+    straight,
+)
+from asperity.orbit.methods.branch_following.parameter_line import ParameterLine, amplitude_line
+from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.methods.collocation.scheme import scheme_for
+from asperity.slider.problem import Problem
+from asperity.theory.adiabatic import adiabatic_growth
+
+Float = NDArray[np.float64]
+
+
+class BranchMesh(NamedTuple):
+    """Intervals of a moving mesh, and most steps along a branch on it."""
+
+    intervals: int
+    most_steps: int
+
+
+#: For all points, and for those whose outcome the first mesh leaves open.
+MESHES = (BranchMesh(144, 200), BranchMesh(288, 1000))
+#: Exponent of the slip rate beyond which a pulse is so narrow, below 1e-7 of the period, that
+#: round-off in the phase limits it.
+RUNAWAY = 13.0
+
+#: Distance from the amplitude asked for below which steps aim at it, and at which it is reached.
+_NEAR, _ARRIVED = 1e-2, 1e-6
+#: Rise of the exponent beyond `RUNAWAY` for which a branch is still followed there.
+_AHEAD = 0.5
+#: A branch this far back from a fold, as a share of the amplitude, is on its way back.
+_BACK = 1e-3
+_NEWTON_STEPS = 10
+#: Distance from the prediction, in steps, above which a step is not trusted.
+_MISS = 0.8
+#: Distance that the moving of the mesh may account for: shorter steps would miss by as much.
+_NOISE = 0.15
+_FIRST = 0.02
+#: Longest step in the space of states, phase and share, and its change by what Newton needed.
+_LONGEST, _GROWTH, _SHRINKAGE = 3.0, 2.0, 0.4
+_EASY, _HARD = 4, 7
+#: Failures after which a step starts anew along the tangent, and after which the branch is left.
+_RESTART, _GIVE_UP = 4, 10
+#: Exponent from which pulses grow steadily if they do, its rise over which the share is watched,
+#: and how many times farther the share may get than where that leads.
+_RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
+
+
+class SteadyBranch(NamedTuple):
+    """Ends of branches that were followed from steady sliding.
+
+    Attributes
+    ----------
+    orbit : Orbit
+        Orbits at the share reached.
+    share : array, shape (points,)
+        Share of the amplitude reached; about 1 where it succeeded.
+    fold : array, shape (points,)
+        Share at the fold that is farthest from steady sliding, NaN where there was none.
+    farthest : array, shape (points,)
+        Largest share on the branch.
+    fastest : array, shape (points,)
+        Largest exponent of the slip rate of the last orbit.
+    limit : array, shape (points,)
+        Share at which, as they grew at last, pulses are to reach e^`RUNAWAY`; inf where they
+        do not grow.
+    growth : array, shape (points,)
+        Exponent by which a disturbance grows while it does, of the last orbit or of steady
+        sliding at the amplitude asked for, whichever is larger; 0 where the outcome is definite.
+    """
+
+    orbit: Orbit
+    share: Float
+    fold: Float
+    farthest: Float
+    fastest: Float
+    limit: Float
+    growth: Float
+
+    @property
+    def arrived(self) -> NDArray[np.bool_]:
+        """Whether the amplitude asked for was reached."""
+        return np.abs(self.share - 1) <= _ARRIVED
+
+    @property
+    def folded(self) -> NDArray[np.bool_]:
+        """Whether the branch was left on its way back from its farthest fold."""
+        with np.errstate(invalid="ignore"):
+            back = (self.fold >= self.farthest - _BACK) & (self.share < self.farthest - _BACK)
+        return ~self.arrived & back
+
+    @property
+    def ran_away(self) -> NDArray[np.bool_]:
+        """Whether slip becomes too fast to be followed before the amplitude asked for."""
+        return ~self.arrived & ~self.folded & (self.end < 1)
+
+    @property
+    def sensitive(self) -> NDArray[np.bool_]:
+        """Whether the branch was lost where neither mesh nor experiment can hold its orbits."""
+        return ~(self.arrived | self.folded | self.ran_away) & (self.growth > LARGEST_GROWTH)
+
+    @property
+    def definite(self) -> NDArray[np.bool_]:
+        """Whether a finer mesh would say the same."""
+        return self.arrived | self.folded | (self.fastest >= RUNAWAY)
+
+    @property
+    def end(self) -> Float:
+        """Share before which pulses pass e^`RUNAWAY`; inf where they are not known to."""
+        return np.where(self.fastest >= RUNAWAY, self.share, self.limit)
+
+
+def follow_from_steady_sliding(problem: Problem, index: Indices, mesh: BranchMesh) -> SteadyBranch:
+    """Follow the points `index` of `problem` (NumPy arrays) from steady sliding.
+
+    Always from the beginning: a coarser mesh resolves a branch poorly long before it is lost.
+    """
+    line = amplitude_line(problem)
+    pair = _steady_pair(line, len(problem.system.V), index, mesh.intervals)
+    progress = BranchProgress.from_steady(len(problem.system.V))
+    _follow(line, pair, progress, index, mesh.most_steps)
+    orbit, share, _ = pair.point
+    known = (progress.fold, progress.farthest, progress.fastest, progress.limit)
+    result = SteadyBranch(orbit, share, *known, np.zeros_like(share))
+    left = index[~result.definite[index]]
+    for part, growth in run_chunks(growth_within, (line, orbit, share), left, CHUNK):
+        result.growth[part] = growth
+    for part, growth in run_chunks(adiabatic_growth, problem, left, CHUNK):
+        result.growth[part] = np.fmax(growth, result.growth[part])
+    return result
+
+
+class BranchProgress(NamedTuple):
+    """What is known of each branch so far, and how to go on.
+
+    Attributes
+    ----------
+    fold, farthest, fastest, limit : array, shape (points,)
+        As in `SteadyBranch`.
+    watched_share, watched_exponent : array, shape (points,)
+        Share and exponent from which the present rise of the exponent is counted.
+    last, ratio : array, shape (points,)
+        Length of the last step, and of the next one in parts of it.
+    failures : int array, shape (points,)
+        Failed steps since the last good one.
+    """
+
+    fold: Float
+    farthest: Float
+    fastest: Float
+    limit: Float
+    watched_share: Float
+    watched_exponent: Float
+    last: Float
+    ratio: Float
+    failures: NDArray[np.int_]
+
+    @classmethod
+    def from_steady(cls, points: int) -> BranchProgress:
+        """Progress at the start of the branches."""
+
+        def full(value: float) -> Float:
+            return np.full(points, value)
+
+        return cls(
+            fold=full(np.nan),
+            farthest=full(0.0),
+            fastest=full(0.0),
+            limit=full(np.inf),
+            watched_share=full(0.0),
+            watched_exponent=full(0.0),
+            last=full(_FIRST),
+            ratio=full(1.0),
+            failures=np.zeros(points, int),
+        )
+
+    def continues(self, share: Float) -> NDArray[np.bool_]:
+        """Branches that neither arrived nor ran away; one that returns may turn again."""
+        left = np.abs(share - 1)
+        # A branch that is about to arrive may exceed the limit a little.
+        fastest = np.where(left < _NEAR, self.fastest - _AHEAD, self.fastest)
+        return (left > _ARRIVED) & (share > -0.01) & (fastest < RUNAWAY)
+
+    def watch(self, rows: Indices, share: Float) -> None:
+        """Extrapolate the share to where pulses run away, once they have grown enough."""
+        exponent = self.fastest[rows]
+        rise = exponent - self.watched_exponent[rows]
+        gain = share - self.watched_share[rows]
+        grown = (exponent > _RUNNING) & (rise > _RISE) & (gain > 0)
+        left = np.maximum(RUNAWAY - exponent, 0.0)
+        ahead = share + _CAUTION * left * gain / np.where(grown, rise, 1.0)
+        known = np.where(rise < 0, np.inf, self.limit[rows])
+        self.limit[rows] = np.where(grown, ahead, known)
+        restart = (rise > _RISE) | (rise < 0)
+        self.watched_share[rows] = np.where(restart, share, self.watched_share[rows])
+        self.watched_exponent[rows] = np.where(restart, exponent, self.watched_exponent[rows])
+
+
+def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: int) -> PointPair:
+    system = line.origin.system
+    orbit = Orbit.empty(scheme_for(system), system.size, intervals, points)
+    orbit.mesh[:] = np.linspace(0, 2 * np.pi, intervals + 1)[:, None]
+    steady = jax.jit(lambda s: s.steady())(system)
+    orbit.centre[:] = np.broadcast_to(np.asarray(steady), orbit.centre.shape)
+    t = np.zeros(points)
+    tangent = Tangent(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.zeros(points))
+    for part, found in run_chunks(first_tangent, (line, orbit, t), index, CHUNK):
+        put(tangent, part, found)
+    pair = jax.tree.map(np.array, PointPair(orbit, t, ContinuationPoint(orbit, t, tangent)))
+    inputs = (line, pair.point, np.full(points, _FIRST))
+    for part, found in run_chunks(straight, inputs, index, CHUNK):
+        put(pair, part, found)
+    return pair
+
+
+def _follow(
+    line: ParameterLine, pair: PointPair, progress: BranchProgress, index: Indices, most_steps: int
+) -> None:
+    """Follow the points `index` in place, each with its own steps."""
+    advance = partial(moving_step, max_steps=_NEWTON_STEPS)
+    for _ in range(most_steps):
+        at = index[(progress.continues(pair.point.t) & (progress.failures < _GIVE_UP))[index]]
+        if not len(at):
+            break
+        progress.ratio[:] = _towards_the_end(pair, progress.ratio, progress.failures)
+        for part, step in run_chunks(advance, (line, pair, progress.ratio), at, CHUNK):
+            near = (step.miss < _MISS) | (step.miss * step.length < _NOISE)
+            good = np.isfinite(step.error) & near
+            kept, chosen = part[good], np.flatnonzero(good)
+            turned = pair.point.tangent.t[kept] * step.next.point.tangent.t[chosen] < 0
+            extremum = np.where(turned, _extremum(pair, step, kept, chosen), np.nan)
+            progress.fold[kept] = np.fmax(progress.fold[kept], extremum)
+            put(pair, kept, take(step.next, chosen))
+            share = pair.point.t[kept]
+            progress.farthest[kept] = np.maximum(progress.farthest[kept], share)
+            progress.last[kept], progress.fastest[kept] = step.length[chosen], step.fastest[chosen]
+            progress.watch(kept, share)
+            progress.failures[part] = np.where(good, 0, progress.failures[part] + 1)
+            progress.ratio[part] = _next_ratio(
+                progress.ratio[part], good, step.iterations, step.length
+            )
+        stuck = at[progress.failures[at] >= _RESTART]
+        lengths = progress.last * 0.1 * _SHRINKAGE ** (progress.failures - float(_RESTART))
+        for part, fresh in run_chunks(straight, (line, pair.point, lengths), stuck, CHUNK):
+            put(pair, part, fresh)
+        progress.ratio[stuck] = 1.0
+
+
+def _towards_the_end(pair: PointPair, ratio: Float, failures: NDArray[np.int_]) -> Float:
+    """Steps that are not predicted to pass the amplitude asked for; back where one passed it."""
+    last, left = pair.point.t - pair.t_before, 1 - pair.point.t
+    near = (last != 0) & (np.abs(left) < _NEAR)
+    near |= (last > 0) & ((ratio * last > left) | (left < 0))
+    secant = left / np.where(near, last, 1.0)
+    # A step that has just failed is not tried again.
+    longest = np.where(failures > 0, np.abs(ratio), 2.0)
+    return np.where(near, np.clip(secant, -np.minimum(longest, 1.0), longest), ratio)
+
+
+def _next_ratio(ratio: Float, good: NDArray[np.bool_], iterations: Float, length: Float) -> Float:
+    """Next step over the last one."""
+    change = np.where(iterations <= _EASY, _GROWTH, np.where(iterations <= _HARD, 1.0, 0.7))
+    longest = _LONGEST / np.maximum(length, 1e-9)
+    return np.where(good, np.minimum(change, longest), ratio * _SHRINKAGE)
+
+
+def _extremum(pair: PointPair, step: MovingMeshStep, rows: Indices, chosen: Indices) -> Float:
+    """Largest or smallest t between two points, of the cubic through values and directions."""
+    t, slope = pair.point.t[rows], pair.point.tangent.t[rows]
+    t_next = step.next.point.t[chosen]
+    slope_next = step.next.point.tangent.t[chosen]
+    # The parabola of the slope has its zero at x; the area under the slope to there is the rise.
+    x = slope / (slope - slope_next)
+    rise = 0.5 * x * slope
+    whole = 0.5 * (slope + slope_next)
+    scale = np.where(np.abs(whole) > 1e-12, (t_next - t) / np.where(whole == 0, 1.0, whole), 0.0)
+    scale = np.where(scale > 0, np.minimum(scale, step.length[chosen]), step.length[chosen])
+    return t + scale * rise

@@ -1,0 +1,117 @@
+"""Orbits followed in frequency, from a modulation so fast that the averaged limit holds.
+
+Each point takes its own steps along its path: longer after a success, shorter after a failure.
+"""
+
+from __future__ import annotations
+
+import equinox as eqx
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.orbit.compiled import STIFFNESS_CHUNK, follow_orbit, stiffness_of_steady_sliding
+from asperity.orbit.methods.collocation.initial_guess import (
+    InitialGuess,
+    orbits_from_averaged_limit,
+)
+from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.methods.collocation.method import solve_from
+from asperity.orbit.methods.collocation.refinement import FIRST_MESH
+from asperity.orbit.methods.method import Method
+from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
+from asperity.orbit.solution import SearchOptions, Solution
+from asperity.slider.problem import Problem
+
+Float = NDArray[np.float64]
+
+#: Stiffness of steady sliding at which the averaged limit is close enough to start from.
+_FAST_MODULATION = 0.02
+#: Steps, in parts of the path: the first, the shortest, and how many there may be.
+_FIRST_STEP, _SHORTEST_STEP, _MOST_STEPS = 0.02, 1e-4, 250
+#: Change of the length of a step after a success and after a failure.
+_GROWTH, _SHRINKAGE = 1.6, 0.35
+#: A step is accepted when Newton's method has converged to this; the end point is solved again.
+_ACCEPTED, _NEWTON_STEPS = 1e-5, 10
+#: Points in a call.
+_CHUNK = 16
+
+
+class FrequencyPath(Method):
+    """Finds orbits of branches that are not connected with steady sliding."""
+
+    name = "frequency path"
+    follows = True
+    choice = "collocation"
+
+    def suits(self, problem: Problem) -> bool:
+        """Any equations and load."""
+        return True
+
+    def candidates(self, solution: Solution) -> Indices:
+        """Points whose branch from steady sliding has no orbit at the amplitude asked for."""
+        return np.flatnonzero(np.isin(solution.outcome, WITHOUT_ORBIT))
+
+    def solve(self, problem: Problem, options: SearchOptions) -> Solution:
+        """As in `Method`; an orbit that is not resolved may not exist, and is not reported."""
+        points = problem.system.V.shape[-1]
+        solution = Solution.unsolved(problem, points, options)
+        solve_from(problem, solution, orbits_from_high_frequency(problem, points), options)
+        lost = solution.outcome == Outcome.NOT_RESOLVED
+        solution.outcome[lost], solution.detail[lost] = Outcome.NO_ORBIT, 0.0
+        options.progress(int(solution.converged.sum()))
+        return solution
+
+
+def orbits_from_high_frequency(problem: Problem, points: int) -> InitialGuess:
+    """Orbits of all points of `problem` (NumPy arrays) at the end of their path in frequency."""
+    stiffness = np.zeros(points)
+    for part, value in run_chunks(
+        stiffness_of_steady_sliding, problem, np.arange(points), STIFFNESS_CHUNK
+    ):
+        stiffness[part] = value
+    omega = np.asarray(problem.system.omega)
+    first = omega * np.maximum(stiffness / _FAST_MODULATION, 1.0)
+    guess = orbits_from_averaged_limit(_at_frequency(problem, first), points)
+    _follow(problem, first, guess.orbit, guess.found)
+    return guess
+
+
+def _at_frequency(problem: Problem, omega: Float) -> Problem:
+    return problem._replace(system=eqx.tree_at(lambda q: q.omega, problem.system, omega))
+
+
+def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool_]) -> None:
+    """Follow orbits from omega = `first` to that of the problem, evenly in its logarithm.
+
+    Parameters
+    ----------
+    problem : Problem
+        NumPy arrays.
+    first : array, shape (points,)
+        rad/s.
+    orbit : Orbit
+        Orbits at `first`; overwritten with those at the end of the path.
+    found : bool array, shape (points,)
+        Which points have an orbit; overwritten with those that reach the end.
+    """
+    reached, step = np.zeros(len(found)), np.full(len(found), _FIRST_STEP)
+    active = np.flatnonzero(found)
+
+    def advance(inputs: tuple[Problem, Orbit]) -> tuple[Orbit, Float]:
+        return follow_orbit(inputs, intervals=FIRST_MESH, max_steps=_NEWTON_STEPS)
+
+    for _ in range(_MOST_STEPS):
+        if not len(active):
+            break
+        trial = np.minimum(1.0, reached + step)
+        omega = first * (np.asarray(problem.system.omega) / first) ** trial
+        inputs = (_at_frequency(problem, omega), orbit)
+        for part, (moved, error) in run_chunks(advance, inputs, active, _CHUNK):
+            # The re-meshed orbit must be finite too: it is the next guess.
+            good = (error < _ACCEPTED) & np.isfinite(moved.slopes).all((0, 1, 2))
+            put(orbit, part[good], take(moved, np.flatnonzero(good)))
+            reached[part[good]] = trial[part[good]]
+            step[part] *= np.where(good, _GROWTH, _SHRINKAGE)
+        active = active[(reached[active] < 1) & (step[active] > _SHORTEST_STEP)]
+    found[:] = reached >= 1

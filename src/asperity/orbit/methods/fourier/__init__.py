@@ -1,0 +1,1 @@
+"""Fourier collocation for orbits that move little within a period: the fast method."""

@@ -1,0 +1,439 @@
+"""The fast method with inertia and radiation damping: Fourier collocation of slow states.
+
+The elongation z = f + l F_i/W of spring and joint and the states of the law change little within a
+period, as without inertia. What changes much is the friction g = F_i/W, which the balance of forces
+gives on the whole grid at once. With slip u = v_pl/V, slider velocity v = u + g'/s and mobility m,
+
+    g''/(m s) + (d/s) g' + (w + l) g + d u + u'/m = z + S,      dz/dtheta = kappa (p - u),
+
+where 1/m = 0 without inertia, d = 0 without damping and 1/s = 0 on rigid asperities, and a prime is
+d/dtheta. A step of the iteration solves the balance for g by Newton's method, a dense system over
+the grid, and advances z and the states of the law as `asperity.orbit.methods.fourier.orbit` does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, NamedTuple, TypeAlias
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from asperity.algebra.contraction import contracted
+from asperity.algebra.small_systems import Matrix, inverse_by_elimination, inverse_points
+from asperity.loads import Excitation
+from asperity.orbit.methods.fourier.observables import spectrum, truncation
+from asperity.orbit.methods.fourier.orbit import LoadCycle, States, grid, load_cycle, together
+from asperity.slider import Inertial, QuasiStatic, StiffInertial
+from asperity.slider.problem import Problem
+from asperity.theory.averaged import averaged_limit
+
+#: Largest change of the slip exponent in a step.
+_LARGEST_CHANGE = 2.0
+#: Change of an exponent below which the matrix of the balance is kept.
+_NEAR = 3e-2
+#: A change this small is round-off of the slip exponent: it no longer shrinks, and need not.
+_ROUND_OFF = 1e-11
+#: Nodes of the grid on which the iteration begins, and its tolerance there.
+FIRST_NODES, _COARSE_TOLERANCE = 32, 1e-5
+#: Steps that a linear system is given beyond those that the orbit took.
+_MORE_STEPS = 3
+#: Tolerance on the averaged limit from which the iteration starts.
+_AVERAGED_TOLERANCE = 1e-2
+#: Share of the elastic swing below which it is beyond a resonance with the modulation.
+_LEAST_SWING = 0.2
+
+
+class BalanceUnknowns(NamedTuple):
+    """An orbit: slow states as means (points,) and zero-mean parts, and F_i/W, (nodes, points)."""
+
+    mean: States
+    rest: States
+    friction: Array
+
+
+Parameters: TypeAlias = tuple[Problem, "Prepared", Array]
+
+
+class _Coefficients(NamedTuple):
+    """Coefficients of the balance, each (points,)."""
+
+    inertness: Array  # 1/m
+    damping: Array  # d
+    elastic: Array  # 1/s
+    ratio: Array  # l
+
+
+class Prepared(NamedTuple):
+    """What a step needs, computed at an orbit or near one.
+
+    Attributes
+    ----------
+    inverse : array, shape (nodes, nodes, points)
+        Of the derivative of the balance by the friction.
+    friction : tuple of arrays, shape (nodes, points)
+        Change of the friction with the mean of each slow state.
+    rates : matrix of arrays, shape (nodes, points)
+        Change of the rates of the slow states with their means.
+    mean_inverse : matrix of arrays, shape (points,)
+        Inverse of the mean of `rates`.
+    """
+
+    inverse: Array
+    friction: States
+    rates: Matrix
+    mean_inverse: Matrix
+
+
+@dataclass(frozen=True)
+class BalanceEquations:
+    """The equations of an orbit on a grid, for the solver and for the implicit-function rule.
+
+    The parameters are the problem, what the last step of the solver was prepared with, and the
+    number of steps that linear systems take.
+
+    Parameters
+    ----------
+    nodes : int
+    grading : float
+    """
+
+    nodes: int
+    grading: float
+
+    def cycle(self, problem: Problem) -> LoadCycle:
+        """The load on the grid."""
+        return load_cycle(problem.load, self.nodes, self.grading)
+
+    def prepare(self, parameters: Parameters, unknowns: BalanceUnknowns) -> tuple[Prepared, Array]:
+        """What the solver has prepared, and the steps to take."""
+        return parameters[1:]
+
+    def linearised(self, problem: Problem, unknowns: BalanceUnknowns) -> Prepared:
+        """Inverse of the balance, and the response to changes of the means."""
+        cycle = self.cycle(problem)
+        slow, g = together(unknowns.mean, unknowns.rest), unknowns.friction
+        D = self.derivative
+        c = _coefficients(problem)
+        one = jnp.ones_like(g)
+        _, push = jax.linearize(lambda *Y: _slip(problem, cycle.at, Y[0], Y[1:]), g, *slow[1:])
+        n, none = range(len(slow)), jnp.zeros_like(g)
+
+        def by(j: int) -> Array:
+            """Change of slip with the j-th of friction and states of the law."""
+            return push(*(one if i == j else none for i in n))
+
+        def drag(slip: Array) -> Array:
+            return c.damping * slip + c.inertness * (D @ slip)
+
+        matrix = (D @ D)[..., None] * (c.inertness * c.elastic) + D[..., None] * (
+            c.damping * c.elastic + c.inertness * by(0)[None]
+        )
+        diagonal = (cycle.at.w + c.ratio) + c.damping * by(0)
+        matrix = matrix + np.eye(self.nodes)[..., None] * diagonal[:, None]
+        inverse = inverse_by_elimination(matrix)
+        pulls = [one, *(-drag(by(j)) for j in n[1:])]
+        friction = tuple(_times(inverse, pull) for pull in pulls)
+        _, push_rates = jax.linearize(lambda *Y: self._rates(problem, cycle, Y[1:], Y[0]), g, *slow)
+        columns = [push_rates(friction[j], *(one if i == j else none for i in n)) for j in n]
+        rates = [[columns[j][i] for j in n] for i in n]
+        mean = [[cycle.share @ entry for entry in row] for row in rates]
+        return Prepared(inverse, friction, rates, inverse_points(mean))
+
+    def _advance(
+        self,
+        problem: Problem,
+        cycle: LoadCycle,
+        unknowns: BalanceUnknowns,
+        at: Prepared,
+        moved: Array,
+        bound: Callable[[Array], Array],
+    ) -> tuple[BalanceUnknowns, States]:
+        """The next unknowns for a change of the friction, and the change of the means."""
+        slow, g = together(unknowns.mean, unknowns.rest), unknowns.friction + moved
+        rates = self._rates(problem, cycle, slow, g)
+        half = self.nodes // 2
+        # Mirror images first: what is odd in theta then cancels exactly, however large it is.
+        gaps = [cycle.share[:half] @ (r[:half] + r[half:]) for r in rates]
+        change = tuple(
+            bound(-sum(a * r for a, r in zip(row, gaps, strict=True))) for row in at.mean_inverse
+        )
+        integral = cycle.integral * cycle.stretch
+        rest = tuple(
+            integral @ (r + sum(a * x for a, x in zip(row, change, strict=True)))
+            for r, row in zip(rates, at.rates, strict=True)
+        )
+        g = g + sum(a * x for a, x in zip(at.friction, change, strict=True))
+        return BalanceUnknowns(together(unknowns.mean, change), rest, g), change
+
+    def bounded_step(
+        self, problem: Problem, cycle: LoadCycle, unknowns: BalanceUnknowns, at: Prepared
+    ) -> tuple[BalanceUnknowns, Array]:
+        """A step that changes no exponent by much, and the largest change, shape (points,)."""
+        slow, g = together(unknowns.mean, unknowns.rest), unknowns.friction
+        moved = _times(at.inverse, -self._balance(problem, cycle, slow, g))
+        _, exponent = jax.jvp(lambda g: _log_slip(problem, cycle.at, g, slow[1:]), (g,), (moved,))
+        leap = jnp.abs(exponent).max(0)
+        moved = moved * jnp.minimum(1.0, _LARGEST_CHANGE / jnp.maximum(leap, 1e-300))
+        new, change = self._advance(
+            problem,
+            cycle,
+            unknowns,
+            at,
+            moved,
+            lambda x: jnp.clip(x, -_LARGEST_CHANGE, _LARGEST_CHANGE),
+        )
+        # Of z relative to its size, whose rate has the round-off of kappa; others are exponents.
+        sizes = [jnp.abs(new.rest[0]).max(0) + 1e-3 * problem.system.kappa, *[1.0] * len(change)]
+        parts = zip(new.rest, unknowns.rest, sizes, strict=False)
+        moves = [jnp.abs(a - b).max(0) / size for a, b, size in parts]
+        return new, jnp.stack([leap, *moves, *map(jnp.abs, change)]).max(0)
+
+    def residual(
+        self, parameters: Parameters, unknowns: BalanceUnknowns, at: tuple[Prepared, Array]
+    ) -> BalanceUnknowns:
+        """The unknowns less what a step of the iteration makes of them."""
+        problem, (prepared, _) = parameters[0], at
+        cycle, slow = self.cycle(problem), together(unknowns.mean, unknowns.rest)
+        gap = self._balance(problem, cycle, slow, unknowns.friction)
+        moved = _times(prepared.inverse, -gap)
+        stepped, _ = self._advance(problem, cycle, unknowns, prepared, moved, lambda x: x)
+        return jax.tree.map(jnp.subtract, unknowns, stepped)
+
+    def solve(
+        self, product: Callable[[Any], Any], right: BalanceUnknowns, at: tuple[Prepared, Array]
+    ) -> BalanceUnknowns:
+        """By the contraction that found the orbit."""
+
+        def contract(y: BalanceUnknowns) -> BalanceUnknowns:
+            return jax.tree.map(jnp.subtract, y, product(y))
+
+        return contracted(contract, right, at[1] + _MORE_STEPS, points_last=True)
+
+    def solve_transposed(
+        self, product: Callable[[Any], Any], right: BalanceUnknowns, at: tuple[Prepared, Array]
+    ) -> BalanceUnknowns:
+        """The same: the transpose contracts as fast."""
+        return self.solve(product, right, at)
+
+    def steady(self, problem: Problem) -> BalanceUnknowns:
+        """Steady sliding under the mean load."""
+        law, V = problem.system.slider.law, problem.system.V
+        at = self.cycle(problem).at
+        mu = law.mu_ss(V) + 0 * V
+        states = tuple(state + 0 * V for state in law.steady_state(V))
+        none = jnp.zeros((self.nodes, *V.shape)) + 0 * at.w
+        z = mu * (1 + problem.system.compliance_ratio)
+        return BalanceUnknowns((z, *states), (none,) * (1 + len(states)), mu + none)
+
+    def force_spectrum(
+        self, problem: Problem, unknowns: BalanceUnknowns, harmonics: int
+    ) -> tuple[Array, Array]:
+        """Mean of F/W0 and its complex harmonics, shape (harmonics, points)."""
+        cycle, c = self.cycle(problem), _coefficients(problem)
+        g, kappa = unknowns.friction, problem.system.kappa
+        centre = cycle.share @ g
+        constant, rest = unknowns.mean[0] - c.ratio * centre, g - centre
+        mean, phasors = spectrum(cycle, constant, unknowns.rest[0] - c.ratio * rest, harmonics)
+        # Where inertia holds the slider back, z and l g nearly cancel, and the harmonics of
+        # f''/(m kappa) + (d/kappa) f' + f = w g - S + d p + p'/m keep more digits.
+        waves = 1j * np.arange(1, harmonics + 1)[:, None]
+        drag = c.damping + waves * c.inertness
+        impedance = 1 + waves * drag / kappa
+        heavy = c.ratio * jnp.abs(impedance) > 1
+        none = jnp.zeros_like(g)
+        _, carried = spectrum(cycle, centre, cycle.at.w * g - cycle.at.shear, harmonics)
+        _, pull = spectrum(cycle, centre, none + cycle.at.pull, harmonics)
+        carried = (carried + drag * pull) / jnp.where(heavy, impedance, 1.0)
+        return mean, jnp.where(heavy, carried, phasors)
+
+    @property
+    def derivative(self) -> np.ndarray:
+        """Matrix of d/dtheta on the grid, (nodes, nodes)."""
+        return _derivative(self.nodes, self.grading)
+
+    def _balance(self, problem: Problem, cycle: LoadCycle, slow: States, g: Array) -> Array:
+        """What of the balance of forces is left, over W0."""
+        D, c, at = self.derivative, _coefficients(problem), cycle.at
+        slip = _slip(problem, at, g, slow[1:])
+        elastic = c.elastic * (D @ g) + slip
+        return (
+            c.inertness * (D @ elastic)
+            + c.damping * elastic
+            + (at.w + c.ratio) * g
+            - (slow[0] + at.shear)
+        )
+
+    def _rates(self, problem: Problem, cycle: LoadCycle, slow: States, g: Array) -> States:
+        """Rates of the slow states per radian."""
+        system, at = problem.system, cycle.at
+        slip = _slip(problem, at, g, slow[1:])
+        v = slip + _coefficients(problem).elastic * (self.derivative @ g)
+        law = system.slider.law
+        rates = law.state_rate(system.V * v, system.V * slip, tuple(slow[1:]), at.w)
+        none = jnp.zeros_like(slip)
+        z_rate = system.kappa * (at.pull - slip)
+        return (z_rate, *(none + r / system.omega for r in rates))
+
+
+def _times(matrix: Array, vector: Array) -> Array:
+    """Product of a matrix (nodes, nodes, points) and a vector (nodes, points)."""
+    return jnp.einsum("ijp,jp->ip", matrix, vector)
+
+
+def _coefficients(problem: Problem) -> _Coefficients:
+    system = problem.system
+    none = jnp.zeros_like(system.V)
+    massive = isinstance(system, Inertial | StiffInertial)
+    return _Coefficients(
+        1 / system.mobility if massive else none,
+        system.damping + none,
+        none + system.slider.law.elastic_length * system.omega / system.V,
+        none + system.compliance_ratio,
+    )
+
+
+def _log_slip(problem: Problem, at: Excitation, g: Array, state: States) -> Array:
+    """ln(v_pl / V)."""
+    system = problem.system
+    return system.slider.law.log_velocity(g, tuple(state), at.w) - jnp.log(system.V)
+
+
+def _slip(problem: Problem, at: Excitation, g: Array, state: States) -> Array:
+    """v_pl / V."""
+    return jnp.exp(_log_slip(problem, at, g, state))
+
+
+@lru_cache
+def _derivative(nodes: int, grading: float) -> np.ndarray:
+    tau = grid(nodes)[0]
+    k = np.arange(1, nodes // 2)[:, None, None]
+    by_tau = (-2 / nodes) * (k * np.sin(k * (tau[:, None] - tau))).sum(0)
+    return by_tau / (1 + grading * np.cos(tau))[:, None]
+
+
+class BalancedOrbit(NamedTuple):
+    """Orbits on the grid; of no meaning where `error` is not small."""
+
+    unknowns: BalanceUnknowns
+    prepared: Prepared
+    error: Array  # (points,): estimated; inf where the iteration does not converge
+    steps: Array
+
+
+def balanced_orbit(
+    problem: Problem,
+    *,
+    nodes: int,
+    grading: float,
+    harmonics: int,
+    tolerance: float,
+    max_steps: int,
+) -> BalancedOrbit:
+    """Iterate to the periodic orbit of every operating point.
+
+    Parameters
+    ----------
+    problem : Problem
+        With inertia or damping, parameters of shape (points,).
+    nodes : int
+        Grid points per period, even. The iteration begins on `FIRST_NODES` at most.
+    grading : float
+        g in theta = tau + g sin(tau), 0 <= g < 1.
+    harmonics : int
+        Harmonics whose truncation counts.
+    tolerance : float
+        Bound on the error estimated from the observed contraction.
+    max_steps : int
+        On each grid.
+    """
+    coarse = BalanceEquations(min(nodes, FIRST_NODES), grading)
+    unknowns, steps = _start(coarse, problem), jnp.asarray(0)
+    if nodes > FIRST_NODES:
+        unknowns, _, _, steps = _iterate(coarse, problem, unknowns, _COARSE_TOLERANCE, max_steps)
+        unknowns = _resampled(unknowns, nodes)
+    equations = BalanceEquations(nodes, grading)
+    unknowns, prepared, error, more = _iterate(equations, problem, unknowns, tolerance, max_steps)
+    slow = together(unknowns.mean, unknowns.rest)
+    exponent = _log_slip(problem, equations.cycle(problem).at, unknowns.friction, slow[1:])
+    # Where the interface sticks it has kinks, which no Fourier series resolves.
+    error = jnp.where(jnp.isfinite(exponent).all(0), error, jnp.inf)
+    g = unknowns.friction
+    for waves in (unknowns.rest[0], g, equations.cycle(problem).at.w * g):
+        error = jnp.maximum(error, truncation(waves, harmonics))
+    return BalancedOrbit(unknowns, prepared, error, steps + more)
+
+
+def _iterate(
+    equations: BalanceEquations,
+    problem: Problem,
+    start: BalanceUnknowns,
+    tolerance: float,
+    max_steps: int,
+) -> tuple[BalanceUnknowns, Prepared, Array, Array]:
+    """Unknowns, what their last step was prepared with, estimated error and number of steps."""
+    cycle = equations.cycle(problem)
+
+    def prepare(unknowns: BalanceUnknowns) -> Prepared:
+        return equations.linearised(problem, unknowns)
+
+    def unfinished(carry: tuple) -> Array:
+        _, _, change, error, steps = carry
+        return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
+
+    def body(carry: tuple) -> tuple:
+        unknowns, at, last, reached, steps = carry
+        far = jnp.any((last > _NEAR) & ~jnp.isnan(last))
+        at = jax.lax.cond(far, prepare, lambda _: at, unknowns)
+        new, change = equations.bounded_step(problem, cycle, unknowns, at)
+        contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
+        error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
+        error = jnp.where(change < _ROUND_OFF, change, error)
+        # Converged points stay so while others need more steps: their changes are round-off.
+        error = jnp.where(reached <= tolerance, reached, error)
+        return new, at, change, error, steps + 1
+
+    shapes = jax.eval_shape(prepare, start)
+    nothing = jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes)
+    far = jnp.full(start.friction.shape[1], jnp.inf)
+    unknowns, at, change, error, steps = jax.lax.while_loop(
+        unfinished, body, (start, nothing, far, far, 0)
+    )
+    return unknowns, at, jnp.where(jnp.isnan(change), jnp.inf, error), steps
+
+
+def _resampled(unknowns: BalanceUnknowns, nodes: int) -> BalanceUnknowns:
+    """The same trigonometric polynomials in tau at more nodes."""
+    before, after = grid(unknowns.friction.shape[0])[0], grid(nodes)[0]
+    k = np.arange(1, len(before) // 2)[:, None, None]
+    kernel = (1 + 2 * np.cos(k * (after[:, None] - before)).sum(0)) / len(before)
+    rest = tuple(kernel @ part for part in unknowns.rest)
+    return BalanceUnknowns(unknowns.mean, rest, kernel @ unknowns.friction)
+
+
+def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:
+    """The averaged limit of a slider that swings on its asperities without slip."""
+    system, _ = problem
+    quasi_static = QuasiStatic(system.slider, system.V, system.omega)
+    cycle, D, c = equations.cycle(problem), equations.derivative, _coefficients(problem)
+    matrix = (D @ D)[..., None] * (c.inertness * c.elastic) + D[..., None] * (c.damping * c.elastic)
+    matrix = matrix + np.eye(equations.nodes)[..., None] * (cycle.at.w + c.ratio)[:, None]
+    inverse = inverse_by_elimination(matrix)
+    swing = inverse.sum(1)
+    usable = (swing * (1 + c.ratio) > _LEAST_SWING).all(0)
+    swing = jnp.where(usable, swing, 1 / (cycle.at.w + c.ratio))
+    shear = _times(inverse, cycle.at.shear + jnp.zeros_like(swing))
+    shear = jnp.where(usable, shear / swing, cycle.at.shear)
+    averaged = averaged_limit(
+        quasi_static,
+        cycle.at._replace(w=1 / swing - c.ratio, shear=shear),
+        cycle.share,
+        tolerance=_AVERAGED_TOLERANCE,
+    )
+    zero = jnp.zeros_like(swing)
+    friction = swing * (averaged.centre[0] + shear)
+    return BalanceUnknowns(averaged.centre, (zero,) * len(averaged.centre), friction)

@@ -1,0 +1,238 @@
+"""SeriesOrbits orbits of stiff equations: Fourier series, solved directly.
+
+Under slow modulation the orbit is nearly a sequence of steady states. Its harmonics fall
+exponentially, however fast perturbations of it grow or decay, so that a few dozen nodes, on which
+both are far from resolved, give it to round-off. Collocation on a mesh that begins to resolve them
+does worse: where sliding is unstable for part of the period, and a perturbation grows by e^40
+there, the solution on the mesh is as sensitive.
+
+A series is accepted where one with more nodes, solved anew, agrees with it.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import pairwise
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from asperity.algebra.runge_kutta import CollocationScheme
+from asperity.algebra.small_systems import jacobian_columns
+from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.orbit.changes import exponent_change
+from asperity.orbit.compiled import STIFFNESS_CHUNK, stiffness_of_steady_sliding
+from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.methods.collocation.refinement import accept
+from asperity.orbit.methods.collocation.scheme import scheme_for
+from asperity.orbit.methods.method import Method
+from asperity.orbit.solution import SearchOptions, Solution
+from asperity.slider import QuasiStatic
+from asperity.slider.problem import Problem
+from asperity.theory.adiabatic import adiabatic_states, even_phases
+
+Float = NDArray[np.float64]
+
+#: Numbers of nodes of successive series, which are compared with each other; odd, so that every
+#: harmonic has its sine.
+NODES = (31, 47, 95, 191)
+#: Intervals of the mesh on which the series are represented: on each a polynomial follows the
+#: highest relevant harmonic to round-off.
+INTERVALS = 216
+
+#: Rate per radian of a disturbance of steady sliding from which modulation counts as slow.
+_SLOW = 1.0
+_CHUNK = 64
+#: Newton's steps from sequences of steady states, and from the series on fewer nodes.
+_FIRST_STEPS, _NEXT_STEPS = 14, 4
+#: Largest change of an exponent in one step.
+_LARGEST_CHANGE = 1.5
+#: Newton change after which the method ends: the next change is about its square.
+_CONVERGED = 1e-9
+#: Steps after which a point is given up whose last change was larger.
+_PATIENCE, _FAR = 7, 0.5
+#: Largest change of a state from one series to the next at which the latter is exact: errors fall
+#: exponentially with the nodes.
+_AGREED = 1e-10
+#: The same, as extrapolated to the longest series, below which it is tried.
+_HOPEFUL = 1e-8
+
+
+class FourierSeries(Method):
+    """Fourier series solved directly, for slow modulation."""
+
+    name = "series"
+    choice = "series"
+
+    def suits(self, problem: Problem) -> bool:
+        """Any equations: points with smooth orbits are found out by the attempt."""
+        return True
+
+    def solve(self, problem: Problem, options: SearchOptions) -> Solution:
+        """As in `Method`; only points under slow modulation are tried."""
+        points = np.arange(problem.system.V.shape[-1])
+        solution = Solution.unsolved(problem, len(points), options)
+        system, load = problem
+        # Mass and damping make the equations stiff too, but not their orbits smooth.
+        sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
+        slow = np.concatenate(
+            [
+                part[stiffness >= _SLOW]
+                for part, stiffness in run_chunks(
+                    stiffness_of_steady_sliding, sliding, points, STIFFNESS_CHUNK
+                )
+            ]
+        )
+        if not len(slow):
+            return solution
+        part = take(problem, slow)
+        orbit, resolved = series_orbits(part, len(slow))
+        kept = np.flatnonzero(resolved)
+        if len(kept):
+            found = Solution.unsolved(problem, len(kept), options)
+            accept(take(part, kept), found, take(orbit, kept), options)
+            options.progress(int(found.converged.sum()))
+            solution.merge(slow[kept], found)
+        return solution
+
+
+def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool_]]:
+    """Orbits of all points of `problem` (NumPy arrays) on `INTERVALS` even intervals.
+
+    Returned beside them is which of them a series resolves, shape (points,).
+    """
+    scheme, size = scheme_for(problem.system), problem.system.size
+    orbit = Orbit.empty(scheme, size, INTERVALS, points)
+    resolved = np.zeros(points, bool)
+    for start in range(0, points, _CHUNK):
+        rows = np.arange(start, min(start + _CHUNK, points))
+        # The last chunk is filled up so that one program serves all; the filling is not solved.
+        filled = np.concatenate([rows, np.full(_CHUNK - len(rows), rows[-1])])
+        harmonics, resolved[rows] = _solve(take(problem, filled), len(rows))
+        put(orbit, rows, _on_even_mesh(harmonics, scheme))
+    return orbit, resolved
+
+
+def _solve(problem: Problem, points: int) -> tuple[NDArray[np.complex128], NDArray[np.bool_]]:
+    """Harmonics (size, count, points) of the first `points`, and which of them are exact."""
+    Y = np.array(adiabatic_states(problem, nodes=NODES[0]))
+    at, exact = np.arange(points), np.zeros(points, bool)
+    harmonics = np.zeros((len(Y), NODES[-1] // 2 + 1, points), complex)
+    at = _newton(problem, Y, at, _FIRST_STEPS)
+    error = _last_harmonics(Y)
+    for before, nodes in pairwise(NODES):
+        # Errors fall by equal factors for equal numbers of nodes.
+        at = at[error[at] ** (NODES[-2] / before) < _HOPEFUL]
+        guess = _resampled(Y, nodes)
+        Y = guess.copy()
+        at = _newton(problem, Y, at, _NEXT_STEPS)
+        gap = np.abs(Y - guess).max((0, 1))
+        error = gap ** (nodes / before)
+        agreed = gap[at] < _AGREED
+        kept, at = at[agreed], at[~agreed]
+        exact[kept] = True
+        harmonics[:, : nodes // 2 + 1, kept] = np.fft.rfft(Y[..., kept], axis=1) / nodes
+        if not len(at):
+            break
+    return harmonics, exact
+
+
+@jax.jit
+def _linearised(problem: Problem, Y: Array) -> tuple[Array, Array]:
+    """Rates (size, nodes, points) and their Jacobian (row, column, nodes, points)."""
+    at = problem.load.at(even_phases(Y.shape[1]) * jnp.ones(Y.shape[2]))
+    rates, columns = jacobian_columns(lambda y: problem.system.rates(y, at), Y)
+    return rates, jnp.stack(columns, axis=1)
+
+
+@jax.jit
+def _largest_change(problem: Problem, Y: Array, step: Array) -> Array:
+    """Largest change of an exponent by a step, shape (points,)."""
+    at = problem.load.at(even_phases(Y.shape[1]) * jnp.ones(Y.shape[2]))
+    return exponent_change(problem.system, at, Y, step).max(0)
+
+
+def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices:
+    """Improve the points `at` of the states in place; returns those that converged."""
+    derivative = _derivative(Y.shape[1])
+    done = []
+    for count in range(1, most_steps + 1):
+        if not len(at):
+            break
+        rates, jacobian = (np.asarray(a) for a in _linearised(problem, Y))
+        finite = np.isfinite(rates).all((0, 1)) & np.isfinite(jacobian).all((0, 1, 2))
+        at = at[finite[at]]
+        gap = rates[..., at] - np.einsum("kl,nlb->nkb", derivative, Y[..., at])
+        try:
+            step = _solved(jacobian[..., at], derivative, gap)
+        except np.linalg.LinAlgError:
+            break
+        every = np.zeros_like(Y)
+        every[..., at] = step
+        change = np.asarray(_largest_change(problem, Y, every))[at]
+        usable = np.isfinite(change)
+        at, step, change = at[usable], step[..., usable], change[usable]
+        Y[..., at] += step * np.minimum(1.0, _LARGEST_CHANGE / np.maximum(change, 1e-300))
+        done.append(at[change < _CONVERGED])
+        at = at[(change >= _CONVERGED) & ((count < _PATIENCE) | (change < _FAR))]
+    return np.sort(np.concatenate(done)) if done else at[:0]
+
+
+def _solved(jacobian: Float, derivative: Float, gap: Float) -> Float:
+    """Solve (d/dtheta - jacobian) step = gap, all nodes at once."""
+    size, nodes, points = gap.shape
+    matrix = np.zeros((points, size, nodes, size, nodes))
+    here = np.arange(nodes)
+    for i in range(size):
+        matrix[:, i, :, i] = derivative
+        for j in range(size):
+            matrix[:, i, here, j, here] -= jacobian[i, j].T
+    # Rates differ by many orders of magnitude.
+    largest = np.abs(matrix).max((3, 4))
+    matrix /= largest[..., None, None]
+    right = np.moveaxis(gap, -1, 0) / largest
+    rank = size * nodes
+    flat = np.linalg.solve(matrix.reshape(points, rank, rank), right.reshape(points, rank, 1))
+    return np.moveaxis(flat.reshape(points, size, nodes), 0, -1)
+
+
+@cache
+def _derivative(nodes: int) -> Float:
+    """Derivative at the nodes of the trigonometric polynomial through them."""
+    apart = np.arange(nodes)[:, None] - np.arange(nodes)
+    sine = np.sin(np.pi * apart / nodes)
+    return np.where(apart == 0, 0.0, 0.5 * (-1.0) ** apart / np.where(apart == 0, 1.0, sine))
+
+
+def _last_harmonics(Y: Float) -> Float:
+    """Size of the last harmonics, about the error of the series."""
+    with np.errstate(invalid="ignore"):
+        harmonics = np.abs(np.fft.rfft(Y, axis=1)) / Y.shape[1]
+        return np.nan_to_num(harmonics[:, -3:].max((0, 1)), nan=1.0, posinf=1.0)
+
+
+def _resampled(Y: Float, nodes: int) -> Float:
+    """The same trigonometric polynomials at more nodes."""
+    harmonics = np.fft.rfft(Y, axis=1) / Y.shape[1]
+    return np.fft.irfft(harmonics * nodes, n=nodes, axis=1)
+
+
+def _on_even_mesh(harmonics: NDArray[np.complex128], scheme: CollocationScheme) -> Orbit:
+    """Series as the piecewise polynomials of collocation."""
+    mesh = np.linspace(0, 2 * np.pi, INTERVALS + 1)
+    order = np.arange(1, harmonics.shape[1])
+    weights = 2 * harmonics[:, 1:]
+    # Less their value at theta = 0, which keeps small orbits exact.
+    nodes = np.expm1(1j * order * mesh[:-1, None])
+    stages = mesh[:-1] + np.asarray(scheme.c)[:, None] * np.diff(mesh)
+    slopes = 1j * order * np.exp(1j * order * stages[..., None])
+    return Orbit(
+        np.broadcast_to(mesh[:, None], (INTERVALS + 1, harmonics.shape[2])),
+        harmonics[:, 0].real + weights.sum(1).real,
+        np.einsum("mk,nkb->nmb", nodes, weights).real,
+        np.einsum("smk,nkb->nsmb", slopes, weights).real,
+        scheme,
+    )

@@ -1,0 +1,1 @@
+"""Shooting over one period, for equations that are not stiff but oscillate."""

@@ -1,0 +1,261 @@
+"""Shooting over one period: a third method, for equations that are not stiff but do oscillate.
+
+With inertia on elastic asperities the slider swings at a few times the frequency of the modulation.
+The states and their derivatives to the first states are integrated over the period by the explicit
+method of order 8 of Dormand and Prince, all operating points in lock step; Newton's method on the
+first states closes the orbit, and the derivatives at its end are the monodromy matrix.
+
+A pass takes the time of some hundred evaluations of the rates, and knows no step control: whether
+the steps were short enough is asked by repeating it with twice as many, see
+`asperity.orbit.methods.shooting.newton`.
+
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
+(Springer, 1993), section II.5; the coefficients are those that SciPy gives.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from asperity.algebra.kepler import eccentric_phase
+from asperity.algebra.runge_kutta import dormand_prince_8
+from asperity.algebra.small_systems import Matrix, inverse_points, jacobian_columns, product
+from asperity.orbit.changes import exponent_change
+from asperity.orbit.observables import waveform_of
+from asperity.slider.problem import Problem
+from asperity.theory.adiabatic import even_phases
+
+#: Most steps in a period: the tables of a pass have room for as many, so that one program serves.
+MOST_STEPS = 192
+
+
+class Steps(NamedTuple):
+    """The steps of a period, the first `number` rows of each table."""
+
+    number: Array
+    phases: Array  # (MOST_STEPS, stages), theta at the stages
+    lengths: Array  # (MOST_STEPS,)
+    spectrum: Array  # (MOST_STEPS, 1 + 2 harmonics): weights of mean, cosines and minus sines
+
+
+class PeriodIntegration(NamedTuple):
+    """What a pass over the period tells of the orbit through given first states."""
+
+    step: Array  # (size, points): Newton's, to be added to the first states
+    leap: Array  # (points,): what it does to the slip exponent and logarithmic states
+    change: Array  # (points,): what it does to these and to the velocity; inf if the slider sticks
+    inverse: Array  # (size, size, points): of 1 less the monodromy matrix
+    monodromy: Array  # (size, size, points)
+    polynomial: Array  # (size + 1, points): its characteristic one, highest power first
+    log_determinant: Array  # of the monodromy matrix, by Liouville's formula
+    mean_friction: Array
+    harmonics: Array  # complex, (harmonics, points)
+
+
+def period_steps(count: int, grading: float, harmonics: int) -> Steps:
+    """`count` steps per period, at most `MOST_STEPS`, uniform in tau = theta - g sin(tau).
+
+    A `grading` g > 0, below 1, makes them shorter where a harmonic load is lightest.
+    """
+    tau = 2 * np.pi * np.arange(count + 1) / count
+    theta = tau + grading * np.sin(tau)
+    share = (1 + grading * np.cos(tau[:-1])) / count
+    angle = theta[:-1, None] * np.arange(1, harmonics + 1)
+    waves = np.concatenate([np.ones((count, 1)), np.cos(angle), -np.sin(angle)], axis=1)
+    lengths = np.diff(theta)
+    phases = theta[:-1, None] + lengths[:, None] * dormand_prince_8().C[:12]
+    tables = phases, lengths, share[:, None] * waves
+    return Steps(np.asarray(count), *map(_padded, tables))
+
+
+def _padded(table: np.ndarray) -> np.ndarray:
+    padded = np.zeros((MOST_STEPS, *table.shape[1:]))
+    padded[: len(table)] = table
+    return padded
+
+
+def _apart(once: Array, k: Array, function: Callable[[Array], Any], like: Any) -> Any:
+    """`function` of the number k of a step, computed apart from its surroundings.
+
+    XLA would compute a stage once more for each later result that needs it. It does not look
+    through a loop, even one that runs once, as long as it cannot know that.
+
+    Parameters
+    ----------
+    once : int array
+        1, unknown to the compiler.
+    like : pytree
+        Of the shapes of the result.
+    """
+    return jax.lax.fori_loop(k, k + once, lambda i, _: function(i), like)
+
+
+def _combined(row: np.ndarray, h: Array, start: Any, slopes: list[Any]) -> Any:
+    """InitialGuess + h sum of row times slopes."""
+
+    def combine(a: Array, *k: Array) -> Array:
+        return a + h * sum(float(c) * s for c, s in zip(row, k, strict=False) if c != 0)
+
+    return jax.tree.map(combine, start, *slopes)
+
+
+def _slopes(problem: Problem, theta: Array, flow: tuple[Array, ...]) -> tuple[Array, ...]:
+    """Slopes of the states and, where they are there, of their derivatives."""
+    at = problem.load.at(theta)
+    states, *derivatives = flow
+    if not derivatives:
+        return (problem.system.rates(states, at),)
+    rates, push = jax.linearize(lambda Y: problem.system.rates(Y, at), states)
+    return rates, jax.vmap(push, in_axes=1, out_axes=1)(derivatives[0])
+
+
+def _advance(problem: Problem, steps: Steps, k: Array, flow: Any) -> Any:
+    """States, and derivatives if any, one step later."""
+    table = dormand_prince_8().A
+    once = jnp.minimum(steps.number, 1)
+    nothing = jax.tree.map(jnp.zeros_like, flow)
+    slopes: list[Any] = []
+
+    def inner(j: int, i: Array) -> Any:
+        return _combined(table[j], steps.lengths[i], flow, slopes)
+
+    def slope(j: int, states: Any, i: Array) -> Any:
+        return _slopes(problem, steps.phases[i, j], states)
+
+    for j in range(len(table) - 1):
+        states = _apart(once, k, partial(inner, j), nothing) if j else flow
+        slopes.append(_apart(once, k, partial(slope, j, states), nothing))
+    return inner(len(table) - 1, k)
+
+
+@jax.jit
+def chord_step(given: tuple[Problem, Array, Array], steps: Steps) -> tuple[Array, Array]:
+    """One chord step with a given inverse: first states, and the change as in `PeriodIntegration`.
+
+    Parameters
+    ----------
+    given : tuple
+        The problem, first states (size, points) and `PeriodIntegration.inverse` of orbits close by.
+    """
+    problem, start, inverse = given
+
+    def body(k: Array, flow: Any) -> Any:
+        return _advance(problem, steps, k, flow)
+
+    (end,) = jax.lax.fori_loop(0, steps.number, body, (start,))
+    step = (inverse * (end - start)[None]).sum(1)
+    return start + step, _changes(problem, start, step)[1]
+
+
+@jax.jit
+def newton_pass(given: tuple[Problem, Array], steps: Steps) -> PeriodIntegration:
+    """Integrate states and derivatives over the period.
+
+    Parameters
+    ----------
+    given : tuple
+        The problem and first states, (size, points).
+    """
+    problem, start = given
+    n, points = start.shape
+
+    def body(k: Array, carry: tuple) -> tuple:
+        flow, spectrum, trace, slips = carry
+        at = problem.load.at(steps.phases[k, 0])
+        _, force = problem.system.force_split(start, flow[0] - start, at)
+        weights = steps.spectrum[k]
+        spectrum = spectrum + weights[:, None] * force
+        trace = trace + weights[0] * _trace(problem, steps.phases[k, 0], flow[0])
+        slips = slips & jnp.isfinite(problem.system.log_slip(flow[0], at))
+        return _advance(problem, steps, k, flow), spectrum, trace, slips
+
+    identity = jnp.eye(n)[:, :, None] * jnp.ones(points)
+    nothing = jnp.zeros((steps.spectrum.shape[1], points)), jnp.zeros(points)
+    (end, monodromy), spectrum, trace, slips = jax.lax.fori_loop(
+        0, steps.number, body, ((start, identity), *nothing, jnp.ones(points, dtype=bool))
+    )
+    inverse = _stacked(inverse_points([list(row) for row in identity - monodromy]))
+    step = (inverse * (end - start)[None]).sum(1)
+    leap, change = _changes(problem, start, step)
+    constant, _ = problem.system.force_split(start, jnp.zeros_like(start), problem.load.at(0.0))
+    cosine, sine = jnp.split(spectrum[1:], 2)
+    return PeriodIntegration(
+        step,
+        leap,
+        # An interface that sticks for part of the period has kinks, which no high order resolves.
+        jnp.where(slips, change, jnp.inf),
+        inverse,
+        monodromy,
+        _characteristic(monodromy),
+        2 * jnp.pi * trace,
+        constant + spectrum[0],
+        2 * jax.lax.complex(cosine, sine),
+    )
+
+
+def _stacked(matrix: Matrix) -> Array:
+    return jnp.stack([jnp.stack(row) for row in matrix])
+
+
+def _characteristic(matrix: Array) -> Array:
+    """Coefficients of det(m - matrix), by the method of Faddeev and LeVerrier."""
+    n = matrix.shape[0]
+    identity = jnp.eye(n)[:, :, None]
+    coefficients, power = [jnp.ones(matrix.shape[2])], jnp.zeros_like(matrix)
+    for k in range(1, n + 1):
+        power = product(matrix, power) + coefficients[-1] * identity
+        coefficients.append(-jnp.trace(product(matrix, power)) / k)
+    return jnp.stack(coefficients)
+
+
+def _trace(problem: Problem, theta: Array, states: Array) -> Array:
+    """Trace of the Jacobian of the rates."""
+    at = problem.load.at(theta)
+    _, columns = jacobian_columns(lambda Y: problem.system.rates(Y, at), states)
+    return sum((column[i] for i, column in enumerate(columns)), jnp.zeros_like(states[0]))
+
+
+def _changes(problem: Problem, start: Array, step: Array) -> tuple[Array, Array]:
+    """Largest change of slip exponent and logarithmic states by a step, without and with velocity.
+
+    The spring force counts as if the asperities carried all of it. The velocity has no part in what
+    makes the equations nonlinear, but it may be far off.
+    """
+    system, at = problem.system, problem.load.at(0.0)
+    names = system.mechanical
+    force, velocity, friction = (names.index(n) for n in ("force", "velocity", "friction"))
+    carried = jnp.zeros_like(step).at[friction].set(step[force] / at.w)
+    leap = jnp.maximum(
+        exponent_change(system, at, start, step), exponent_change(system, at, start, carried)
+    )
+    leap = jnp.where(jnp.isfinite(leap), leap, jnp.inf)
+    return leap, jnp.maximum(leap, jnp.abs(step[velocity]))
+
+
+@partial(jax.jit, static_argnames=("count", "grading", "phases"))
+def shot_waveform(
+    given: tuple[Problem, Array], steps: Steps, *, count: int, grading: float, phases: int
+) -> Array:
+    """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points).
+
+    By trigonometric interpolation in tau between the ends of `count` steps.
+    """
+    problem, start = given
+
+    def body(flow: Any, k: Array) -> tuple[Any, Array]:
+        return _advance(problem, steps, k, flow), flow[0] - start
+
+    _, path = jax.lax.scan(body, (start,), jnp.arange(count))
+    theta = even_phases(phases)
+    apart = eccentric_phase(theta, grading) - 2 * np.pi * np.arange(count) / count
+    k = np.arange(1, (count + 1) // 2)[:, None, None]
+    interpolate = (1 + 2 * np.cos(k * apart).sum(0)) / count
+    Y = start[:, None] + jnp.einsum("pk,knb->npb", interpolate, path)
+    return waveform_of(problem, Y, jnp.asarray(theta))

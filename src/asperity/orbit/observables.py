@@ -1,0 +1,96 @@
+"""The record of what every method evaluates on an orbit."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from asperity.orbit.floquet import log_multipliers, log_multipliers_of_exponent
+from asperity.slider.problem import Problem
+from asperity.theory.adiabatic import even_phases
+
+
+class Observables(NamedTuple):
+    """Mean, harmonics and monodromy matrix of orbits; F/W0 = mean + sum Re(c_n e^{i n theta}).
+
+    Attributes
+    ----------
+    mean_friction : array, shape (points,)
+        Mean of F/W0.
+    harmonics : complex array, shape (count, points)
+        c_1, c_2, ...
+    monodromy : array, shape (size, size, points)
+        The monodromy matrix over exp(`log_scale`).
+    log_scale : array, shape (points,)
+    log_determinant : array, shape (points,)
+        Logarithm of the determinant of the monodromy matrix: the integral of the trace of the
+        Jacobian (Liouville), free of cancellation.
+    exponent : array, shape (size, size, points)
+        A matrix whose exponential is the monodromy matrix; NaN where it is not known.
+    growth : array, shape (points,)
+        Integral of the largest real part of the eigenvalues of the Jacobian; inf where it was not
+        computed.
+    start : array, shape (size, points)
+        States at theta = 0.
+    waveform : array, shape (2, phases, points)
+        F/W0 and ln(v_pl/V) at even phases.
+    """
+
+    mean_friction: Array
+    harmonics: Array
+    monodromy: Array
+    log_scale: Array
+    log_determinant: Array
+    exponent: Array
+    growth: Array
+    start: Array
+    waveform: Array
+
+    @property
+    def log_multipliers(self) -> NDArray[np.complex128]:
+        """Logarithms of the Floquet multipliers by falling modulus, shape (size, points)."""
+        monodromy, log_scale, log_determinant, exponent = map(np.asarray, self[2:6])
+        logs = log_multipliers(monodromy, log_scale, log_determinant)
+        # Of multipliers near 1 a matrix of their logarithms keeps more digits.
+        known = np.flatnonzero(np.isfinite(exponent).all((0, 1)))
+        logs[:, known] = log_multipliers_of_exponent(exponent[..., known], log_determinant[known])
+        return logs
+
+
+class PeriodicOrbit(Protocol):
+    """What observables ask of an orbit, however it is represented.
+
+    Two representations have it. `FourierOrbit` keeps the mean of each state apart from the rest on
+    a grid, so that a rest 1e-9 of the mean keeps its digits, and is small enough for hundreds of
+    points to be iterated in a core's cache. `Orbit` has polynomials on a mesh of its own for every
+    point, which puts the intervals where an orbit is steep, and from whose equations the monodromy
+    matrix follows. Neither could stand in for the other without a loss of digits or of range, and
+    nothing beyond the method that made it needs to know which one it has.
+    """
+
+    @property
+    def start(self) -> Array:
+        """States at theta = 0, shape (size, points)."""
+        ...
+
+    def states(self, theta: np.ndarray) -> Array:
+        """States at the phases `theta`, a column: shape (size, phases, points)."""
+        ...
+
+
+def waveform(problem: Problem, orbit: PeriodicOrbit, phases: int) -> Array:
+    """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points)."""
+    if phases == 0:
+        return jnp.zeros((2, 0, orbit.start.shape[-1]))
+    theta = even_phases(phases)
+    return waveform_of(problem, orbit.states(theta), jnp.asarray(theta))
+
+
+def waveform_of(problem: Problem, Y: Array, theta: Array) -> Array:
+    """F/W0 and ln(v_pl/V) of the states `Y`, (size, phases, points), at the phases `theta`."""
+    at = problem.load.at(theta)
+    return jnp.stack([problem.system.force(Y, at), problem.system.log_slip(Y, at)])

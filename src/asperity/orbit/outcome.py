@@ -1,0 +1,125 @@
+"""What became of the solve of an operating point, as data and as a sentence."""
+
+from __future__ import annotations
+
+import math
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class Outcome(IntEnum):
+    """Outcome of a periodic solve.
+
+    FOLDED, RUNAWAY and SENSITIVE are answers: the branch of orbits that begins with steady sliding
+    does not reach the amplitude asked for, or not in a way that anything could hold. Other orbits,
+    not connected to it, may exist. OUT_OF_RANGE is given without a search.
+    """
+
+    CONVERGED = 0
+    NO_ORBIT = 1
+    NOT_RESOLVED = 2
+    MULTIPLIERS_NOT_RESOLVED = 3
+    FOLDED = 4
+    RUNAWAY = 5
+    SENSITIVE = 6
+    INVALID = 7
+    OUT_OF_RANGE = 8
+
+
+#: Smallest and largest rate of a disturbance of steady sliding, per radian of the modulation, at
+#: which orbits are searched for. Below, multipliers are 1 to round-off, which then decides on
+#: stability; above, round-off of the slip rate is as large as the rate of change of the force.
+SMALLEST_RATE, LARGEST_RATE = 1e-9, 1e15
+#: Largest share of W0 that may be taken off the contacts: of a harmonic load, epsilon.
+LARGEST_UNLOADING = 0.999
+
+#: Outcomes of a branch from steady sliding without an orbit; another branch may have one.
+WITHOUT_ORBIT = (Outcome.NO_ORBIT, Outcome.FOLDED, Outcome.RUNAWAY, Outcome.SENSITIVE)
+
+_SENTENCES = {
+    Outcome.CONVERGED: "converged",
+    Outcome.NO_ORBIT: (
+        "no periodic orbit found: followed from steady sliding the branch stops at "
+        "{detail:.4g} of the amplitude asked for; lower epsilon or stiffen the spring"
+    ),
+    Outcome.NOT_RESOLVED: (
+        "an orbit was found but not resolved: refining the mesh still changes it by {detail:.1e} "
+        "relative, above 1e-8"
+    ),
+    Outcome.MULTIPLIERS_NOT_RESOLVED: (
+        "the orbit is resolved but its Floquet multipliers are not: refining the mesh "
+        "still changes them by {detail:.1e} relative, above 1e-8"
+    ),
+    Outcome.FOLDED: (
+        "the branch from steady sliding folds back at epsilon = {detail:.3g}, below the amplitude "
+        "asked for; lower epsilon or stiffen the spring"
+    ),
+    Outcome.RUNAWAY: (
+        "on the branch from steady sliding slip runs away: before epsilon = {detail:.3g} its "
+        "pulses become faster than e^13 V, without inertia nothing bounds them; lower epsilon or "
+        "let inertia or radiation damping count"
+    ),
+    Outcome.SENSITIVE: (
+        "the branch from steady sliding is lost at epsilon = {detail:.3g}: sliding is so unstable "
+        "for part of the period that a disturbance grows by more than e^15, which neither a mesh "
+        "nor an experiment can hold; lower epsilon or stiffen the spring"
+    ),
+    Outcome.INVALID: (
+        "a parameter breaks its rule, so that there is nothing to solve; keep every parameter in "
+        "its range"
+    ),
+}
+
+_GROUP = (
+    "the rate of steady sliding per radian, about the larger of V/(omega D0) and V K/(omega W0 A),"
+)
+#: Of points out of range.
+_UNLOADED = (
+    "not searched: epsilon (the largest share of W0 taken off the contacts) must be at most "
+    f"{LARGEST_UNLOADING:g}, got {{detail:.9g}}; lower epsilon"
+)
+_TOO_FAST = (
+    f"not searched: {_GROUP} must be at least {SMALLEST_RATE:g}, got {{detail:.3g}}; lower the "
+    "frequency, or take the limit of fast modulation, averaged_response"
+)
+_TOO_SLOW = (
+    f"not searched: {_GROUP} must be at most {LARGEST_RATE:g}, got {{detail:.3g}}; raise the "
+    "frequency or lower the velocity"
+)
+_NO_RATE = (
+    f"not searched: {_GROUP} must be a finite number, got {{detail}}; bring the velocity "
+    "nearer to V0"
+)
+
+_LOST = (
+    "an orbit was found on a coarse mesh but lost on every finer one, so it may not exist; "
+    "lower epsilon or stiffen the spring"
+)
+
+
+def sentence(outcome: int, detail: float) -> str:
+    """The sentence that a user reads."""
+    if outcome == Outcome.NOT_RESOLVED and not math.isfinite(detail):
+        return _LOST
+    if outcome == Outcome.OUT_OF_RANGE:
+        return _out_of_range(detail).format(detail=detail)
+    return _SENTENCES[Outcome(outcome)].format(detail=detail)
+
+
+def _out_of_range(detail: float) -> str:
+    """Which limit the number breaks: rates out of range are far from shares of the load."""
+    if not math.isfinite(detail):
+        return _NO_RATE
+    if detail < SMALLEST_RATE:
+        return _TOO_FAST
+    return _TOO_SLOW if detail > LARGEST_RATE else _UNLOADED
+
+
+def sentences(outcomes: NDArray[np.int_], details: NDArray[np.float64]) -> NDArray[np.object_]:
+    """`sentence` for arrays."""
+    texts = np.full(outcomes.shape, _SENTENCES[Outcome.CONVERGED], dtype=object)
+    for i in map(tuple, np.argwhere(outcomes)):
+        texts[i] = sentence(outcomes[i], details[i])
+    return texts

@@ -1,0 +1,114 @@
+"""Force, velocities and age over one period of an orbit."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from asperity.laws import Law, LinkerDieterich
+from asperity.loads import Harmonic
+from asperity.orbit.response import PeriodicResponse
+from asperity.parameters.arguments import instance
+
+Float = NDArray[np.float64]
+
+#: Newton steps for the state. Friction is affine in it for most laws, and nearly so for the others.
+_STEPS = 12
+
+
+class Period(NamedTuple):
+    """One period of the motion, each array of shape (samples,).
+
+    Attributes
+    ----------
+    phase : array
+        Time over the period, 0 at the largest load.
+    load : array
+        W/W0.
+    force : array
+        F/W0, the force of the pulling spring.
+    velocity : array
+        Velocity of the slider over the pulling velocity.
+    plastic_velocity : array
+        Velocity of slip over the pulling velocity; differs where asperities are elastic.
+    age : array or None
+        Age of the contacts over that of steady sliding, V Phi/D0; None where the law's state is no
+        age, or the load is not harmonic.
+    """
+
+    phase: Float
+    load: Float
+    force: Float
+    velocity: Float
+    plastic_velocity: Float
+    age: Float | None
+
+
+def over_a_period(response: PeriodicResponse) -> Period:
+    """Force, velocities and age over one period.
+
+    Parameters
+    ----------
+    response : PeriodicResponse
+        Of a single point, with a waveform.
+
+    Notes
+    -----
+    The slider's velocity is that of the pulling point less the rate of the spring's stretch,
+    dx/dt = V - (dF/dt)/K, by Fourier differentiation. The interface carries the spring's force less
+    what accelerates the slider and what it radiates; the state is the one at which the law carries
+    that force at that slip velocity.
+    """
+    instance(response, PeriodicResponse, "response", "give the result of periodic_response")
+    motion, slider = response.motion, response.slider
+    V, omega = float(np.ravel(motion.V)[0]), float(np.ravel(motion.omega)[0])
+    K, W0, M = (float(np.ravel(getattr(slider, n))[0]) for n in ("K", "W0", "M"))
+    force, log_slip = response.waveform.reshape(2, -1)
+    slip = np.exp(log_slip)
+    at = response.load.at(response.theta)
+    elastic = bool(np.any(np.asarray(slider.law.elastic_length) > 0))
+    velocity = 1 - omega * W0 / (K * V) * _derivative(force) if elastic else slip
+    friction = force - float(np.ravel(motion.damping)[0]) * velocity
+    if "inertial" in motion.name:
+        friction = friction - M * V * omega / W0 * _derivative(velocity)
+    load = np.asarray(at.w) * np.ones(len(force))
+    age = None
+    if isinstance(response.load, Harmonic) and _has_age(slider.law):
+        state = _state(slider.law, jnp.asarray(V * slip), friction / load, load)
+        log_age = state
+        if isinstance(slider.law, LinkerDieterich):
+            log_age = slider.law.log_age((state,), jnp.asarray(load))
+        age = np.asarray(jnp.exp(log_age - slider.law.steady_state(V)[0])).reshape(-1)
+    return Period(response.theta / (2 * np.pi), load, force, velocity, slip, age)
+
+
+def _has_age(law: Law) -> bool:
+    return law.state_names == ("log_age",) or isinstance(law, LinkerDieterich)
+
+
+@jax.jit
+def _state(law: Law, v: Array, friction: Array, w: Array) -> Array:
+    """The state at which the law carries F_i/W = `friction` at the velocity `v`."""
+
+    def excess(state: Array) -> Array:
+        return law.friction(v, (state,), w) - friction
+
+    def step(_: int, state: Array) -> Array:
+        value, slope = jax.jvp(excess, (state,), (jnp.ones_like(state),))
+        return state - value / slope
+
+    first = jnp.broadcast_to(law.steady_state(v)[0], friction.shape)
+    found: Array = jax.lax.fori_loop(0, _STEPS, step, first)
+    return found
+
+
+def _derivative(values: Float) -> Float:
+    """Derivative by the phase (rad) of a periodic function on a uniform grid."""
+    orders = np.fft.rfftfreq(len(values), 1 / len(values))
+    found: Float = np.fft.irfft(1j * orders * np.fft.rfft(values), len(values))
+    return found

@@ -1,0 +1,141 @@
+"""The periodic response of a slider to a harmonic modulation of its normal load."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from jax.typing import ArrayLike
+
+from asperity.loads import Modulation
+from asperity.orbit.methods.registry import CHOICES, chosen_methods
+from asperity.orbit.outcome import Outcome
+from asperity.orbit.processes import WORTHWHILE, available_cores, find_orbits_on_cores
+from asperity.orbit.response import PeriodicResponse
+from asperity.orbit.search import find_orbits
+from asperity.orbit.solution import SearchOptions, Solution
+from asperity.parameters.arguments import counted, function, whole_number
+from asperity.slider import Slider
+from asperity.slider.problem import Problem, checked_problem, flatten
+
+
+def periodic_response(
+    slider: Slider,
+    *,
+    velocity: ArrayLike | str,
+    epsilon: ArrayLike | str | None = None,
+    frequency: ArrayLike | str,
+    modulation: Modulation | None = None,
+    inertia: bool = False,
+    radiation_damping: ArrayLike | str | None = None,
+    harmonics: int = 8,
+    waveform: int = 0,
+    progress: Callable[[int, int], None] | None = None,
+    methods: tuple[str, ...] = CHOICES,
+    workers: int | None = None,
+) -> PeriodicResponse:
+    """Periodic response to W = W0 (1 + eps cos wt), stable or not.
+
+    Arrays may stand wherever a number does, the parameters of the slider included; they
+    broadcast as NumPy's do, and every operating point is solved on its own.
+
+    Parameters
+    ----------
+    slider : Slider
+    velocity : array or str
+        Pulling velocity V (m/s), positive.
+    epsilon : array or str
+        Relative amplitude of the load that the contacts carry, 0 <= eps < 1.
+    frequency : array or str
+        Modulation frequency (Hz), positive; not rad/s.
+    modulation : Modulation, optional
+        In place of `epsilon`: any periodic load, shear force and pulling velocity, from
+        `asperity.loads.modulated` or `asperity.loads.sampled`.
+    inertia : bool
+        Whether the mass of the slider counts.
+    radiation_damping : array or str, optional
+        eta (N s/m), positive: waves radiated from the interface take the force eta v.
+    harmonics : int
+        Number of harmonics of the force, at least 2.
+    waveform : int
+        Samples of the force and slip rate over the period to keep; 0 for none.
+    progress : callable, optional
+        Called with the number of points finished so far and of all points.
+    methods : tuple of str
+        Which to use of "fourier", the fast method (shooting with inertia on elastic asperities),
+        "series", for slow modulation, and "collocation", the robust method with the methods that
+        follow branches to its initial guess. All by default.
+    workers : int, optional
+        Processes to use; by default one per core for 200,000 points or more, else this one alone.
+
+    Returns
+    -------
+    PeriodicResponse
+        A point that fails says why in `result`; its numbers are NaN and `converged` is False.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or shapes do not broadcast.
+
+    Notes
+    -----
+    Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). Where converged,
+    mean, mu1, mu2 and multipliers are good to 1e-8 relative (multipliers of modulus below 1e-12
+    to 1e-20 absolute; with inertia or several states of the law, those below 1e-6 to 1e-14, and
+    those below 1e-7 of the largest to 1e-15 of that).
+
+    Orbits are searched for where epsilon is at most 0.999 and the rate of steady sliding per
+    radian, about the larger of V/(omega D0) and V K/(omega W0 A), is from 1e-9 to 1e15. Points
+    outside get the outcome `Outcome.OUT_OF_RANGE` at once.
+    """
+    harmonics = whole_number(harmonics, "harmonics", least=2)
+    waveform = whole_number(waveform, "waveform")
+    chosen = chosen_methods(methods)
+    workers = None if workers is None else whole_number(workers, "workers", least=1)
+    progress = function(progress, "progress")
+    problem = checked_problem(
+        slider,
+        velocity=velocity,
+        epsilon=epsilon,
+        frequency=frequency,
+        modulation=modulation,
+        inertia=inertia,
+        radiation_damping=radiation_damping,
+    )
+    flat, shape = flatten(problem)
+    points = int(np.prod(shape, dtype=int))
+    report = counted(progress, points)
+    if slider.law.rate_dependent:
+        options = {"harmonics": harmonics, "phases": waveform, "methods": chosen}
+        if workers is None:
+            workers = available_cores() if points >= WORTHWHILE else 1
+        if workers > 1:
+            solution = find_orbits_on_cores(flat, points, workers, progress=report, **options)
+        else:
+            solution = find_orbits(flat, points, progress=report, **options)
+    else:
+        solution = _proportional(flat, points, harmonics, waveform)
+        report(points)
+    mu_ss = np.asarray(slider.law.mu_ss(problem.system.V)) * np.ones(shape)
+    return PeriodicResponse.from_search(solution, shape, mu_ss, *problem)
+
+
+def _proportional(problem: Problem, points: int, harmonics: int, phases: int) -> Solution:
+    """A law without rate dependence: the force follows load and shear force, without dynamics."""
+    system, load = problem
+    count = max(phases, 4 * harmonics)
+
+    def force(samples: int) -> np.ndarray:
+        theta = 2 * np.pi * np.arange(samples)[:, None] / max(samples, 1)
+        at, law = load.at(theta), system.slider.law
+        friction = law.friction(system.V, law.steady_state(system.V), at.w)
+        return np.asarray(at.w * friction - at.shear)
+
+    spectrum = np.fft.rfft(force(count), axis=0) / count
+    solution = Solution.empty(0, points, SearchOptions(harmonics, phases, lambda _: None))
+    solution.mean_friction[:] = spectrum[0].real
+    solution.harmonics[:] = 2 * spectrum[1 : harmonics + 1]
+    solution.waveform[:] = np.stack([force(phases), np.zeros((phases, points))])
+    solution.outcome[:] = Outcome.CONVERGED
+    return solution

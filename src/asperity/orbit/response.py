@@ -1,0 +1,358 @@
+"""The record of a periodic response."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.loads import Modulation
+from asperity.orbit.floquet import from_logs, kind_of_crossing, without_lost_arguments
+from asperity.orbit.outcome import Outcome, sentences
+from asperity.orbit.provenance import provenance_of
+from asperity.orbit.solution import Solution
+from asperity.parameters import DRIVE, OUTPUTS, Parameter
+from asperity.parameters.arguments import shown
+from asperity.parameters.display import (
+    Displayed,
+    SummaryLine,
+    count_text,
+    number_line,
+    parameter_line,
+)
+from asperity.slider import Motion, Slider
+from asperity.slider.named import equation_parameters, value_of
+from asperity.slider.problem import Problem
+
+if TYPE_CHECKING:
+    import xarray
+
+Float = NDArray[np.float64]
+
+#: Variables of the dataset with one value a point.
+_VARIABLES = (
+    *("mean_friction", "delta_mu", "mu_ss", "mu1", "mu2", "phase1", "phase2", "floquet_max"),
+    *("mode", "mode_frequency", "growth_rate", "stable", "converged", "result"),
+)
+
+
+@dataclass(frozen=True, repr=False)
+class PeriodicResponse(Displayed):
+    """Periodic response at one or many operating points.
+
+    Convention: w(t) = 1 + eps cos(wt) and F/W0 = mean_friction + sum mu_n cos(n wt + phase_n), with
+    peak amplitudes mu_n = |c_n| and phases arg c_n in (-pi, pi].
+
+    Attributes
+    ----------
+    mean_friction : array, shape (...)
+        Mean of F/W0.
+    delta_mu : array, shape (...)
+        mean_friction - mu_ss(V): negative where modulation lowers friction.
+    mu_ss : array, shape (...)
+        Friction coefficient of unmodulated steady sliding.
+    harmonics : complex array, shape (..., count)
+        c_1, c_2, ...
+    mode, mode_frequency, growth_rate : array, shape (...)
+        Bifurcation of the leading multiplier, its frequency (Hz) and growth rate (1/s).
+    multipliers : complex array, shape (..., states)
+        Floquet multipliers, by falling modulus.
+    log_multipliers : complex array, shape (..., states)
+        ln|m| + i arg m. Where a multiplier overflows ln|m| does not; arg m is then NaN. Of
+        orbits so unstable that no mesh resolves them the first is a lower bound and the others are
+        NaN; of multipliers that are 0 as doubles ln|m| is an estimate.
+    stable : bool array, shape (...)
+        All multipliers inside the unit circle; False where not converged.
+    converged : bool array, shape (...)
+    iterations : int array, shape (...)
+        Steps of the fast method, or intervals of the mesh of the robust one.
+    outcome : int array, shape (...)
+        `Outcome` of each point.
+    result : str array, shape (...)
+        "converged", or why not.
+    start : array, shape (..., states)
+        States of `motion` at the phase theta = 0.
+    waveform : array, shape (2, ..., samples)
+        F/W0 and ln(v_plastic / V) at the phases `theta`.
+    theta : array, shape (samples,)
+    motion : Motion
+        Equation of motion, with the slider.
+    load : Modulation
+        What is modulated.
+    slider, velocity, epsilon, frequency
+        What was asked, in SI; epsilon is the amplitude of the load's first harmonic.
+    """
+
+    mean_friction: Float
+    mu_ss: Float
+    harmonics: NDArray[np.complex128]
+    log_multipliers: NDArray[np.complex128]
+    start: Float
+    waveform: Float
+    iterations: NDArray[np.int64]
+    outcome: NDArray[np.int64]
+    detail: Float
+    motion: Motion
+    load: Modulation
+
+    @classmethod
+    def from_search(
+        cls,
+        solution: Solution,
+        shape: tuple[int, ...],
+        mu_ss: Float,
+        motion: Motion,
+        load: Modulation,
+    ) -> PeriodicResponse:
+        """The results of a search in the shape of the arguments."""
+
+        def shaped(a: np.ndarray) -> np.ndarray:
+            return np.moveaxis(a, -1, 0).reshape((*shape, *a.shape[:-1]))
+
+        return cls(
+            mean_friction=shaped(solution.mean_friction),
+            mu_ss=mu_ss,
+            harmonics=shaped(solution.harmonics),
+            log_multipliers=without_lost_arguments(shaped(solution.log_multipliers)),
+            start=shaped(solution.start),
+            waveform=np.stack([shaped(solution.waveform[0]), shaped(solution.waveform[1])]),
+            iterations=shaped(solution.iterations),
+            outcome=shaped(solution.outcome),
+            detail=shaped(solution.detail),
+            motion=motion,
+            load=load,
+        )
+
+    @property
+    def slider(self) -> Slider:
+        """Law, spring, mass and mean load."""
+        return self.motion.slider
+
+    @property
+    def velocity(self) -> Float:
+        """Pulling velocity (m/s)."""
+        return np.asarray(self.motion.V)
+
+    @property
+    def epsilon(self) -> Float:
+        """Amplitude of the first harmonic of the load."""
+        return np.asarray(self.load.amplitude)
+
+    @property
+    def frequency(self) -> Float:
+        """Modulation frequency (Hz)."""
+        return np.asarray(self.motion.omega) / (2 * np.pi)
+
+    @property
+    def delta_mu(self) -> Float:
+        """Change of the mean by the modulation."""
+        return self.mean_friction - self.mu_ss
+
+    @property
+    def mu1(self) -> Float:
+        """Amplitude of the first harmonic over W0."""
+        return np.abs(self.harmonics[..., 0])
+
+    @property
+    def mu2(self) -> Float:
+        """Amplitude of the second harmonic over W0."""
+        return np.abs(self.harmonics[..., 1])
+
+    @property
+    def phase1(self) -> Float:
+        """Phase of the first harmonic against the load (rad)."""
+        return np.angle(self.harmonics[..., 0])
+
+    @property
+    def phase2(self) -> Float:
+        """Phase of the second harmonic against the load's phase (rad)."""
+        return np.angle(self.harmonics[..., 1])
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers; beyond the range of doubles they are inf or 0."""
+        return from_logs(self.log_multipliers)
+
+    @property
+    def floquet_max(self) -> Float:
+        """Largest modulus of the multipliers; 0 for a law without dynamics."""
+        if self.log_multipliers.shape[-1] == 0:
+            return np.zeros(self.mean_friction.shape)
+        with np.errstate(over="ignore"):
+            return np.exp(self.log_multipliers[..., 0].real)
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Whether each point was solved."""
+        return np.asarray(self.outcome == Outcome.CONVERGED)
+
+    @property
+    def stable(self) -> NDArray[np.bool_]:
+        """Whether a small perturbation dies out."""
+        with np.errstate(invalid="ignore"):
+            return self.converged & np.asarray(self.floquet_max < 1)
+
+    @property
+    def mode(self) -> NDArray[np.object_]:
+        """Bifurcation that the leading multiplier stands for, whether it has crossed or not.
+
+        "fold", "period doubling" or "Neimark-Sacker"; "" where not converged or not known.
+        """
+        if self.log_multipliers.shape[-1] == 0:
+            return np.full(self.mean_friction.shape, "", dtype=object)
+        return kind_of_crossing(self.log_multipliers[..., 0])
+
+    @property
+    def mode_frequency(self) -> Float:
+        """Frequency of the leading mode (Hz): 0 at a fold, f/2 at a period doubling.
+
+        Known from the monodromy up to multiples of the modulation frequency f and up to its sign.
+        """
+        if self.log_multipliers.shape[-1] == 0:
+            return np.full(self.mean_friction.shape, np.nan)
+        turn = np.abs(self.log_multipliers[..., 0].imag) / (2 * np.pi)
+        return np.asarray(turn * self.frequency)
+
+    @property
+    def growth_rate(self) -> Float:
+        """Rate at which the leading mode grows (1/s); negative where the orbit is stable."""
+        if self.log_multipliers.shape[-1] == 0:
+            return np.full(self.mean_friction.shape, -np.inf)
+        return np.asarray(self.log_multipliers[..., 0].real * self.frequency)
+
+    @property
+    def result(self) -> NDArray[np.object_]:
+        """Of each point: converged, or the reason why not."""
+        return sentences(np.asarray(self.outcome), np.asarray(self.detail))
+
+    @property
+    def theta(self) -> Float:
+        """Phases of the waveform (rad)."""
+        samples = self.waveform.shape[-1]
+        return 2 * np.pi * np.arange(samples) / max(samples, 1)
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Law, equation of motion, and what was found."""
+        law, points = self.slider.law.name, self.mean_friction.size
+        title = f"PeriodicResponse, {law}, {self.motion.name}, {count_text(points, 'point')}"
+        drive = ((n, getattr(self, DRIVE[n].argument)) for n in ("V", "epsilon", "frequency"))
+        lines = [parameter_line(DRIVE[name], value) for name, value in drive]
+        lines += [
+            number_line(name, getattr(self, name), OUTPUTS[name].meaning)
+            for name in ("mean_friction", "delta_mu", "mu1", "mu2", "floquet_max")
+        ]
+        if points == 1:
+            lines.append(
+                SummaryLine("stable", str(bool(self.stable.item())), OUTPUTS["stable"].meaning)
+            )
+            return title, [*lines, SummaryLine("result", str(self.result.item()))]
+        stable, converged = int(self.stable.sum()), int(self.converged.sum())
+        lines.append(SummaryLine("stable", f"{stable} of {points}", OUTPUTS["stable"].meaning))
+        return title, [*lines, SummaryLine("converged", f"{converged} of {points}")]
+
+    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
+        """The response as a labelled dataset, ready for NetCDF.
+
+        Parameters
+        ----------
+        dims : tuple of str, optional
+            Names of the axes. By default an axis along which one parameter varies, and that
+            varies along no other, has the name of the parameter; others are ``axis_0``, ...
+
+        Returns
+        -------
+        xarray.Dataset
+            Every variable has `units` and `long_name`; real and imaginary parts of complex ones
+            are variables of their own. All parameters are coordinates, those that vary along the
+            axes that they vary along; attributes hold the provenance.
+
+        Raises
+        ------
+        InputError
+            If `dims` does not have one name for each axis.
+        """
+        import xarray
+
+        shape = self.mean_friction.shape
+        values = self._parameter_values()
+        dims = dimension_names(shape, {n: np.shape(v) for n, (_, v) in values.items()}, dims)
+
+        def variable(name: str, array: Any, *extra: str, part: str = "") -> tuple:
+            output = OUTPUTS[name]
+            label = f"{part} part of {output.meaning}" if part else output.meaning
+            return (*dims, *extra), array, {"units": output.unit, "long_name": label}
+
+        data = {name: variable(name, getattr(self, name)) for name in _VARIABLES}
+        for name in ("mode", "result"):
+            data[name] = variable(name, getattr(self, name).astype(str))
+        for name, axis in (("harmonics", "harmonic"), ("log_multipliers", "multiplier")):
+            for part in ("real", "imag"):
+                array = getattr(getattr(self, name), part)
+                data[f"{name}_{part}"] = variable(name, array, axis, part=part)
+        coords = {}
+        for name, (parameter, value) in values.items():
+            array = np.asarray(value)
+            own = dims[len(dims) - array.ndim :]
+            long = [d for d, size in zip(own, array.shape, strict=True) if size > 1]
+            coords[name] = (
+                long,
+                array.reshape([n for n in array.shape if n > 1]),
+                parameter.attributes,
+            )
+        return xarray.Dataset(data, coords=coords, attrs=self.provenance)
+
+    def _parameter_values(self) -> dict[str, tuple[Parameter, Any]]:
+        """Parameters of the equations and of the drive with their values, of any shape."""
+        problem = Problem(self.motion, self.load)
+        known = equation_parameters(self.motion, self.load)
+        found = {name: (p, value_of(problem, p)) for name, p in known.items()}
+        # Of a load that is not harmonic: the amplitude of its first harmonic.
+        return found | {"epsilon": (DRIVE["epsilon"], self.epsilon)}
+
+    @property
+    def provenance(self) -> dict[str, Any]:
+        """Version, law, conventions, tolerance and source of the numbers."""
+        return provenance_of(self)
+
+
+def dimension_names(
+    shape: tuple[int, ...], shapes: Mapping[str, tuple[int, ...]], given: Any = None
+) -> tuple[str, ...]:
+    """Names of the axes of a grid.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Of the grid.
+    shapes : mapping of str to tuple of int
+        Of each parameter, broadcastable to `shape`.
+    given : tuple of str, optional
+        Names to take instead.
+
+    Raises
+    ------
+    InputError
+        If there are not as many names as axes, or a name occurs twice.
+    """
+    if given is not None:
+        chosen = [given] if isinstance(given, str) else given
+        texts = isinstance(chosen, list | tuple) and all(isinstance(n, str) for n in chosen)
+        if texts and len(chosen) == len(set(chosen)) == len(shape):
+            return tuple(chosen)
+        raise InputError(
+            f"dims must be {len(shape)} different names, one for each axis, got {shown(given)}; "
+            "leave it out to have the axes named by what varies"
+        )
+    along: dict[str, list[int]] = {}
+    for name, own in shapes.items():
+        along[name] = [i + len(shape) - len(own) for i, size in enumerate(own) if size > 1]
+    names = []
+    for axis in range(len(shape)):
+        varying = [name for name, axes in along.items() if axis in axes]
+        alone = len(varying) == 1 and along[varying[0]] == [axis]
+        names.append(varying[0] if alone else f"axis_{axis}")
+    return tuple(names)

@@ -1,0 +1,124 @@
+"""Derivatives of a periodic response with respect to every parameter, as a table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import jax
+import numpy as np
+from jax.typing import ArrayLike
+from numpy.typing import NDArray
+
+from asperity.loads import Modulation
+from asperity.orbit.differentiable import ResponseFunction
+from asperity.orbit.gradient.parametrised import ParametrisedProblem
+from asperity.orbit.gradient.program import ResponseValues
+from asperity.orbit.outcome import Outcome
+from asperity.slider import Slider
+from asperity.slider.problem import checked_problem, flatten
+
+#: Points that are differentiated at a time, which bounds the memory.
+_BLOCK = 1024
+
+
+@dataclass(frozen=True)
+class Sensitivities:
+    """Derivatives at one or many operating points.
+
+    Attributes
+    ----------
+    parameters : tuple of str
+        Names, in the order of the last axis: those of the law, then K, W0, M, V, frequency, eta
+        (with radiation damping only), and epsilon or the coefficients of the load.
+    outcome : int array, shape (...)
+        `Outcome` of each point.
+    converged : bool array, shape (...)
+        False where no orbit was found, or not resolved; the derivatives there are NaN.
+    mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
+        d(output)/d(parameter) in SI; phases in rad.
+    log_multipliers : complex array, shape (..., states, parameters)
+        Derivatives of ln|m| + i arg m, sorted as in `PeriodicResponse`; of a complex pair the one
+        with the positive argument comes first.
+    """
+
+    parameters: tuple[str, ...]
+    outcome: NDArray[np.int64]
+    mean_friction: NDArray[np.float64]
+    mu1: NDArray[np.float64]
+    mu2: NDArray[np.float64]
+    phase1: NDArray[np.float64]
+    phase2: NDArray[np.float64]
+    log_multipliers: NDArray[np.complex128]
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Whether each point was solved."""
+        return np.asarray(self.outcome == Outcome.CONVERGED)
+
+
+def sensitivities(
+    slider: Slider,
+    *,
+    velocity: ArrayLike | str,
+    epsilon: ArrayLike | str | None = None,
+    frequency: ArrayLike | str,
+    modulation: Modulation | None = None,
+    inertia: bool = False,
+    radiation_damping: ArrayLike | str | None = None,
+) -> Sensitivities:
+    """Derivatives of mean, harmonics and multipliers with respect to every parameter.
+
+    Parameters
+    ----------
+    slider : Slider
+        With a rate-dependent law.
+    velocity, epsilon, frequency, modulation, inertia, radiation_damping
+        As in `periodic_response`; arrays broadcast.
+
+    Returns
+    -------
+    Sensitivities
+
+    Raises
+    ------
+    InputError
+        As `periodic_response`; if the law does not depend on the velocity.
+
+    Notes
+    -----
+    As `response_function`, with the parameters of the slider.
+    """
+    problem, shape = flatten(
+        checked_problem(
+            slider,
+            velocity=velocity,
+            epsilon=epsilon,
+            frequency=frequency,
+            modulation=modulation,
+            inertia=inertia,
+            radiation_damping=radiation_damping,
+        )
+    )
+    model = ResponseFunction.of(ParametrisedProblem.of(problem), harmonics=2, multipliers=True)
+    numbers = model.equations.values(problem)
+    points = int(np.prod(shape, dtype=int))
+    blocks = [
+        model.value_and_jacobian({n: v[i : i + _BLOCK] for n, v in numbers.items()})
+        for i in range(0, points, _BLOCK)
+    ]
+    values, derivatives = jax.tree.map(lambda *parts: np.concatenate(parts), *blocks)
+    columns = [_outputs(values, derivatives[name]) for name in model.parameters]
+    table = np.stack(columns, axis=-1).reshape(*shape, -1, len(columns))
+    return Sensitivities(
+        model.parameters,
+        values.outcome.reshape(shape),
+        *(table[..., i, :].real for i in range(5)),
+        log_multipliers=table[..., 5:, :],
+    )
+
+
+def _outputs(values: ResponseValues, change: ResponseValues) -> NDArray[np.complex128]:
+    """Derivatives of the outputs to one parameter, (points, outputs)."""
+    relative = change.harmonics / values.harmonics
+    growth, turn = relative.real * np.abs(values.harmonics), relative.imag
+    return np.column_stack([change.mean_friction, growth, turn, change.log_multipliers])

@@ -1,0 +1,131 @@
+"""The record of a search: observables and outcome of every operating point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.algebra.runge_kutta import CollocationScheme
+from asperity.orbit.batches import Indices, put, take
+from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.methods.collocation.scheme import GAUSS, scheme_for
+from asperity.orbit.observables import Observables
+from asperity.orbit.outcome import Outcome
+from asperity.slider.problem import Problem
+
+Float = NDArray[np.float64]
+
+
+class Solution(NamedTuple):
+    """Results of a method or of the whole search, points along the last axis.
+
+    Attributes
+    ----------
+    mean_friction, harmonics, log_multipliers, start, waveform : array
+        As in `Observables`; NaN where no orbit was found.
+    iterations : int array, shape (points,)
+        Steps of Fourier collocation, or steps or intervals of the last division of the period.
+    outcome : int array, shape (points,)
+        `Outcome` of each point.
+    detail : array, shape (points,)
+        The number in its sentence; 0 where a method learnt nothing of the point.
+    method : str array, shape (points,)
+        Name of the method that gave the outcome; "" for none.
+    orbit : Orbit
+        Orbits of the points that a method found on a mesh, on `SearchOptions.intervals` intervals,
+        without any where that is 0; the mesh of the others is 0 throughout.
+    """
+
+    mean_friction: Float
+    harmonics: NDArray[np.complex128]
+    log_multipliers: NDArray[np.complex128]
+    start: Float
+    waveform: Float
+    iterations: NDArray[np.int64]
+    outcome: NDArray[np.int64]
+    detail: Float
+    method: NDArray[np.str_]
+    orbit: Orbit
+
+    @classmethod
+    def unsolved(cls, problem: Problem, points: int, options: SearchOptions) -> Solution:
+        """No orbit of a problem found yet."""
+        return cls.empty(problem.system.size, points, options, scheme_for(problem.system))
+
+    @classmethod
+    def empty(
+        cls,
+        size: int,
+        points: int,
+        options: SearchOptions,
+        scheme: CollocationScheme = GAUSS,
+    ) -> Solution:
+        """No orbit with `size` states found yet."""
+        return cls(
+            np.full(points, np.nan),
+            np.full((options.harmonics, points), np.nan + 0j),
+            np.full((size, points), np.nan + 0j),
+            np.full((size, points), np.nan),
+            np.full((2, options.phases, points), np.nan),
+            np.zeros(points, dtype=np.int64),
+            np.full(points, int(Outcome.NO_ORBIT)),
+            np.zeros(points),
+            np.full(points, "", dtype="<U16"),
+            Orbit.empty(scheme, size, options.intervals, points),
+        )
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Which points are solved."""
+        return np.asarray(self.outcome == Outcome.CONVERGED)
+
+    @property
+    def informed(self) -> NDArray[np.bool_]:
+        """Of which points a method learnt something, be it why there is no orbit."""
+        return (self.outcome != Outcome.NO_ORBIT) | (self.detail > 0)
+
+    def store(
+        self, rows: Indices, observables: Observables, logs: NDArray[np.complex128] | None = None
+    ) -> None:
+        """Write converged points, with logarithms of the multipliers if these are known better."""
+        self.mean_friction[rows] = observables.mean_friction
+        self.harmonics[:, rows] = observables.harmonics
+        self.log_multipliers[:, rows] = observables.log_multipliers if logs is None else logs
+        self.start[:, rows] = observables.start
+        self.waveform[..., rows] = observables.waveform
+        self.outcome[rows] = Outcome.CONVERGED
+
+    def discard(self, rows: Indices) -> None:
+        """Set the numbers of failed points to NaN, so that none is mistaken for an answer."""
+        for values in self[:5]:
+            values[..., rows] = np.nan
+
+    def merge(self, rows: Indices, attempt: Solution, method: str = "") -> None:
+        """Write another attempt at the points `rows`; a failed one keeps the earlier outcome."""
+        better = np.flatnonzero(attempt.informed)
+        rows = rows[better]
+        put(self, rows, take(attempt, better))
+        if method:
+            self.method[rows] = method
+
+
+class SearchOptions(NamedTuple):
+    """Observables that are asked for, and progress.
+
+    Attributes
+    ----------
+    harmonics, phases : int
+        Numbers of harmonics and of waveform samples.
+    progress : callable
+        Called with the number of points solved since the last call.
+    intervals : int
+        Of the meshes on which orbits that were found on a mesh are kept; 0 to keep none.
+    """
+
+    harmonics: int
+    phases: int
+    progress: Callable[[int], None]
+    intervals: int = 0

@@ -1,0 +1,41 @@
+"""Files and folders that a computation writes: checked first, and complete or absent at the end.
+
+`targets` checks where results go before anything is computed, `file` and `folder` write them in
+one piece, and `unfinished` keeps the finished blocks of a long computation so that it can go on
+after an interruption.
+"""
+
+from asperity.outputs.capacity import (
+    free_disk,
+    free_memory,
+    require_disk,
+    require_memory,
+    size_text,
+)
+from asperity.outputs.file import written_file
+from asperity.outputs.folder import written_folder
+from asperity.outputs.targets import output_file, output_files
+from asperity.outputs.unfinished import (
+    Interrupted,
+    UnfinishedOutput,
+    UnfinishedText,
+    differences,
+    undisturbed,
+)
+
+__all__ = [
+    "Interrupted",
+    "UnfinishedOutput",
+    "UnfinishedText",
+    "differences",
+    "free_disk",
+    "free_memory",
+    "output_file",
+    "output_files",
+    "require_disk",
+    "require_memory",
+    "size_text",
+    "undisturbed",
+    "written_file",
+    "written_folder",
+]

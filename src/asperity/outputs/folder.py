@@ -1,0 +1,112 @@
+"""A folder that is written completely or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from asperity.errors import InputError
+
+try:
+    import fcntl
+except ImportError:  # pragma: no cover  Windows: temporary folders of killed runs stay
+    fcntl = None  # type: ignore[assignment]
+
+_PREFIX = ".asperity-unfinished-"
+
+
+@contextmanager
+def written_folder(folder: Path) -> Iterator[Path]:
+    """Hand out a temporary folder whose files are moved to `folder` at the end.
+
+    An error, or an interruption, leaves `folder` as it was. Files of other names that lie there
+    stay. The temporary folder lies inside `folder` if that exists, else beside it, so that moving
+    is renaming, which cannot stop half-way through a file. Temporary folders that killed processes
+    have left at that place are removed; those of running processes stay.
+
+    Raises
+    ------
+    InputError
+        At once, if the folder cannot be written.
+    """
+    staging, lock = _staging(folder)
+    try:
+        yield staging
+        _move_files(staging, folder)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _staging(folder: Path) -> tuple[Path, int | None]:
+    """A new temporary folder, and the descriptor that holds its lock where there are locks."""
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise NotADirectoryError(20, "it is a file")
+        place = folder
+        while not place.exists():
+            place = place.parent
+        # Nobody else may take a folder for abandoned between its creation and its lock.
+        guard = _locked(place, wait=True)
+        try:
+            if guard is not None:
+                _remove_abandoned(place)
+            staging = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=place))
+            return staging, _locked(staging)
+        finally:
+            if guard is not None:
+                os.close(guard)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def _remove_abandoned(place: Path) -> None:
+    """Remove temporary folders that no running process holds."""
+    for left in place.glob(f"{_PREFIX}*"):
+        if left.is_symlink() or not left.is_dir():
+            continue
+        lock = _locked(left)
+        if lock is not None:
+            shutil.rmtree(left, ignore_errors=True)
+            os.close(lock)
+
+
+def _locked(folder: Path, *, wait: bool = False) -> int | None:
+    """Lock a folder until the descriptor is closed or the process ends, however it ends.
+
+    None where it is locked by someone else, or where the file system has no locks.
+    """
+    if fcntl is None:
+        return None
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
+
+
+def _move_files(staging: Path, folder: Path) -> None:
+    try:
+        for source in sorted(p for p in staging.rglob("*") if p.is_file()):
+            target = folder / source.relative_to(staging)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source, target)
+    except OSError as error:
+        raise _unwritable(folder, error) from None
+
+
+def _unwritable(folder: Path, error: OSError) -> InputError:
+    why = (error.strerror or "no reason given").lower()
+    return InputError(
+        f"out must be a folder that can be written, got '{folder}' ({why}); choose another folder"
+    )

@@ -1,0 +1,246 @@
+"""The output of a long computation on its way: finished blocks, and a record of what they are.
+
+``OUT.partial`` holds the finished blocks. ``OUT.partial.json``, the record, holds the inputs that
+they belong to and how far the computation has come. The record is replaced after each block has
+reached the disk: what lies behind the recorded end is a block that was never finished.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any, TypeVar
+
+from asperity._version import __version__
+from asperity.errors import InputError
+from asperity.outputs.file import to_disk, writable
+from asperity.outputs.targets import fresh_name, record_name, unfinished_name
+
+_Result = TypeVar("_Result")
+
+#: Differences of the inputs that a message lists.
+_LISTED = 3
+
+
+class Interrupted(KeyboardInterrupt):
+    """The user stopped a computation; the message says what is kept and how to go on.
+
+    Parameters
+    ----------
+    kept : str
+        What is finished, such as ``"8 of 12 rows"``; empty when nothing is kept.
+    """
+
+    def __init__(self, kept: str = "") -> None:
+        super().__init__(
+            f"interrupted with {kept} finished; repeat the command with --resume to go on from "
+            "there"
+            if kept
+            else "interrupted before the first block was finished; nothing was written"
+        )
+
+
+class UnfinishedOutput:
+    """The finished blocks of an output, and their record.
+
+    Parameters
+    ----------
+    target : Path
+        Appears only when everything is done.
+    inputs : mapping of str to object
+        All that the numbers depend on, as JSON values by name; nested mappings are allowed. The
+        version of the package is added.
+
+    Attributes
+    ----------
+    data : Path
+        File of the finished blocks.
+    record : Path
+    progress : dict of str to object
+        The saved progress; empty before the first block.
+    """
+
+    def __init__(self, target: Path, inputs: Mapping[str, Any]) -> None:
+        self.target = target
+        self.inputs = json.loads(json.dumps({"version": __version__, **inputs}))
+        self.data = unfinished_name(target)
+        self.record = record_name(target)
+        self.progress: dict[str, Any] = {}
+
+    def start(self, resume: bool) -> dict[str, Any]:
+        """Read what an interrupted computation has left.
+
+        Returns
+        -------
+        dict
+            The saved progress; empty where there is none.
+
+        Raises
+        ------
+        InputError
+            If finished blocks exist and are not to be used, belong to other inputs, or have a
+            damaged record.
+        """
+        if not (self.record.exists() and self.data.exists()):
+            return self.progress
+        if not resume:
+            raise InputError(
+                f"{self.target} must not have an unfinished run, got '{self.record}'; "
+                "go on with --resume, or delete it to start over"
+            )
+        try:
+            saved = json.loads(self.record.read_text(encoding="utf-8"))
+            inputs, progress = dict(saved["inputs"]), dict(saved["progress"])
+        except (OSError, ValueError, KeyError, TypeError):
+            raise self.damaged() from None
+        different = differences(inputs, self.inputs)
+        if different:
+            raise InputError(
+                f"{self.record} must belong to the same inputs, got {different}; "
+                "repeat the earlier command, or delete it to start over"
+            )
+        self.progress = progress
+        return progress
+
+    def damaged(self) -> InputError:
+        """Return the error for a record that does not fit the blocks."""
+        return InputError(
+            f"{self.record} must be the record of finished blocks, got a damaged one; "
+            "delete it to start over"
+        )
+
+    def save(self, progress: Mapping[str, Any]) -> None:
+        """Record the progress after a block has been written to `data`.
+
+        Parameters
+        ----------
+        progress : mapping of str to object
+            JSON values; doubles are read back as they are.
+        """
+        fresh = fresh_name(self.record)
+        with writable(self.target):
+            to_disk(self.data)
+            with fresh.open("w", encoding="utf-8") as stream:
+                json.dump({"inputs": self.inputs, "progress": dict(progress)}, stream)
+                stream.flush()
+                os.fsync(stream.fileno())
+            fresh.replace(self.record)
+        self.progress = dict(progress)
+
+    def finish(self) -> None:
+        """Give the blocks their final name, and remove the record."""
+        with writable(self.target):
+            to_disk(self.data)
+            self.data.replace(self.target)
+        self.record.unlink(missing_ok=True)
+
+    def discard(self) -> None:
+        """Remove blocks and record."""
+        self.data.unlink(missing_ok=True)
+        self.record.unlink(missing_ok=True)
+
+    def discard_if_empty(self) -> None:
+        """Leave nothing behind when not one block was finished."""
+        if not self.progress:
+            self.discard()
+
+
+class UnfinishedText(UnfinishedOutput):
+    """Finished blocks that are lines of text, one behind the other.
+
+    The progress holds ``length``, the bytes of the finished blocks, ``rows`` and whatever else is
+    counted.
+    """
+
+    def start(self, resume: bool) -> dict[str, Any]:
+        """As in `UnfinishedOutput`, and make an empty file where nothing is finished."""
+        progress = super().start(resume)
+        if progress:
+            whole = all(isinstance(progress.get(name), int) for name in ("length", "rows"))
+            if not whole or self.data.stat().st_size < progress["length"]:
+                self.progress = {}
+                raise self.damaged()
+        else:
+            with writable(self.target):
+                self.data.write_bytes(b"")
+        return progress
+
+    @property
+    def rows(self) -> int:
+        """Finished rows."""
+        return int(self.progress.get("rows", 0))
+
+    def append(self, text: str, rows: int, **counts: int) -> None:
+        """Add a block of `rows` rows behind the finished ones and record it.
+
+        Parameters
+        ----------
+        text : str
+        rows : int
+        **counts : int
+            Other numbers that add up over the blocks, such as ``failed``.
+        """
+        length = self.progress.get("length", 0)
+        with writable(self.target), self.data.open("r+b") as stream:
+            stream.truncate(length)
+            stream.seek(length)
+            stream.write(text.encode())
+            length = stream.tell()
+        added = {"rows": rows, **counts}
+        summed = {name: self.progress.get(name, 0) + count for name, count in added.items()}
+        self.save({**self.progress, **summed, "length": length})
+
+    def text(self) -> str:
+        """Return the finished blocks."""
+        with self.data.open("rb") as stream:
+            return stream.read(self.progress.get("length", 0)).decode()
+
+
+def undisturbed(work: Callable[[], _Result]) -> _Result:
+    """Do what an interruption must not tear apart.
+
+    Ctrl-C reaches the main thread only, which waits here while another one works.
+    """
+    with ThreadPoolExecutor(1) as worker:
+        return worker.submit(work).result()
+
+
+def _flat(inputs: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+    """Nested mappings as one, with dots between the names."""
+    flat: dict[str, Any] = {}
+    for name, value in inputs.items():
+        if isinstance(value, dict):
+            flat |= _flat(value, f"{prefix}{name}.")
+        else:
+            flat[prefix + name] = value
+    return flat
+
+
+def differences(saved: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
+    """Which inputs differ, in words; empty where all are the same.
+
+    Parameters
+    ----------
+    saved, asked : mapping of str to object
+        Inputs of what is there and of what is asked for, as JSON values; nested mappings are
+        allowed.
+    """
+    saved, asked = _flat(saved), _flat(asked)
+    changed = [n for n in {**saved, **asked} if saved.get(n, ...) != asked.get(n, ...)]
+    listed = [
+        f"{name} = {_shown(saved, name)} there and {_shown(asked, name)} here"
+        for name in changed[:_LISTED]
+    ]
+    if len(changed) > _LISTED:
+        listed.append(f"{len(changed) - _LISTED} other differences")
+    return ", ".join(listed)
+
+
+def _shown(values: Mapping[str, Any], name: str) -> str:
+    if name not in values:
+        return "nothing"
+    text = json.dumps(values[name])
+    return text if len(text) <= 60 else text[:57] + "..."

@@ -1,0 +1,528 @@
+"""The paper's own way from measurements to numbers, step by step, on data of the same kind.
+
+1. A - B is the slope of the mean friction with ln V, without modulation (section III).
+2. At the bifurcation between steady sliding and stick-slip, K/W0 = (B - A)/D0 and
+   omega = sqrt((B - A)/A) V/D0 (Eqs. 16 and 17): with step 1 these give A, B and D0.
+3. eps_ratio = eps_eff/eps makes the drop of the mean that of the Rice-Ruina law (III.A.2).
+4. lambda makes mu1 that of the elasto-plastic law, at that eps_ratio (III.C).
+5. The drop bounds alpha of the Linker-Dieterich law, at that eps_ratio (III.B).
+
+Each step keeps the numbers of the earlier ones fixed, as the paper does. Their uncertainties are
+propagated to first order, which the paper does not do.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.stats import chi2 as chi_squared
+
+from asperity._version import __version__
+from asperity.errors import InputError
+from asperity.inference import Fit, LockInTable, fit
+from asperity.inference.forward import Forward, LockInTerm
+from asperity.inference.intervals import bounded_interval
+from asperity.materials import load as load_material
+
+Float = NDArray[np.float64]
+
+#: Columns of a table of bifurcations.
+THRESHOLD_COLUMNS = ("V", "K_over_W0", "K_over_W0_err", "frequency", "frequency_err")
+#: Below this probability the measurements contradict the formulas that they are read with.
+_MISFIT = 0.01
+_LEVEL = 0.95
+
+
+@dataclass(frozen=True, eq=False)
+class Thresholds:
+    """Bifurcations between steady sliding and stick-slip, one a row, in SI.
+
+    Attributes
+    ----------
+    name : str
+        What messages call the table.
+    V : array, shape (rows,)
+        Pulling velocity (m/s).
+    K_over_W0, K_over_W0_err : array, shape (rows,)
+        Stiffness over mean load at which sliding becomes unsteady (1/m), and its standard
+        uncertainty.
+    frequency, frequency_err : array, shape (rows,)
+        Frequency of the first oscillations (Hz), not rad/s, and its standard uncertainty.
+    """
+
+    name: str
+    V: Float
+    K_over_W0: Float
+    K_over_W0_err: Float
+    frequency: Float
+    frequency_err: Float
+
+    def __post_init__(self) -> None:
+        for column in THRESHOLD_COLUMNS:
+            values = np.asarray(getattr(self, column), float)
+            object.__setattr__(self, column, np.atleast_1d(values))
+            for row, value in enumerate(np.atleast_1d(values), start=1):
+                if not (math.isfinite(value) and value > 0):
+                    raise InputError(
+                        f"{self.name}.{column} must be positive, got {value:g} in row {row}; "
+                        "correct the cell"
+                    )
+
+
+def read_thresholds(path: str | Path) -> Thresholds:
+    """Read a table of bifurcations.
+
+    Parameters
+    ----------
+    path : str or Path
+        CSV in SI without units; columns `THRESHOLD_COLUMNS`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing, or a cell is no positive number.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not text in UTF-8"
+        raise InputError(
+            f"thresholds must be a readable table, got '{path}': {reason}; give a CSV file"
+        ) from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    rows = list(csv.DictReader(lines, skipinitialspace=True))
+    if not rows:
+        raise InputError(
+            f"{path.name} must have a header and rows, got {len(lines)} lines; give one "
+            "bifurcation a row"
+        )
+    missing = [c for c in THRESHOLD_COLUMNS if c not in rows[0]]
+    if missing:
+        raise InputError(
+            f"{path.name} must have the columns {', '.join(THRESHOLD_COLUMNS)}, got none for "
+            f"{', '.join(missing)}; add them in SI"
+        )
+    columns = {}
+    for column in THRESHOLD_COLUMNS:
+        values = []
+        for number, row in enumerate(rows, start=1):
+            try:
+                values.append(float(row[column]))
+            except (TypeError, ValueError):
+                raise InputError(
+                    f"{path.name} must have numbers in SI without unit in column {column}, got "
+                    f"'{row[column]}' in row {number}; correct the cell"
+                ) from None
+        columns[column] = np.array(values)
+    return Thresholds(path.name, **columns)
+
+
+@dataclass(frozen=True)
+class RecipeNumber:
+    """A number of the recipe beside the paper's, in SI.
+
+    Attributes
+    ----------
+    name, unit : str
+    value, se : float
+        Estimate and standard error, with the errors of all earlier steps.
+    se_own : float
+        Standard error by the readings of this step alone.
+    step : int
+    how : str
+        What it is read from.
+    published, published_uncertainty : float or None
+    published_place : str
+        Section of the paper.
+    upper_limit : float or None
+        At 95 % confidence, of a number of which only that is asked.
+    """
+
+    name: str
+    unit: str
+    value: float
+    se: float
+    se_own: float
+    step: int
+    how: str
+    published: float | None
+    published_uncertainty: float | None
+    published_place: str
+    upper_limit: float | None = None
+
+    @property
+    def deviation(self) -> float | None:
+        """Difference from the paper in standard errors of both together; None without either."""
+        if self.published is None or self.upper_limit is not None:
+            return None
+        spread = math.hypot(self.se, self.published_uncertainty or 0.0)
+        return (self.value - self.published) / spread if spread > 0 else None
+
+
+@dataclass(frozen=True, eq=False)
+class Recipe:
+    """All numbers of the paper's procedure.
+
+    Attributes
+    ----------
+    numbers : mapping of str to RecipeNumber
+    warnings : tuple of str
+    data : tuple of str
+        Names of the tables.
+    """
+
+    numbers: Mapping[str, RecipeNumber]
+    warnings: tuple[str, ...]
+    data: tuple[str, ...]
+
+    def record(self) -> dict[str, Any]:
+        """Everything as plain numbers and texts, for JSON."""
+        return {
+            "recipe": "bureau2000",
+            "numbers": {
+                n: {
+                    "value": r.value,
+                    "unit": r.unit,
+                    "se": r.se,
+                    "se_own": r.se_own,
+                    "upper_limit_95": r.upper_limit,
+                    "step": r.step,
+                    "how": r.how,
+                    "published": r.published,
+                    "published_uncertainty": r.published_uncertainty,
+                    "published_place": r.published_place,
+                    "deviation": r.deviation,
+                }
+                for n, r in self.numbers.items()
+            },
+            "warnings": list(self.warnings),
+            "data": list(self.data),
+            "asperity_version": __version__,
+        }
+
+
+#: Name in the paper's file of numbers, and of its uncertainty where that is another one.
+_PUBLISHED = {
+    "mu0": ("mu0", ""),
+    "A": ("A", ""),
+    "B": ("B", ""),
+    "D0": ("D0", ""),
+    "eps_ratio": ("transmission", ""),
+    "lambda": ("lambda", "lambda_quasi_static"),
+    "alpha": ("alpha_low", ""),
+}
+
+
+def paper_procedure(
+    readings: LockInTable,
+    thresholds: Thresholds,
+    *,
+    fixed: Mapping[str, Any] | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> Recipe:
+    """A, B, D0, eps_ratio, lambda and a bound on alpha as Bureau et al. (2000) find them.
+
+    Parameters
+    ----------
+    readings : LockInTable
+        Rows with epsilon = 0 and mean_friction, at two velocities or more, for step 1; rows with
+        epsilon > 0 and delta_mu for steps 3 and 5, and mu1 for step 4.
+    thresholds : Thresholds
+        For step 2.
+    fixed : mapping, optional
+        K and W0 where they are no columns, in SI or as texts with units; those of the paper if
+        they are neither. V0 is 1 um/s.
+    progress : callable, optional
+        Called with steps done, all steps, and a label.
+
+    Returns
+    -------
+    Recipe
+
+    Raises
+    ------
+    InputError
+        If rows for a step are missing, or friction does not weaken with velocity.
+    """
+    report = progress or (lambda done, total, label: None)
+    material = load_material("bureau2000")
+    constants = {"V0": material["V0"].si, **dict(fixed or {})}
+    steady, drop, first = _rows(readings)
+    warnings: list[str] = []
+    report(0, 4, "steady sliding and bifurcation")
+    base = _steady_and_threshold(steady, thresholds, float(material["V0"].si), warnings)
+    steps = _Steps(base, constants, warnings)
+    found: list[RecipeNumber] = [*base.numbers]
+    report(1, 4, "eps_ratio from the drop")
+    ratio = steps.fitted(3, drop, "rice-ruina", "eps_ratio", {}, "the drop, by Rice-Ruina")
+    found.append(ratio.number)
+    later = {"eps_ratio": (ratio.number.value, ratio)}
+    report(2, 4, "lambda from mu1")
+    found.append(
+        steps.fitted(4, first, "elasto-plastic", "lambda", later, "mu1, elasto-plastic law").number
+    )
+    report(3, 4, "alpha from the drop")
+    at_ratio = steps.fitted(
+        5, drop, "linker-dieterich", "alpha", later, "the drop, at that eps_ratio", same=True
+    )
+    found.append(_limited(at_ratio.number))
+    free = steps.fitted(
+        5, drop, "linker-dieterich", "alpha", {}, "the drop, eps_ratio free", ("eps_ratio",)
+    )
+    found.append(replace(_limited(free.number), name="alpha, eps_ratio free"))
+    report(4, 4, "alpha from the drop")
+    return Recipe({n.name: n for n in found}, tuple(warnings), (readings.name, thresholds.name))
+
+
+def _limited(number: RecipeNumber) -> RecipeNumber:
+    """With the upper end of the 95 % interval of a number that is not negative."""
+    limit = bounded_interval(number.value, number.se, _LEVEL, 0.0, math.inf)[1]
+    return replace(number, upper_limit=limit)
+
+
+def _rows(readings: LockInTable) -> tuple[LockInTable, LockInTable, LockInTable]:
+    """Rows of steady sliding, of the drop and of mu1, each with its observable alone."""
+    modulated = readings.points["epsilon"] > 0
+    parts = []
+    for name, wanted, what in (
+        ("mean_friction", ~modulated, "epsilon = 0"),
+        ("delta_mu", modulated, "epsilon above 0"),
+        ("mu1", modulated, "epsilon above 0"),
+    ):
+        if name not in readings.values:
+            raise InputError(
+                f"{readings.name} must have the column {name} (rows with {what}), got none; add it "
+                f"with {name}_err"
+            )
+        keep = wanted & np.isfinite(readings.values[name])
+        if not keep.any():
+            raise InputError(
+                f"{readings.name} must have rows with {what} and {name}, got none; measure some"
+            )
+        part = LockInTable(
+            readings.name,
+            readings.points,
+            {name: readings.values[name]},
+            {name: readings.errors[name]},
+        )
+        parts.append(part.without(~keep))
+    if np.unique(parts[0].points["V"]).size < 2:
+        raise InputError(
+            f"{readings.name} must have rows with epsilon = 0 at two velocities or more, got one; "
+            "the slope with ln V needs them"
+        )
+    return parts[0], parts[1], parts[2]
+
+
+@dataclass(frozen=True, eq=False)
+class _Base:
+    """mu0, A, B and D0, with the covariance of mu0, ln(B - A), ln A and ln D0."""
+
+    numbers: tuple[RecipeNumber, ...]
+    coordinates: Float
+    covariance: Float
+
+    def values(self, coordinates: Float) -> dict[str, float]:
+        mu0, weakening, a, d = coordinates
+        A = math.exp(a)
+        return {"mu0": float(mu0), "A": A, "B": A + math.exp(weakening), "D0": math.exp(d)}
+
+
+def _steady_and_threshold(
+    steady: LockInTable, thresholds: Thresholds, V0: float, warnings: list[str]
+) -> _Base:
+    """Steps 1 and 2 as one weighted least squares: what is measured twice is averaged."""
+    log_v = np.log(steady.points["V"] / V0)
+    mean, error = steady.values["mean_friction"], steady.errors["mean_friction"]
+    weight = 1 / error**2
+    centre = np.average(log_v, weights=weight)
+    slope = np.average((log_v - centre) * mean, weights=weight) / np.average(
+        (log_v - centre) ** 2, weights=weight
+    )
+    if slope >= 0:
+        raise InputError(
+            f"{steady.name} must have friction that weakens with velocity, got a slope of "
+            f"{slope:.3g} with ln V; without weakening there is no bifurcation"
+        )
+    k = float(np.average(thresholds.K_over_W0, weights=thresholds.K_over_W0_err**-2))
+    omega, omega_err = 2 * math.pi * thresholds.frequency, 2 * math.pi * thresholds.frequency_err
+    contrast = float(np.median(omega / thresholds.V)) * -slope / k
+    start = np.array(
+        [
+            np.average(mean, weights=weight) - slope * centre,
+            math.log(-slope),
+            math.log(-slope / contrast**2),
+            math.log(-slope / k),
+        ]
+    )
+
+    def residuals(u: Float) -> Float:
+        mu0, weakening, a, d = u
+        line = mu0 - math.exp(weakening) * log_v
+        stiffness = math.exp(weakening - d)
+        pulsation = math.exp((weakening - a) / 2 - d) * thresholds.V
+        return np.concatenate(
+            [
+                (line - mean) / error,
+                (stiffness - thresholds.K_over_W0) / thresholds.K_over_W0_err,
+                (pulsation - omega) / omega_err,
+            ]
+        )
+
+    solved = least_squares(residuals, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    covariance = np.linalg.inv(solved.jac.T @ solved.jac)
+    dof = solved.fun.size - 4
+    if dof > 0 and chi_squared.sf(float(solved.fun @ solved.fun), dof) < _MISFIT:
+        warnings.append(
+            f"steady sliding and bifurcations do not agree within their uncertainties: "
+            f"chi-squared {solved.fun @ solved.fun:.3g} for {dof} degrees of freedom"
+        )
+    base = _Base((), solved.x, covariance)
+    values = base.values(solved.x)
+    step = math.exp(solved.x[1])
+    gradient = {
+        "mu0": [1.0, 0, 0, 0],
+        "A": [0, 0, values["A"], 0],
+        "B": [0, step, values["A"], 0],
+        "D0": [0, 0, 0, values["D0"]],
+        "B - A": [0, step, 0, 0],
+    }
+    shown = {"mu0": values["mu0"], "B - A": step, **{n: values[n] for n in ("A", "B", "D0")}}
+    how = {
+        "mu0": (1, "mean friction at V0"),
+        "B - A": (1, "slope of the mean friction with ln V"),
+        "A": (2, "critical frequency, K/W0 and B - A at the bifurcation"),
+        "B": (2, "A and the slope"),
+        "D0": (2, "K/W0 at the bifurcation and the slope"),
+    }
+    numbers = []
+    for name, value in shown.items():
+        se = float(np.sqrt(np.array(gradient[name]) @ covariance @ np.array(gradient[name])))
+        numbers.append(_beside(name, value, se, se, *how[name]))
+    return replace(base, numbers=tuple(numbers))
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A fitted number, and how it moves with what was fixed.
+
+    Attributes
+    ----------
+    number : RecipeNumber
+    shifts : array, shape (m,)
+        By one standard deviation of each independent source of error.
+    """
+
+    number: RecipeNumber
+    shifts: Float
+
+
+@dataclass(frozen=True, eq=False)
+class _Steps:
+    """Fits of one parameter with the numbers of earlier steps fixed."""
+
+    base: _Base
+    constants: Mapping[str, Any]
+    warnings: list[str]
+
+    def fitted(
+        self,
+        step: int,
+        table: LockInTable,
+        law: str,
+        name: str,
+        earlier: Mapping[str, tuple[float, _Step]],
+        how: str,
+        beside: Sequence[str] = (),
+        *,
+        same: bool = False,
+    ) -> _Step:
+        """The fit of a parameter, with others beside it if they are named.
+
+        With `same` the earlier steps use the same readings: their noise is that of this step and
+        is not counted again.
+        """
+        known = self.base.values(self.base.coordinates)
+        fixed = {**self.constants, **known, **{n: v for n, (v, _) in earlier.items()}}
+        material = load_material("bureau2000")
+        free = [name, *beside]
+        start = {n: v for n, v in {"alpha": material["alpha_low"].si}.items() if n in free}
+        if "eps_ratio" in free:
+            start["eps_ratio"] = material["transmission"].si
+        found = fit(table, law, free, fixed=fixed, material=material, start=start)
+        if not found.converged:
+            raise InputError(
+                f"{table.name} must have periodic responses with the numbers of the earlier steps, "
+                f"got none that fits {name}; check the thresholds and K and W0"
+            )
+        self.warnings.extend(f"step {step}: {w}" for w in found.warnings)
+        estimate = found.parameters[name]
+        shifts = np.array([self._shift(found, moved) for moved in self._moved()])
+        more = []
+        for other, (value, source) in earlier.items():
+            # To first order, from a change of 1 %.
+            slope = self._shift(found, ({other: value * 1.01}, {other: value * 0.99}))
+            shifts = shifts + slope / (0.01 * value) * source.shifts[: shifts.size]
+            more.append(0.0 if same else slope / (0.01 * value) * source.number.se_own)
+        shifts = np.array([*shifts, *more])
+        se = float(np.sqrt(estimate.se**2 + np.sum(shifts**2)))
+        return _Step(_beside(name, estimate.value, se, estimate.se, step, how), shifts)
+
+    def _moved(self) -> list[tuple[dict[str, float], ...]]:
+        """mu0, A, B and D0 one standard deviation up and down each principal axis."""
+        values, vectors = np.linalg.eigh(self.base.covariance)
+        along = vectors * np.sqrt(np.maximum(values, 0.0))
+        return [
+            tuple(self.base.values(self.base.coordinates + sign * along[:, j]) for sign in (1, -1))
+            for j in range(along.shape[1])
+        ]
+
+    def _shift(self, found: Fit, moved: Sequence[Mapping[str, float]]) -> float:
+        """First-order change of the first estimate with what is fixed, half of up less down."""
+        (term,) = found.objective.terms
+        assert isinstance(term, LockInTerm)  # a table was fitted
+        law = found.objective.law
+        sides = []
+        for change in moved:
+            forward = Forward(law, term.table, {**found.objective.fixed, **change})
+            residuals = LockInTerm(term.table, forward).residuals(found.values, search=True)
+            if residuals is None:
+                return math.inf
+            sides.append(residuals)
+        jacobian = (sides[0].jacobian + sides[1].jacobian) / 2
+        change_of_residuals = (sides[0].values - sides[1].values) / 2
+        scale = np.sqrt((jacobian**2).sum(0))
+        moved_by = np.linalg.lstsq(jacobian / scale, -change_of_residuals, rcond=None)[0] / scale
+        return float(moved_by[0])
+
+
+def _beside(name: str, value: float, se: float, own: float, step: int, how: str) -> RecipeNumber:
+    """A number with the paper's."""
+    material = load_material("bureau2000")
+    unit = {"D0": "m", "lambda": "m"}.get(name, "")
+    if name not in _PUBLISHED:
+        return RecipeNumber(name, unit, value, se, own, step, how, None, None, "")
+    key, uncertain = _PUBLISHED[name]
+    number, with_uncertainty = material[key], material[uncertain or key]
+    uncertainty = with_uncertainty.si_uncertainty
+    return RecipeNumber(
+        name,
+        unit,
+        value,
+        se,
+        own,
+        step,
+        how,
+        float(number.si),
+        None if uncertainty is None else float(uncertainty),
+        number.place,
+    )

@@ -1,0 +1,47 @@
+"""One table of parameters and outputs: names, symbols, units, rules, defaults, places.
+
+Command line, tables, maps, sweeps, continuation, materials, JSON and the page of nomenclature take
+every name from here.
+"""
+
+from asperity.parameters.outputs import OUTPUTS, RESULT_COLUMNS
+from asperity.parameters.parameter import Output, Parameter
+from asperity.parameters.rules import RULES, Rule, obeying
+from asperity.parameters.table import (
+    DRIVE,
+    EXPERIMENT,
+    INTERFACE,
+    MACHINE,
+    MODULATION,
+    all_parameters,
+    canonical_name,
+    known_name,
+    law_parameters,
+    plain_name,
+    point_parameters,
+    required,
+    suggestion,
+)
+
+__all__ = [
+    "DRIVE",
+    "EXPERIMENT",
+    "INTERFACE",
+    "MACHINE",
+    "MODULATION",
+    "OUTPUTS",
+    "RESULT_COLUMNS",
+    "RULES",
+    "Output",
+    "Parameter",
+    "Rule",
+    "all_parameters",
+    "canonical_name",
+    "known_name",
+    "law_parameters",
+    "obeying",
+    "plain_name",
+    "point_parameters",
+    "required",
+    "suggestion",
+]

@@ -1,0 +1,276 @@
+"""A protocol: law, numbers and what an experimenter does, as a file and as an object."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    PositiveInt,
+    PrivateAttr,
+    ValidationError,
+    model_validator,
+)
+
+from asperity.errors import InputError
+from asperity.loads import Programme, Step
+from asperity.loads.programme.steps import Level
+from asperity.operating_point import SourcedNumber
+from asperity.protocol.mistakes import ProtocolError, sentences
+from asperity.protocol.numbers import numbers_of, slider_of
+from asperity.protocol.plan import Planned, check_levels, plan
+from asperity.protocol.recording import Setup, setup_of
+from asperity.slider import Slider
+from asperity.transients import Trajectory, transient
+from asperity.transients.initial_state import require_contact
+from asperity.transients.inputs import MOST_STEPS
+from asperity.transients.sampling import planned_rows
+from asperity.transients.trajectory import row_bytes
+from asperity.units import to_si
+
+#: A number in SI, or a text with its unit.
+Given = float | str
+
+#: Segments whose values are listed one by one, so that two protocols can be compared.
+_COMPARED = 100
+
+_STRICT = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+class Repeat(BaseModel):
+    """Steps done several times, one round after the other.
+
+    Attributes
+    ----------
+    repeat : int
+        How often.
+    steps : tuple of str, Step or Repeat
+    """
+
+    model_config = _STRICT
+
+    repeat: PositiveInt
+    steps: tuple[str | Repeat | Step, ...]
+
+
+class Start(BaseModel):
+    """What there is before the first step.
+
+    Attributes
+    ----------
+    velocity : float or str
+        Pulling velocity (m/s): the slider slides steadily at it, unless states are given.
+    load : float or str, optional
+        Normal load (N), W0 by default.
+    states : tuple of float, optional
+        States of the equation of motion, for a start that is not steady sliding; see
+        `asperity.transients.transient`.
+    """
+
+    model_config = _STRICT
+
+    velocity: Given
+    load: Given | None = None
+    states: tuple[float, ...] | None = None
+
+
+class Solver(BaseModel):
+    """How the motion is integrated and written.
+
+    Attributes
+    ----------
+    inertia : bool
+        Whether the mass of the slider counts.
+    sampling : float or str, optional
+        Samples per second (Hz); the integrator's own steps by default.
+    rtol : float
+        Tolerated relative error of a step.
+    method : str
+        "auto", "explicit" or "implicit".
+    most_steps : float
+        Number of steps at which the integration stops and says so.
+    """
+
+    model_config = _STRICT
+
+    inertia: bool = False
+    sampling: Given | None = None
+    rtol: float = 1e-9
+    method: str = "auto"
+    most_steps: float = MOST_STEPS
+
+
+class Protocol(BaseModel):
+    """An experiment: what slides, how it begins, and the steps.
+
+    Attributes
+    ----------
+    law : str
+        A registered law.
+    steps : tuple of str, Step or Repeat
+        Lines such as ``"hold 10 s"``, steps of `asperity.loads`, or blocks of them.
+    start : Start
+    material : str
+        Where numbers come from that `parameters` does not have.
+    parameters : mapping of str to float or str
+        Numbers of the law, and K, W0, M and eta (radiation damping), by the names of tables.
+    solver : Solver
+    tribometer : mapping, optional
+        What a recording of the run is made with: fields of `Recorder`, ``seed``, and ``sensors``.
+    title : str
+    folder : Path
+        Where files that steps name lie.
+
+    Raises
+    ------
+    ProtocolError
+        An `InputError` with all mistakes: steps by their place, counted from 1.
+    """
+
+    model_config = _STRICT
+
+    law: str
+    steps: tuple[str | Repeat | Step, ...]
+    start: Start
+    material: str = ""
+    parameters: Mapping[str, Given] = {}
+    solver: Solver = Solver()
+    tribometer: Mapping[str, Any] | None = None
+    title: str = ""
+    folder: Path = Path()
+
+    _planned: list[Planned] = PrivateAttr(default_factory=list)
+    _numbers: dict[str, SourcedNumber] = PrivateAttr(default_factory=dict)
+
+    def __init__(self, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            models: dict[str, type[BaseModel]] = {"": Protocol, "start": Start, "solver": Solver}
+            raise ProtocolError(sentences(error, models)) from None
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A protocol with some fields replaced, checked as any other."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **(update or {})})
+
+    @model_validator(mode="after")
+    def _free_of_mistakes(self) -> Protocol:
+        planned, mistakes = plan(self.steps, self.folder)
+        self._planned.extend(planned)
+        try:
+            self._numbers.update(self._found_numbers())
+            level = self._level()
+        except InputError as error:
+            mistakes.append(str(error))
+        else:
+            mistakes += check_levels(planned, level)
+        try:
+            _ = self.setup
+        except InputError as error:
+            mistakes.append(str(error))
+        if mistakes:
+            raise ProtocolError(mistakes)
+        # What concerns the programme as a whole, such as steps that take no time.
+        require_contact(self.programme, self._numbers["W0"].value)
+        return self
+
+    def _found_numbers(self) -> dict[str, SourcedNumber]:
+        return numbers_of(
+            self.law, self.parameters, self.material, self.folder, self.solver.inertia
+        )
+
+    def _level(self) -> Level:
+        load = self._numbers["W0"].value if self.start.load is None else self.start.load
+        return Level(
+            to_si(load, "force", "start.load"),
+            to_si(self.start.velocity, "velocity", "start.velocity"),
+        )
+
+    @property
+    def numbers(self) -> dict[str, SourcedNumber]:
+        """Parameters in SI by name, with where each comes from."""
+        return dict(self._numbers)
+
+    @cached_property
+    def programme(self) -> Programme:
+        """Load and drive over time."""
+        level = self._level()
+        steps = (one.step for one in self._planned)
+        return Programme(*steps, load=level.load, velocity=level.velocity, name="start")
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Each step as it was written, repetitions written out."""
+        return tuple(one.text for one in self._planned)
+
+    @cached_property
+    def slider(self) -> Slider:
+        """The law with its parameters, spring, mass and mean load."""
+        return slider_of(self.law, {name: n.value for name, n in self._numbers.items()})
+
+    @cached_property
+    def setup(self) -> Setup | None:
+        """What a recording of the run is made with, None without a tribometer."""
+        if self.tribometer is None:
+            return None
+        return setup_of(self.tribometer, self.solver.sampling, self._numbers["K"].value)
+
+    @property
+    def integration(self) -> dict[str, Any]:
+        """Keyword arguments for `asperity.transients.transient` besides slider and programme."""
+        eta = self._numbers.get("eta")
+        states = self.start.states
+        return {
+            "initial": "steady" if states is None else np.asarray(states),
+            "sampling": self.solver.sampling,
+            "inertia": self.solver.inertia,
+            "radiation_damping": eta.value if eta is not None and eta.value > 0 else None,
+            "rtol": self.solver.rtol,
+            "method": self.solver.method,
+            "most_steps": self.solver.most_steps,
+        }
+
+    @property
+    def rows(self) -> float | None:
+        """Number of rows that a run writes, None where the integrator's steps decide."""
+        return planned_rows(self.solver.sampling, self.programme.duration)
+
+    @property
+    def row_bytes(self) -> int:
+        """Bytes of a row in the file of a run, at most."""
+        return row_bytes(len(self.slider.law.state_names))
+
+    def trajectory(self) -> Trajectory:
+        """The motion, all of it in memory; `run_protocol` writes it to a file block by block."""
+        return transient(self.slider, self.programme, **self.integration)
+
+    @cached_property
+    def inputs(self) -> dict[str, Any]:
+        """Everything that the motion depends on besides the version, as JSON values by name."""
+        import jax
+
+        digest = hashlib.sha256()
+        segments: dict[str, Any] = {}
+        for number, segment in enumerate(self.programme.segments, start=1):
+            digest.update(type(segment).__name__.encode())
+            for path, leaf in jax.tree_util.tree_leaves_with_path(segment):
+                values = np.asarray(leaf, float)
+                digest.update(values.tobytes())
+                # Recordings may have millions of samples: the digest covers them.
+                if values.ndim == 0 and number <= _COMPARED:
+                    segments[f"segment {number}{jax.tree_util.keystr(path)}"] = float(values)
+        return {
+            "law": self.law,
+            "parameters": {name: number.value for name, number in self._numbers.items()},
+            "start": {**self._level()._asdict(), "states": self.start.states},
+            "solver": self.solver.model_dump(),
+            **segments,
+            "programme": digest.hexdigest(),
+        }

@@ -1,0 +1,202 @@
+"""The recording that a laboratory would have of a run: a protocol's ``[tribometer]``."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError, closest
+from asperity.recording.roles import candidates
+from asperity.recording.trace import Trace
+from asperity.tribometer.sensors import (
+    Accelerometer,
+    DisplacementGauge,
+    LoadCell,
+    Sensor,
+    SpringGauge,
+)
+from asperity.tribometer.tribometer import Recorder, Tribometer
+from asperity.units import to_si
+
+#: Sensors by the names that files give them, each with what it can measure, the usual first.
+SENSORS: Mapping[str, tuple[type[Sensor], tuple[str, ...]]] = {
+    "spring gauge": (SpringGauge, ("shear force",)),
+    "load cell": (LoadCell, ("normal load", "shear force")),
+    "accelerometer": (Accelerometer, ("normal load",)),
+    "displacement gauge": (DisplacementGauge, ("slider displacement", "load-point displacement")),
+}
+
+#: Variable of the motion for what a sensor measures; the load point is made of two.
+_SIGNALS = {
+    "shear force": "force",
+    "normal load": "load",
+    "slider displacement": "displacement",
+    "load-point displacement": "load point",
+}
+
+#: Role that a channel's name may claim, with what plays it.
+_CLAIMS = {"F": "shear force", "W": "normal load"}
+
+
+@dataclasses.dataclass(frozen=True)
+class Setup:
+    """What a protocol says of its recording.
+
+    Attributes
+    ----------
+    tribometer : Tribometer
+    exposed : dict of str to str
+        Variable of the motion that each sensor measures; ``"load point"`` for the far end of the
+        spring.
+    seed : int
+        Of the noise.
+    stiffness : float
+        Of the spring (N/m), for the load point.
+    """
+
+    tribometer: Tribometer
+    exposed: dict[str, str]
+    seed: int
+    stiffness: float = np.nan
+
+
+def setup_of(
+    table: Mapping[str, Any], sampling: float | str | None, stiffness: float = np.nan
+) -> Setup:
+    """The tribometer that a table of a protocol describes.
+
+    Parameters
+    ----------
+    table : mapping
+        Fields of `Recorder`, ``seed``, and ``sensors``: a table for each channel, with ``type``,
+        the fields of that sensor and, where it can measure several things, ``measures``.
+    sampling : float, str or None
+        At which the motion is written (Hz).
+    stiffness : float
+        Of the spring (N/m).
+
+    Raises
+    ------
+    InputError
+        If a field is unknown or breaks its rule, or the motion is sampled too coarsely.
+    """
+    rest = dict(table)
+    seed, described = rest.pop("seed", 0), rest.pop("sensors", {})
+    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
+        raise InputError(f"tribometer.seed must be a whole number from 0, got {seed!r}; correct it")
+    if not isinstance(described, Mapping) or not described:
+        raise InputError(
+            "tribometer.sensors must have a table for each channel, got none; write it like "
+            "[tribometer.sensors.'shear force'] with type = 'spring gauge' below it"
+        )
+    recorder = _made(Recorder, rest, "tribometer")
+    sensors, exposed = {}, {}
+    for channel, fields in described.items():
+        sensors[channel], exposed[channel] = _sensor(channel, fields)
+    _check_sampling(sampling, recorder, sensors)
+    return Setup(Tribometer(sensors=sensors, recorder=recorder), exposed, seed, stiffness)
+
+
+def record_run(setup: Setup, run: str | Path) -> Trace:
+    """Record the motion of a run; all of it is in memory.
+
+    Parameters
+    ----------
+    setup : Setup
+    run : str or path
+        NetCDF file of `run_protocol`.
+    """
+    import h5netcdf
+
+    with h5netcdf.File(run, "r") as file:
+        time = np.asarray(file.variables["time"][:])
+        wanted = set(setup.exposed.values()) - {"load point"}
+        if "load point" in setup.exposed.values():
+            wanted |= {"force", "displacement"}
+        motion = {name: np.asarray(file.variables[name][:]) for name in wanted}
+        told = {str(name): value for name, value in file.attrs.items()}
+    if "load point" in setup.exposed.values():
+        stretched = (motion["force"] - motion["force"][:1]) / setup.stiffness
+        motion["load point"] = motion["displacement"] + stretched
+    signals = {channel: motion[name] for channel, name in setup.exposed.items()}
+    # A motion that has ended early ends between two samples of its clock.
+    even = time.size - 1 if time.size > 3 and _last_is_odd(time) else time.size
+    signals = {channel: values[:even] for channel, values in signals.items()}
+    return setup.tribometer.record(time[:even], signals, seed=setup.seed, provenance=told)
+
+
+def _last_is_odd(time: np.ndarray) -> bool:
+    step = time[1] - time[0]
+    return bool(abs(time[-1] - time[-2] - step) > 1e-6 * step)
+
+
+def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
+    """The sensor of a channel, and the variable of the motion that it measures."""
+    place = f"tribometer.sensors.{channel}"
+    rest = dict(fields) if isinstance(fields, Mapping) else {}
+    name = rest.pop("type", None)
+    if name not in SENSORS:
+        raise InputError(
+            f"{place}.type must be a sensor, got {name!r}; {closest(str(name), SENSORS)}"
+        )
+    made, measurable = SENSORS[name]
+    given = rest.pop("measures", None)
+    measured = measurable[0] if given is None else given
+    if measured not in measurable:
+        raise InputError(
+            f"{place}.measures must be something that a {name} can measure, got {measured!r}; "
+            f"choose {' or '.join(map(repr, measurable))}"
+        )
+    claimed = next((_CLAIMS[r] for r in _CLAIMS if candidates(r, {channel: None})), measured)
+    if given is None and claimed != measured:
+        raise InputError(
+            f"{place}.measures must be given for a {name} in a channel of this name, got nothing; "
+            f"it measures the {measured} unless it says measures = '{claimed}'"
+        )
+    return _made(made, rest, place), _SIGNALS[measured]
+
+
+def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
+    known = {f.name: f for f in dataclasses.fields(kind)}
+    for name in fields:
+        if name not in known:
+            advice = closest(name, known)
+            raise InputError(
+                f"{place}.{name} must be a known field, got {fields[name]!r}; {advice}"
+            )
+        if isinstance(fields[name], list) or (
+            isinstance(fields[name], Mapping) and name != "ranges"
+        ):
+            raise InputError(
+                f"{place}.{name} must be one value, got {fields[name]!r}; give a number or a text "
+                "with its unit"
+            )
+    for name, field in known.items():
+        needed = field.default is field.default_factory is dataclasses.MISSING
+        if needed and name not in fields:
+            raise InputError(f"{place}.{name} must be given, got nothing; add it")
+    try:
+        return kind(**fields)
+    except TypeError:
+        raise InputError(
+            f"{place} must hold numbers and texts with units, got {dict(fields)}; correct the one "
+            "that is neither"
+        ) from None
+
+
+def _check_sampling(
+    sampling: float | str | None, recorder: Recorder, sensors: Mapping[str, Sensor]
+) -> None:
+    """Before anything is computed: what the tribometer will ask of the motion."""
+    wanted = max(recorder.rate, *(2 * sensor.bandwidth for sensor in sensors.values()))
+    rate = None if sampling is None else to_si(sampling, "frequency", "solver.sampling")
+    if rate is None or rate < wanted:
+        shown = "none" if rate is None else f"{rate:g} Hz"
+        raise InputError(
+            f"solver.sampling must be at least {wanted:g} Hz for the tribometer, its rate and "
+            f"twice its bandwidths, got {shown}; give four times its rate if you can"
+        )

@@ -1,0 +1,9 @@
+"""Signals as a laboratory has them: a `Trace` of channels over time, read, checked and measured."""
+
+from asperity.recording.checks import check
+from asperity.recording.derived import derive
+from asperity.recording.finding import Finding
+from asperity.recording.readers import read
+from asperity.recording.trace import Channel, Trace
+
+__all__ = ["Channel", "Finding", "Trace", "check", "derive", "read"]

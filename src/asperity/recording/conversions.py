@@ -1,0 +1,139 @@
+"""Conversions that need a number from outside the recording: never done unless asked for.
+
+Rock mechanics records stresses over an area, coefficients of friction, and stiffness as change of
+friction per length of slip. The models here are in forces: F = mu W, W = sigma_n A, K = k W.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+
+from asperity.errors import InputError
+from asperity.recording.trace import Channel, Trace
+from asperity.units import to_si
+
+_PER_LENGTH = re.compile(r"\s*([-+.\deE]+)\s*(?:friction|mu|1)?\s*/\s*(.+?)\s*")
+
+
+def stress_to_force(
+    trace: Trace, area: float | str, channels: Sequence[str] | None = None
+) -> Trace:
+    """Stresses times the area that they act on.
+
+    Parameters
+    ----------
+    trace : Trace
+        Any recording.
+    area : float or str
+        Nominal contact area (m^2, or a text such as ``"25 cm^2"``), the same for all channels.
+    channels : sequence of str, optional
+        Names or roles; all pressures without it.
+
+    Returns
+    -------
+    Trace
+        With these channels in newton under the same names, the area in its provenance.
+
+    Raises
+    ------
+    InputError
+        If the area is not positive, or a channel is no pressure.
+    """
+    size = to_si(area, "area", "stress_to_force.area")
+    if size <= 0:
+        raise InputError(
+            f"stress_to_force.area must be positive, got {size:g} m^2; give the contact area"
+        )
+    wanted = [k for k, c in trace.channels.items() if c.kind == "pressure"]
+    if channels is not None:
+        wanted = [_pressure(trace, name) for name in channels]
+    converted = {
+        name: replace(c, values=c.values * size, kind="force", unit="N") if name in wanted else c
+        for name, c in trace.channels.items()
+    }
+    note = {"area (m^2)": size, "stresses made forces": wanted}
+    return replace(trace, channels=converted, provenance={**trace.provenance, **note})
+
+
+def _pressure(trace: Trace, name: str) -> str:
+    channel = trace.channel(name)
+    if channel.kind != "pressure":
+        raise InputError(
+            f"stress_to_force.channels must be pressures, got '{name}' in '{channel.unit}'; leave "
+            "it out"
+        )
+    return next(key for key, c in trace.channels.items() if c is channel)
+
+
+def friction_to_force(trace: Trace, name: str = "F") -> Trace:
+    """Shear force (or stress) that a recorded coefficient of friction stands for, F = mu W.
+
+    Parameters
+    ----------
+    trace : Trace
+        With the roles ``friction`` and ``W``.
+    name : str
+        The new channel, in the unit of W.
+
+    Raises
+    ------
+    InputError
+        If one of the two is missing or ambiguous, or `name` is taken.
+    """
+    friction, load = trace.channel("friction"), trace.channel("W")
+    if name in trace.channels:
+        raise InputError(
+            f"friction_to_force.name must be free, got '{name}', which the trace has; give another"
+        )
+    made = Channel(friction.values * load.values, load.kind, load.unit, name)
+    note = {"shear from friction": f"{friction.recorded_name} x {load.recorded_name}"}
+    return replace(
+        trace,
+        channels={**trace.channels, name: made},
+        provenance={**trace.provenance, **note},
+    )
+
+
+def stiffness_from_friction(stiffness: float | str, load: float | str) -> float:
+    """Stiffness in force per length of one given as friction per length, K = k W.
+
+    Parameters
+    ----------
+    stiffness : float or str
+        Friction per metre, or a text such as ``"1e-3 /um"`` or ``"0.5 friction/mm"``.
+    load : float or str
+        Mean normal load W, N; or normal stress as a text such as ``"20 MPa"``.
+
+    Returns
+    -------
+    float
+        N/m; Pa/m if the load is a stress.
+
+    Raises
+    ------
+    InputError
+        If one of the two is not understood or not positive.
+    """
+    per_length = stiffness
+    if isinstance(stiffness, str):
+        match = _PER_LENGTH.fullmatch(stiffness)
+        if match is None:
+            raise InputError(
+                "stiffness_from_friction.stiffness must be a friction per length, got "
+                f"'{stiffness}'; write it like '1e-3 /um'"
+            )
+        per_length = to_si(match[1], "dimensionless", "stiffness_from_friction.stiffness")
+        per_length /= to_si(f"1 {match[2]}", "length", "stiffness_from_friction.stiffness")
+    kind = (
+        "pressure" if isinstance(load, str) and load.rstrip().endswith(("Pa", "bar")) else "force"
+    )
+    weight = to_si(load, kind, "stiffness_from_friction.load")
+    product = float(per_length) * weight
+    if not (float(per_length) > 0 and weight > 0):
+        raise InputError(
+            f"stiffness_from_friction must have a positive stiffness and load, got {stiffness} and "
+            f"{load}; check the signs"
+        )
+    return product

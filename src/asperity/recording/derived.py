@@ -1,0 +1,197 @@
+"""Channels that are computed from those of the file: effective stress, area, gain, zero, clock."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.recording.checks import CHECKED, check
+from asperity.recording.expressions import Evaluated, Names, Quantity, evaluate
+from asperity.recording.finding import Finding
+from asperity.recording.roles import ROLES, role_of
+from asperity.recording.trace import Channel, Trace
+from asperity.units import KINDS
+from asperity.units.dimension import base_units, kind_of_dimension, unit_text
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+#: Findings on time, which belong to no channel.
+_OF_TIME = frozenset({"backward time", "repeated time", "gap", "uneven sampling"})
+
+
+def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
+    """A recording with further channels, each made by an expression of others.
+
+    Parameters
+    ----------
+    trace : Trace
+    channels : mapping of str to str
+        Expressions by the name of the new channel, such as ``{"load": "Conf.Press - (Up.Pore.Press
+        + Dwn.Pore.Press)/2", "force": "zero(Force, 0 s, 5 s) / (20 mm * 36 mm)"}``; see
+        `asperity.recording.expressions` for the grammar. A name of a role, such as ``load`` or
+        ``force``, gives that role to the channel; ``time`` makes a new time axis. Later ones may
+        use earlier ones. A recorded channel of the same name is kept as ``NAME (recorded)``.
+
+    Returns
+    -------
+    Trace
+        With the expressions in its provenance. What was found in the channels that a new one is
+        made of is a finding of the new one too.
+
+    Raises
+    ------
+    InputError
+        If an expression cannot be understood, or gives what its role cannot be.
+    """
+    for target, text in channels.items():
+        field = f"channels['{target}']"
+        if not str(text).strip():
+            raise InputError(
+                f"{field} must be an expression, got {text!r}; write it like '2.4 N/V * Gauge'"
+            )
+        if not target.strip():
+            raise InputError("channels must have names, got an empty one; write 'load = ...'")
+        trace = _with(trace, target, evaluate(str(text), _names(trace, field), field), field, text)
+    made = {**trace.provenance.get("derived channels", {}), **channels}
+    return replace(trace, provenance={**trace.provenance, "derived channels": made})
+
+
+def _with(trace: Trace, target: str, found: Evaluated, field: str, text: str) -> Trace:
+    role = role_of(target)
+    quantity = found.quantity
+    kind = kind_of_dimension(quantity.dimension)
+    _check_kind(role, kind, quantity, field)
+    shape = trace.time.shape
+    values = np.array(np.broadcast_to(np.asarray(quantity.values, dtype=np.float64), shape))
+    if role == "time":
+        return _with_time(trace, values, field, text)
+    unit = KINDS[kind].si if kind else ""
+    channel = Channel(values, kind, unit, target, unit or unit_text(quantity.dimension))
+    channels, findings, roles = dict(trace.channels), trace.findings, dict(trace.roles)
+    if target in channels:
+        kept = _free(f"{target} (recorded)", channels)
+        channels = {kept if name == target else name: c for name, c in channels.items()}
+        findings = tuple(_moved(f, target, kept) for f in findings)
+        roles = {r: kept if name == target else name for r, name in roles.items()}
+        found = replace(found, sources=tuple(kept if s == target else s for s in found.sources))
+    channels[target] = channel
+    if role is not None:
+        roles[role] = target
+    alone = check(Trace(trace.time, {target: channel}))
+    own = [f for f in alone if f.name not in _OF_TIME and not f.where.startswith("time,")]
+    inherited = _inherited(findings, found.sources, target, {f.name for f in own})
+    return replace(trace, channels=channels, findings=(*findings, *own, *inherited), roles=roles)
+
+
+def _with_time(trace: Trace, time: NDArray[np.float64], field: str, text: str) -> Trace:
+    if not np.isfinite(time).any():
+        raise InputError(f"{field} must give times, got no finite one; correct the expression")
+    kept = [f for f in trace.findings if f.name not in CHECKED]
+    moved = replace(trace, time=time, findings=())
+    provenance = {**trace.provenance, "time": f"derived: {text}"}
+    return replace(moved, findings=(*kept, *check(moved)), provenance=provenance)
+
+
+def _check_kind(role: str | None, kind: str | None, quantity: Quantity, field: str) -> None:
+    if role is None:
+        return
+    fitting = ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
+    if kind not in fitting:
+        shown = f"one in {unit_text(quantity.dimension)}" if quantity.dimension else "a pure number"
+        raise InputError(
+            f"{field} must be a {' or '.join(sorted(fitting))}, got {shown}; add the units of "
+            "gains and areas, like '2.4 N/V' or '25 cm^2'"
+        )
+
+
+def _names(trace: Trace, field: str) -> Names:
+    def find(name: str, only_channels: bool) -> tuple[Quantity, str] | None:
+        key = _key_of(trace, name)
+        if key is not None:
+            return _quantity(trace.channels[key], key, field), key
+        if not only_channels and name.lower() == "time":
+            return Quantity(trace.time, base_units("s")[1]), ""
+        return None
+
+    return Names(find, ("time", *trace.channels), trace.time)
+
+
+def _key_of(trace: Trace, name: str) -> str | None:
+    """The channel that a name means: as it is, as a heading, by its role, or but for its dots."""
+    if name in trace.channels:
+        return name
+    headings = [key for key, c in trace.channels.items() if c.recorded_name == name]
+    if len(headings) == 1:
+        return headings[0]
+    for bare in (_bare, lambda text: _bare(text).casefold()):
+        similar = [key for key in trace.channels if bare(key) == bare(name)]
+        if len(similar) == 1:
+            return similar[0]
+    role = role_of(name)
+    if role is None or role == "time":
+        return None
+    try:
+        channel = trace.channel(name)
+    except InputError:
+        # Names such as V and N are units where no channel has that role.
+        if any(name in unit for unit in ("V", "N", "W", "F")):
+            return None
+        raise
+    return next(key for key, c in trace.channels.items() if c is channel)
+
+
+def _bare(name: str) -> str:
+    """A name without blanks, and without dots and underscores at its ends."""
+    return name.replace(" ", "").strip("._")
+
+
+def _quantity(channel: Channel, key: str, field: str) -> Quantity:
+    if channel.kind is not None:
+        return Quantity(channel.values, base_units(channel.unit)[1])
+    if not channel.recorded_unit:
+        # A column without any unit is a column of numbers.
+        return Quantity(channel.values, ())
+    try:
+        factor, dimension = base_units(channel.recorded_unit)
+    except InputError:
+        raise InputError(
+            f"{field} must be made of channels in known units, got '{key}' in "
+            f"'{channel.recorded_unit}'; name its unit when reading, like {key}=N"
+        ) from None
+    return Quantity(channel.values * factor, dimension)
+
+
+def _inherited(
+    findings: tuple[Finding, ...], sources: tuple[str, ...], target: str, own: set[str]
+) -> list[Finding]:
+    """What is known of the sources that a check of the new channel may not see."""
+    made = []
+    for source in sources:
+        for f in findings:
+            about = f.where == source or f.where.startswith(f"{source}, ")
+            if not about or f.name in (*own, "unknown unit", "unit overridden", "constant"):
+                continue
+            said = f"'{target}' is made from '{source}': {f.sentence}"
+            where = f"{target}{f.where.removeprefix(source)}"
+            name = f.name if f.name.startswith("source ") else f"source {f.name}"
+            made.append(Finding(name, f.severity, f.number, where, said))
+    return made
+
+
+def _moved(finding: Finding, old: str, new: str) -> Finding:
+    if finding.where != old and not finding.where.startswith(f"{old}, "):
+        return finding
+    return replace(finding, where=new + finding.where.removeprefix(old))
+
+
+def _free(name: str, taken: Mapping[str, object]) -> str:
+    number = 2
+    free = name
+    while free in taken:
+        free, number = f"{name} ({number})", number + 1
+    return free

@@ -1,0 +1,6 @@
+"""Readers of recordings: one function for all formats, and the parts of a reader of one's own."""
+
+from asperity.recording.readers.from_file import read
+from asperity.recording.readers.raw import RawColumn, RawRecording
+
+__all__ = ["RawColumn", "RawRecording", "read"]

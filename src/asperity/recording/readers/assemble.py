@@ -1,0 +1,262 @@
+"""Columns as recorded to a checked `Trace`: names, units and roles are settled here, once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from decimal import Decimal
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asperity.errors import InputError, closest, listed, printable
+from asperity.recording.checks import check
+from asperity.recording.finding import Finding
+from asperity.recording.readers.clock import settle_time
+from asperity.recording.readers.labels import split_labels
+from asperity.recording.readers.raw import refuse_truncated
+from asperity.recording.readers.unit_text import Unit, is_empty, required, understood
+from asperity.recording.roles import ROLES, candidates, role_of
+from asperity.recording.trace import Channel, Trace
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asperity.recording.readers.raw import RawColumn, RawRecording
+
+
+#: Characters of a column's name.
+_LONGEST_NAME = 120
+#: More findings of one name than this become one.
+_FOLDED = 60
+
+
+def assemble(
+    recorded: RawRecording,
+    path: Path,
+    columns: Mapping[str, str | int] | None,
+    units: Mapping[str, str] | None,
+    rate: float | str | None,
+) -> Trace:
+    """Trace of what a file holds; the arguments are those of `read`."""
+    findings = list(recorded.findings)
+    split = split_labels([c.label for c in recorded.columns])
+    # Names of a damaged file may hold anything.
+    names = _unique([printable(name, _LONGEST_NAME) for name, _ in split], findings)
+    texts = dict(zip(names, map(_unit_text, recorded.columns, split), strict=True))
+    labels = {c.label: name for c, name in zip(recorded.columns, names, strict=True)}
+    roles = _chosen_roles(columns or {}, names, labels)
+    known = _known_units(texts, _by_name(units or {}, names, labels, roles), findings)
+    _check_kinds(roles, known)
+    values = {name: c.values for name, c in zip(names, recorded.columns, strict=True)}
+    numbers = {name: v for name, v in values.items() if v.dtype.kind in "iufb"}
+    try:
+        clock = settle_time(values, known, roles, rate, recorded)
+    except InputError:
+        if any(f.name == "truncated" for f in findings) and "time" not in roles:
+            left = listed(map(repr, names))
+            raise refuse_truncated(
+                path, f"which is cut so that no time but {left} is left"
+            ) from None
+        raise
+    findings += clock.findings
+    dropped = [n for n in names if n not in numbers and n != clock.column]
+    if dropped:
+        findings.append(_left_out(dropped))
+    channels = {}
+    for name, column in zip(names, recorded.columns, strict=True):
+        if name in numbers and name != clock.column:
+            unit, text = known.get(name), texts[name]
+            channels[name] = Channel(
+                in_si(column.values, unit),
+                unit.kind if unit else None,
+                unit.si if unit else "",
+                column.label,
+                text,
+            )
+    findings = _folded(findings + _unknown(channels))
+    provenance = {"file": path.name, **recorded.provenance, "time": clock.source}
+    roles = {role: name for role, name in roles.items() if role != "time"}
+    trace = Trace(clock.time, channels, (), provenance, roles)
+    return Trace(clock.time, channels, (*findings, *check(trace)), provenance, roles)
+
+
+def in_si(values: NDArray[Any], unit: Unit | None) -> NDArray[np.float64]:
+    """Values times the factor of the unit, rounded once."""
+    values = np.asarray(values, dtype=np.float64)
+    if unit is None or unit.factor == 1:
+        return values
+    # What overflows in a damaged file becomes infinite, and is found as such.
+    with np.errstate(over="ignore"):
+        # 10^-n is inexact in binary, 10^n is not.
+        if abs(unit.factor) < 1:
+            return values / float(Decimal(1) / unit.factor)
+        return values * float(unit.factor)
+
+
+def _unit_text(column: RawColumn, split: tuple[str, str]) -> str:
+    """The unit beside the name where the format has one, else the one in the heading."""
+    if column.unit is not None and not is_empty(column.unit):
+        return column.unit.strip().strip("[](){}").strip()
+    return split[1]
+
+
+def _unique(names: list[str], findings: list[Finding]) -> list[str]:
+    """Names that differ: of several columns of one name, the later ones are numbered."""
+    unique: dict[str, None] = {}
+    times: dict[str, int] = {}
+    for i, name in enumerate(names):
+        plain = name or f"column {i}"
+        free, again = plain, times.get(plain, 1)
+        while free in unique:
+            again += 1
+            free = f"{plain} ({again})"
+        times[plain] = again
+        unique[free] = None
+        if free != plain:
+            findings.append(
+                Finding(
+                    "repeated name",
+                    "warning",
+                    again,
+                    f"column {i}",
+                    f"The name '{plain}' stands on more than one column; this one is called "
+                    f"'{free}'.",
+                )
+            )
+    return list(unique)
+
+
+def _chosen_roles(
+    columns: Mapping[str, str | int], names: list[str], labels: Mapping[str, str]
+) -> dict[str, str]:
+    roles = {}
+    for key, wanted in columns.items():
+        role = role_of(key)
+        if role is None:
+            raise InputError(f"columns must name roles, got '{key}'; {closest(key, ROLES)}")
+        roles[role] = _name_of(wanted, names, labels, f"columns['{key}']")
+    return roles
+
+
+def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
+    """Refuse a column that measures what its role cannot be; a ratio may stand for a force."""
+    for role, name in roles.items():
+        kind = known[name].kind if name in known else None
+        fitting = ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
+        if kind is not None and kind not in fitting:
+            raise InputError(
+                f"columns['{role}'] must be a {' or '.join(sorted(fitting))}, got '{name}', a "
+                f"{kind}; choose another column, or correct its unit with units={{'{name}': ...}}"
+            )
+
+
+def _name_of(wanted: str | int, names: list[str], labels: Mapping[str, str], field: str) -> str:
+    if isinstance(wanted, int):
+        if not -len(names) <= wanted < len(names):
+            raise InputError(
+                f"{field} must be a column, got {wanted}; the file has columns 0 to "
+                f"{len(names) - 1}"
+            )
+        return names[wanted]
+    if wanted in names:
+        return wanted
+    if wanted in labels:
+        return labels[wanted]
+    same = [n for n in names if n.lower() == wanted.lower()]
+    if len(same) == 1:
+        return same[0]
+    raise InputError(f"{field} must be a column, got '{wanted}'; {closest(wanted, names)}")
+
+
+def _by_name(
+    units: Mapping[str, str],
+    names: list[str],
+    labels: Mapping[str, str],
+    roles: Mapping[str, str],
+) -> dict[str, str]:
+    """Units by the name of the column, whatever the user has called it."""
+    found = {}
+    for key, text in units.items():
+        role = role_of(key) if key not in names else None
+        if role in roles:
+            name = roles[str(role)]
+        elif role and key not in labels:
+            fitting = candidates(role, dict.fromkeys(names))
+            name = fitting[0] if len(fitting) == 1 else _name_of(key, names, labels, "units")
+        else:
+            name = _name_of(key, names, labels, "units")
+        found[name] = text
+    return found
+
+
+def _known_units(
+    texts: dict[str, str], given: Mapping[str, str], findings: list[Finding]
+) -> dict[str, Unit]:
+    """Units that are understood; what the user gives goes before what the file says."""
+    known = {}
+    for name, text in texts.items():
+        unit = understood(text)
+        if name in given:
+            wanted = required(given[name], name)
+            if unit is not None and unit != wanted:
+                findings.append(
+                    Finding(
+                        "unit overridden",
+                        "note",
+                        float(wanted.factor),
+                        name,
+                        f"The file gives '{name}' in '{text}'; it was read in '{given[name]}', as "
+                        "asked.",
+                    )
+                )
+            unit = wanted
+        elif unit is None and is_empty(text) and candidates("friction", {name: "dimensionless"}):
+            # A coefficient of friction has no unit to state.
+            unit = Unit("dimensionless", Decimal(1))
+        if unit is not None:
+            known[name] = unit
+    return known
+
+
+def _left_out(names: list[str]) -> Finding:
+    named = listed(map(repr, names), most=12)
+    return Finding(
+        "text column",
+        "note",
+        len(names),
+        named,
+        f"{named} {'holds' if len(names) == 1 else 'hold'} text and no numbers, and was left out.",
+    )
+
+
+def _folded(findings: list[Finding]) -> list[Finding]:
+    """One finding in place of many of one name, as a wide table without units has."""
+    many = {name for name, n in Counter(f.name for f in findings).items() if n > _FOLDED}
+    folded = [f for f in findings if f.name not in many]
+    for name in many:
+        same = [f for f in findings if f.name == name]
+        said = f"{len(same)} columns have this finding; the first: {same[0].sentence}"
+        where = listed([f.where for f in same], most=12)
+        folded.append(Finding(name, same[0].severity, len(same), where, said))
+    return folded
+
+
+def _unknown(channels: Mapping[str, Channel]) -> list[Finding]:
+    return [
+        Finding(
+            "unknown unit",
+            "warning",
+            1.0,
+            name,
+            (
+                f"The unit '{c.recorded_unit}' of '{name}' is not known"
+                if c.recorded_unit
+                else f"The file states no unit of '{name}'"
+            )
+            + f"; its values are as recorded, until units={{'{name}': ...}} says what they are.",
+        )
+        for name, c in channels.items()
+        if c.kind is None
+    ]

@@ -1,0 +1,174 @@
+"""One door for all formats."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asperity.errors import InputError, closest, printable
+from asperity.parameters.arguments import file_path
+from asperity.recording.derived import derive
+from asperity.recording.finding import Finding
+from asperity.recording.readers.assemble import assemble
+from asperity.recording.readers.detect import FORMATS, format_of
+from asperity.recording.readers.plugins import plugin_format_of, read_by_plugin, reader_points
+from asperity.recording.roles import role_of
+
+if TYPE_CHECKING:
+    from asperity.recording.readers.raw import RawRecording
+    from asperity.recording.recipe import Recipe
+    from asperity.recording.trace import Trace
+
+
+#: Characters of a message.
+_LONGEST = 1200
+
+
+def read(
+    path: str | os.PathLike[str],
+    columns: Mapping[str, str | int] | None = None,
+    units: Mapping[str, str] | None = None,
+    *,
+    channels: Mapping[str, str] | None = None,
+    recipe: Recipe | str | os.PathLike[str] | None = None,
+    rate: float | str | None = None,
+    group: str | None = None,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    format: str | None = None,
+) -> Trace:
+    """Read a recording of a laboratory into a checked `Trace`.
+
+    Parameters
+    ----------
+    path : str or path
+        A file: CSV, tab or blank separated text, HDF5, MATLAB (v4 to v7.3), TDMS, or the LOOK
+        binary of xlook; and what readers of other packages recognise
+        (`asperity.recording.readers.plugins`).
+    columns : mapping of str to str or int, optional
+        Which column plays a role, such as ``{"F": "Shear", "time": 0}``. Roles are ``time``, ``W``
+        (load), ``F`` (shear force), ``velocity``, ``displacement`` and ``friction``; a column is
+        given by its name or its place, counted from 0. What is not given goes by name when asked
+        for, and an ambiguity is an error then.
+    units : mapping of str to str, optional
+        Units of columns, by name or role, where the file has none or a wrong one, such as
+        ``{"Shear": "MPa"}``; or what one recorded unit is, as ``{"Gauge": "12.5 N"}``.
+    channels : mapping of str to str, optional
+        Channels that are made of others, such as ``{"load": "Conf.Press - Pore.Press"}``; see
+        `asperity.recording.derive`.
+    recipe : Recipe, str or path, optional
+        A reduction file with any of these arguments; what is given here goes before it, and
+        mappings are joined.
+    rate : float or str, optional
+        Samples per second (Hz, or a text such as ``"10 kHz"``), in place of the file's own times.
+    group : str, optional
+        The group of an HDF5, MATLAB (a struct) or TDMS file to read, where groups differ in length.
+    delimiter, decimal : str, optional
+        Layout of a text, where it cannot be seen from the file.
+    format : str, optional
+        ``"text"``, ``"hdf5"``, ``"matlab"``, ``"tdms"``, ``"look"`` or the name of a reader of
+        another package, in place of what the file looks like.
+
+    Returns
+    -------
+    Trace
+        In SI. Its findings are everything that was noticed: defects of the file (``"truncated"``,
+        ``"malformed row"``), assumptions (``"unknown unit"``), and those of `check`.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, or can be read in more than one way.
+    """
+    from asperity.recording.recipe import Recipe, load_recipe
+
+    if recipe is not None and not isinstance(recipe, Recipe):
+        recipe = load_recipe(recipe)
+    rules = Recipe() if recipe is None else recipe
+    layout = {"group": group, "delimiter": delimiter, "decimal": decimal, "format": format}
+    layout = {k: getattr(rules, k) if v is None else v for k, v in layout.items()}
+    rate = rules.rate if rate is None else rate
+    expressions = {**rules.channels, **(channels or {})}
+    file = file_path(path, "recording.path")
+    with _quiet() as warned:
+        clock = [name for name in expressions if role_of(name) == "time"]
+        if clock and rate is None:
+            # The file's own clock is a column as any other until the new one is made of it.
+            rate = "1 Hz"
+        recorded = _recorded(file, **layout)
+        trace = assemble(
+            recorded,
+            file,
+            {**rules.columns, **(columns or {})},
+            {**rules.units, **(units or {})},
+            rate,
+        )
+        if expressions:
+            trace = derive(trace, expressions)
+    if recipe is not None:
+        provenance = {**trace.provenance, "recipe": rules.model_dump(exclude_defaults=True)}
+        trace = replace(trace, provenance=provenance)
+    return replace(trace, findings=(*trace.findings, *_said_by_libraries(warned)))
+
+
+def _recorded(
+    file: Path,
+    *,
+    format: str | None,
+    delimiter: str | None,
+    decimal: str | None,
+    group: str | None,
+) -> RawRecording:
+    if not file.is_file():
+        raise InputError(f"recording.path must be a file, got '{file}'; check the name")
+    if file.stat().st_size == 0:
+        raise InputError(
+            f"recording.path must hold a recording, got '{file.name}', which is empty; copy it "
+            "again from where it was recorded"
+        )
+    plugins = reader_points()
+    name = format or plugin_format_of(file) or format_of(file)
+    if name in plugins:
+        for option, value in (("group", group), ("delimiter", delimiter), ("decimal", decimal)):
+            if value is not None:
+                raise InputError(
+                    f"read.{option} must be left out for format '{name}', got '{value}'; its "
+                    "reader takes none"
+                )
+        return read_by_plugin(name, file)
+    if name not in FORMATS:
+        known = [*FORMATS, *plugins]
+        raise InputError(f"read.format must be a format, got '{name}'; {closest(name, known)}")
+    # Each format loads what it needs only when it is met.
+    module: Any = importlib.import_module(f"asperity.recording.readers.{FORMATS[name]}")
+    layout = {"delimiter": delimiter, "decimal": decimal} if name == "text" else {"group": group}
+    recorded: RawRecording = module.load(file, **layout)
+    return recorded
+
+
+@contextmanager
+def _quiet() -> Iterator[list[warnings.WarningMessage]]:
+    """Collect the warnings of libraries, and make an error that quotes a file fit for a line."""
+    with warnings.catch_warnings(record=True) as caught, np.errstate(all="ignore"):
+        warnings.simplefilter("always")
+        try:
+            yield caught
+        except InputError as error:
+            raise type(error)(printable(str(error), _LONGEST)) from None
+
+
+def _said_by_libraries(caught: list[warnings.WarningMessage]) -> list[Finding]:
+    """What a library has warned of while a file was read, once for each text."""
+    texts = dict.fromkeys(str(w.message) for w in caught)
+    return [
+        Finding("library warning", "warning", 1.0, "the file", f"While it was read: {text}")
+        for text in texts
+    ]

@@ -1,0 +1,141 @@
+"""TDMS, the format of LabVIEW, read by npTDMS."""
+
+from __future__ import annotations
+
+import logging
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.recording.finding import Finding
+from asperity.recording.readers.raw import (
+    RawColumn,
+    RawRecording,
+    one_table,
+    refuse_truncated,
+    truncated,
+    unit_of,
+)
+
+_LEAD_IN = struct.Struct("<4siIQQ")
+_UNFINISHED = 0xFFFF_FFFF_FFFF_FFFF
+
+
+def load(path: Path, group: str | None = None) -> RawRecording:
+    """Columns of a TDMS file; of one that is cut, the rows that all channels have.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+    group : str or None
+        The group to read, where they differ in length.
+    """
+    try:
+        import nptdms
+    except ImportError:
+        raise InputError(
+            f"recording.path must be in a format that can be read here, got '{path.name}', which "
+            "is TDMS; install npTDMS, as 'pip install asperity[lab]' does"
+        ) from None
+    missing = _missing(path)
+    try:
+        with _quiet(nptdms):
+            file = nptdms.TdmsFile.read(path)
+            channels = {g.name: g.channels() for g in file.groups()}
+            groups = {name: [_column(c) for c in found] for name, found in channels.items()}
+    # The library raises whatever the damage makes of the data.
+    except Exception:
+        raise refuse_truncated(path, "which is damaged or not whole") from None
+    findings: list[Finding] = []
+    if missing:
+        groups, finding = _whole_rows(path, groups, missing)
+        findings.append(finding)
+    columns, left_out = one_table(groups, path, group)
+    used = channels[group.strip("/")] if group else [c for f in channels.values() for c in f]
+    start, step = _clock([c.properties for c in used], path)
+    provenance = {
+        "format": "tdms",
+        "group": group or "",
+        "title": str(file.properties.get("name", "")),
+    }
+    return RawRecording(columns, findings + left_out, provenance, start, step)
+
+
+@contextmanager
+def _quiet(nptdms: Any) -> Iterator[None]:
+    """Keep the library from talking of files that are cut: a finding says it here."""
+    manager = nptdms.log.log_manager
+    level = manager.log_level
+    manager.set_level(logging.ERROR)
+    try:
+        yield
+    finally:
+        manager.set_level(level)
+
+
+def _column(channel: Any) -> RawColumn:
+    values = channel[:] if len(channel) else np.empty(0)
+    return RawColumn(channel.name, np.asarray(values), unit_of(channel.properties))
+
+
+def _whole_rows(
+    path: Path, groups: dict[str, list[RawColumn]], missing: int
+) -> tuple[dict[str, list[RawColumn]], Finding]:
+    """Columns of each group cut to the shortest, and the finding that says so."""
+    cut = {}
+    lost = 0
+    for name, columns in groups.items():
+        rows = [c.values.size for c in columns if c.values.size]
+        if not rows:
+            continue
+        kept = min(rows)
+        lost += sum(rows) - kept * len(rows)
+        cut[name] = [RawColumn(c.label, c.values[:kept], c.unit) for c in columns if c.values.size]
+    if not cut:
+        raise refuse_truncated(path, "which is cut before its first value")
+    said = "at least some rows" if missing < 0 else f"{missing} bytes at least"
+    sentence = f"{said} are missing at its end; the rows that all channels have were read."
+    return cut, truncated(
+        path, lost, f"row {min(len(c[0].values) for c in cut.values())}", sentence
+    )
+
+
+def _missing(path: Path) -> int:
+    """Bytes that the last segment lacks; -1 where it was never finished, 0 for a whole file."""
+    size = path.stat().st_size
+    position = 0
+    with path.open("rb") as file:
+        while position < size:
+            file.seek(position)
+            lead = file.read(_LEAD_IN.size)
+            if len(lead) < _LEAD_IN.size:
+                return _LEAD_IN.size - len(lead)
+            _, mask, _, following, _ = _LEAD_IN.unpack(lead)
+            if mask & (1 << 6):
+                # The lead-in itself is big-endian where the flag says so; its mask is not.
+                following = int.from_bytes(lead[12:20], "big")
+            if following == _UNFINISHED:
+                return -1
+            position += _LEAD_IN.size + following
+    return max(0, position - size)
+
+
+def _clock(properties: list[Any], path: Path) -> tuple[float, float | None]:
+    """Start and interval of the waveforms, which must be one clock."""
+    steps = {float(p["wf_increment"]) for p in properties if p.get("wf_increment")}
+    if not steps:
+        return 0.0, None
+    if len(steps) > 1:
+        listed = " and ".join(f"{s:g} s" for s in sorted(steps))
+        raise InputError(
+            f"read.group must be chosen where channels differ in interval, got {listed} in "
+            f"'{path.name}'; choose a group, or give rate= to override them"
+        )
+    starts = [float(p.get("wf_start_offset", 0.0)) for p in properties if "wf_increment" in p]
+    return starts[0], steps.pop()

@@ -1,0 +1,154 @@
+"""Units as laboratories write them: ``microns``, ``sec``, ``[kN]``; and what they measure."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from decimal import Decimal
+from functools import lru_cache
+
+from asperity.errors import InputError
+from asperity.units import KINDS
+from asperity.units.scale import normalised, unit_factor
+
+#: Words for units, lower case, as the unit they stand for.
+_WORDS = {
+    **dict.fromkeys(("sec", "secs", "second", "seconds", "sek", "sekunden"), "s"),
+    **dict.fromkeys(("msec", "msecs", "millisecond", "milliseconds"), "ms"),
+    **dict.fromkeys(("usec", "usecs", "microsecond", "microseconds"), "us"),
+    **dict.fromkeys(("minute", "minutes"), "min"),
+    **dict.fromkeys(("hr", "hrs", "hour", "hours"), "h"),
+    **dict.fromkeys(("mic", "mics", "micron", "microns", "micrometer", "micrometre"), "um"),
+    **dict.fromkeys(("micrometers", "micrometres"), "um"),
+    **dict.fromkeys(("nanometer", "nanometers", "nanometre", "nanometres"), "nm"),
+    **dict.fromkeys(("millimeter", "millimeters", "millimetre", "millimetres"), "mm"),
+    **dict.fromkeys(("meter", "meters", "metre", "metres"), "m"),
+    **dict.fromkeys(("newton", "newtons"), "N"),
+    **dict.fromkeys(("kilonewton", "kilonewtons"), "kN"),
+    **dict.fromkeys(("pascal", "pascals"), "Pa"),
+    **dict.fromkeys(("megapascal", "megapascals", "mpa"), "MPa"),
+    **dict.fromkeys(("hertz", "hz"), "Hz"),
+    **dict.fromkeys(("kelvin", "degk"), "K"),
+}
+#: Signs for "no unit": a pure number.
+_PURE = frozenset({"-", "--", "1", ".", "/", "dimensionless", "unitless", "nd", "n/d", "friction"})
+#: Fields that a format leaves empty.
+_EMPTY = frozenset({"", "no_val", "no_info", "none", "n/a", "na", "unknown", "?"})
+#: Units of kinds that pint would misread, or read slowly.
+_DIRECT = {
+    "min": ("time", Decimal(60)),
+    "h": ("time", Decimal(3600)),
+    "mm/min": ("velocity", Decimal(1) / Decimal(60_000)),
+    "um/min": ("velocity", Decimal(1) / Decimal(60_000_000)),
+    "KN": ("force", Decimal(1000)),
+    "cm": ("length", Decimal("0.01")),
+    "cm/s": ("velocity", Decimal("0.01")),
+    "kgf": ("force", Decimal("9.80665")),
+    "gf": ("force", Decimal("0.00980665")),
+    "lbf": ("force", Decimal("4.4482216152605")),
+    "psi": ("pressure", Decimal("6894.757293168361")),
+    "bar": ("pressure", Decimal(100_000)),
+    "%": ("dimensionless", Decimal("0.01")),
+}
+_NUMBERED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s+(\S.*)")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """A unit that is understood.
+
+    Attributes
+    ----------
+    kind : str
+        Key of `asperity.units.KINDS`.
+    factor : Decimal
+        SI value of one unit.
+    """
+
+    kind: str
+    factor: Decimal
+
+    @property
+    def si(self) -> str:
+        """The SI unit of the kind."""
+        return KINDS[self.kind].si
+
+
+def is_empty(text: str) -> bool:
+    """Whether a unit field says nothing."""
+    return text.strip().lower() in _EMPTY
+
+
+def understood(text: str) -> Unit | None:
+    """Unit of a text, None if it is not known.
+
+    A word (``"microns/sec"``), a sign for a pure number (``"-"``), or any unit of
+    `asperity.units`; prefixes keep their case, so that ``mN`` and ``MN`` differ. Volts, counts,
+    degrees and the like, which `asperity` has no kind for, are not understood.
+    """
+    text = _bare(text)
+    # A bare letter that is no usual unit is more likely a name than a unit of pint's.
+    return usual(text) or (_by_pint(_worded(text)) if len(text) > 1 else None)
+
+
+@lru_cache(maxsize=1024)
+def usual(text: str) -> Unit | None:
+    """Unit of a text if it is one that laboratories use every day, None otherwise."""
+    text = _bare(text)
+    if text.lower() in _PURE:
+        return Unit("dimensionless", Decimal(1))
+    # As written first: mPa is no MPa, while nothing but MPa can be meant by mpa.
+    for plain in (text, _worded(text)):
+        if plain in _DIRECT:
+            return Unit(*_DIRECT[plain])
+        for kind, spec in KINDS.items():
+            for unit, power in spec.ladder:
+                if unit and unit == plain:
+                    return Unit(kind, Decimal(1).scaleb(power))
+    return None
+
+
+def _bare(text: str) -> str:
+    return normalised(text.strip().strip("[](){}").strip())
+
+
+def _worded(text: str) -> str:
+    return "/".join(_WORDS.get(part.lower().strip(), part.strip()) for part in text.split("/"))
+
+
+@lru_cache(maxsize=1024)
+def _by_pint(text: str) -> Unit | None:
+    for kind, spec in KINDS.items():
+        if not spec.si or kind == "angular_frequency":
+            continue
+        try:
+            return Unit(kind, unit_factor(text, kind, "unit", text))
+        except InputError:
+            continue
+    return None
+
+
+def required(text: str, name: str) -> Unit:
+    """Unit that the user has given for a column, which must be understood.
+
+    Parameters
+    ----------
+    text : str
+        A unit, or a number with a unit: what one recorded unit is, such as ``"12.5 N"`` for a
+        gauge of 12.5 N per volt.
+    name : str
+        The column, for the message.
+
+    Raises
+    ------
+    InputError
+        If it is not a unit of `asperity.units`.
+    """
+    match = _NUMBERED.fullmatch(text)
+    unit = understood(match[2] if match else text)
+    if unit is None:
+        raise InputError(
+            f"units['{name}'] must be a unit, got '{text}'; write it like 'N', 'MPa', 'um', '-' "
+            "for a pure number, or '12.5 N' for what one recorded unit is"
+        )
+    return Unit(unit.kind, unit.factor * Decimal(match[1])) if match else unit

@@ -1,0 +1,200 @@
+"""Which channel plays which part: time, load W, shear force F, velocity, displacement, friction.
+
+Laboratories name the same quantity in a dozen ways. A role is matched by the words of the name and
+by the kind of its unit; where two channels fit, nothing is chosen and the answer names both.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from asperity.errors import InputError, closest
+
+
+@dataclass(frozen=True)
+class Role:
+    """How the channels of one role are named.
+
+    Attributes
+    ----------
+    also : frozenset of str
+        Other names of the role itself.
+    whole : frozenset of str
+        Whole names, lower case without separators.
+    words : tuple of str
+        Beginnings of words, one of which the name holds.
+    weak : frozenset of str
+        Whole names that count only where nothing else fits.
+    without : tuple of str
+        Beginnings of words that rule the name out.
+    kinds : frozenset of str
+        What the unit may measure; an unknown unit rules nothing out.
+    """
+
+    also: frozenset[str]
+    whole: frozenset[str]
+    words: tuple[str, ...]
+    weak: frozenset[str]
+    without: tuple[str, ...]
+    kinds: frozenset[str]
+
+
+def _role(
+    also: str, whole: str, words: str, weak: str = "", without: str = "", kinds: str = ""
+) -> Role:
+    return Role(
+        frozenset(also.split(",")) - {""},
+        frozenset(whole.split()),
+        tuple(words.split()),
+        frozenset(weak.split()),
+        tuple(without.split()),
+        frozenset(kinds.split()),
+    )
+
+
+_MOTION = (
+    "disp displ displacement velocity speed rate strain position stiffness geschwindigkeit weg "
+    "verschiebung vitesse deplacement velocita spostamento velocidad desplazamiento"
+)
+
+#: The roles, in the letters of the field and in the words of some languages, without accents.
+ROLES: Mapping[str, Role] = {
+    "time": _role(
+        "",
+        "t time xvalue",
+        "time timestamp elapsed zeit zeitstempel messzeit temps tempo tiempo tijd",
+        without="delay constant konstante",
+        kinds="time",
+    ),
+    "W": _role(
+        "load,normal load,normal force,normal stress",
+        "w fn ns n fz load sigma sigman signorm normalkraft normalspannung normallast auflast "
+        "auflagekraft anpresskraft σ σn",
+        "nor norm normal normale normala normalkraft normalspannung normallast auflast sigman",
+        weak="load loadcell pressure axialforce axialload axialstress last belastung charge carico "
+        "carga",
+        without=_MOTION + " shear shr tangential coefficient koeffizient",
+        kinds="force pressure",
+    ),
+    "F": _role(
+        "force,shear,shear force,shear stress",
+        "f ft fs fx ss tau τ frictionforce frictionalforce reibkraft reibungskraft scherkraft "
+        "schubkraft schubspannung scherspannung tangentialkraft querkraft forcedefrottement "
+        "efforttranchant forzadiattrito fuerzaderozamiento fuerzadefriccion",
+        "shear shr tangential tangentielle tangenziale tangencial lateral laterale traction tau τ "
+        "reibkraft reibungskraft scherkraft schubkraft schubspannung scherspannung "
+        "tangentialkraft cisaillement taglio cizalla cortante",
+        weak="force kraft effort forza fuerza friction frottement attrito rozamiento friccion "
+        "reibung",
+        without=_MOTION + " nor norm normal normale coefficient coeff coef angle koeffizient "
+        "coefficiente coeficiente",
+        kinds="force pressure",
+    ),
+    "velocity": _role(
+        "V,speed",
+        "v vel vlp speed sliprate",
+        "velocity vel speed geschwindigkeit gleitgeschwindigkeit vitesse velocita velocidad",
+        without="angular",
+        kinds="velocity",
+    ),
+    "displacement": _role(
+        "slip,position",
+        "x u d s slip lvdt weg gleitweg",
+        "disp displ displacement slip position weg gleitweg verschiebung deplacement spostamento "
+        "desplazamiento",
+        without="rate velocity vel speed geschwindigkeit",
+        kinds="length",
+    ),
+    "friction": _role(
+        "mu,friction coefficient",
+        "mu μ cof friction frict reibwert reibzahl reibungszahl reibungskoeffizient "
+        "reibkoeffizient",
+        "mu μ cof friction frict reibwert reibzahl reibungszahl reibungskoeffizient "
+        "reibkoeffizient frottement attrito rozamiento friccion reibung",
+        without="force stress load kraft forza fuerza spannung",
+        kinds="dimensionless",
+    ),
+}
+
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[Α-Ωα-ω]+|\d+")
+
+
+def words(name: str) -> list[str]:
+    """Words of a recorded name in lower case and without accents.
+
+    ``"Normal_stress"`` and ``"NormalStress"`` agree.
+    """
+    if not name.isascii():
+        # The micro sign becomes the Greek letter, and an accent a mark of its own, left out here.
+        apart = unicodedata.normalize("NFKD", name)
+        name = "".join(c for c in apart if not unicodedata.combining(c))
+    return [w.lower() for w in _WORD.findall(name)]
+
+
+def role_of(name: str) -> str | None:
+    """The role that a name stands for, such as W for ``"load"``; None if it is none."""
+    for role, spec in ROLES.items():
+        if name == role or name in spec.also or name.lower() == role.lower():
+            return role
+    return None
+
+
+def candidates(role: str, kinds: Mapping[str, str | None]) -> list[str]:
+    """Names that can be `role`, judged by their words and by the kinds of their units."""
+    spec = ROLES[role]
+    fitting = [
+        name
+        for name, kind in kinds.items()
+        if (kind is None or kind in spec.kinds)
+        and not any(word in spec.without for word in words(name))
+    ]
+    strong = [n for n in fitting if _says(n, spec)]
+    return strong or [n for n in fitting if "".join(words(n)) in spec.weak]
+
+
+def _says(name: str, spec: Role) -> bool:
+    said = words(name)
+    return "".join(said) in spec.whole or any(w in spec.words for w in said)
+
+
+def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str, str]) -> str:
+    """Name of the one channel that `name`, a recorded name or a role, can mean.
+
+    Parameters
+    ----------
+    name : str
+        Recorded name, in any case, or role.
+    kinds : mapping
+        Kind of each channel, None where the unit is unknown.
+    chosen : mapping
+        Channels that the user has already given a role.
+
+    Raises
+    ------
+    InputError
+        If no channel fits or several do.
+    """
+    if name in chosen:
+        return chosen[name]
+    if name in kinds:
+        return name
+    role = role_of(name)
+    if role is not None and role in chosen:
+        return chosen[role]
+    same = [k for k in kinds if k.lower() == name.lower()]
+    found = same or (candidates(role, kinds) if role else [])
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise InputError(
+            f"Trace.channel must name one channel, got '{name}', which can be "
+            f"{' or '.join(map(repr, found))}; choose when reading, like "
+            f"columns={{'{role or name}': '{found[0]}'}}"
+        )
+    raise InputError(
+        f"Trace.channel must name a channel, got '{name}'; "
+        + (closest(name, kinds) if kinds else "the trace has none")
+    )

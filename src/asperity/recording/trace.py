@@ -1,0 +1,204 @@
+"""A recording, simulated or measured: time and channels in SI, with what was found in it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asperity.errors import InputError, listed
+from asperity.parameters.display import Displayed, SummaryLine, count_text, number_line
+from asperity.recording.checks import CHECKED, check, even_rate
+from asperity.recording.finding import Finding
+from asperity.recording.roles import find_channel
+from asperity.units import from_si, to_si
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One recorded quantity.
+
+    Attributes
+    ----------
+    values : ndarray, shape (n,)
+        float64, in SI; as recorded where the unit is unknown. Read-only.
+    kind : str or None
+        Key of `asperity.units.KINDS`; None where the unit is unknown.
+    unit : str
+        SI unit of `values`; empty for a pure number and for an unknown unit.
+    recorded_name, recorded_unit : str
+        As the file has them; empty where it has none.
+    """
+
+    values: NDArray[np.float64]
+    kind: str | None = None
+    unit: str = ""
+    recorded_name: str = ""
+    recorded_unit: str = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", _column(self.values, "Channel.values"))
+
+    def to(self, unit: str) -> NDArray[np.float64]:
+        """Values in another unit, such as ``"MPa"``; raises `InputError` if it does not fit."""
+        if self.kind is None:
+            raise InputError(
+                f"Channel.unit must be known to be converted, got '{self.recorded_unit}' for "
+                f"'{self.recorded_name}'; name it when reading, like units={{"
+                f"'{self.recorded_name}': 'N'}}"
+            )
+        return np.asarray(from_si(self.values, unit, self.kind))
+
+
+@dataclass(frozen=True, eq=False)
+class Trace(Displayed):
+    """Channels over one time axis, with all that is known about them.
+
+    Attributes
+    ----------
+    time : ndarray, shape (n,)
+        Seconds, float64, as recorded: neither sorted nor made even. Read-only.
+    channels : mapping of str to Channel
+        In the order of the file, under their recorded names; time is not among them.
+    findings : tuple of Finding
+        What the reader and `asperity.recording.check` found; empty when nothing was.
+    provenance : dict
+        Where the trace comes from: file, format, decisions of the reader; or the simulation.
+    roles : mapping of str to str
+        Channels chosen for a role, such as ``{"F": "Shear"}``; other roles go by name.
+    """
+
+    time: NDArray[np.float64]
+    channels: Mapping[str, Channel]
+    findings: tuple[Finding, ...] = ()
+    provenance: dict[str, Any] = field(default_factory=dict)
+    roles: Mapping[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time", _column(self.time, "Trace.time"))
+        object.__setattr__(self, "channels", MappingProxyType(dict(self.channels)))
+        object.__setattr__(self, "findings", tuple(self.findings))
+        for name, channel in self.channels.items():
+            if channel.values.size != self.time.size:
+                raise InputError(
+                    f"Trace.channels must be as long as time, got {channel.values.size} values "
+                    f"of '{name}' for {self.time.size} times; cut them to the same length"
+                )
+
+    def __len__(self) -> int:
+        return self.time.size
+
+    def __repr__(self) -> str:
+        units = {n: c.unit if c.kind else c.recorded_unit for n, c in self.channels.items()}
+        names = listed((f"{n} ({unit})" if unit else n for n, unit in units.items()), most=12)
+        return f"<Trace: {len(self)} samples of {names}; {len(self.findings)} findings>"
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Times, channels with their units, and findings."""
+        lines = [number_line("time", self.time, "s")]
+        lines += [
+            number_line(n, c.values, c.unit if c.kind else c.recorded_unit)
+            for n, c in self.channels.items()
+        ]
+        lines += [SummaryLine("finding", str(finding)) for finding in self.findings]
+        return f"Trace, {count_text(len(self), 'sample')}", lines
+
+    def channel(self, name: str) -> Channel:
+        """Channel by its name, the heading it was recorded under, or a role.
+
+        Roles are W, F, velocity, displacement and friction, and go by other names too, such as
+        ``"load"`` and ``"shear force"``.
+
+        Raises
+        ------
+        InputError
+            If no channel, or more than one, can be meant; the message names them.
+        """
+        recorded = [c for c in self.channels.values() if c.recorded_name == name]
+        if len(recorded) == 1 and name not in self.channels:
+            return recorded[0]
+        kinds = {key: c.kind for key, c in self.channels.items()}
+        return self.channels[find_channel(name, kinds, self.roles)]
+
+    @property
+    def sample_rate(self) -> float | None:
+        """Samples per second, Hz; None where the sampling is uneven."""
+        return even_rate(self.time)
+
+    def slice(self, start: float | str | None = None, end: float | str | None = None) -> Trace:
+        """Samples with ``start <= time < end``, checked anew.
+
+        Parameters
+        ----------
+        start, end : float, str or None
+            Seconds on the trace's own clock, or texts such as ``"10 s"``; None is no limit.
+
+        Raises
+        ------
+        InputError
+            If no sample lies between them.
+        """
+        inside = np.ones(len(self), dtype=bool)
+        if start is not None:
+            inside &= self.time >= to_si(start, "time", "slice.start")
+        if end is not None:
+            inside &= self.time < to_si(end, "time", "slice.end")
+        if not inside.any():
+            raise InputError(
+                f"slice.start and slice.end must enclose samples, got {start} to {end}; "
+                f"{_extent(self.time)}"
+            )
+        cut = {k: replace(c, values=c.values[inside]) for k, c in self.channels.items()}
+        kept = tuple(f for f in self.findings if f.name not in CHECKED)
+        part = replace(self, time=self.time[inside], channels=cut, findings=())
+        return replace(part, findings=kept + check(part))
+
+    def to_dataset(self) -> xr.Dataset:
+        """Labelled `xarray.Dataset` over ``time``: units, recorded names, findings, provenance."""
+        import xarray as xr
+
+        variables = {
+            name: (
+                "time",
+                c.values,
+                {
+                    "units": c.unit if c.kind else c.recorded_unit,
+                    "long_name": c.recorded_name or name,
+                    "recorded_unit": c.recorded_unit,
+                },
+            )
+            for name, c in self.channels.items()
+        }
+        return xr.Dataset(
+            variables,
+            coords={"time": ("time", self.time, {"units": "s", "long_name": "time"})},
+            attrs={
+                "findings": "\n".join(map(str, self.findings)),
+                "provenance": json.dumps(self.provenance, default=str),
+            },
+        )
+
+
+def _column(values: Any, name: str) -> NDArray[np.float64]:
+    """A read-only float64 view; the caller's array stays as it is."""
+    column = np.asarray(values, dtype=np.float64).view()
+    if column.ndim != 1:
+        raise InputError(
+            f"{name} must have one dimension, got {column.ndim}; give one array per channel"
+        )
+    column.flags.writeable = False
+    return column
+
+
+def _extent(time: NDArray[np.float64]) -> str:
+    if not np.isfinite(time).any():
+        return "the trace has no finite time"
+    return f"the trace runs from {np.nanmin(time):.10g} s to {np.nanmax(time):.10g} s"

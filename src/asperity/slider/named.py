@@ -1,0 +1,90 @@
+"""Parameters of equations of motion by name: which there are, their values, and other values."""
+
+from __future__ import annotations
+
+from functools import reduce
+from typing import Any
+
+import equinox as eqx
+import numpy as np
+
+from asperity.loads import Harmonic, Modulation
+from asperity.parameters import Parameter, point_parameters
+from asperity.slider.motion import Motion
+from asperity.slider.problem import Problem
+from asperity.slider.slider import Slider
+
+
+def equation_parameters(motion: Motion, load: Modulation | None = None) -> dict[str, Parameter]:
+    """Parameters that the equations depend on, by name.
+
+    Parameters
+    ----------
+    motion : Motion
+    load : Modulation, optional
+        Without one, amplitude, frequency and pulling velocity are left out: in a transient they
+        belong to its programme.
+    """
+    absent: set[str] = set()
+    if "inertial" not in motion.name:
+        absent.add("M")
+    if not hasattr(motion, "eta"):
+        absent.add("eta")
+    if not isinstance(load, Harmonic):
+        absent.add("epsilon")
+    if load is None:
+        absent |= {"V", "frequency"}
+    known = point_parameters(type(motion.slider.law))
+    return {name: p for name, p in known.items() if p.path and name not in absent}
+
+
+def value_of(problem: Problem, parameter: Parameter) -> Any:
+    """Value of a parameter in SI, as the equations hold it: any shape."""
+    return _leaf(problem, parameter.path) / parameter.scale
+
+
+def with_value(problem: Problem, parameter: Parameter, value: Any) -> Problem:
+    """The problem with another value of one parameter, unchecked."""
+    changed = np.asarray(value) * parameter.scale
+    return eqx.tree_at(lambda p: _leaf(p, parameter.path), problem, changed)
+
+
+def values_as_text(motion: Motion, load: Modulation | None = None) -> str:
+    """All parameters with units, ``A = 0.013; K = 200000.0 N/m``; a range for an array."""
+    problem = Problem(motion, load)
+    named = equation_parameters(motion, load).values()
+    shown = [f"{p.name} = {_shown(value_of(problem, p))} {p.unit}".rstrip() for p in named]
+    return "; ".join(shown)
+
+
+def slider_values(slider: Slider) -> dict[str, Any]:
+    """Parameters of the law, K, W0 and M by name, in SI and of any shape."""
+    known = point_parameters(type(slider.law)).values()
+    own = (p for p in known if p.place in ("law", "slider"))
+    return {p.name: _leaf(slider, p.path.removeprefix("system.slider.")) for p in own}
+
+
+def slider_from(law: type[Any], values: Any) -> Slider:
+    """The slider with the values, SI or texts with units, that a mapping has by name.
+
+    Parameters
+    ----------
+    law : type of Law
+    values : mapping of str to number, array or str
+        Parameters of the law, K, W0, and M unless it is 0.
+    """
+    fields = {
+        p.path.rsplit(".", 1)[-1]: values[name]
+        for name, p in point_parameters(law).items()
+        if p.place == "law"
+    }
+    return Slider(law(**fields), spring=values["K"], load=values["W0"], mass=values.get("M", 0.0))
+
+
+def _leaf(owner: Any, path: str) -> Any:
+    return reduce(getattr, path.split("."), owner)
+
+
+def _shown(value: Any) -> str:
+    low, high = float(np.min(value)), float(np.max(value))
+    return f"{low!r}" if low == high else f"{low!r} to {high!r}"

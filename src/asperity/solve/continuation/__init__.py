@@ -1,1 +1,0 @@
-"""Continuation of periodic orbits in parameters, their bifurcations, and stability boundaries."""

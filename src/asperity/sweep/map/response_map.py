@@ -1,0 +1,168 @@
+"""A map of the response and its stability over two numbers of the operating point."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from asperity.errors import InputError
+from asperity.laws import get_law
+from asperity.operating_point import (
+    SourcedNumber,
+    numbers_for,
+    refuse_foreign,
+    sourced_numbers,
+)
+from asperity.outputs import output_file, written_file
+from asperity.parameters import MODULATION, point_parameters
+from asperity.parameters.arguments import function, instance
+from asperity.sweep.map.axis import Axis
+from asperity.sweep.map.boundary import trace_boundary
+from asperity.sweep.map.dataset import as_dataset
+from asperity.sweep.map.grid import BLOCK, interrupted, kept_beside, solve_grid, solve_grid_kept
+from asperity.sweep.map.plane import MapPlane
+from asperity.units import KINDS
+
+if TYPE_CHECKING:
+    import xarray
+
+
+def response_map(
+    law: str,
+    numbers: Mapping[str, Any],
+    *,
+    x: Axis,
+    y: Axis,
+    progress: Callable[[int, int], None] | None = None,
+) -> xarray.Dataset:
+    """Response and stability on a grid over two numbers, and the stability boundary between.
+
+    Parameters
+    ----------
+    law : str
+        Name of a registered law.
+    numbers : mapping of str to float, str or SourcedNumber
+        The other numbers of the operating point by name (`asperity.parameters`), SI or
+        texts with units: parameters of the law, ``K, W0, M, eta, V, epsilon, frequency``,
+        ``inertia=1`` to include the mass, and `asperity.parameters.MODULATION`. Parameters that
+        belong to other laws only are left out.
+    x, y : Axis
+        The numbers that vary; any two.
+    progress : callable, optional
+        Called with the number of points done so far and of all points.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimensions (y, x): `asperity.sweep.map.SHOWN`, ``mode``, ``stable``, ``converged``
+        and ``result``; a point that failed has NaN and its reason in ``result``. On
+        ``boundary_point``: position (``boundary_`` and the axis' name), ``boundary_line``,
+        ``boundary_kind``, ``boundary_mode_frequency`` and ``boundary_result``; line -1 holds
+        places where stability changes between neighbours but no crossing was found, and why.
+        ``critical_stiffness`` is there if K is on an axis and K_c has a closed form. Every
+        variable has `units` and `long_name`; fixed numbers are scalar coordinates.
+
+    Raises
+    ------
+    InputError
+        If a number is missing, unknown, given twice, or breaks its rule.
+
+    Notes
+    -----
+    The boundary consists of points at which ln|m| = 0 within 1e-6 of the axes; between neighbours
+    it deviates from a straight line by less than 1e-4 of them. The attribute
+    ``boundary_unresolved_chords`` counts the exceptions: chords where it bends too much for the
+    grid. A feature within one cell that changes no stability at its corners is not detected.
+    """
+    plane, origins = _plane(law, numbers, x, y)
+    grid = solve_grid(plane, function(progress, "progress") or _silent)
+    return as_dataset(plane, grid, trace_boundary(plane, grid), origins)
+
+
+def write_map(
+    out: Path,
+    law: str,
+    numbers: Mapping[str, Any],
+    *,
+    x: Axis,
+    y: Axis,
+    resume: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+    block: int = BLOCK,
+) -> xarray.Dataset:
+    """`response_map` to a NetCDF file; an interruption keeps the finished blocks.
+
+    Parameters
+    ----------
+    out : Path
+        Written when everything is done; until then finished blocks are in ``OUT.partial``.
+    law, numbers, x, y, progress
+        As for `response_map`.
+    resume : bool
+        Continue an interrupted map; without one, start from the first point.
+    block : int
+        Points solved and kept at a time.
+
+    Raises
+    ------
+    InputError
+        As `response_map`, and if `out` cannot be written.
+    Interrupted
+        On Ctrl-C.
+    """
+    plane, origins = _plane(law, numbers, x, y)
+    target = output_file(out, example="map.nc")
+    kept = kept_beside(target, plane)
+    grid = solve_grid_kept(plane, kept, resume, progress or _silent, block)
+    try:
+        found = as_dataset(plane, grid, trace_boundary(plane, grid), origins)
+        with written_file(target) as file:
+            found.to_netcdf(file, engine="h5netcdf")
+    except KeyboardInterrupt:
+        raise interrupted(kept, len(grid.converged)) from None
+    kept.discard()
+    return found
+
+
+def _plane(
+    law: str, numbers: Mapping[str, Any], x: Axis, y: Axis
+) -> tuple[MapPlane, dict[str, str]]:
+    """The checked plane, and the origin of each fixed number."""
+    advice = "build one as asperity.sweep.map.Axis('epsilon', 0.0, 0.5, 20)"
+    x, y = instance(x, Axis, "x", advice), instance(y, Axis, "y", advice)
+    advice = "give a dictionary such as {'V': '1 um/s'}"
+    numbers = instance(numbers, Mapping, "numbers", advice)
+    if x.name == y.name:
+        raise InputError(
+            f"axes must be two numbers, got '{x.name}' on both; choose another one for y"
+        )
+    refuse_foreign(law, {x.name: "", y.name: ""})
+    known = point_parameters(get_law(law))
+    given = sourced_numbers(numbers, None, law=law)
+    for axis in (x, y):
+        if axis.kind != known[axis.name].kind:
+            raise InputError(
+                f"axis of {axis.name} must be {KINDS[known[axis.name].kind].noun} for {law}, got "
+                f"{KINDS[axis.kind].noun}; another registered law has a parameter of that name"
+            )
+        if axis.name in given:
+            raise InputError(
+                f"{axis.name} must be given once, got an axis and a fixed value; leave one out"
+            )
+    given |= {axis.name: SourcedNumber(float(axis.low), "axis") for axis in (x, y)}
+    own = numbers_for(law, given)
+    defaults = {
+        name: SourcedNumber(parameter.default, "default")
+        for name, parameter in known.items()
+        # What is not modulated needs no coordinate.
+        if parameter.default is not None and name not in MODULATION
+    }
+    fixed = {n: s for n, s in (defaults | own).items() if n not in (x.name, y.name)}
+    plane = MapPlane(get_law(law), {n: s.value for n, s in fixed.items()}, x, y)
+    plane.values(plane.nodes()[:1])
+    return plane, {n: s.origin for n, s in fixed.items()}
+
+
+def _silent(done: int, total: int) -> None:
+    """No report of progress."""

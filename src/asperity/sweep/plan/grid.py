@@ -1,0 +1,205 @@
+"""The grid of a sweep: from the numbers of its chunks to the operating points in them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.laws import get_law
+from asperity.parameters import Parameter, all_parameters, point_parameters
+from asperity.sweep.plan.axis import Column, DrawnAxis, ListedAxis, Spread, SweepAxis
+from asperity.sweep.plan.model import SweepPlan
+from asperity.sweep.plan.ratios import RATIOS
+from asperity.sweep.plan.record import plan_record
+
+Float = NDArray[np.float64]
+Slices = tuple[slice, ...]
+
+#: Laws of an axis that are more than this share chunks.
+_LAWS_APART = 64
+
+
+@dataclass(frozen=True)
+class Points:
+    """Operating points of a chunk, along one axis.
+
+    Attributes
+    ----------
+    laws : str array, shape (points,)
+    values : dict of str to array, shape (points,)
+        SI numbers by name, NaN where a point has none.
+    """
+
+    laws: NDArray[np.object_]
+    values: dict[str, Float]
+
+    def __len__(self) -> int:
+        return len(self.laws)
+
+    def take(self, index: Any) -> Points:
+        """The points `index`."""
+        return Points(self.laws[index], {n: v[index] for n, v in self.values.items()})
+
+    def of_law(self, law: str) -> dict[str, Float]:
+        """Values of all parameters of one law, with defaults where a point has none."""
+        rows = len(self)
+        found = {}
+        for name, parameter in point_parameters(get_law(law)).items():
+            default = math.nan if parameter.default is None else parameter.default
+            values = self.values.get(name, np.full(rows, default))
+            found[name] = np.where(np.isnan(values), default, values)
+        return found
+
+
+class SweepGrid:
+    """The points of a sweep, none of which is in memory.
+
+    Parameters
+    ----------
+    record : mapping
+        From `asperity.sweep.plan.record.plan_record`.
+    chunks : tuple of int, optional
+        Chunk length along each axis; chosen from the record by default.
+
+    Attributes
+    ----------
+    axes : tuple of SweepAxis
+    shape : tuple of int
+    chunks : tuple of int
+    """
+
+    def __init__(self, record: Mapping[str, Any], chunks: Sequence[int] | None = None) -> None:
+        self.record = dict(record)
+        self.axes = tuple(_axis(name, axis) for name, axis in record["axes"].items())
+        self.shape = tuple(axis.length for axis in self.axes)
+        self.chunks = tuple(chunks) if chunks is not None else self._chunks()
+
+    @classmethod
+    def of(cls, plan: SweepPlan) -> SweepGrid:
+        """The grid of a plan.
+
+        Raises
+        ------
+        PlanError
+            If the plan means nothing that can be solved.
+        """
+        return cls(plan_record(plan))
+
+    @property
+    def points(self) -> int:
+        """Number of points."""
+        return math.prod(self.shape)
+
+    @property
+    def chunk_shape(self) -> tuple[int, ...]:
+        """Number of chunks along each axis."""
+        return tuple(-(-n // c) for n, c in zip(self.shape, self.chunks, strict=True))
+
+    @property
+    def chunk_count(self) -> int:
+        """Number of chunks."""
+        return math.prod(self.chunk_shape)
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the record."""
+        return hashlib.sha256(json.dumps(self.record, sort_keys=True).encode()).hexdigest()
+
+    @cached_property
+    def known(self) -> dict[str, Parameter]:
+        """Parameters of all laws of the sweep, and ratios."""
+        laws = [get_law(name) for name in self.record["laws"]]
+        return {**all_parameters(laws), **{n: r.parameter for n, r in RATIOS.items()}}
+
+    def place(self, chunk: int) -> tuple[int, ...]:
+        """Position of a chunk among the chunks, by its number in C order."""
+        return tuple(int(i) for i in np.unravel_index(chunk, self.chunk_shape))
+
+    def slices(self, chunk: int) -> Slices:
+        """The part of the grid that a chunk covers."""
+        return tuple(
+            slice(i * c, min((i + 1) * c, n))
+            for i, c, n in zip(self.place(chunk), self.chunks, self.shape, strict=True)
+        )
+
+    def size(self, chunk: int) -> int:
+        """Points of a chunk."""
+        return math.prod(s.stop - s.start for s in self.slices(chunk))
+
+    def at(self, chunk: int) -> Points:
+        """The points of a chunk in C order."""
+        return self.between(self.slices(chunk))
+
+    def between(self, slices: Slices) -> Points:
+        """The points of a part of the grid in C order."""
+        rows = [axis.rows(s.start, s.stop) for axis, s in zip(self.axes, slices, strict=True)]
+        return self._points(rows, tuple(s.stop - s.start for s in slices))
+
+    def numbered(self, numbers: NDArray[np.int64]) -> Points:
+        """Points by their numbers in C order, anywhere on the grid."""
+        places = np.unravel_index(numbers, self.shape)
+        rows = []
+        for axis, index in zip(self.axes, places, strict=True):
+            picked = [axis.rows(int(i), int(i) + 1) for i in index]
+            rows.append({n: np.concatenate([p[n] for p in picked]) for n in axis.names})
+        return self._points(rows, None, len(numbers))
+
+    def _points(
+        self, rows: list[dict[str, Column]], shape: tuple[int, ...] | None, count: int = 0
+    ) -> Points:
+        """Points from the columns of each axis: their product, or row by row without a shape."""
+        count = math.prod(shape) if shape is not None else count
+        values = {n: np.full(count, float(v)) for n, v in self.record["numbers"].items()}
+        first = self.record["laws"][0]
+        laws = np.full(count, first, dtype=object)
+        for i, columns in enumerate(rows):
+            for name, column in columns.items():
+                if shape is not None:
+                    along = column.reshape([-1 if k == i else 1 for k in range(len(shape))])
+                    column = np.broadcast_to(along, shape).ravel()
+                if name == "law":
+                    laws = np.where(column == "", laws, column)
+                else:
+                    values[name] = np.array(column, dtype=float)
+        for name, ratio in RATIOS.items():
+            if name in values:
+                needed = {n: values.get(n, np.full(count, np.nan)) for n in (name, *ratio.needs)}
+                with np.errstate(all="ignore"):
+                    values[ratio.target] = ratio.solve(needed)
+        return Points(laws, values)
+
+    def _chunks(self) -> tuple[int, ...]:
+        """Chunk lengths: laws apart, then as many points of the last axes as belong together."""
+        from asperity.sweep.solve import SOLVES
+
+        wanted = self.record.get("chunk") or SOLVES[self.record["solve"]].chunk_points(self)
+        lengths = []
+        for axis in reversed(self.axes):
+            apart = "law" in axis.names and axis.length <= _LAWS_APART
+            # Chunks of one length, so that the last one is not much shorter.
+            parts = axis.length if apart else -(-axis.length // max(wanted, 1))
+            length = -(-axis.length // parts)
+            wanted = wanted // length
+            lengths.append(length)
+        return tuple(reversed(lengths))
+
+
+def _axis(name: str, record: Mapping[str, Any]) -> SweepAxis:
+    if "columns" in record:
+        return ListedAxis(name, {n: _values(n, v) for n, v in record["columns"].items()})
+    spreads = {n: Spread(**spread) for n, spread in record["over"].items()}
+    return DrawnAxis(name, record["draw"], record["seed"], record["count"], spreads)
+
+
+def _values(name: str, values: Sequence[Any]) -> Column:
+    if name == "law":
+        return np.array(values, dtype=object)
+    return np.array([math.nan if value is None else value for value in values], dtype=float)

@@ -1,0 +1,202 @@
+"""The plan of a sweep as a file has it, checked field by field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, PositiveInt, ValidationError, model_validator
+
+from asperity.errors import InputError
+from asperity.sweep.plan.mistakes import PlanError, sentences
+
+#: A number in SI, a text with its unit, or a switch.
+Given = bool | float | str
+
+_STRICT = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+
+class AxisTable(BaseModel):
+    """An axis as a plan writes it: exactly one of five forms.
+
+    Attributes
+    ----------
+    from_, to, count, spacing
+        A grid with both ends, written ``from``; ``spacing`` is ``"linear"`` or ``"log"``.
+    values : tuple
+        Its values one by one.
+    zip : mapping of str to tuple
+        Several numbers that vary together, all of one length.
+    cases : tuple of mapping
+        Rows one after the other; where a case has lists, all their combinations.
+    draw : {"random", "sobol", "halton"}
+        ``count`` draws of the numbers in ``over``.
+    over : mapping of str to mapping
+        For each drawn number ``from``, ``to`` and ``spacing``, or ``mean`` and ``std``.
+    """
+
+    model_config = _STRICT
+
+    from_: Given | None = Field(default=None, alias="from")
+    to: Given | None = None
+    count: PositiveInt | None = None
+    spacing: Literal["linear", "log"] | None = None
+    values: tuple[Given, ...] | None = None
+    zip: Mapping[str, tuple[Given, ...]] | None = None
+    cases: tuple[Mapping[str, Any], ...] | None = None
+    draw: Literal["random", "sobol", "halton"] | None = None
+    over: Mapping[str, Mapping[str, Any]] | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> AxisTable:
+        allowed = {
+            "from": {"from_", "to", "count", "spacing"},
+            "values": {"values"},
+            "zip": {"zip"},
+            "cases": {"cases"},
+            "draw": {"draw", "over", "count"},
+        }
+        given = {name for name in type(self).model_fields if getattr(self, name) is not None}
+        forms = [form for form in allowed if form.replace("from", "from_") in given]
+        if len(forms) != 1 or given - allowed[forms[0]]:
+            told = ", ".join(sorted(name.rstrip("_") for name in given)) or "nothing"
+            raise InputError(
+                f"axis must have one of from-to-count, values, zip, cases or draw, got {told}; "
+                "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }"
+            )
+        needed = {"from": ("to", "count"), "draw": ("over", "count")}.get(forms[0], ())
+        missing = [name for name in needed if getattr(self, name) is None]
+        if missing:
+            raise InputError(
+                f"axis must have {' and '.join(needed)} beside {forms[0]}, got no "
+                f"{' and no '.join(missing)}; add it"
+            )
+        return self
+
+
+class ThresholdTable(BaseModel):
+    """How thresholds of stiffness are looked for.
+
+    Attributes
+    ----------
+    between : pair of float
+        Stiffnesses over K_c = (B - A) W0/D0 of the same point.
+    scan : int
+        Stiffnesses looked at before the search, at equal ratios.
+    """
+
+    model_config = _STRICT
+
+    between: tuple[float, float] = (0.3, 4.0)
+    scan: PositiveInt = 24
+
+
+class NumberTable(BaseModel):
+    """A number read from a transient.
+
+    Attributes
+    ----------
+    of : str
+        A channel: ``friction``, ``force``, ``load``, ``velocity``, ``slip_velocity``,
+        ``displacement``.
+    take : str
+        ``mean``, ``min``, ``max``, ``range``, ``std``, ``first`` or ``last``.
+    from_, to : float or str, optional
+        Times between which it is taken (s), written ``from``; the whole transient by default.
+    """
+
+    model_config = _STRICT
+
+    of: str
+    take: str
+    from_: float | str | None = Field(default=None, alias="from")
+    to: float | str | None = None
+
+
+class TransientTable(BaseModel):
+    """A transient, and the numbers that are read from it.
+
+    Attributes
+    ----------
+    steps : tuple of str
+        Lines as those of a protocol; ``{epsilon}`` stands for the value at the point.
+    numbers : mapping of str to NumberTable
+    sampling : float or str
+        Samples per second (Hz).
+    rtol : float
+    most_steps : float
+    """
+
+    model_config = _STRICT
+
+    steps: tuple[str, ...]
+    numbers: Mapping[str, NumberTable]
+    sampling: float | str
+    rtol: float = 1e-9
+    most_steps: float = 2e6
+
+
+class SweepPlan(BaseModel):
+    """What a sweep computes.
+
+    Attributes
+    ----------
+    axes : mapping of str to AxisTable
+        In the order of the dimensions. The grid is the product of all of them.
+    law : str
+        Friction law, where no axis has a column ``law``.
+    material : str
+        Where numbers come from that neither an axis nor `parameters` has.
+    parameters : mapping of str to float, str or bool
+        Numbers that are the same at every point, by the names of tables, and ratios.
+    solve : {"periodic", "threshold", "transient"}
+    outputs : tuple of str
+        What is kept of each point; all that the solve has by default.
+    seed : int
+        Of drawn axes.
+    chunk : int, optional
+        Points solved and written together, about.
+    threshold, transient
+        How these are solved.
+    title : str
+    folder : Path
+        Where files that the plan names lie.
+
+    Raises
+    ------
+    PlanError
+        An `InputError` with all mistakes.
+    """
+
+    model_config = _STRICT
+
+    axes: Mapping[str, AxisTable]
+    law: str = ""
+    material: str = ""
+    parameters: Mapping[str, Given] = {}
+    solve: Literal["periodic", "threshold", "transient"] = "periodic"
+    outputs: tuple[str, ...] | None = None
+    seed: int = 0
+    chunk: PositiveInt | None = None
+    threshold: ThresholdTable = ThresholdTable()
+    transient: TransientTable | None = None
+    title: str = ""
+    folder: Path = Path()
+
+    def __init__(self, **fields: Any) -> None:
+        models: dict[str, type[BaseModel]] = {
+            "": SweepPlan,
+            "axes": AxisTable,
+            "threshold": ThresholdTable,
+            "transient": TransientTable,
+        }
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise PlanError(sentences(error, models)) from None
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A plan with some fields replaced, checked as any other."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **(update or {})})

@@ -1,0 +1,103 @@
+"""What a sweep would take, from its plan and a sample of its points."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.sweep.plan import SweepGrid, SweepPlan, load_plan
+from asperity.sweep.solve import SOLVES
+
+#: Points of the sample, and seconds that its second stage may take.
+_SAMPLE, _SECONDS = 2000, 20.0
+
+
+@dataclass(frozen=True)
+class SweepEstimate:
+    """What a sweep would take.
+
+    Attributes
+    ----------
+    shape, chunk_shape : tuple of int
+        Rows of each axis, and of a chunk.
+    points, chunks : int
+    bytes : float
+        In the store, uncompressed.
+    sample : int
+        Points that were solved for the estimate.
+    second_stage : float
+        Share of the points that the fast method leaves.
+    failed : float
+        Share of the points of the sample without an answer; of those of the second stage that
+        there was time for.
+    seconds : float
+        Processor time for all points; to be divided by the workers.
+    """
+
+    shape: tuple[int, ...]
+    chunk_shape: tuple[int, ...]
+    points: int
+    chunks: int
+    bytes: float
+    sample: int
+    second_stage: float
+    failed: float
+    seconds: float
+
+
+def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
+    """Count the points of a plan, and solve some of them for an estimate of the time.
+
+    Raises
+    ------
+    InputError
+        If the plan has mistakes.
+    """
+    if not isinstance(plan, SweepPlan):
+        plan = load_plan(plan)
+    grid = SweepGrid.of(plan)
+    solve = SOLVES[plan.solve]
+    count = min(_SAMPLE, grid.points, max(1, solve.chunk_points(grid)))
+    numbers = np.random.default_rng(0).choice(grid.points, count, replace=False) if (
+        grid.points < 10**7
+    ) else np.unique(np.random.default_rng(0).integers(0, grid.points, count))  # fmt: skip
+    points = grid.numbered(np.sort(numbers))
+    # Once for the compiler, once for the clock.
+    for _ in range(2):
+        begin = time.process_time()
+        found = solve.first(points, grid.record)
+        first = time.process_time() - begin
+    left = found.left
+    share = len(left) / len(points)
+    second, solved = 0.0, 0
+    failed = int(np.count_nonzero(found.outcome > 0))
+    seen = len(points) - len(left)
+    batches = solve.batches(points, left)
+    if batches:
+        solve.second(points.take(batches[0]), grid.record)  # for the compiler
+    # The sample's batches are mixed; any of them stands for the rest.
+    np.random.default_rng(0).shuffle(batches)
+    start = time.perf_counter()
+    for batch in batches:
+        begin = time.process_time()
+        part = solve.second(points.take(batch), grid.record)
+        second, solved = second + time.process_time() - begin, solved + len(batch)
+        failed += part.failed
+        seen += len(batch)
+        if time.perf_counter() - start > _SECONDS:
+            break
+    each = first / len(points) + (share * second / solved if solved else 0.0)
+    return SweepEstimate(
+        shape=grid.shape,
+        chunk_shape=grid.chunks,
+        points=grid.points,
+        chunks=grid.chunk_count,
+        bytes=float(grid.points) * (8 * (len(grid.record["outputs"]) + 1) + 2),
+        sample=len(points),
+        second_stage=share,
+        failed=failed / max(seen, 1),
+        seconds=each * grid.points,
+    )

@@ -1,0 +1,203 @@
+"""Where tasks run: processes of this machine, or the workers of a Dask scheduler."""
+
+from __future__ import annotations
+
+import contextlib
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor, Executor, Future
+from contextlib import contextmanager
+from typing import Any
+
+from asperity.errors import InputError
+from asperity.sweep.run.tasks import ENVIRONMENT
+
+
+class Workers(ABC):
+    """Processes that do tasks.
+
+    Attributes
+    ----------
+    count : int
+    about : str
+        What the store says of them.
+    lost : tuple of type
+        Exceptions of a task whose process died.
+    """
+
+    count: int
+    about: str
+    lost: tuple[type[BaseException], ...] = (BrokenExecutor,)
+
+    @abstractmethod
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        """Hand out a task."""
+
+    def restart(self) -> None:  # noqa: B027
+        """Start new processes in place of dead ones, where that does not happen by itself."""
+
+    @abstractmethod
+    def close(self, *, kill: bool) -> None:
+        """Let the processes go; with `kill`, whatever they are doing."""
+
+
+class LocalProcesses(Workers):
+    """Processes of this machine, each with one thread.
+
+    Parameters
+    ----------
+    count : int
+    """
+
+    def __init__(self, count: int) -> None:
+        self.count = count
+        self.about = f"{count} processes of one machine"
+        self._executor = self._start()
+
+    def _start(self) -> Any:
+        from loky import get_reusable_executor
+
+        # Never forked: a fork of a process in which JAX runs hangs.
+        return get_reusable_executor(
+            max_workers=self.count, env=dict(ENVIRONMENT), timeout=600, initializer=_keep_programs
+        )
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        """As in `Workers`."""
+        try:
+            return self._executor.submit(task, *args)
+        except BrokenExecutor:
+            self.restart()
+            return self._executor.submit(task, *args)
+
+    def restart(self) -> None:
+        """As in `Workers`."""
+        self._executor = self._start()
+
+    def close(self, *, kill: bool) -> None:
+        """As in `Workers`; without `kill` the processes stay for the next sweep a while."""
+        if kill:
+            self._executor.shutdown(wait=False, kill_workers=True)
+
+
+def _keep_programs() -> None:
+    """Keep a worker whose memory has grown by 300 MB: that is compiled programs, and no leak."""
+    from loky import process_executor
+
+    process_executor._USE_PSUTIL = False
+
+
+class DaskWorkers(Workers):
+    """Workers of a Dask scheduler.
+
+    Parameters
+    ----------
+    client : distributed.Client
+    about : str
+    """
+
+    def __init__(self, client: Any, about: str) -> None:
+        from distributed.scheduler import KilledWorker
+
+        self.client = client
+        self.lost = (KilledWorker,)
+        self.count = max(1, sum(client.nthreads().values()))
+        self.about = f"{about}, {self.count} threads"
+        self._executor: Executor = client.get_executor(pure=False)
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        """As in `Workers`."""
+        return self._executor.submit(task, *args)
+
+    def close(self, *, kill: bool) -> None:
+        """As in `Workers`."""
+        self._executor.shutdown(wait=False)
+
+
+@contextmanager
+def local_processes(count: int) -> Iterator[Workers]:
+    """Processes of this machine; they are killed if the block ends with an exception."""
+    workers = LocalProcesses(count)
+    try:
+        yield workers
+    except BaseException:
+        workers.close(kill=True)
+        raise
+    workers.close(kill=False)
+
+
+@contextmanager
+def local_cluster(count: int) -> Iterator[Workers]:
+    """A Dask cluster on this machine, for the time of the block.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed.
+    """
+    distributed = _distributed("--cluster")
+    import dask
+
+    with (
+        dask.config.set({"distributed.nanny.pre-spawn-environ": {**_limits(), **ENVIRONMENT}}),
+        distributed.LocalCluster(
+            n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        yield from _using(client, f"Dask cluster on one machine with {count} workers")
+
+
+@contextmanager
+def scheduler(address: str) -> Iterator[Workers]:
+    """The workers of a Dask scheduler that runs already.
+
+    Raises
+    ------
+    InputError
+        If Dask is not installed, or there is no scheduler or no worker at the address.
+    """
+    distributed = _distributed("--scheduler")
+    try:
+        client = distributed.Client(address, timeout="10s")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"--scheduler must be the address of a Dask scheduler, got '{address}' ({error}); "
+            "write it like tcp://host:8786"
+        ) from None
+    with client:
+        try:
+            client.wait_for_workers(1, timeout=60)
+        except TimeoutError:
+            raise InputError(
+                f"--scheduler must have workers, got none at '{address}' within a minute; start "
+                "some with dask worker"
+            ) from None
+        yield from _using(client, f"Dask scheduler at {address}")
+
+
+def _using(client: Any, about: str) -> Iterator[Workers]:
+    workers = DaskWorkers(client, about)
+    kill = True
+    try:
+        yield workers
+        kill = False
+    finally:
+        with contextlib.suppress(RuntimeError):
+            workers.close(kill=kill)
+
+
+def _limits() -> dict[str, str]:
+    """What Dask sets for its workers by default: one thread of every library."""
+    return dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
+
+
+def _distributed(option: str) -> Any:
+    try:
+        import distributed
+    except ImportError:
+        raise InputError(
+            f"{option} must have Dask, got none installed; install it with pip install "
+            "'asperity[dask]', or leave the option out for processes of this machine"
+        ) from None
+    return distributed

@@ -1,0 +1,298 @@
+"""A sweep from its plan to its store."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import platform
+import socket
+import time
+from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from asperity._version import __version__
+from asperity.errors import InputError
+from asperity.laws import get_law
+from asperity.materials import citation
+from asperity.orbit.processes import available_cores
+from asperity.outputs import differences, free_disk, require_disk, size_text
+from asperity.parameters.arguments import file_path, whole_number
+from asperity.sweep.plan import SweepGrid, SweepPlan, load_plan
+from asperity.sweep.run.driver import Driver, SweepProgress, is_full, units_of
+from asperity.sweep.run.executors import Workers, local_cluster, local_processes, scheduler
+from asperity.sweep.run.tasks import Job
+from asperity.sweep.store.extend import extend, is_extension
+from asperity.sweep.store.lock import StoreLock
+from asperity.sweep.store.pieces import remove_pieces
+from asperity.sweep.store.store import SweepStore, create
+
+#: Seconds between signs of life in the lock file.
+_REFRESH = 5.0
+#: Packages whose versions the store records.
+_PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "zarr", "loky", "distributed")
+
+
+@dataclass(frozen=True)
+class SweepSummary:
+    """How a run went.
+
+    Attributes
+    ----------
+    out : Path
+    points, failed : int
+        All points of the store, and those without a converged answer.
+    solved : int
+        Points that this run solved.
+    seconds : float
+    memory : float
+        Largest resident memory of a worker (bytes).
+    lost : int
+        Times that a worker process died.
+    """
+
+    out: Path
+    points: int
+    failed: int
+    solved: int
+    seconds: float
+    memory: float
+    lost: int
+
+
+def run_sweep(
+    plan: SweepPlan | str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    workers: int | Workers | None = None,
+    cluster: int | None = None,
+    address: str | None = None,
+    extend_store: bool = False,
+    retry_failed: bool = False,
+    progress: Callable[[SweepProgress], None] | None = None,
+    log: Callable[[str], None] | None = None,
+) -> SweepSummary:
+    """Solve every point of a plan and write it to a Zarr store.
+
+    The same call goes on after an interruption of any kind: chunks that are done and sound are
+    read and kept, whatever the number of workers.
+
+    Parameters
+    ----------
+    plan : SweepPlan or path
+    out : path
+        Folder of the store.
+    workers : int or Workers, optional
+        Processes of this machine; one for each core by default. Or any other
+        `asperity.sweep.run.executors.Workers`.
+    cluster : int, optional
+        Workers of a Dask cluster on this machine, instead.
+    address : str, optional
+        Of a Dask scheduler, instead.
+    extend_store : bool
+        The plan may have more rows than the store's, behind those that it has.
+    retry_failed : bool
+        Solve chunks with failed points again, with this version of the package.
+    progress : callable, optional
+        Called with a `SweepProgress` at least once a second.
+    log : callable, optional
+        Called with lines about what went wrong on the way.
+
+    Raises
+    ------
+    InputError
+        If the plan has mistakes, the store has another plan or is in use, or the disk is full.
+    """
+    path = file_path(out, "out").resolve()
+    text = ""
+    if not isinstance(plan, SweepPlan):
+        text = Path(plan).read_text(encoding="utf-8-sig") if Path(plan).is_file() else ""
+        plan = load_plan(plan)
+    grid = SweepGrid.of(plan)
+    pool = _workers(workers, cluster, address)
+    with StoreLock(path) as lock:
+        store = _opened(path, plan, text, grid, extend_store, retry_failed)
+        swept = store.sweep_orphans()
+        if swept and log is not None:
+            log(f"{swept} files that killed writers had left half-written were removed")
+        require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
+                     "choose another disk or fewer outputs")  # fmt: skip
+        with pool as found:
+            return _run(store, lock, found, retry_failed, progress, log)
+
+
+def _workers(
+    workers: int | Workers | None, cluster: int | None, address: str | None
+) -> AbstractContextManager[Workers]:
+    given = [n for n, v in (("workers", workers), ("cluster", cluster), ("scheduler", address))
+             if v is not None]  # fmt: skip
+    if len(given) > 1:
+        raise InputError(
+            f"{given[0]} must be the only choice of where to run, got {' and '.join(given)}; "
+            "leave all but one out"
+        )
+    if cluster is not None:
+        return local_cluster(whole_number(cluster, "cluster", least=1))
+    if address is not None:
+        return scheduler(address)
+    if isinstance(workers, Workers):
+        return nullcontext(workers)
+    count = available_cores() if workers is None else whole_number(workers, "workers", least=1)
+    return local_processes(count)
+
+
+def _opened(
+    path: Path, plan: SweepPlan, text: str, grid: SweepGrid, extending: bool, retry: bool
+) -> SweepStore:
+    """The store of the plan: a new one, or one of the same plan."""
+    if not path.exists() or (path.is_dir() and not any(path.iterdir())):
+        if path.exists():
+            path.rmdir()
+        if not path.parent.is_dir():
+            raise InputError(
+                f"out must lie in a folder that exists, got '{path}'; make the folder or choose "
+                "another"
+            )
+        remove_pieces(path)
+        return create(path, grid, _attributes(plan, text, grid))
+    store = SweepStore(path)
+    if store.attributes.get("asperity_version") != __version__ and not retry:
+        raise InputError(
+            f"out must be of this version of asperity, {__version__}, got "
+            f"'{path.name}' of {store.attributes.get('asperity_version')}, whose numbers may "
+            "differ in their last digits; finish it with that version, or choose another store"
+        )
+    pending = store.attributes.get("extending")
+    if pending:
+        store = extend(store, json.loads(pending))
+    if store.record == grid.record:
+        return store
+    if extending and is_extension(store.record, grid.record):
+        remove_pieces(path)
+        store = extend(store, grid.record)
+        store.update_attributes(plan_text=text)
+        return store
+    told = differences(store.record, grid.record)
+    way = "its axes may only become longer" if extending else (
+        "change the plan back, choose another store, or add points to the end of axes with --extend"
+    )  # fmt: skip
+    raise InputError(f"{path.name} must have the same plan, got {told}; {way}")
+
+
+def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
+    sources = {
+        key.strip()
+        for law in grid.record["laws"]
+        for key in get_law(law).source.split(",")
+        if key.strip()
+    }
+    return {
+        "title": plan.title or f"Sweep of {grid.points:,} points",
+        "source": f"asperity {__version__}",
+        "asperity_version": __version__,
+        "plan_text": text,
+        "relative_tolerance": 1e-8,
+        "convention": "F/W0 = mean_friction + sum mu_n cos(n w t + phase_n), w(t) = W/W0",
+        "references": [citation(key) for key in sorted(sources)],
+        "runs": [],
+    }
+
+
+def _bytes_left(store: SweepStore) -> float:
+    """Bytes that the chunks which are not done will take, uncompressed, at most."""
+    done = sum(1 for _ in _status_files(store))
+    left = max(0, store.grid.chunk_count - done) / store.grid.chunk_count
+    return left * store.grid.points * (8 * (len(store.record["outputs"]) + 1) + 2)
+
+
+def _status_files(store: SweepStore) -> Any:
+    folder = store.path / "status" / "c"
+    for _, _, names in os.walk(folder):
+        yield from names
+
+
+def _run(
+    store: SweepStore,
+    lock: StoreLock,
+    workers: Workers,
+    retry: bool,
+    progress: Callable[[SweepProgress], None] | None,
+    log: Callable[[str], None] | None,
+) -> SweepSummary:
+    grid = store.grid
+    counts = SweepProgress(total=grid.points, chunk_total=grid.chunk_count)
+    job = Job(str(store.path), grid.digest, lock.token, retry)
+    runs = [*store.attributes.get("runs", []), _started(workers)]
+    store.update_attributes(runs=runs)
+    refreshed = time.monotonic()
+
+    def tick(now: SweepProgress) -> None:
+        nonlocal refreshed
+        if time.monotonic() - refreshed > _REFRESH:
+            lock.refresh()
+            refreshed = time.monotonic()
+        if progress is not None:
+            progress(now)
+
+    chunks = units_of(grid.chunk_count, grid.size)
+    driver = Driver(job, chunks, workers, counts, tick, log or (lambda _: None))
+    try:
+        driver.run()
+    except OSError as error:
+        room = size_text(free_disk(store.path))
+        why = "the disk is full" if is_full(error) else (error.strerror or str(error)).lower()
+        raise InputError(
+            f"out must be a folder that can be written, got '{store.path.name}' ({why}, {room} "
+            f"free) after {counts.points:,} of {counts.total:,} points; make room and repeat the "
+            "command, which goes on from there"
+        ) from None
+    finally:
+        with contextlib.suppress(OSError):
+            runs[-1] |= _ended(counts)
+            store.update_attributes(runs=runs)
+    remove_pieces(store.path)
+    return SweepSummary(
+        out=store.path,
+        points=counts.points,
+        failed=counts.failed,
+        solved=counts.points - counts.kept,
+        seconds=counts.seconds,
+        memory=counts.memory,
+        lost=counts.lost,
+    )
+
+
+def _started(workers: Workers) -> dict[str, Any]:
+    return {
+        "started": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "ended": None,
+        "host": socket.gethostname(),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "workers": workers.about,
+        "asperity": __version__,
+        "python": platform.python_version(),
+        **{name: found for name in _PACKAGES if (found := _version(name))},
+    }
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
+def _ended(counts: SweepProgress) -> Mapping[str, Any]:
+    return {
+        "ended": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "seconds": round(counts.seconds, 3),
+        "points_solved": counts.points - counts.kept,
+        "points_kept": counts.kept,
+        "failed": counts.failed,
+        "worker_memory": round(counts.memory),
+        "workers_lost": counts.lost,
+    }

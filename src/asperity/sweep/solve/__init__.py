@@ -1,0 +1,13 @@
+"""What a sweep solves at each of its points: one module a kind."""
+
+from asperity.sweep.solve.kind import Findings, SolveKind
+from asperity.sweep.solve.periodic import PeriodicSolve
+from asperity.sweep.solve.threshold import ThresholdSolve
+from asperity.sweep.solve.transient import TransientSolve
+
+#: Every kind, by the name that plans use.
+SOLVES: dict[str, SolveKind] = {
+    kind.name: kind for kind in (PeriodicSolve(), ThresholdSolve(), TransientSolve())
+}
+
+__all__ = ["SOLVES", "Findings", "SolveKind"]

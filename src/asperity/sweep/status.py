@@ -1,0 +1,159 @@
+"""How far a store is, and statistics over all of its points, chunk by chunk."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.parameters.arguments import file_path
+from asperity.sweep.solve.outcome import SweepOutcome, words
+from asperity.sweep.store.lock import holder_of, is_held
+from asperity.sweep.store.store import NOT_DONE, SweepStore
+
+
+@dataclass(frozen=True)
+class SweepStatus:
+    """How far a sweep is.
+
+    Attributes
+    ----------
+    store : Path
+    title : str
+    points, done, failed : int
+        All points, those in chunks that are done, and those of these without a converged answer.
+    chunks, chunks_done : int
+    outcomes : dict of str to int
+        Points of each outcome, of chunks that are done.
+    running : str
+        Who is at work on it; "" for nobody.
+    runs : list of dict
+        Every run so far: when, where, with which versions, how many points.
+    bytes : int
+        On the disk.
+    """
+
+    store: Path
+    title: str
+    points: int
+    done: int
+    failed: int
+    chunks: int
+    chunks_done: int
+    outcomes: dict[str, int]
+    running: str
+    runs: list[dict[str, Any]]
+    bytes: int
+
+
+def store_status(store: str | os.PathLike[str]) -> SweepStatus:
+    """How far a sweep is, while it runs too.
+
+    Raises
+    ------
+    InputError
+        If there is no store of a sweep.
+    """
+    found = SweepStore(file_path(store, "store").resolve(), mode="r")
+    outcomes: Counter[int] = Counter()
+    chunks = done = failed = 0
+    for chunk, count in _done(found):
+        chunks, done, failed = chunks + 1, done + found.grid.size(chunk), failed + count
+        codes, counts = np.unique(found.read(chunk, ("outcome",))["outcome"], return_counts=True)
+        outcomes.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
+    names = words()
+    lock = found.path.with_name(found.path.name + ".lock")
+    holder = holder_of(lock)
+    running = ""
+    if holder and is_held(lock):
+        running = f"process {holder['process']} on {holder['host']} since {holder['since']}"
+    return SweepStatus(
+        store=found.path,
+        title=str(found.attributes.get("title", "")),
+        points=found.grid.points,
+        done=done,
+        failed=failed,
+        chunks=found.grid.chunk_count,
+        chunks_done=chunks,
+        outcomes={names.get(code, str(code)): n for code, n in sorted(outcomes.items())},
+        running=running,
+        runs=list(found.attributes.get("runs", [])),
+        bytes=sum(f.stat().st_size for f in found.path.rglob("*") if f.is_file()),
+    )
+
+
+@dataclass
+class _Moments:
+    """Sums that two parts of a population can be joined from (Chan, Golub and LeVeque, 1979)."""
+
+    count: int = 0
+    mean: float = 0.0
+    square: float = 0.0
+    low: float = math.inf
+    high: float = -math.inf
+
+    def add(self, values: np.ndarray) -> None:
+        """Join the finite ones of some values."""
+        values = values[np.isfinite(values)]
+        if not values.size:
+            return
+        count, mean = values.size, float(values.mean())
+        square = float(((values - mean) ** 2).sum())
+        total, apart = self.count + count, mean - self.mean
+        self.square += square + apart**2 * self.count * count / total
+        self.mean += apart * count / total
+        self.count = total
+        self.low = min(self.low, float(values.min()))
+        self.high = max(self.high, float(values.max()))
+
+    def record(self) -> dict[str, float]:
+        """The statistics by name; NaN where there is no value."""
+        none = not self.count
+        return {
+            "count": self.count,
+            "mean": math.nan if none else self.mean,
+            "std": math.nan if none else math.sqrt(self.square / self.count),
+            "min": math.nan if none else self.low,
+            "max": math.nan if none else self.high,
+        }
+
+
+def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, float]]:
+    """Count, mean, standard deviation, smallest and largest value of every output.
+
+    Over the points that have one, a chunk at a time: memory does not grow with the store.
+
+    Raises
+    ------
+    InputError
+        If there is no store of a sweep.
+    """
+    found = SweepStore(file_path(store, "store").resolve(), mode="r")
+    names = tuple(found.record["outputs"])
+    moments = {name: _Moments() for name in names}
+    for chunk, _ in _done(found):
+        values = found.read(chunk, (*names, "outcome"))
+        solved = values["outcome"] == SweepOutcome.CONVERGED
+        for name in names:
+            moments[name].add(values[name][solved])
+    return {name: m.record() for name, m in moments.items()}
+
+
+def _done(store: SweepStore) -> Iterator[tuple[int, int]]:
+    """Chunks that are done, with their failed points."""
+    for chunk in range(store.grid.chunk_count):
+        failed = store.failed_in(chunk)
+        if failed != NOT_DONE:
+            yield chunk, failed
+
+
+def status_record(status: SweepStatus) -> dict[str, Any]:
+    """The status as JSON values."""
+    return json.loads(json.dumps({**vars(status), "store": str(status.store)}))

@@ -1,0 +1,152 @@
+"""The averaged (high-frequency) limit: states constant over a period.
+
+When a period is too short for the states to move, only the means of their rates count, and with
+the mean slip rate equal to the pulling velocity the periodic orbit shrinks to a point:
+
+    < v_pl(f/w, state, w) > = V,      < state rates > = 0.
+
+The exponent of v_pl varies by eps mu / A, tens of units, so the mean over the load cycle is
+that of a narrow pulse at the weakest contact. The start comes from its Laplace (saddle-point)
+estimate, and Newton's method works on the logarithm of the mean slip rate, which is nearly linear.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+
+from asperity.algebra.small_systems import Matrix, inverse_points
+from asperity.loads import Excitation
+from asperity.slider import QuasiStatic
+
+#: Largest change of a logarithmic state in one step; the mean of e^(-state) is what is solved for.
+_STATE_STEP = 2.0
+
+
+class SlipPulse(NamedTuple):
+    """Slip concentrated where the contact is weakest, for states of steady sliding."""
+
+    weakest: Array  # spring force at which the weakest contact carries V
+    width: Array  # of the exponent of the slip rate, in units of that force
+    swing: Array  # of that force over the cycle, half its range
+
+    @property
+    def sharpness(self) -> Array:
+        """Half the range of the exponent of the slip rate over the cycle."""
+        return self.swing / self.width
+
+
+def slip_pulse(system: QuasiStatic, at: Excitation) -> SlipPulse:
+    """The pulse over samples of the load cycle, arrays of shape (nodes, points)."""
+    law = system.slider.law
+    state, w = tuple(system.steady()[1:]), at.w
+
+    def friction(log_v: Array) -> Array:
+        return law.friction(jnp.exp(log_v), state, w)
+
+    log_v = jnp.log(system.V)
+    strength, direct_effect = jax.jvp(friction, (log_v,), (jnp.ones_like(log_v),))
+    carried = strength * (w + system.compliance_ratio) - at.shear
+    weakest = carried.min(0)
+    return SlipPulse(weakest, (direct_effect * w).min(0), 0.5 * (carried.max(0) - weakest))
+
+
+def laplace_estimate(system: QuasiStatic, at: Excitation) -> Array:
+    """States at which the pulse of slip at the weakest contact carries the mean velocity.
+
+    Parameters
+    ----------
+    system : QuasiStatic
+    at : Excitation
+        Samples of the load cycle, arrays of shape (nodes, points).
+
+    Returns
+    -------
+    array, shape (size, points)
+    """
+    start = jnp.broadcast_to(system.steady(), (system.size, at.w.shape[1]))
+    pulse = slip_pulse(system, at)
+    # Second derivative of the strength at its minimum, as if its whole swing were one cosine.
+    gain = 0.5 * jnp.log(jnp.maximum(2 * jnp.pi * pulse.sharpness, 1.0))
+    return start.at[0].set(jnp.minimum(start[0], pulse.weakest + pulse.width * gain))
+
+
+class AveragedLimit(NamedTuple):
+    """The averaged limit, as tuples of arrays (points,) over the states."""
+
+    centre: tuple[Array, ...]
+    matrix: Matrix  # [i][j]: derivative of the mean rate of state i to state j
+
+
+def averaged_limit(
+    system: QuasiStatic,
+    at: Excitation,
+    weights: Array,
+    *,
+    tolerance: float = 1e-12,
+    max_steps: int = 12,
+) -> AveragedLimit:
+    """States that make the mean rates vanish, by Newton's method from `laplace_estimate`.
+
+    Parameters
+    ----------
+    system : QuasiStatic
+    at : Excitation
+        Samples of the load cycle, arrays of shape (nodes, points). Of the pulling velocity only
+        the mean counts.
+    weights : array, shape (nodes,)
+        Their share of the period; sums to 1.
+    tolerance : float
+        On the last change of the exponent of the slip rate and of the logarithmic states.
+    max_steps : int
+        Newton steps at most.
+
+    Returns
+    -------
+    AveragedLimit
+        Not finite where it failed.
+    """
+    points = at.w.shape[1]
+    n = system.size
+
+    def unfinished(carry: tuple) -> Array:
+        *_, change, steps = carry
+        return (steps < max_steps) & jnp.any(change > tolerance)
+
+    def body(carry: tuple) -> tuple:
+        centre, _, _, steps = carry
+        return (*_newton_step(system, centre, at, weights), steps + 1)
+
+    none = [[jnp.zeros(points)] * n] * n
+    start = (tuple(laplace_estimate(system, at)), none, jnp.full(points, jnp.inf), 0)
+    centre, matrix, _, _ = jax.lax.while_loop(unfinished, body, start)
+    return AveragedLimit(centre, matrix)
+
+
+def _newton_step(
+    system: QuasiStatic, centre: tuple[Array, ...], at: Excitation, weights: Array
+) -> tuple:
+    """The new means, the matrix used, and the largest logarithmic change."""
+    # Of constant states, terms in the slopes of load and shear force have zero mean.
+    flat = jnp.zeros_like(at.w)
+    constant = Excitation(at.w, flat, at.shear)
+
+    def rates(*Y: Array) -> tuple[Array, ...]:
+        return tuple(system.rates(jnp.stack(Y), constant))
+
+    value, push = jax.linearize(rates, *(c + flat for c in centre))
+    one = jnp.ones_like(at.w)
+    n = len(centre)
+    columns = [push(*(one if i == j else flat for j in range(n))) for i in range(n)]
+    matrix = [[weights @ column[i] for column in columns] for i in range(n)]
+    mean = [weights @ rate for rate in value]
+    slip = 1 - mean[0] / system.kappa
+    mean[0] = -system.kappa * slip * jnp.log(slip)
+    inverse = inverse_points(matrix)
+    change = [-sum(a * m for a, m in zip(row, mean, strict=True)) for row in inverse]
+    change[1:] = [jnp.clip(c, -_STATE_STEP, _STATE_STEP) for c in change[1:]]
+    moved = jnp.stack([jnp.log(slip), *change[1:]])
+    return tuple(c + d for c, d in zip(centre, change, strict=True)), matrix, jnp.abs(moved).max(0)

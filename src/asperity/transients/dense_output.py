@@ -1,0 +1,95 @@
+"""The solution between two instants, as polynomials in time, one a step."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from jax import Array
+
+#: Steps that a compiled program takes before it returns.
+STEPS = 2048
+
+#: Events are looked for at the ends of this many equal parts of every step.
+PARTS = 4
+
+#: Status of a compiled program: more steps to take, or no accurate step.
+GOING_ON, UNDERFLOW = 0, 1
+
+
+class StepChunk(NamedTuple):
+    """Some steps, as a compiled program returns them.
+
+    Attributes
+    ----------
+    begin, length : array, shape (STEPS,)
+        Beginning of each accepted step and its length (s).
+    coefficients : array, shape (STEPS, degree + 1, size)
+        Of rising powers of (time - begin) / length.
+    taken : int
+        Number of accepted steps; rows beyond are not used.
+    t, Y : array
+        Time (s) and states at the end of the last of them.
+    next_length : array
+        Proposal for the next step (s).
+    rejected : int
+        Number of rejected steps.
+    status : int
+        GOING_ON, or UNDERFLOW where no step however short was accurate.
+    doubtful : int
+        Steps of the explicit method at its limit of stability, or of the implicit method that an
+        explicit one could have made.
+    """
+
+    begin: Array
+    length: Array
+    coefficients: Array
+    taken: Array
+    t: Array
+    Y: Array
+    next_length: Array
+    rejected: Array
+    status: Array
+    doubtful: Array
+
+
+class DenseOutput(NamedTuple):
+    """Accepted steps one after the other, as in `StepChunk` without its unused rows.
+
+    Attributes
+    ----------
+    begin, length : array, shape (steps,)
+    coefficients : array, shape (degree + 1, size, steps)
+        Steps last, so that many instants are evaluated along memory.
+    """
+
+    begin: np.ndarray
+    length: np.ndarray
+    coefficients: np.ndarray
+
+    @classmethod
+    def of(cls, chunk: StepChunk) -> DenseOutput:
+        """The steps of a chunk."""
+        begin, length, coefficients = (np.asarray(a)[: int(chunk.taken)] for a in chunk[:3])
+        return cls(begin, length, np.ascontiguousarray(np.moveaxis(coefficients, 0, -1)))
+
+    @property
+    def end(self) -> float:
+        """Where the last step ends (s)."""
+        return float(self.begin[-1] + self.length[-1])
+
+    def evaluate(self, t: np.ndarray) -> np.ndarray:
+        """States at the times `t` within the steps, shape (size, n)."""
+        i = np.clip(np.searchsorted(self.begin, t, side="right") - 1, 0, len(self.begin) - 1)
+        # A step may be shorter than the spacing of the numbers `t`.
+        share = np.clip((t - self.begin[i]) / self.length[i], 0.0, 1.0)
+        value = self.coefficients[-1].take(i, axis=1)
+        for coefficient in self.coefficients[-2::-1]:
+            value = value * share + coefficient.take(i, axis=1)
+        return value
+
+    def refined(self) -> np.ndarray:
+        """Times that divide every step in `PARTS`, with the end, shape (PARTS count + 1,)."""
+        shares = np.arange(PARTS) / PARTS
+        inner = (self.begin[:, None] + self.length[:, None] * shares).ravel()
+        return np.append(inner, self.end)

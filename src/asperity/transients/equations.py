@@ -1,0 +1,161 @@
+"""The integrated equations: an equation of motion with its displacement, under one segment."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+
+from asperity.loads import Excitation
+from asperity.loads.programme.segments import Segment
+from asperity.slider import Motion, QuasiStatic
+from asperity.transients.dense_output import PARTS, StepChunk
+
+#: Relative error of the displacement that rounding leaves room for.
+_DIGITS = 1e-13
+
+#: Numbers of instants that one call of a compiled program evaluates; the smallest that is enough.
+BATCH_SIZES = (64, 1024, 4096)
+
+
+class System(eqx.Module):
+    """Rates in time of Y = (*states of the motion, x K / W0), x the displacement of the slider.
+
+    Parameters
+    ----------
+    motion : Motion
+        With omega = 1 rad/s, so that its radians are seconds.
+    segment : Segment
+    ringing : array
+        Error of v/V that is tolerated for each unit of error of F_i/W, where the slider's ringing
+        on its asperities is left out (`asperity.transients.pace`); 0 where it is resolved.
+    """
+
+    motion: Motion
+    segment: Segment
+    ringing: ArrayLike = 0.0
+
+    def at(self, t: Array) -> Excitation:
+        """Excitation at the time `t` (s) of the segment."""
+        return self.segment.at(t, self.motion.slider.W0, self.motion.V)
+
+    def motion_rates(self, at: Excitation, Y: Array) -> tuple[Array, Array]:
+        """Rates of the motion's states, and of x K / W0; no rate depends on x."""
+        motion = self.motion
+        rates = motion.rates(Y, at)
+        if isinstance(motion, QuasiStatic):
+            x_rate = motion.kappa * motion.slider_velocity(Y, at)
+        else:
+            # The first state is the spring force: dF/dt = K (V p - v).
+            x_rate = motion.kappa * at.pull - rates[0]
+        return rates, x_rate
+
+    def rates(self, at: Excitation, Y: Array) -> Array:
+        """dY/dt (1/s), same shape as Y, (size + 1, ...)."""
+        rates, x_rate = self.motion_rates(at, Y[:-1])
+        return jnp.concatenate([rates, jnp.broadcast_to(x_rate, rates.shape[1:])[None]])
+
+    def scale(self, Y: Array, rtol: Array, atol: Array) -> Array:
+        """Error of a step that counts as 1, shape (size + 1,).
+
+        An error of a logarithm is a relative error already. The displacement, which grows without
+        bound, keeps the error of the force as long as its digits allow it.
+        """
+        free = np.ones(self.motion.size + 1, bool)
+        free[list(self.motion.linear)] = False
+        scale = jnp.where(free, rtol, atol + rtol * jnp.abs(Y))
+        scale = scale.at[-1].max(_DIGITS * jnp.abs(Y[-1]))
+        names = self.motion.mechanical
+        if "velocity" not in names:
+            return scale
+        v, friction = names.index("velocity"), names.index("friction")
+        return scale.at[v].max(self.ringing * scale[friction])
+
+    def first_length(self, t: Array, Y: Array) -> Array:
+        """Length (s) of a first step over which no state changes by much more than a hundredth."""
+        slope = jnp.abs(self.rates(self.at(t), Y))[:-1]
+        relative = jnp.max(slope / jnp.maximum(jnp.abs(Y[:-1]), 1e-3))
+        # No upper limit is needed: a step that is too long is rejected and shortened.
+        return 0.01 / jnp.maximum(relative, 1e-30)
+
+
+class MotionSamples(NamedTuple):
+    """Forces and velocities that follow from the states; arrays of shape (n,).
+
+    Attributes
+    ----------
+    force, load : array
+        F/W0 and W/W0.
+    velocity, slip : array
+        Velocity of the slider and plastic velocity, over V.
+    friction : array
+        F_i/W.
+    unsteadiness : array
+        Distance from steady sliding: the larger of the relative deviation of the velocity and the
+        largest change of a state while the drive moves by W0/K. NaN while the drive stands still.
+    """
+
+    force: np.ndarray
+    load: np.ndarray
+    velocity: np.ndarray
+    slip: np.ndarray
+    friction: np.ndarray
+    unsteadiness: np.ndarray
+
+
+def _read(system: System, t: Array, Y: Array) -> Array:
+    motion, at, states = system.motion, system.at(t), Y[:-1]
+    law = motion.slider.law
+    velocity = motion.slider_velocity(states, at)
+    if isinstance(motion, QuasiStatic):
+        friction = motion.friction(states, at)
+    elif "friction" in motion.mechanical:
+        friction = states[motion.mechanical.index("friction")]
+    else:
+        friction = law.friction(motion.V * velocity, motion.law_state(states), at.w)
+    elastic = isinstance(motion, QuasiStatic) or "friction" in motion.mechanical
+    slip = motion.slip_velocity(friction, states, at) if elastic else velocity
+    speed = jnp.where(at.pull > 0, at.pull, jnp.nan)
+    change = jnp.abs(motion.rates(states, at)).max(0) / (motion.kappa * speed)
+    unsteadiness = jnp.maximum(change, jnp.abs(velocity / speed - 1))
+    force = motion.force(states, at)
+    # One array: every output of a compiled program costs time.
+    columns = MotionSamples(force, at.w, velocity, slip, friction, unsteadiness)
+    return jnp.stack([jnp.broadcast_to(a, t.shape) for a in columns])
+
+
+_read_points = jax.jit(_read)
+
+
+def motion_samples(system: System, t: np.ndarray, Y: np.ndarray) -> MotionSamples:
+    """Evaluate the states `Y`, shape (size + 1, n), at the times `t` of the segment, shape (n,)."""
+    parts = []
+    most = next((room for room in BATCH_SIZES if len(t) <= room), BATCH_SIZES[-1])
+    for i in range(0, max(len(t), 1), most):
+        # Filled up with the last instant, so that one program serves any number.
+        part = np.minimum(np.arange(i, i + most), len(t) - 1)
+        parts.append(np.asarray(_read_points(system, t[part], Y[:, part]))[:, : len(t) - i])
+    return MotionSamples(*np.concatenate(parts, axis=1))
+
+
+def step_samples(system: System, chunk: StepChunk) -> MotionSamples:
+    """Evaluate the steps of a chunk at `DenseOutput.refined`."""
+    inner, end = jax.device_get(_read_steps(system, chunk))
+    return MotionSamples(*np.concatenate([inner[:, : PARTS * int(chunk.taken)], end], axis=1))
+
+
+@jax.jit
+def _read_steps(system: System, chunk: StepChunk) -> tuple[Array, Array]:
+    shares = jnp.arange(PARTS) / PARTS
+    t = chunk.begin[:, None] + chunk.length[:, None] * shares
+    powers = jnp.moveaxis(chunk.coefficients, 0, -1)[..., None]
+    Y = powers[-1]
+    for coefficient in powers[-2::-1]:
+        Y = Y * shares + coefficient
+    Y = jnp.broadcast_to(Y, (Y.shape[0], *t.shape)).reshape(Y.shape[0], -1)
+    return _read(system, t.ravel(), Y), _read(system, chunk.t[None], chunk.Y[:, None])

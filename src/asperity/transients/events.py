@@ -1,0 +1,242 @@
+"""Events: detected between points of a step, located on the dense output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.slider import Motion, QuasiStatic, StiffInertial
+from asperity.transients.dense_output import DenseOutput
+from asperity.transients.equations import MotionSamples, System, motion_samples
+from asperity.transients.termination import Termination
+
+_ROOT_STEPS = 60
+
+#: v/V below which a slider whose velocity is about to vanish counts as at rest.
+_REST = 1e-9
+
+
+@dataclass(frozen=True)
+class Event:
+    """Slip, steadiness, reversal or termination at an instant.
+
+    Attributes
+    ----------
+    time : float
+        Seconds.
+    kind : str
+        "slip start", "slip end", "steady", "reversal", or the kind of a `Termination`.
+    """
+
+    time: float
+    kind: str
+
+
+@dataclass(frozen=True)
+class EventThresholds:
+    """Limits at whose crossing an event occurs.
+
+    Attributes
+    ----------
+    slip : float
+        Velocity of the slider (m/s) above which it slips.
+    runaway : float
+        Plastic velocity (m/s) above which a slider without inertia counts as running away.
+    steady : float
+        Relative deviation below which sliding counts as steady, or change of a state over a period
+        below which the response to a modulation counts as steady.
+    """
+
+    slip: float
+    runaway: float
+    steady: float
+
+
+#: Signed distance from a threshold; an event is a change of its sign.
+Distance = Callable[[MotionSamples], np.ndarray]
+
+
+class EventDetector:
+    """Detects events, chunk by chunk.
+
+    Parameters
+    ----------
+    motion : Motion
+    thresholds : EventThresholds
+    """
+
+    def __init__(self, motion: Motion, thresholds: EventThresholds) -> None:
+        self._may_run_away = isinstance(motion, QuasiStatic)
+        self._reverses = motion.signed
+        self._may_come_to_rest = motion.signed and isinstance(motion, StiffInertial)
+        V = float(motion.V)
+
+        def log_speed(velocity: np.ndarray, threshold: float) -> np.ndarray:
+            return np.log(np.maximum(velocity * V, 1e-300) / threshold)
+
+        self._slip: Distance = lambda r: log_speed(r.slip, thresholds.slip)
+        self._runaway: Distance = lambda r: log_speed(r.slip, thresholds.runaway)
+        self._unsteadiness: Distance = lambda r: np.log(r.unsteadiness / thresholds.steady)
+        self._friction: Distance = lambda r: r.friction
+        self._steady = thresholds.steady
+        self._before: dict[str, float] = {}
+
+    def enter(self, system: System, start: float) -> None:
+        """Begin a segment; slip that began before it continues."""
+        self._system, self._start = system, start
+        self._steady_reached = not system.segment.constant
+        self._periodic = _PeriodicSteadiness(system.segment.period, self._steady)
+
+    def underflow(self, t: float, states: np.ndarray) -> Termination:
+        """Why no step was accurate at the time `t` of the segment, from `states` (size + 1,)."""
+        now = motion_samples(self._system, np.array([t]), states[:, None])
+        kind = "no accurate step"
+        if self._may_run_away and not self._slip(now)[0] < 0:
+            kind = "runaway"
+        if self._may_come_to_rest and now.velocity[0] < _REST:
+            kind = "rest"
+        return Termination(kind, self._start + t)
+
+    def detect(
+        self, dense_output: DenseOutput, samples: MotionSamples
+    ) -> tuple[list[Event], Termination | None]:
+        """Events of the steps in the order of time, and the first termination, if any.
+
+        `samples` are those at the times `dense_output.refined`.
+        """
+        if len(dense_output.begin) == 0:
+            return [], None
+        times = dense_output.refined()
+        found = [
+            Event(t, "slip start" if up else "slip end")
+            for t, up in self._crossings("slip", self._slip, times, samples, dense_output)
+        ]
+        terminations = []
+        if self._may_run_away:
+            crossed = self._crossings("runaway", self._runaway, times, samples, dense_output)
+            terminations += [
+                Termination("runaway", t) for t, up in crossed if up and t > self._start
+            ]
+        reversals = self._crossings("friction", self._friction, times, samples, dense_output)
+        if self._reverses:
+            found += [Event(t, "reversal") for t, _ in reversals]
+        else:
+            terminations += [Termination("reversal", t) for t, up in reversals if not up]
+        found += self._steadiness(times, samples, dense_output)
+        termination = min(terminations, key=lambda s: s.time, default=None)
+        return sorted(found, key=lambda e: e.time), termination
+
+    def _steadiness(
+        self, times: np.ndarray, samples: MotionSamples, dense_output: DenseOutput
+    ) -> list[Event]:
+        """Steady sliding, or a steady response to a modulation, at most once in a segment."""
+        t = self._periodic.detect(dense_output)
+        if t is not None:
+            return [Event(self._start + t, "steady")]
+        if self._steady_reached:
+            return []
+        if samples.unsteadiness[0] < self._steady and dense_output.begin[0] == 0:
+            self._steady_reached = True
+            return [Event(self._start, "steady")]
+        self._before.pop("unsteadiness", None)
+        crossed = self._crossings("unsteadiness", self._unsteadiness, times, samples, dense_output)
+        down = [t for t, up in crossed if not up][:1]
+        self._steady_reached = bool(down)
+        return [Event(t, "steady") for t in down]
+
+    def _crossings(
+        self,
+        name: str,
+        distance: Distance,
+        times: np.ndarray,
+        samples: MotionSamples,
+        dense_output: DenseOutput,
+    ) -> list[tuple[float, bool]]:
+        """Times (s) at which a distance changes its sign, and whether it rises."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            values = distance(samples)
+        before = self._before.get(name)
+        self._before[name] = float(values[-1])
+        crossings = []
+        # A step of the load crosses the threshold at the break point itself.
+        if before is not None and np.sign(before) * np.sign(values[0]) < 0:
+            crossings.append((self._start + float(times[0]), bool(values[0] > 0)))
+        change = np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0)
+        if change.size:
+            ends = times[change], times[change + 1]
+            roots = self._roots(distance, *ends, values[change], values[change + 1], dense_output)
+            crossings += [
+                (self._start + float(t), bool(values[i] < 0))
+                for t, i in zip(roots, change, strict=True)
+            ]
+        return crossings
+
+    def _roots(
+        self,
+        distance: Distance,
+        left: np.ndarray,
+        right: np.ndarray,
+        f_left: np.ndarray,
+        f_right: np.ndarray,
+        dense_output: DenseOutput,
+    ) -> np.ndarray:
+        """Roots between `left` and `right`, all at once, by the Illinois method."""
+        left, right, f_left, f_right = (a.copy() for a in (left, right, f_left, f_right))
+        for _ in range(_ROOT_STEPS):
+            middle = right - f_right * (right - left) / (f_right - f_left)
+            middle = np.where(np.isfinite(middle), middle, 0.5 * (left + right))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                value = distance(
+                    motion_samples(self._system, middle, dense_output.evaluate(middle))
+                )
+            beyond = np.sign(value) * np.sign(f_right) < 0
+            left = np.where(beyond, right, left)
+            f_left = np.where(beyond, f_right, 0.5 * f_left)
+            converged = np.abs(middle - right) <= 4e-16 * np.abs(middle)
+            right, f_right = middle, value
+            if np.all(converged | (np.abs(value) < 1e-13)):
+                break
+        return right
+
+
+class _PeriodicSteadiness:
+    """Compares the states once a period of a modulation: steady when they repeat themselves."""
+
+    def __init__(self, period: float | None, tolerance: float) -> None:
+        self._period, self._tolerance = period, tolerance
+        self._last: np.ndarray | None = None
+        self._change = np.inf
+        self._next = 0
+
+    def detect(self, dense_output: DenseOutput) -> float | None:
+        """Time of the segment at which the response has become steady, once."""
+        if self._period is None:
+            return None
+        # A resumed integration begins within the segment.
+        self._next = max(self._next, int(np.ceil(dense_output.begin[0] / self._period)))
+        last = int(np.floor(dense_output.end / self._period))
+        times = self._period * np.arange(self._next, last + 1)
+        times = times[times <= dense_output.end]
+        self._next += len(times)
+        if times.size == 0:
+            return None
+        # Without the displacement, which grows from period to period.
+        states = dense_output.evaluate(times)[:-1]
+        before = states[:, :1] if self._last is None else self._last
+        changes = np.abs(np.diff(np.concatenate([before, states], axis=1))).max(0)
+        if self._last is None:
+            changes[0] = np.inf
+        # Sum of the changes still to come if they fall geometrically. Changes that no longer fall
+        # are lost in the errors of the steps: they count with the largest such factor.
+        previous = np.append(self._change, changes[:-1])
+        known = np.isfinite(previous) & (changes < previous)
+        ratios = np.where(known, changes / np.where(known, previous, 1.0), 1.0)
+        left = changes * np.minimum(ratios / np.maximum(1 - ratios, 1e-12), 1e3)
+        self._last, self._change = states[:, -1:], changes[-1]
+        steady = np.flatnonzero(left < self._tolerance)
+        if steady.size == 0:
+            return None
+        self._period = None
+        return float(times[steady[0]])

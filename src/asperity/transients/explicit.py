@@ -1,0 +1,111 @@
+"""Explicit steps: the method of order 8 of Dormand and Prince, with dense output of order 7.
+
+In logarithms of velocity and age the equations of motion are not stiff as long as the velocity
+follows from the force; then an explicit method of high order is the fastest.
+
+Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
+(Springer, 1993), section II.5 (error estimate, coefficients) and II.6 (dense output); the
+coefficients are those that SciPy gives with its integrator of the same name.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from asperity.algebra.runge_kutta import dormand_prince_8
+from asperity.transients.dense_output import StepChunk
+from asperity.transients.equations import System
+from asperity.transients.single_kernel import one_kernel
+from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, run_steps
+
+_SAFETY = 0.9
+_LIMITS = LengthLimits(shrink=0.2, grow=6.0)
+
+#: The method becomes unstable where the product of step and eigenvalue is about 6.1; from this
+#: smaller value on a step counts as limited by stability.
+_STIFF = 5.0
+
+#: Product far beyond the limit of stability. There the end of the step is a huge number, compared
+#: with which the estimated error is small: the step is refused whatever the estimate.
+_UNSTABLE = 100.0
+
+
+def advance(
+    system: System, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
+) -> StepChunk:
+    """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `run_steps`.
+
+    Parameters
+    ----------
+    rtol, atol : array
+        Tolerances of `System.scale`.
+    """
+    run = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    return run.chunk(_dense(system, run.begin, run.length, *run.records))
+
+
+@one_kernel
+def _run(
+    system: System,
+    t: Array,
+    Y: Array,
+    h: Array,
+    end: Array,
+    longest: Array,
+    rtol: Array,
+    atol: Array,
+) -> AcceptedSteps:
+    def attempt(t: Array, Y: Array, h: Array, slope: Array) -> TrialStep:
+        return _attempt(system, t, Y, h, slope, rtol, atol)
+
+    slope = system.rates(system.at(t), Y)
+    return run_steps(system, t, Y, h, end, longest, attempt, slope, _LIMITS)
+
+
+def _attempt(
+    system: System, t: Array, Y: Array, h: Array, slope: Array, rtol: Array, atol: Array
+) -> TrialStep:
+    table, size = dormand_prince_8(), Y.shape[0]
+    # Excitation of all stages at once: it does not depend on the states. The last two coincide.
+    C = jnp.asarray(table.C[1:12])
+    drive = jax.tree.map(lambda a: jnp.broadcast_to(a, C.shape), system.at(t + C * h))
+    stages = jnp.zeros((13, size)).at[0].set(slope)
+    new = Y
+    # Unrolled: the number of terms in the sum differs from stage to stage.
+    for k in range(1, 13):
+        before, new = new, Y + h * _combined(table.A[k, :k], stages)
+        at = jax.tree.map(lambda a, k=k: a[min(k, 11) - 1], drive)
+        slope = system.rates(at, new)
+        stages = stages.at[k].set(slope)
+    scale = system.scale(jnp.maximum(jnp.abs(Y), jnp.abs(new)), rtol, atol)
+    fifth = jnp.square(_combined(table.E5, stages) / scale).sum()
+    third = jnp.square(_combined(table.E3, stages) / scale).sum()
+    error = h * fifth / jnp.sqrt((fifth + 0.01 * third + 1e-300) * size)
+    # The last two stages lie at the end of the step: two slopes, and two states.
+    steep = jnp.square(h * (stages[12] - stages[11]) / scale).sum()
+    apart = jnp.square((new - before) / scale).sum()
+    at_limit = steep > _STIFF**2 * apart
+    error = jnp.where(steep > _UNSTABLE**2 * apart, jnp.inf, error)
+    return TrialStep(new, error, _SAFETY * error ** (-1 / 8), slope, at_limit, (Y, stages))
+
+
+def _combined(weights: np.ndarray, stages: Array) -> Array:
+    """Sum of the first stages, weighted, shape (size,)."""
+    return (weights[:, None] * stages[: len(weights)]).sum(0)
+
+
+@jax.jit
+def _dense(system: System, begin: Array, length: Array, states: Array, stages: Array) -> Array:
+    """Polynomials of all steps at once, shape (STEPS, 8, size)."""
+    table = dormand_prince_8()
+    # Steps last: operations on all of them run along memory.
+    states, stages = states.T, jnp.moveaxis(stages, 0, -1)
+    for row, c in zip(table.extra_A, table.extra_C, strict=True):
+        inner = states + length * jnp.tensordot(row[: len(stages)], stages, 1)
+        slope = system.rates(system.at(begin + c * length), inner)
+        stages = jnp.concatenate([stages, slope[None]])
+    powers = length * jnp.tensordot(table.powers, stages, 1)
+    return jnp.moveaxis(powers.at[0].add(states), -1, 0)

@@ -1,0 +1,199 @@
+"""Implicit steps: Radau collocation with five stages, of order 9, for stiff equations.
+
+    Z_i = h sum_j a_ij f(t + c_j h, Y + Z_j),        Y_new = Y + Z_5,
+
+solved by simplified Newton iterations in the eigenvectors of the matrix a, which splits them into
+one real and two complex systems of the size of one state. The displacement, on which no rate
+depends, is a quadrature. Dense output is the collocation polynomial.
+
+Source: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, 2nd ed. (Springer,
+1996), section IV.8; J. Comput. Appl. Math. 111, 93 (1999) for other numbers of stages. The
+coefficients are computed from their definition.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from asperity.algebra.runge_kutta import radau_iia
+from asperity.algebra.small_systems import jacobian_columns, product, solve_columns
+from asperity.loads import Excitation
+from asperity.transients.dense_output import StepChunk
+from asperity.transients.equations import System
+from asperity.transients.single_kernel import one_kernel
+from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, run_steps
+
+STAGES = 5
+_SAFETY = 0.9
+_LIMITS = LengthLimits(shrink=0.1, grow=8.0)
+
+_NEWTON_STEPS = 10
+#: Newton's method ends where the estimated remainder is this share of the tolerated error.
+_NEWTON_SHARE = 0.01
+
+#: Product of step and largest eigenvalue up to which explicit steps would cost less.
+_MILD = 8.0
+
+#: Squarings of the Jacobian in the estimate of its largest eigenvalue.
+_SQUARINGS = 4
+
+
+class _ModalTableau(NamedTuple):
+    c: np.ndarray  # (s,)
+    a: np.ndarray  # (s, s)
+    inverse: np.ndarray  # of a
+    eigenvalues: np.ndarray  # of the inverse: the real one and those with Im > 0, (pairs,)
+    to_modes: np.ndarray  # (pairs, s)
+    from_modes: np.ndarray  # (s, pairs); the real part of the sum
+    error: np.ndarray  # (s,), weights of Z in the error estimate
+    powers: np.ndarray  # (s + 1, s): polynomial through 0 and Z in rising powers
+
+
+@cache
+def _tableau() -> _ModalTableau:
+    scheme, s = radau_iia(STAGES), STAGES
+    c, a, k = scheme.c, scheme.a, np.arange(1, STAGES + 1)
+    inverse = np.linalg.inv(a)
+    values, vectors = np.linalg.eig(inverse)
+    kept = np.flatnonzero(values.imag > -1e-9)
+    kept = kept[np.argsort(np.abs(values[kept].imag))]
+    # A complex pair adds twice its real part.
+    twice = np.where(np.abs(values[kept].imag) < 1e-9, 1.0, 2.0)
+    # An embedded quadrature of order s on the same points and on t itself, which has the weight
+    # of the real eigenvalue, so that the matrix at hand filters what is stiff out of it.
+    gamma = 1 / values[kept[0]].real
+    weights = (1 / k - gamma * (k == 1)) @ scheme.monomials
+    powers = np.zeros((s + 1, s))
+    powers[1:] = np.linalg.inv(c[:, None] ** k)
+    return _ModalTableau(
+        c, a, inverse, values[kept], np.linalg.inv(vectors)[kept], vectors[:, kept] * twice,
+        (weights - a[-1]) @ inverse, powers,
+    )  # fmt: skip
+
+
+class _LastStep(NamedTuple):
+    """The last accepted step, from which the guess of the next is extrapolated."""
+
+    polynomial: Array  # (s + 1, size)
+    length: Array  # 0 before the first
+
+
+def advance(
+    system: System, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
+) -> StepChunk:
+    """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `explicit.advance`."""
+    run = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
+    return run.chunk(run.records[0])
+
+
+@one_kernel
+def _run(
+    system: System,
+    t: Array,
+    Y: Array,
+    h: Array,
+    end: Array,
+    longest: Array,
+    rtol: Array,
+    atol: Array,
+) -> AcceptedSteps:
+    powers = jnp.asarray(_tableau().powers)
+
+    def attempt(t: Array, Y: Array, h: Array, last: _LastStep) -> TrialStep:
+        scale = system.scale(Y, rtol, atol)
+        Z, error, steps, slope = _step(system, t, Y, h, _extrapolated(last, Y, h), scale)
+        # After many Newton iterations the step should not grow.
+        safety = _SAFETY * (2 * _NEWTON_STEPS + 1) / (2 * _NEWTON_STEPS + steps)
+        factor = safety * error ** (-1 / (STAGES + 1))
+        piece = (powers @ Z.T).at[0].set(Y)
+        return TrialStep(
+            Y + Z[:, -1], error, factor, _LastStep(piece, h), h * slope < _MILD, (piece,)
+        )
+
+    none = _LastStep(jnp.zeros((STAGES + 1, Y.shape[0])), jnp.zeros(()))
+    return run_steps(system, t, Y, h, end, longest, attempt, none, _LIMITS)
+
+
+def _extrapolated(last: _LastStep, Y: Array, h: Array) -> Array:
+    """The last polynomial extrapolated to the stages, less the state, shape (size, stages)."""
+    # Far beyond its step a polynomial is no guide; before the first step there is none.
+    near = h < 3 * last.length
+    share = 1 + h / jnp.where(near, last.length, h) * jnp.asarray(_tableau().c)
+    ahead = last.polynomial[STAGES][:, None]
+    for power in range(STAGES - 1, -1, -1):
+        ahead = ahead * share + last.polynomial[power][:, None]
+    return jnp.where(near, ahead - Y[:, None], 0.0)
+
+
+def _step(
+    system: System, t: Array, Y: Array, h: Array, guess: Array, scale: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Stages Z, shape (size, stages), error, Newton iterations, and largest eigenvalue."""
+    table = _tableau()
+    n = Y.shape[0] - 1
+    now, at = system.at(t), system.at(t + jnp.asarray(table.c) * h)
+    value, columns = jacobian_columns(lambda y: _stacked(system, now, y), Y[:n])
+    jacobian = jnp.stack([c[:n] for c in columns], axis=1)
+    values = jnp.asarray(table.eigenvalues)
+    identity = jnp.eye(n)[:, :, None]
+    matrices = identity * values / h - jacobian[:, :, None]
+    inverses = solve_columns(matrices, jnp.broadcast_to(identity + 0j, matrices.shape))
+
+    inertness_now = jnp.reshape(system.motion.inertness(Y[:n], now), (-1, 1))
+
+    def newton(carry: tuple) -> tuple:
+        Z, steps, change, _ = carry
+        rates, _ = system.motion_rates(at, Y[:n, None] + Z)
+        inertness = system.motion.inertness(Y[:n, None] + Z, at)
+        residual = (rates - Z @ table.inverse.T / h) * (inertness / inertness_now)
+        modes = residual @ table.to_modes.T
+        correction = (jnp.einsum("ijk,jk->ik", inverses, modes) @ table.from_modes.T).real
+        size = jnp.sqrt(jnp.mean(jnp.square(correction / scale[:n, None])))
+        return Z + correction, steps + 1, size, size / change
+
+    def unfinished(carry: tuple) -> Array:
+        _, steps, size, rate = carry
+        hopeless = (steps > 1) & (rate > 2)
+        return (steps < _NEWTON_STEPS) & (_left(size, rate) > _NEWTON_SHARE) & ~hopeless
+
+    start = (guess[:n], jnp.asarray(0), jnp.asarray(1.0), jnp.asarray(1.0))
+    Z, steps, size, rate = jax.lax.while_loop(unfinished, newton, start)
+    converged = _left(size, rate) <= _NEWTON_SHARE
+    _, x_rate = system.motion_rates(at, Y[:n, None] + Z)
+    x = h * (jnp.asarray(table.a) @ (x_rate * jnp.ones(STAGES)))
+    Z = jnp.concatenate([Z, x[None]])
+    real = table.eigenvalues[0].real
+    raw = h * value / real + Z @ table.error
+    filtered = (inverses[:, :, 0].real @ raw[:n]) * real / h
+    error = jnp.concatenate([filtered, raw[n:]]) / scale
+    size = jnp.sqrt(jnp.mean(jnp.square(error)))
+    return Z, jnp.where(converged, size, jnp.inf), steps, _largest_eigenvalue(jacobian)
+
+
+def _largest_eigenvalue(matrix: Array) -> Array:
+    """Upper estimate of the modulus: limit of |matrix^k|^(1/k)."""
+    sizes = []
+    for _ in range(_SQUARINGS):
+        sizes.append(jnp.abs(matrix).max() + 1e-300)
+        matrix = product(matrix / sizes[-1], matrix / sizes[-1])
+    root = jnp.abs(matrix).max()
+    for size in reversed(sizes):
+        root = size * jnp.sqrt(root)
+    return root
+
+
+def _left(size: Array, rate: Array) -> Array:
+    """Remainder after corrections that fall geometrically."""
+    return size * jnp.minimum(rate / jnp.maximum(1 - rate, 1e-3), 1.0)
+
+
+def _stacked(system: System, at: Excitation, states: Array) -> Array:
+    """Rates of the motion's states and of the displacement, shape (size + 1,)."""
+    rates, x_rate = system.motion_rates(at, states)
+    return jnp.concatenate([rates, jnp.reshape(x_rate, (1,))])

@@ -1,0 +1,1 @@
+"""The virtual tribometer: from the motion of a slider to what a laboratory would record."""

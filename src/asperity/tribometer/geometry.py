@@ -1,0 +1,123 @@
+"""Geometries of rigs: forces of the machine to stresses on the sliding surface, and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity.errors import InputError
+from asperity.tribometer.sensors import Given
+from asperity.units import KINDS, to_si
+
+Array = NDArray[np.float64]
+
+
+def _to_si(geometry: Any, kinds: dict[str, str]) -> None:
+    """Make the fields of a geometry positive floats in SI."""
+    for field in fields(geometry):
+        name = f"{type(geometry).__name__}.{field.name}"
+        kind = kinds[field.name]
+        value = to_si(getattr(geometry, field.name), kind, name)
+        if not value > 0:
+            raise InputError(
+                f"{name} must be positive, got {value:g} {KINDS[kind].si}; correct the value"
+            )
+        object.__setattr__(geometry, field.name, value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class DirectShear:
+    """One sliding surface: shear stress F/A under the normal stress N/A.
+
+    Parameters
+    ----------
+    area : float or str
+        Of the surface (m^2).
+    """
+
+    area: Given
+    surfaces = 1
+
+    def __post_init__(self) -> None:
+        _to_si(self, {"area": "area"})
+
+    def stresses(self, shear_force: ArrayLike, normal_force: ArrayLike) -> tuple[Array, Array]:
+        """Shear and normal stress (Pa) of the machine's forces (N)."""
+        shear, normal = (np.asarray(f, dtype=np.float64) for f in (shear_force, normal_force))
+        return shear / (self.surfaces * self.area), normal / self.area
+
+    def forces(self, shear_stress: ArrayLike, normal_stress: ArrayLike) -> tuple[Array, Array]:
+        """Shear and normal force of the machine (N) of the stresses (Pa)."""
+        shear, normal = (np.asarray(s, dtype=np.float64) for s in (shear_stress, normal_stress))
+        return shear * self.surfaces * self.area, normal * self.area
+
+
+@dataclass(frozen=True, kw_only=True)
+class DoubleDirectShear(DirectShear):
+    """A block between two others: both surfaces bear the normal force, and half the shear force.
+
+    Parameters
+    ----------
+    area : float or str
+        Of one surface (m^2).
+    """
+
+    surfaces = 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Triaxial:
+    """A cylinder with a plane cut at an angle to its axis, under confining pressure.
+
+    Parameters
+    ----------
+    diameter : float or str
+        Of the cylinder (m).
+    angle : float
+        Between the cut and the axis of the cylinder (rad), such as ``np.deg2rad(30)``.
+    """
+
+    diameter: Given
+    angle: float
+
+    def __post_init__(self) -> None:
+        _to_si(self, {"diameter": "length", "angle": "dimensionless"})
+        if not self.angle < np.pi / 2:
+            raise InputError(
+                f"Triaxial.angle must be below pi/2, got {self.angle:g} rad; give the angle "
+                "between the cut and the axis, like np.deg2rad(30)"
+            )
+
+    @property
+    def area(self) -> float:
+        """Of the cut, an ellipse (m^2)."""
+        return float(np.pi * self.diameter**2 / 4 / np.sin(self.angle))
+
+    def stresses(
+        self,
+        axial_force: ArrayLike,
+        confining_pressure: ArrayLike,
+        pore_pressure: ArrayLike = 0.0,
+    ) -> tuple[Array, Array]:
+        """Shear and effective normal stress (Pa) on the cut.
+
+        Parameters
+        ----------
+        axial_force : array_like
+            Beyond that of the confining pressure (N): differential stress times cross-section.
+        confining_pressure, pore_pressure : array_like
+            Pa.
+        """
+        difference = np.asarray(axial_force, dtype=np.float64) / (np.pi * self.diameter**2 / 4)
+        shear = difference / 2 * np.sin(2 * self.angle)
+        normal = np.asarray(confining_pressure) + difference * np.sin(self.angle) ** 2
+        return shear, normal - np.asarray(pore_pressure)
+
+    def forces(self, shear_stress: ArrayLike, normal_stress: ArrayLike) -> tuple[Array, Array]:
+        """Axial force (N) and effective confining pressure (Pa) of the stresses on the cut (Pa)."""
+        difference = 2 * np.asarray(shear_stress, dtype=np.float64) / np.sin(2 * self.angle)
+        confining = np.asarray(normal_stress) - difference * np.sin(self.angle) ** 2
+        return difference * np.pi * self.diameter**2 / 4, confining

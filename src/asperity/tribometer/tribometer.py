@@ -1,0 +1,203 @@
+"""The virtual tribometer: from the motion of a slider to what a laboratory would have recorded.
+
+It is handed signals and knows no laws and no solvers: force, load and displacement go through
+their sensors, an anti-alias filter and the recorder's clock and converter into a `Trace`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity.errors import InputError
+from asperity.recording.checks import check
+from asperity.recording.sampling import even_rate
+from asperity.recording.trace import Channel, Trace
+from asperity.tribometer.filters import between, filtered, low_pass
+from asperity.tribometer.sensors import Given, Sensor
+from asperity.units import KINDS, to_si
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recorder:
+    """Anti-alias filter, clock and analogue-to-digital converter, the same for all channels.
+
+    Parameters
+    ----------
+    rate : float or str
+        Samples per second (Hz).
+    jitter : float or str
+        Standard deviation of the instants of sampling (s); the time stamps do not know of it.
+    clock_error : float
+        Relative error of the clock: a positive one samples late, so that recorded frequencies
+        come out higher by this much.
+    cut_off : float or str, optional
+        Of the Butterworth low-pass before the converter (Hz): there its gain is 1/sqrt 2.
+    order : int
+        Of that filter.
+    bits : int
+        Of the converter; 0 for one without steps.
+    ranges : mapping of str to (float or str, float or str)
+        Lowest and highest value of the converter for a channel, by name; what lies
+        outside is cut off. A channel without a range is not converted.
+    """
+
+    rate: Given
+    jitter: Given = 0.0
+    clock_error: float = 0.0
+    cut_off: Given | None = None
+    order: int = 4
+    bits: int = 16
+    ranges: Mapping[str, tuple[Given, Given]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, kind in (("rate", "frequency"), ("cut_off", "frequency"), ("jitter", "time")):
+            given = getattr(self, name)
+            if given is None:
+                continue
+            value = to_si(given, kind, f"Recorder.{name}")
+            if value < 0 or (value == 0 and name != "jitter"):
+                raise InputError(
+                    f"Recorder.{name} must be positive, got {value:g} {KINDS[kind].si}; "
+                    "correct the value"
+                )
+            object.__setattr__(self, name, value)
+        if not 1 <= self.order <= 8:
+            raise InputError(
+                f"Recorder.order must lie between 1 and 8, got {self.order}; give one such as 4"
+            )
+        if not 0 <= self.bits <= 32:
+            raise InputError(
+                f"Recorder.bits must lie between 0 and 32, got {self.bits}; give one such as 16"
+            )
+
+    def step(self, channel: str, kind: str) -> tuple[float, float, float] | None:
+        """Lowest value, highest value and step of the converter for a channel, in SI."""
+        if channel not in self.ranges or not self.bits:
+            return None
+        low, high = (to_si(v, kind, f"Recorder.ranges['{channel}']") for v in self.ranges[channel])
+        if not low < high:
+            raise InputError(
+                f"Recorder.ranges['{channel}'] must rise, got {low:g} to {high:g}; "
+                "give the lowest value first"
+            )
+        return low, high, (high - low) / (2**self.bits - 1)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Tribometer:
+    """Sensors by the name of the channel that each makes, and the recorder.
+
+    Parameters
+    ----------
+    sensors : mapping of str to Sensor
+        Such as ``{"shear force": SpringGauge(...), "normal force": LoadCell(...)}``. The names
+        are the headings of the recording.
+    recorder : Recorder
+    """
+
+    sensors: Mapping[str, Sensor]
+    recorder: Recorder
+
+    def record(
+        self,
+        time: ArrayLike,
+        signals: Mapping[str, ArrayLike],
+        *,
+        seed: int | np.random.Generator = 0,
+        provenance: Mapping[str, Any] | None = None,
+    ) -> Trace:
+        """Record signals as the sensors and the recorder have them.
+
+        Parameters
+        ----------
+        time : array, shape (n,)
+            Evenly spaced (s), closer than the recorder's samples: four times as close is enough
+            for the numbers that tests ask for.
+        signals : mapping of str to array, shape (n,)
+            What each sensor is exposed to, in SI: the spring's force for a gauge of the spring.
+        seed : int or Generator
+            Of all noise: the same seed makes the same recording.
+        provenance : mapping, optional
+            Kept in the trace.
+
+        Returns
+        -------
+        Trace
+            In SI, checked as a recording that has been read is.
+
+        Raises
+        ------
+        InputError
+            If signals and sensors do not belong together or the times are not even.
+        """
+        grid = np.asarray(time, float)
+        rate = even_rate(grid) if grid.ndim == 1 and grid.size > 3 else None
+        if rate is None:
+            raise InputError(
+                f"Tribometer.time must be evenly spaced, got {grid.size} uneven times; "
+                "sample the motion at a rate, like sampling='20 kHz'"
+            )
+        if rate < self.recorder.rate:
+            raise InputError(
+                f"Tribometer.time must be at least as fine as the recorder's clock, "
+                f"{self.recorder.rate:g} Hz, got {rate:g} Hz; sample the motion faster"
+            )
+        if set(signals) != set(self.sensors):
+            raise InputError(
+                f"Tribometer.signals must be those of the sensors, {', '.join(self.sensors)}, got "
+                f"{', '.join(signals) or 'none'}; name each as its sensor is named"
+            )
+        random = np.random.default_rng(seed)
+        stamps, instants = self._clock(grid, random)
+        channels = {}
+        for name, sensor in self.sensors.items():
+            values = np.asarray(signals[name], float)
+            if values.shape != grid.shape:
+                raise InputError(
+                    f"Tribometer.signals['{name}'] must be as long as time, got {values.shape} "
+                    f"for {grid.shape}; give one value for each time"
+                )
+            channels[name] = self._channel(name, sensor, values, rate, instants, random)
+        told = {"format": "virtual tribometer", **(provenance or {})}
+        trace = Trace(stamps, channels, provenance=told)
+        return Trace(stamps, channels, check(trace), told)
+
+    def _clock(self, grid: Array, random: np.random.Generator) -> tuple[Array, Array]:
+        """Time stamps, and the instants since the first sample at which really is sampled."""
+        recorder = self.recorder
+        length = grid[-1] - grid[0]
+        # Half a step of a double more, so that the last sample is not lost to rounding.
+        count = int(np.floor(length * recorder.rate / (1 + recorder.clock_error) + 1e-9)) + 1
+        nominal = np.arange(count) / recorder.rate
+        instants = nominal * (1 + recorder.clock_error)
+        if recorder.jitter:
+            instants = instants + recorder.jitter * random.standard_normal(count)
+        return grid[0] + nominal, instants
+
+    def _channel(
+        self,
+        name: str,
+        sensor: Sensor,
+        values: Array,
+        rate: float,
+        instants: Array,
+        random: np.random.Generator,
+    ) -> Channel:
+        recorder = self.recorder
+        seen = sensor.read(values, rate, random)
+        if recorder.cut_off is not None:
+            seen = filtered(seen, rate, *low_pass(recorder.order, recorder.cut_off))
+        sampled = between(seen, rate, instants - sensor.delay)
+        converter = recorder.step(name, sensor.reads)
+        if converter is not None:
+            low, high, step = converter
+            sampled = low + step * np.rint((np.clip(sampled, low, high) - low) / step)
+        unit = KINDS[sensor.reads].si
+        return Channel(sampled, sensor.reads, unit, name, unit)

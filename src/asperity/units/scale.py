@@ -1,0 +1,117 @@
+"""Unit text to its SI value, as an exact decimal.
+
+The spellings of `asperity.units.kinds` are looked up directly; any other is read by pint, which
+costs a third of a second to load and is therefore loaded only then.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from decimal import Context, Decimal
+from functools import lru_cache
+from typing import Any
+
+from asperity.errors import InputError
+from asperity.units.kinds import KINDS
+
+#: More digits than any double needs, so that only the final rounding to a double is inexact.
+EXACT = Context(prec=60)
+
+#: Spellings that need no pint, by kind, besides those of the ladders.
+_ALSO_KNOWN = {
+    "dimensionless": {"%": -2, "percent": -2},
+    "angular_frequency": {"1/s": 0, "s^-1": 0},
+    "length": {"cm": -2},
+    "pressure": {"mbar": 2, "bar": 5},
+}
+
+#: What a unit may be written with; anything else never reaches pint's expression parser.
+_UNIT = re.compile(r"[A-Za-zΩµμ%°][A-Za-z0-9Ωµμ%°²³⁻¹·_ */^.()+-]*|1 ?/[A-Za-z0-9_ */^.()+-]+")
+_LONGEST_UNIT = 60
+
+
+def normalised(unit: str) -> str:
+    """One spelling of micro (two code points look alike) and single blanks."""
+    return " ".join(unit.replace("µ", "u").replace("μ", "u").split())
+
+
+@lru_cache(maxsize=1024)
+def _known(kind: str) -> Mapping[str, Decimal]:
+    powers = dict(KINDS[kind].ladder) | _ALSO_KNOWN.get(kind, {})
+    return {unit: Decimal(1).scaleb(power) for unit, power in powers.items()}
+
+
+def unit_factor(unit: str, kind: str, name: str, text: str) -> Decimal:
+    """SI value of one `unit`; `name` and `text` only serve the message."""
+    known = _known(kind).get(unit)
+    if known is not None:
+        return known
+    try:
+        return _factor_by_pint(unit, kind)
+    except _UnitError as refused:
+        spec = KINDS[kind]
+        expected = f"{spec.noun} ({spec.si})" if spec.si else spec.noun
+        raise InputError(
+            f"{name} must be {expected}, got '{text}'{refused}; "
+            + (refused.advice or f"write it like '{spec.example}'")
+        ) from None
+
+
+class _UnitError(Exception):
+    """A unit that does not fit: why, and what to do when an example is not advice enough."""
+
+    def __init__(self, why: str = "", advice: str = "") -> None:
+        super().__init__(why)
+        self.advice = advice
+
+
+@lru_cache(maxsize=1024)
+def _factor_by_pint(unit: str, kind: str) -> Decimal:
+    registry = _registry()
+    spec = KINDS[kind]
+    parsed = _parse_unit(unit)
+    try:
+        factor, root = registry.get_root_units(parsed)
+    except (ArithmeticError, ValueError):  # a power that decimals cannot hold
+        raise _UnitError(", and no such power of a unit is a number") from None
+    si_factor, si_root = registry.get_root_units(registry.parse_units(spec.si))
+    if kind == "frequency":
+        _require_hertz(parsed, root)
+    if kind == "angular_frequency" and "hertz" in str(parsed):
+        raise _UnitError(", which counts cycles", "multiply by 2 pi and write rad/s")
+    # Roots are compared as units, not as dimensions: pint counts radians and turns as pure
+    # numbers, and would take 24 degrees for an amplitude of 0.42.
+    if root != si_root:
+        raise _UnitError
+    if registry.Quantity(Decimal(0), parsed).to(spec.si or "").magnitude != 0:
+        raise _UnitError(", which has a zero of its own")
+    return EXACT.divide(Decimal(factor), Decimal(si_factor))
+
+
+def _require_hertz(parsed: Any, root: Any) -> None:
+    """Refuse what pint holds to be the same as Hz: rad/s, rpm and a bare 1/s."""
+    if str(parsed).endswith("hertz"):
+        return
+    if "second" in str(root) and root.dimensionality == {"[time]": -1}:
+        raise _UnitError(
+            ", which can be an angular frequency", "give omega/(2 pi) in Hz, like '120 Hz'"
+        )
+    raise _UnitError
+
+
+def _parse_unit(unit: str) -> Any:
+    if len(unit) > _LONGEST_UNIT or not _UNIT.fullmatch(unit):
+        raise _UnitError(", which is no unit")
+    try:
+        return _registry().parse_units(unit.replace("%", "percent"))
+    # pint's parser raises whatever its tokenizer meets: syntax, type, value and attribute errors.
+    except Exception:
+        raise _UnitError(f", and '{unit}' is no known unit") from None
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)

@@ -1,0 +1,120 @@
+"""The page, served from a thread of this process, and ways to ask it and to open it."""
+
+import http.client
+import json
+import socket
+import threading
+import time
+
+import pytest
+
+for name in ("starlette", "uvicorn", "latex2mathml"):
+    pytest.importorskip(name, reason="the extra app is not installed")
+
+
+@pytest.fixture(scope="session")
+def server():
+    """A running server; `server.port` is where."""
+    from asperity.app.server import listen, server_on
+
+    listening = listen(0)
+    running = server_on(listening, prepare=False)
+    running.port = listening.getsockname()[1]
+    thread = threading.Thread(target=running.run, kwargs={"sockets": [listening]})
+    thread.start()
+    while not running.started:
+        time.sleep(0.01)
+    yield running
+    running.should_exit = True
+    thread.join()
+    listening.close()
+
+
+class Asked:
+    """An answer of the server."""
+
+    def __init__(self, response):
+        self.status = response.status
+        self.headers = {name.lower(): value for name, value in response.getheaders()}
+        self.body = response.read()
+
+    @property
+    def json(self):
+        return json.loads(self.body)
+
+    @property
+    def lines(self):
+        return [json.loads(line) for line in self.body.splitlines()]
+
+
+@pytest.fixture
+def ask(server):
+    """Send a request: ``ask("explore", {...})`` is a POST of JSON to ``/api/explore``."""
+
+    def send(path, body=None, *, method=None, headers=None, host=None):
+        connection = http.client.HTTPConnection("127.0.0.1", server.port, timeout=300)
+        sent = {"Host": host or f"127.0.0.1:{server.port}"}
+        content = body
+        if body is not None and not isinstance(body, bytes):
+            content = json.dumps(body).encode()
+        if body is not None:
+            sent["Content-Type"] = "application/json"
+        sent |= headers or {}
+        target = path if path.startswith("/") else f"/api/{path}"
+        try:
+            connection.request(method or ("GET" if body is None else "POST"), target, content, sent)
+            return Asked(connection.getresponse())
+        finally:
+            connection.close()
+
+    return send
+
+
+@pytest.fixture
+def explored(ask):
+    """Ask Explore until the programs that it needs are compiled; the JSON of the answer."""
+
+    def send(question):
+        while "preparing" in (answer := ask("explore", question).json):
+            time.sleep(0.2)
+        return answer
+
+    return send
+
+
+@pytest.fixture
+def raw(server):
+    """Send bytes, and return the first line of the answer."""
+
+    def send(content):
+        with socket.create_connection(("127.0.0.1", server.port), timeout=30) as connection:
+            connection.sendall(content)
+            with connection.makefile("rb") as answer:
+                return answer.readline().decode().strip()
+
+    return send
+
+
+@pytest.fixture
+def visit(chromium, server):
+    """Open a view of the page; a request to anywhere else, or a script that fails, is an error."""
+    opened, fetched, failed = [], [], []
+    origin = f"http://127.0.0.1:{server.port}"
+
+    def open_page(fragment="", width=1280, height=900, **options):
+        page = chromium.new_page(viewport={"width": width, "height": height}, **options)
+        page.set_default_timeout(300_000)
+        page.on("request", lambda request: fetched.append(request.url))
+        page.on("pageerror", lambda error: failed.append(str(error)))
+        page.on("console", lambda m: failed.append(m.text) if m.type == "error" else None)
+        page.goto(f"{origin}/{fragment}")
+        opened.append(page)
+        return page
+
+    yield open_page
+    for page in opened:
+        page.close()
+    allowed = (f"{origin}/", "data:image/", f"blob:{origin}/")
+    assert [url for url in fetched if not url.startswith(allowed)] == []
+    # A refused request is a matter of the page, which says why; Chromium notes it too.
+    assert [text for text in failed if "status of 400" not in text] == []

@@ -1,0 +1,261 @@
+"""Data: files that are sent, what is measured of them, fits, and the virtual tribometer."""
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.app.api import recordings
+from asperity.app.uploads import Uploads
+from asperity.errors import InputError
+
+MU1, PHASE1 = 0.012, -0.4
+
+
+@pytest.fixture(scope="module")
+def modulated():
+    """A recording with known harmonics, as CSV: F/W0 = 0.5 + MU1 cos(phi + PHASE1) + noise."""
+    rng = np.random.default_rng(3)
+    t = np.arange(6000) / 1000.0
+    phi = 2 * np.pi * 20.0 * t
+    load = 7 * (1 + 0.2 * np.cos(phi))
+    force = 7 * (0.5 + MU1 * np.cos(phi + PHASE1)) + 1e-3 * rng.normal(size=t.size)
+    rows = np.column_stack([t, load, force])
+    lines = [",".join(f"{v:.7g}" for v in row) for row in rows]
+    return ("time (s),Fn (N),Ft (N)\n" + "\n".join(lines) + "\n").encode()
+
+
+@pytest.fixture
+def send(ask):
+    """Send a file; the answer of the server."""
+
+    def to_server(content, name="recording.csv", **headers):
+        own = {"Content-Type": "application/octet-stream", "X-File-Name": name}
+        return ask("data/upload", content, headers=own | headers)
+
+    return to_server
+
+
+@pytest.fixture
+def measured(ask, send):
+    """Send a file and measure it; the messages of the server."""
+
+    def of(content, name="recording.csv", **asked):
+        key = send(content, name).json["id"]
+        return ask("data/measure", {"recording": key, **asked}).lines
+
+    return of
+
+
+def test_a_recording_is_measured_as_the_package_does(measured, modulated, tmp_path):
+    *_, understood, _, last = measured(modulated, "a.csv")
+    channels = {c["name"]: c for c in understood["recording"]["channels"]}
+    assert {n: c["unit"] for n, c in channels.items()} == {"Fn": "N", "Ft": "N"}
+    assert understood["recording"]["roles"]["W"] == "Fn"
+    record = last["result"]["measured"]["record"]
+    assert record["mu1"] == pytest.approx(MU1, rel=0.01)
+    assert record["phase1"] == pytest.approx(PHASE1, abs=0.01)
+    (tmp_path / "a.csv").write_bytes(modulated)
+    direct = asp.measure(tmp_path / "a.csv")
+    assert record["mu1"] == pytest.approx(abs(direct.reading.harmonics[0]), rel=1e-12)
+    assert record["verdict"] == direct.verdict
+    assert len(last["result"]["measured"]["curves"]["force"]["x"]) <= 1402
+
+
+def test_columns_and_units_are_corrected_by_hand(measured, modulated):
+    swapped = {"columns": {"W": "Ft", "F": "Fn"}, "units": {"Fn": "kN", "Ft": "kN"}}
+    lines = measured(modulated, source=swapped, options={"mode": "modulated"})
+    recording = next(m["recording"] for m in lines if "recording" in m)
+    assert recording["roles"]["W"] == "Ft"
+    assert recording["channels"][0]["mean"] == pytest.approx(7e3, rel=1e-3)
+    assert "--load Ft" in lines[-1]["result"]["command"]
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["../../../etc/passwd", "..\\..\\passwd", "%2e%2e%2fpasswd", "/etc/passwd", "a\x7f/passwd"],
+)
+def test_no_name_becomes_a_path(send, name, tmp_path):
+    before = Path("/etc/passwd").read_bytes()
+    answer = send(b"1,2\n", name)
+    assert answer.json["name"] == "passwd"
+    assert answer.json["size"] == 4
+    assert Path("/etc/passwd").read_bytes() == before
+
+
+def test_files_lie_under_names_of_the_server_and_are_deleted():
+    uploads = Uploads()
+    kept = [uploads.begin(name) for name in ("../../x.csv", "a.h5", "b.exe", "")]
+    for upload in kept:
+        upload.path.write_bytes(b"1")
+    (folder,) = {upload.path.parent for upload in kept}
+    assert [u.path.suffix for u in kept] == [".csv", ".h5", "", ""]
+    assert sorted(p.name for p in folder.iterdir()) == sorted(u.path.name for u in kept)
+    assert uploads.get(kept[1].key).name == "a.h5"
+    uploads.close()
+    assert not folder.exists()
+
+
+HOSTILE = {
+    "empty": b"",
+    "zip": b"PK\x03\x04" + b"\0" * 1000,
+    "hdf5 garbage": b"\x89HDF\r\n\x1a\n" + bytes(range(256)) * 8,
+    "gzip cut": gzip.compress(b"1,2\n" * 10_000)[:-30],
+    "no numbers": b"time,load,force\n" + b"nan,nan,nan\n" * 200,
+    "binary": bytes(range(256)) * 40,
+    "words": b"hello world, this is a text\n" * 50,
+    "matlab garbage": b"MATLAB 5.0 MAT-file" + b"\xff" * 500,
+    "tdms garbage": b"TDSm" + b"\xff" * 500,
+    "a cell without end": b"time,load,force\n" + b"9" * 100_000,
+    "json that is no reading": b'{"mode": [' * 50,
+}
+
+
+@pytest.mark.parametrize("what", HOSTILE)
+def test_what_is_no_recording_gets_a_sentence(what, tmp_path):
+    """What the process does that reads a file."""
+    path = tmp_path / "0123.csv"
+    path.write_bytes(HOSTILE[what])
+    source = recordings.Source().model_dump()
+    argument = {"path": str(path), "name": "mine.csv", "source": source, "options": {}}
+    with pytest.raises(InputError, match=" must ") as refused:
+        recordings.measure(argument, lambda **message: None)
+    assert str(tmp_path) not in str(refused.value)
+    assert "0123" not in str(refused.value)
+
+
+def test_the_sentence_of_a_file_reaches_the_page(measured):
+    *_, last = measured(HOSTILE["hdf5 garbage"], "garbage.h5")
+    assert last["done"]
+    assert "garbage.h5" in last["error"]
+    assert " must " in last["error"]
+
+
+def test_a_file_that_is_too_large_is_refused(raw, server):
+    host = f"Host: 127.0.0.1:{server.port}\r\n"
+    head = f"POST /api/data/measure HTTP/1.1\r\n{host}Content-Type: application/json\r\n"
+    assert "413" in raw(f"{head}Content-Length: 100000\r\n\r\n".encode())
+    head = f"POST /api/data/upload HTTP/1.1\r\n{host}Content-Type: application/octet-stream\r\n"
+    assert "413" in raw(f"{head}Content-Length: 10000000000\r\n\r\n".encode())
+
+
+def test_a_form_of_another_site_cannot_send_a_file(send):
+    assert send(b"1,2", **{"Content-Type": "text/plain"}).status == 400
+    assert send(b"1,2", Origin="http://evil.example").status == 403
+
+
+@pytest.mark.parametrize("key", ["", "../x", "/etc/passwd", "0" * 32, "x" * 61])
+def test_only_files_that_were_sent_are_read(ask, key):
+    answer = ask("data/measure", {"recording": key})
+    assert answer.status == 400
+    assert " must " in answer.json["error"]
+
+
+PROTOCOL = """
+law = "elasto-plastic"
+material = "bureau2000"
+steps = ["slide for 0.2 s", {step}]
+[start]
+velocity = "10 um/s"
+{more}
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "word"),
+    [
+        (PROTOCOL.format(step='"hold 10 kg"', more=""), 4, "step 2"),
+        (PROTOCOL.format(step='"follow load from /etc/passwd"', more=""), 4, "file"),
+        (PROTOCOL.format(step='"hold 1 s"', more='[solver]\nsampling = "2 kg"'), 8, "sampling"),
+        (PROTOCOL.format(step="", more="x = = 3"), 7, "TOML"),
+        (PROTOCOL.replace("bureau2000", "../x.toml").format(step="", more=""), 3, "material"),
+        (PROTOCOL.replace("elasto-plastic", "f.py:Law").format(step="", more=""), 2, "law"),
+        ('folder = "/etc"\n', 1, "folder"),
+    ],
+)
+def test_a_mistake_of_a_protocol_has_a_sentence_and_a_line(ask, text, line, word):
+    result = ask("data/protocol", {"text": text}).lines[-1]["result"]
+    mistake = result["mistakes"][0]
+    assert mistake["line"] == line
+    assert word in mistake["sentence"]
+    assert " must " in mistake["sentence"]
+
+
+def test_the_recording_of_a_protocol_is_measured(ask):
+    text = PROTOCOL.format(step='"hold 0.1 s"', more='[solver]\nsampling = "1 kHz"')
+    result = ask("data/run", {"text": text}).lines[-1]["result"]
+    assert result["stopped"] is None
+    assert result["curves"]["load"]["y"][0] == pytest.approx(asp.materials.load("bureau2000").W0)
+    (*_, last) = ask("data/measure", {"recording": result["id"]}).lines
+    assert last["result"]["measured"]["record"]["mode"] == "sliding"
+
+
+TABLE = """V,epsilon,frequency,mean_friction,mean_friction_err
+1e-6,1e-4,120,0.49,0.001
+2e-6,1e-4,120,0.48,0.001
+3e-6,1e-4,120,0.47,0.001
+"""
+
+
+def test_a_table_is_fitted(ask, measured):
+    """Hardly modulated, the mean friction is mu0 + (A - B) ln(V/V0)."""
+    *_, last = measured(TABLE.encode(), "readings.csv")
+    table = last["result"]["table"]
+    assert table["count"] == 3
+    asked = {
+        "laws": ["rice-ruina"], "free": ["mu0"], "material": "bureau2000",
+        "tables": [{"name": "readings.csv", "text": table["text"]}],
+    }  # fmt: skip
+    result = ask("data/fit", asked).lines[-1]["result"]
+    p = asp.materials.load("bureau2000")
+    V = np.array([1e-6, 2e-6, 3e-6])
+    mu0 = np.mean([0.49, 0.48, 0.47] - (p.A - p.B) * np.log(V / p.V0))
+    estimate = result["fit"]["parameters"]["mu0"]
+    assert estimate["value"] == pytest.approx(mu0, abs=1e-6)
+    assert estimate["se"] == pytest.approx(0.001 / np.sqrt(3), rel=1e-4)
+    assert "--free mu0" in result["command"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "word"),
+    [
+        ({"laws": ["file.py:Law"]}, "law"),
+        ({"material": "../x.toml"}, "material"),
+        ({"tables": []}, "data"),
+        ({"free": ["nonsense"]}, "free"),
+        ({"fixed": {"K": "1 kg"}}, "K"),
+        ({"tables": [{"name": "t.csv", "text": "no table"}]}, "t.csv"),
+    ],
+)
+def test_a_wrong_fit_gets_a_sentence(ask, changed, word):
+    asked = {
+        "laws": ["rice-ruina"], "free": ["mu0"], "material": "bureau2000",
+        "tables": [{"name": "t.csv", "text": TABLE}],
+    }  # fmt: skip
+    answer = ask("data/fit", asked | changed)
+    error = answer.json["error"] if answer.status == 400 else answer.lines[-1]["error"]
+    assert word in error
+    assert " must " in error
+
+
+def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modulated, tmp_path):
+    (tmp_path / "good.csv").write_bytes(modulated)
+    (tmp_path / "bad.csv").write_bytes(b"PK\x03\x04" + b"\0" * 500)
+    page = visit("#data")
+    page.locator(".drop").wait_for()
+    page.set_input_files("#data-files", [tmp_path / "good.csv", tmp_path / "bad.csv"])
+    good, bad = (
+        page.locator(".recording[aria-label='good.csv']"),
+        page.locator(".recording[aria-label='bad.csv']"),
+    )
+    good.locator(".sentence", has_text="Modulated at 20 Hz by 20 %").wait_for()
+    bad.locator(".message", has_text="must").wait_for()
+    assert good.locator("figure").count() == 4
+    page.wait_for_url(lambda url: "good.csv" in url)
+    again = visit(page.url.split("/")[-1])
+    again.locator(".sentence", has_text="Modulated at 20 Hz").wait_for()
+    again.locator("summary", has_text="Channels").first.click()
+    again.get_by_label("Role of Fn").select_option("F")
+    again.locator(".recording[aria-label='good.csv'] .message", has_text="must").wait_for()

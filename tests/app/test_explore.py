@@ -1,0 +1,49 @@
+"""Explore: the numbers that it answers with, and the page in a browser."""
+
+import statistics
+
+import numpy as np
+import pytest
+
+import asperity as asp
+
+POINT = {"V": 1e-6, "epsilon": 0.12, "frequency": 120.0}
+
+
+def test_numbers_are_those_of_the_package(explored):
+    answer = explored({"law": "rice-ruina", "numbers": POINT})
+    material = asp.materials.load("bureau2000")
+    slider = asp.Slider(material.law("rice-ruina"), spring=material.K, load=material.W0)
+    found = asp.periodic_response(slider, velocity=1e-6, epsilon=0.12, frequency=120.0)
+    for name in ("mean_friction", "mu1", "mu2", "phase1", "phase2", "growth_rate"):
+        assert answer["point"][name] == pytest.approx(float(getattr(found, name)), rel=1e-7)
+    assert answer["point"]["stable"] == bool(found.stable)
+    curve = answer["curves"]["rice-ruina"]
+    mean = np.interp(0.12, answer["amplitudes"], np.array(curve["mean_friction"], dtype=float))
+    assert mean == pytest.approx(float(found.mean_friction), rel=1e-3)
+
+
+def test_the_link_shows_the_view_and_a_slider_changes_it(visit, record_property):
+    page = visit("#explore?law=rice-ruina&laws=&epsilon=0.1&V=2e-6")
+    sentence = page.locator(".sentence")
+    sentence.filter(has_text="able;").wait_for()
+    assert page.locator("label:has-text('pulling velocity') + input").input_value() == "2 µm/s"
+    before = page.locator(".readings").inner_text()
+    slider = page.locator(".quantity", has_text="relative amplitude").locator("input[type=range]")
+    slider.focus()
+    times = []
+    for _ in range(20):
+        count = len(measured(page))
+        slider.press("ArrowRight")
+        while len(measured(page)) == count:
+            page.wait_for_timeout(5)
+        times = measured(page)
+    assert page.locator(".readings").inner_text() != before
+    page.wait_for_url(lambda url: "epsilon=0.1" in url)
+    # For the record: a machine that does other things says nothing about the page.
+    record_property("slider_to_picture_ms_median", statistics.median(times[1:]))
+
+
+def measured(page):
+    """Times (ms) from a slider's movement to the picture."""
+    return page.evaluate("performance.getEntriesByName('slider to picture').map((e) => e.duration)")

@@ -1,0 +1,84 @@
+"""Map: the numbers of its grid, cancelling, and a click that takes a point to Explore."""
+
+import numpy as np
+import pytest
+
+from asperity.sweep.map import Axis
+
+ASKED = {
+    "law": "rice-ruina",
+    "numbers": {"V": 1e-6, "frequency": 120.0},
+    "x": {"name": "epsilon", "low": 0.01, "high": 0.4},
+    "y": {"name": "K", "low": "0.1 N/um", "high": "0.4 N/um"},
+    "show": "growth_rate",
+    "count": 2,
+}
+
+
+def test_the_grid_is_that_of_the_package(ask):
+    *_, grid, last = ask("map", ASKED).lines
+    assert last["done"]
+    grid = grid["grid"]
+    text = ask("map/text", ASKED).json["python"]
+    namespace = {}
+    exec(text.replace('print(found["growth_rate"])', ""), namespace)
+    found = namespace["found"]
+    # The page's numbers have five digits.
+    assert np.array(grid["values"]) == pytest.approx(found["growth_rate"].values, rel=1e-4)
+    assert np.array_equal(np.array(grid["stable"], dtype=bool), found["stable"].values)
+    assert grid["x"] == pytest.approx(Axis("epsilon", 0.01, 0.4, 2).values)
+    assert {k for line in grid["boundaries"] for k in line["kind"]} == {"Neimark-Sacker"}
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"x": {"name": "K", "low": 1, "high": 2}}, "axes must be two numbers"),
+        ({"x": {"name": "alpha", "low": 1, "high": 2}}, "must be given its own parameters"),
+        ({"x": {"name": "epsilon", "low": 0.5, "high": 0.1}}, "smaller to a larger"),
+        ({"x": {"name": "epsilon", "low": 0, "high": 0.1, "log": True}}, "above zero"),
+        ({"x": {"name": "epsilon", "low": 0, "high": 1.5}}, "below 1"),
+        ({"x": {"name": "epsilon", "low": 0, "high": "1 kg"}}, "must be"),
+        ({"x": {"name": "no", "low": 0, "high": 1}}, "axis must be a number"),
+        ({"count": 100_000}, "count must be"),
+        ({"show": "__class__"}, "map.show must be"),
+        ({"air": {}}, "map.air must be left out"),
+    ],
+)
+def test_what_cannot_be_mapped_gets_a_sentence(ask, change, told):
+    asked = {**ASKED, "numbers": {**ASKED["numbers"], "epsilon": 0.1}, **change}
+    answer = ask("map/text", asked)
+    assert answer.status == 400
+    assert told in answer.json["error"]
+    assert ask("map", asked).status == 400
+
+
+def test_a_map_is_drawn_finer_and_a_point_goes_to_explore(visit):
+    page = visit("#map?law=rice-ruina&x=epsilon,0.01,0.4,linear&y=K,100000,400000,linear&count=16")
+    page.get_by_text("Neimark-Sacker", exact=False).first.wait_for()
+    picture = page.locator(".stability-map .plot")
+    picture.focus()
+    picture.press("ArrowRight")
+    assert "K" in page.locator(".status").inner_text()
+    picture.press("Enter")
+    page.locator("section.tab.explore").wait_for()
+    assert page.get_by_label("Law", exact=True).input_value() == "rice-ruina"
+    assert "K=" in page.url
+
+
+def test_a_map_can_be_cancelled(visit):
+    page = visit("#map?law=rice-ruina&count=128")
+    button = page.get_by_role("button", name="Cancel")
+    button.wait_for()
+    button.click()
+    page.get_by_text("Cancelled.").wait_for()
+    assert not button.is_visible()
+
+
+def test_a_huge_map_does_not_hold_up_others(ask, explored, visit):
+    """Explore answers while a map that takes minutes is being solved."""
+    page = visit("#map?law=rice-ruina&count=128")
+    page.get_by_role("button", name="Cancel").wait_for()
+    answer = explored({"law": "rice-ruina", "numbers": {**ASKED["numbers"], "epsilon": 0.1}})
+    assert answer["point"]["converged"]
+    assert page.get_by_role("button", name="Cancel").is_visible()

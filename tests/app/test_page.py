@@ -1,0 +1,191 @@
+"""The page as a whole: accessibility, widths, keyboard, links, copies, printing."""
+
+import json
+import subprocess
+import sys
+from urllib.parse import parse_qs
+
+import pytest
+
+from asperity.cli.main import main
+
+TABS = ("explore", "map", "data", "paper")
+VIEW = {
+    "explore": "#explore?law=rice-ruina&laws=&epsilon=0.1",
+    "map": "#map?count=16",
+    "data": "#data?run=modulation",
+}
+
+
+def opened(visit, tab, **options):
+    page = visit(VIEW.get(tab, f"#{tab}"), **options)
+    page.locator(f"section.tab.{tab}").wait_for()
+    return page
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("tab", TABS)
+def test_no_barrier_that_axe_knows_of(visit, tab, scheme):
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright")
+    # The checks are a script that is put into the page, which the page's own policy forbids.
+    page = opened(visit, tab, color_scheme=scheme, bypass_csp=True)
+    found = axe.Axe().run(page)
+    assert found.response["violations"] == [], found.generate_report()
+
+
+@pytest.mark.parametrize("width", [375, 800, 1440])
+@pytest.mark.parametrize("tab", TABS)
+def test_nothing_is_wider_than_the_screen(visit, tab, width):
+    page = opened(visit, tab, width=width)
+    page.evaluate("document.querySelectorAll('details').forEach((d) => { d.open = true })")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_keyboard_reaches_every_control(visit):
+    page = opened(visit, "explore")
+    page.locator(".sentence", has_text="able;").wait_for()
+    shown = "[...document.querySelectorAll('a, button, input, select, summary')]"
+    shown += ".filter((e) => e.checkVisibility())"
+    count = page.evaluate(f"{shown}.forEach((e, i) => {{ e.dataset.test = i }}), {shown}.length")
+    reached = set()
+    for _ in range(count + 10):
+        page.keyboard.press("Tab")
+        reached.add(page.evaluate("document.activeElement.dataset.test"))
+    missed = page.evaluate(
+        f"(seen) => {shown}.filter((e) => !seen.includes(e.dataset.test)).map((e) => e.outerHTML)",
+        [name for name in reached if name],
+    )
+    assert missed == []
+
+
+def test_tabs_are_links_and_come_back_as_they_were(visit):
+    page = opened(visit, "explore")
+    page.get_by_label("Law", exact=True).select_option("linker-dieterich")
+    page.get_by_role("link", name="Map").click()
+    page.locator("section.tab.map").wait_for()
+    page.get_by_role("link", name="Explore").click()
+    assert page.get_by_label("Law", exact=True).input_value() == "linker-dieterich"
+    page.go_back()
+    page.locator("section.tab.map").wait_for()
+
+
+def test_a_wrong_number_is_told_in_a_sentence_and_undone(visit):
+    page = opened(visit, "explore")
+    field = page.get_by_label("pulling velocity, with its unit")
+    field.fill("-3 um/s")
+    field.press("Enter")
+    message = page.locator(".message", has_text="velocity must be positive")
+    message.wait_for()
+    field.fill("2 mm/min")  # a unit that only the server knows
+    field.press("Enter")
+    message.wait_for(state="hidden")
+    page.wait_for_url(lambda url: "V=2+mm%2Fmin" in url)
+
+
+def test_a_foreign_text_in_the_link_is_a_text(visit):
+    page = visit("#explore?law=<img src=x onerror=alert(1)>&V=<b>1</b>&laws=<script>&epsilon=0.1")
+    page.locator(".message", has_text="velocity must be").wait_for()
+    assert page.locator("main img, main script, main b").count() == 0
+
+
+def test_the_copied_python_gives_the_same_numbers(explored):
+    numbers = {"V": 2e-6, "epsilon": 0.2, "frequency": "90 Hz", "A": 0.012, "K": 3e5}
+    answer = explored({"law": "rice-ruina", "numbers": numbers, "air": {"h0": "9 um"}})
+    namespace = {}
+    exec(answer["python"].replace("print(response)", ""), namespace)
+    found = namespace["response"]
+    for name in ("mean_friction", "mu1", "mu2", "phase1"):
+        assert float(getattr(found, name)) == pytest.approx(answer["point"][name], rel=1e-9)
+
+
+def test_the_copied_command_gives_the_same_numbers(explored):
+    import shlex
+
+    from click.testing import CliRunner
+
+    numbers = {"V": 2e-6, "epsilon": 0.2, "frequency": "90 Hz", "A": 0.012, "K": 3e5}
+    answer = explored({"law": "rice-ruina", "numbers": numbers, "air": {"h0": "9 um"}})
+    arguments = shlex.split(answer["command"])[1:]
+    told = CliRunner().invoke(main, [*arguments, "--json"]).stdout
+    for name in ("mean_friction", "mu1", "mu2", "phase1"):
+        assert json.loads(told)[name] == pytest.approx(answer["point"][name], rel=1e-9)
+
+
+def test_figures_are_saved_as_svg_png_and_csv(visit, tmp_path):
+    page = opened(visit, "explore")
+    page.locator(".sentence", has_text="able;").wait_for()
+    for what, start in (("SVG", b"<svg"), ("PNG", b"\x89PNG"), ("CSV", b"phase,force")):
+        with page.expect_download() as waited:
+            page.locator(".panel.period").get_by_role("button", name=what).click()
+        target = tmp_path / what
+        waited.value.save_as(target)
+        assert target.read_bytes().startswith(start)
+    rows = (tmp_path / "CSV").read_text().splitlines()
+    assert len(rows) == 257
+    # A picture on its own has its colours: nothing points to the page's style sheet.
+    assert b"var(" not in (tmp_path / "SVG").read_bytes()
+    assert b"class=" not in (tmp_path / "SVG").read_bytes()
+
+
+def test_print_shows_the_figures_and_no_controls(visit):
+    page = opened(visit, "explore")
+    page.emulate_media(media="print")
+    assert not page.locator(".controls").is_visible()
+    assert page.locator(".panel.period").is_visible()
+
+
+def test_the_theme_can_be_changed_and_is_kept(visit):
+    page = opened(visit, "explore", color_scheme="light")
+    ground = "getComputedStyle(document.body).backgroundColor"
+    light = page.evaluate(ground)
+    page.get_by_role("button", name="Light or dark").click()
+    dark = page.evaluate(ground)
+    assert dark != light
+    page.reload()
+    assert page.evaluate(ground) == dark
+
+
+def test_a_signal_ends_the_server_in_order(tmp_path):
+    started = subprocess.Popen(
+        [sys.executable, "-m", "asperity", "serve", "--port", "0"],
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    address = started.stderr.readline()
+    assert "http://127.0.0.1:" in address
+    started.terminate()
+    assert started.wait(timeout=60) == 0
+    assert "Traceback" not in started.stderr.read()
+    started.stderr.close()
+
+
+def test_a_port_that_is_taken_is_told(server):
+    from click.testing import CliRunner
+
+    told = CliRunner().invoke(main, ["serve", "--port", str(server.port)])
+    assert told.exit_code == 2
+    assert "--port must be free" in told.stderr
+    assert "Traceback" not in told.stderr
+
+
+def test_without_the_extra_there_is_a_sentence(monkeypatch):
+    from click.testing import CliRunner
+
+    from asperity.app import extra
+
+    monkeypatch.setattr(extra, "_PACKAGES", ("no_such_package_anywhere",))
+    told = CliRunner().invoke(main, ["serve"])
+    assert told.exit_code == 2
+    assert "pip install 'asperity[app]'" in told.stderr
+
+
+def test_the_link_of_a_view_restores_it(visit):
+    page = opened(visit, "explore")
+    page.get_by_label("pulling velocity, with its unit").fill("3 um/s")
+    page.keyboard.press("Enter")
+    page.wait_for_timeout(2000)
+    query = parse_qs(page.url.split("?", 1)[1])
+    assert float(query["V"][0]) == 3e-6
+    again = visit("#" + page.url.split("#", 1)[1])
+    field = again.get_by_label("pulling velocity, with its unit")
+    assert field.input_value() == "3 µm/s"

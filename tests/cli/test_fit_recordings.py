@@ -1,0 +1,53 @@
+"""``asperity fit`` of a recording: a file in, numbers out; bad options in one sentence."""
+
+import json
+
+import numpy as np
+import pytest
+from benchmarks.coverage import CASES, runs_of
+from click.testing import CliRunner
+
+from asperity.cli.main import main
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory):
+    run = next(runs_of(CASES["steps"], 1))
+    path = tmp_path_factory.mktemp("fit") / "steps.csv"
+    rows = np.column_stack([run.time, 1e6 * run.slip, run.friction])
+    header = "time (s),load point displacement (um),friction"
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.9g")
+    return path
+
+
+def run_fit(*arguments):
+    return CliRunner().invoke(main, ["fit", *map(str, arguments)])
+
+
+def test_a_recording_is_fitted(recording):
+    found = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", "--json")
+    assert found.exit_code == 0, found.output
+    record = json.loads(found.output)
+    K = record["parameters"]["K"]
+    assert K["unit"] == "1/m"
+    # The stiffness over the load that the recording was computed with.
+    assert abs(K["value"] - 4e3) < 4 * K["se"]
+    assert record["noise"]["model"].startswith("AR(")
+    assert record["noise"]["effective_samples"] < 1400
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--trend", "cubic"], "--trend must be none, linear or quadratic"),
+        (["--initial", "any"], "--initial must be steady or free"),
+        (["--prior", "K=3"], "--prior must be a material or NAME=VALUE+-DEVIATION"),
+        (["--prior", "K=3+-0 1/um"], "must have a positive deviation"),
+        (["--velocities", "1 um/s"], "must be one more than the steps"),
+        (["--gauge", "-1 Hz"], "--gauge must be positive"),
+    ],
+)
+def test_bad_options_are_refused(recording, more, said):
+    found = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
+    assert said in found.output + str(found.exception)
+    assert "Traceback" not in found.output

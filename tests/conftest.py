@@ -1,0 +1,49 @@
+"""References that the tests of several rooms share, and how rooms go to the processes of xdist."""
+
+import pytest
+
+pytest_plugins = [
+    "references.browser",
+    "references.planted_recordings",
+    "references.published_equations",
+]
+
+#: Rooms that take longest from an empty compilation cache; they come first.
+LONGEST = (
+    *("orbit", "app", "benchmarks", "inference", "papers", "branches", "docs", "cli", "sweep"),
+    "transients",
+)
+
+
+def room(nodeid):
+    """The folder of a test."""
+    return nodeid.split("::")[0].split("/")[1]
+
+
+def scope(nodeid):
+    """What one process of xdist runs: a room, of the longest one a file."""
+    return nodeid.split("::")[0] if room(nodeid) == LONGEST[0] else room(nodeid)
+
+
+def pytest_collection_modifyitems(items):
+    order = {name: place for place, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: order.get(room(item.nodeid), len(order)))
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_make_scheduler(config, log):
+    """With `pytest -n`, one process runs a room: its tests share compiled programs.
+
+    By xdist's default each process compiles those of nearly every room. `--dist loadgroup` does not
+    group with pytest 9.2 and pytest-xdist 3.8.
+    """
+    from xdist.scheduler import LoadScopeScheduling
+
+    class ByRoom(LoadScopeScheduling):
+        def _split_scope(self, nodeid):
+            return scope(nodeid)
+
+    if config.getvalue("dist") != "load":
+        return None
+    config.option.loadscopereorder = False
+    return ByRoom(config, log)

@@ -1,0 +1,121 @@
+"""Designs of periodic responses: what they expect is what fits to such readings find."""
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.inference import design, fit, table_of
+
+#: Settings that the elasto-plastic law leaves steady at 120 Hz, and two that it does not.
+PLAN = {
+    "law": "elasto-plastic",
+    "material": "bureau2000",
+    "free": ["lambda", "eps_ratio", "A"],
+    "measure": "lambda",
+    "points": 8,
+    "ranges": {
+        "V": ["1 um/s", "10 um/s"],
+        "epsilon": {"from": 0.1, "to": 0.5, "levels": 5},
+        "frequency": "120 Hz",
+    },
+    "fixed": {"W0": "3 N"},
+    "values": {"eps_ratio": 0.48},
+    "noise": {"delta_mu": 1e-3, "mu1": 2e-5, "phase1": "2 deg", "mu2": 1e-5},
+}
+
+
+@pytest.fixture(scope="module")
+def found():
+    return design(PLAN, simulate=60)
+
+
+def test_expected_errors_are_those_of_a_fit_to_the_expected_readings(found):
+    rows = [p for p in found.points for _ in range(p.readings)]
+    assert len(rows) == found.readings == 8
+    columns = {n: [p.setting[n] for p in rows] for n in ("V", "epsilon", "frequency")}
+    for i, name in enumerate(("delta_mu", "mu1", "phase1", "mu2")):
+        # Copies of a reading are refused as copied rows: let each differ by nothing that matters.
+        copy = 1 + 1e-9 * np.arange(8) * (i == 0)
+        columns[name] = np.array([p.predicted[name][0] for p in rows]) * copy
+        columns[f"{name}_err"] = [p.predicted[name][1] for p in rows]
+    truth = {"lambda": 0.7e-6, "eps_ratio": 0.48, "A": 0.013}
+    from asperity import materials
+
+    fitted = fit(
+        table_of(columns),
+        "elasto-plastic",
+        PLAN["free"],
+        material=materials.load("bureau2000"),
+        fixed={"W0": 3.0},
+        start=truth,
+    )
+    for name, value in truth.items():
+        assert fitted.values[name] == pytest.approx(value, rel=1e-5)
+        assert found.parameters[name].se == pytest.approx(fitted.parameters[name].se, rel=1e-4)
+
+
+def test_simulated_fits_spread_as_expected(found):
+    simulation = found.simulation
+    assert simulation.sets == 60
+    assert simulation.failed == 0
+    for name, error in found.parameters.items():
+        # Three standard errors of the spread of 60 fits, some 10 % each.
+        assert simulation.spread[name] == pytest.approx(
+            error.se, abs=3 * simulation.uncertainty[name]
+        )
+
+
+def test_the_design_beats_the_grid_as_its_errors_say(found):
+    error = found.parameters["lambda"]
+    assert found.fewer == pytest.approx((error.se_grid / error.se) ** 2, rel=1e-3)
+    assert found.fewer > 1
+    assert found.efficiency >= 0.999
+    # Eight whole readings of three parameters lose little.
+    assert 0.7 < found.efficiency_whole <= 1
+
+
+def test_stick_slip_is_no_candidate():
+    # At 7 N sliding is unstable without modulation; K/Kc = 0.88.
+    plan = {**PLAN, "fixed": {"W0": "7 N"}}
+    plan["ranges"] = {**PLAN["ranges"], "epsilon": [0.02, 0.4, 0.45, 0.5, 0.55]}
+    found = design(plan)
+    assert found.candidates == 8
+    assert found.combinations == 10
+    assert list(found.left_out.values()) == [2]
+    assert "stick-slip" in next(iter(found.left_out))
+    assert all(p.setting["epsilon"] > 0.02 for p in found.points)
+    plan["ranges"] = {**PLAN["ranges"], "epsilon": [0.01, 0.02, 0.03, 0.04, 0.05]}
+    with pytest.raises(InputError, match=r"got none of 10 \(10 times: .* stick-slip\)"):
+        design(plan)
+
+
+def test_a_nested_law_is_excluded_where_its_parameter_is_measured():
+    # For a small lambda, chi-squared of the refitted law without it is (lambda / se)^2.
+    plan = {**PLAN, "values": {"eps_ratio": 0.48, "lambda": "0.01 nm"}}
+    plan["noise"] = {"delta_mu": 1e-3, "mu1": 5e-8, "phase1": "0.05 mrad", "mu2": 5e-8}
+    measured = design(plan)
+    del plan["measure"]
+    excluded = design({**plan, "rival": "rice-ruina"})
+    error = measured.parameters["lambda"]
+    assert excluded.chi2 == pytest.approx((error.value / error.se) ** 2, rel=0.03)
+    expected = {tuple(p.setting.values()): p.readings for p in measured.points}
+    assert {tuple(p.setting.values()): p.readings for p in excluded.points} == expected
+    assert excluded.efficiency > 0.95
+
+
+def test_draws_average_over_the_uncertain_values():
+    plan = {**PLAN, "draws": 2, "uncertainty": {"A": 0.001}}
+    found = design(plan)
+    assert found.candidates == 10
+    assert found.efficiency >= 0.999
+
+
+def test_the_record_and_the_table_hold_the_points(found):
+    record = found.record()
+    assert [p["readings"] for p in record["points"]] == [p.readings for p in found.points]
+    assert record["even_grid"]["times_fewer"] == found.fewer
+    row = found.rows()[0]
+    assert row["law"] == "elasto-plastic"
+    assert row["A"] == 0.013
+    assert row["W0"] == 3.0
+    assert "eps_ratio" not in row

@@ -1,0 +1,130 @@
+"""Plans are read with their units, and every mistake is one sentence."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.inference import plan_of, read_plan
+
+PLAN = {
+    "law": "elasto-plastic",
+    "material": "bureau2000",
+    "free": ["lambda", "eps_ratio"],
+    "measure": "lambda",
+    "points": 6,
+    "ranges": {
+        "V": ["1 um/s", "10 um/s"],
+        "epsilon": {"from": 0.1, "to": 0.4, "levels": 4},
+        "frequency": {"from": "1 Hz", "to": "100 Hz", "levels": 3},
+    },
+    "values": {"eps_ratio": 0.5},
+    "noise": {"delta_mu": 1e-3, "mu1": {"absolute": 2e-5, "relative": "1 %"}, "phase1": "2 deg"},
+}
+
+
+def changed(**changes):
+    """The plan with other entries; None takes one out, `table__key` names one in a table."""
+    plan = copy.deepcopy(PLAN)
+    for key, value in changes.items():
+        table, _, inner = key.partition("__")
+        owner, name = (plan[table], inner) if inner else (plan, table)
+        if value is None:
+            del owner[name]
+        else:
+            owner[name] = value
+    return plan
+
+
+def test_a_plan_is_read_in_SI():
+    plan = plan_of(PLAN, require_unit=True)
+    levels = {axis.name: axis.levels for axis in plan.axes}
+    np.testing.assert_allclose(levels["V"], [1e-6, 1e-5])
+    np.testing.assert_allclose(levels["epsilon"], [0.1, 0.2, 0.3, 0.4])
+    np.testing.assert_allclose(levels["frequency"], [1, 10, 100])
+    assert plan.truth.values == {"lambda": 0.7e-6, "eps_ratio": 0.5}
+    assert plan.truth.fixed["W0"] == 7
+    assert len(plan.candidates()["V"]) == 24
+    assert plan.noise["phase1"].absolute == pytest.approx(2 * np.pi / 180)
+    assert plan.noise["mu1"].at(np.array(1e-3)) == pytest.approx(np.hypot(2e-5, 1e-5))
+
+
+def test_time_is_spent_on_settling_and_reading():
+    plan = plan_of(changed(points=None, time="1 h", settling_slip="20 um", integration="10 s"))
+    np.testing.assert_allclose(plan.budget.cost(np.array([1e-6, 1e-5])), [30, 12])
+    assert plan.budget.total == 3600
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"laws": "x"}, "known keys, got 'laws'; did you mean 'law'"),
+        ({"law": "amontons"}, "depend on the velocity"),
+        ({"measure": None}, "one aim, measure or rival, got none"),
+        ({"rival": "rice-ruina"}, "one aim, measure or rival, got both"),
+        ({"measure": "A"}, "name free parameters, got 'A'"),
+        ({"measure": None, "rival": "rice-ruina", "draws": 4}, "draws must be 0 with a rival"),
+        ({"rival_free": ["A"]}, "rival_free must go with a rival"),
+        ({"free": []}, "must name parameters, got none"),
+        ({"free": ["V"]}, "free must not have what ranges has, got 'V'"),
+        ({"points": None}, "must have points or time, got none"),
+        ({"points": 2.5}, "whole number"),
+        ({"points": 0}, "whole number from 1"),
+        ({"time": "1 h"}, "must have points or time, got both"),
+        ({"points": None, "time": "1 h"}, "must say what a reading takes"),
+        ({"points": None, "time": 3600, "integration": "1 s"}, "must carry a unit"),
+        ({"integration": "1 s"}, "integration must go with time"),
+        ({"ranges__V": None}, "got none for V"),
+        ({"ranges__V": [1e-6]}, "must carry a unit"),
+        ({"ranges__V": "1 um"}, "velocity"),
+        ({"ranges__V": ["1 um/s", "1 um/s"]}, "each value once"),
+        ({"ranges__A": [0.01]}, "drive or the machine, got 'A'"),
+        ({"ranges__epsilon": {"from": 0.4, "to": 0.1}}, "to must be above from"),
+        ({"ranges__epsilon": {"from": 0.1}}, "must have from and to"),
+        ({"ranges__epsilon": {"from": 0, "to": 0.1, "spacing": "log"}}, "must be positive"),
+        ({"ranges__epsilon": {"from": 0.1, "to": 0.4, "levels": 1}}, "whole number from 2"),
+        ({"ranges__epsilon": 1.2}, "below 1"),
+        ({"values__eps_ratio": 2.6}, "below 1, got 1.04"),
+        ({"ranges__epsilon": {"from": 0.1, "to": 0.4, "number": 3}}, "known keys, got 'number'"),
+        ({"noise": None}, "must say what is measured how well"),
+        ({"noise__mu3": 1e-5}, "of observables, got 'mu3'"),
+        ({"noise__mu1": None}, "must have mu1 where it has phase1"),
+        ({"noise__mu1": 0}, "must be positive, got 0"),
+        ({"noise__mu1": -1e-5}, "must be positive, got -1e-05"),
+        ({"noise__phase1": 2}, "an angle with its unit"),
+        ({"noise__phase1": "2 Hz"}, "an angle with its unit"),
+        ({"values__eps_ration": 0.5}, "did you mean 'eps_ratio'"),
+        ({"fixed": {"V": "1 um/s"}}, "must not have what ranges has"),
+        ({"draws": 4}, "uncertainty"),
+        ({"draws": -1}, "whole number"),
+        ({"draws": 4, "uncertainty": {"A": 0.001}}, "of free parameters, got 'A'"),
+        ({"prior": 3}, "prior must be the name of a material"),
+        ({"material": None}, "got none for lambda"),
+        ({"inertia": "yes"}, "true or false"),
+        ({"usable_share": 2}, "above 0 and at most 1"),
+    ],
+)
+def test_a_mistake_is_one_sentence(changes, message):
+    with pytest.raises(InputError) as raised:
+        plan_of(changed(**changes), require_unit=True)
+    assert message in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("content", "rule"),
+    [
+        (None, "plan must be a file"),
+        ("law = ", "plan must be valid TOML"),
+        (b"\xff\xfe\x00", "plan must be a readable TOML file"),
+    ],
+)
+def test_an_unreadable_file_is_one_sentence(tmp_path, content, rule):
+    path = tmp_path / "plan.toml"
+    if isinstance(content, bytes):
+        path.write_bytes(content)
+    elif content is not None:
+        path.write_text(content)
+    with pytest.raises(InputError, match=rule):
+        read_plan(path)

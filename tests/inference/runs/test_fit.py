@@ -1,0 +1,171 @@
+"""Recordings computed by SciPy, with the noise of gauges: recovery, coverage, refusals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
+
+from asperity.errors import InputError
+from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
+from asperity.laws import RiceRuina
+from asperity.orbit import periodic_response
+from asperity.recording import Channel, Trace
+from asperity.slider import Slider
+
+CASE = CASES["steps"]
+FREE = ["A", "B", "D0"]
+
+
+def trace_of(time, values, displacement, load=None):
+    channels = {
+        "friction": Channel(values, "dimensionless", "", "friction", ""),
+        "displacement": Channel(displacement, "length", "m", "displacement", "m"),
+    }
+    if load is not None:
+        channels["normal stress"] = Channel(load, "pressure", "Pa", "normal stress", "Pa")
+    return Trace(time, channels)
+
+
+@pytest.fixture(scope="module")
+def found():
+    return fit(next(runs_of(CASE, 1)), "rice-ruina", FREE)
+
+
+def test_the_truth_is_recovered_from_starts_of_the_programs_own(found):
+    assert found.converged
+    for name, truth in TRUE.items():
+        p = found.parameters[name]
+        assert abs(p.value - truth) < 4 * p.se
+        assert p.se < 0.2 * truth
+    assert found.parameters["K"].unit == "Pa/m"
+    assert found.undetermined == ()
+
+
+def test_noise_is_reported(found):
+    (term,) = found.objective.terms
+    # White, half a second and eight seconds, and a line: far fewer samples than 1,400 count.
+    assert 30 < term.noise["effective_samples"] < 700
+    assert term.noise["model"].startswith("AR(")
+    assert found.chi2 == pytest.approx(found.dof, rel=0.05)
+
+
+def test_exact_recordings_give_the_truth():
+    time = np.arange(1400) / 10
+    (run,) = runs_of(CASE, 1)
+    exact = replace(run, friction=friction(CASE, time) + 1e-9 * np.sin(time * time))
+    estimates = fit(exact, "rice-ruina", FREE, starts=8).values
+    for name, truth in TRUE.items():
+        # The drive is known from a displacement with noise of 20 nm.
+        assert estimates[name] == pytest.approx(truth, rel=2e-3)
+
+
+def test_white_noise_bars_are_too_small_and_a_factor_of_two_is_seen():
+    sets = 8
+    white = covered(CASE, sets, RunOptions(order=0))["parameters"]
+    right = covered(CASE, sets, RunOptions())["parameters"]
+    inside = np.mean([right[n]["cover_95"] for n in TRUE])
+    # Of 8 sets of 4 correlated parameters: a spread of some 8 %.
+    assert inside > 0.8
+    assert np.mean([white[n]["cover_68"] for n in TRUE]) < 0.55
+    for name in TRUE:
+        # Standard errors against the scatter of the estimates, known to 27 % from 8 sets: a
+        # factor of 2 in the likelihood would be one of 1.41 here, in every parameter.
+        assert white[name]["mean_se"] < right[name]["mean_se"]
+    ratio = np.array([right[n]["mean_se"] / right[n]["scatter"] for n in TRUE])
+    assert 0.75 < ratio.mean() < 1.33
+
+
+def test_alpha_under_a_constant_load_is_refused():
+    with pytest.raises(InputError, match="alpha must be seen in a change of the load"):
+        fit(next(runs_of(CASE, 1)), "linker-dieterich", [*FREE, "alpha"])
+
+
+def test_a_recording_without_steps_is_refused():
+    time = np.arange(400) / 10
+    noise = 1e-3 * np.random.default_rng(0).normal(size=400)
+    run = recorded_run(trace_of(time, 0.6 + noise, 1e-6 * time), name="flat")
+    with pytest.raises(InputError, match="A must be seen in a change of the velocity"):
+        fit(run, "rice-ruina", FREE)
+
+
+def test_a_recording_that_begins_with_a_hold_is_refused():
+    time = np.arange(600) / 10
+    slip = np.where(time < 30, 0.0, 1e-6 * (time - 30))
+    with pytest.raises(InputError, match="must begin with sliding"):
+        recorded_run(trace_of(time, 0.6 + 0 * time, slip), steps=[30.0])
+
+
+def test_samples_without_a_number_are_said_to_be_left_out():
+    time = np.arange(600) / 10
+    friction = np.full(600, 0.6)
+    friction[[5, 310]] = np.nan
+    run = recorded_run(trace_of(time, friction, 1e-6 * time), steps=[30.0])
+    assert run.time.size == 598
+    assert any(doubt.startswith("2 samples are left out") for doubt in run.doubts)
+
+
+def test_a_load_that_is_not_positive_is_refused():
+    time = np.arange(600) / 10
+    load = np.where(time < 30, 1e6, -1.0)
+    with pytest.raises(InputError, match="must be under a positive load"):
+        recorded_run(trace_of(time, 0.6 + 0 * time, 1e-6 * time, load), steps=[30.0])
+
+
+def test_too_short_a_recording_is_refused(found):
+    (term,) = found.objective.terms
+    run = term.run
+    short = replace(run, time=run.time[:40], friction=run.friction[:40], slip=run.slip[:40])
+    with pytest.raises(InputError, match="must have at least"):
+        fit(short, "rice-ruina", FREE)
+
+
+def test_unknown_options_are_refused():
+    with pytest.raises(InputError, match="linear must be of"):
+        RunOptions(linear=("offset", "trends"))
+    with pytest.raises(InputError, match="initial must be"):
+        RunOptions(initial="unsteady")
+
+
+def test_a_prior_of_the_stiffness_over_the_load_is_one_of_the_stiffness():
+    run = next(runs_of(CASE, 1))
+    over_load = Prior(3e3, 1.0, "unloading", "1/m")
+    found = fit(run, "rice-ruina", FREE, prior={"K": over_load}, starts=4)
+    # Far narrower than what the recording knows.
+    assert found.values["K"] == pytest.approx(3e3 * run.W0, rel=2e-3)
+    with pytest.raises(InputError, match="prior of K must be in Pa/m or 1/m"):
+        fit(run, "rice-ruina", FREE, prior={"K": replace(over_load, unit="N/m")})
+
+
+def readings():
+    """Exact lock-in readings of a slider with the law of the recordings, on a spring of its own."""
+    V = np.repeat([1e-6, 3e-6, 1e-5], 4)
+    epsilon = np.tile([0.05, 0.1, 0.15, 0.2], 3)
+    law = RiceRuina(mu0=0.6, V0=1e-6, **{name: TRUE[name] for name in ("A", "B", "D0")})
+    slider = Slider(law, spring=2e6, mass=0.0, load=1000.0)
+    r = periodic_response(slider, velocity=V, epsilon=epsilon, frequency=120.0)
+    assert r.converged.all()
+    columns = {"V": V, "epsilon": epsilon, "frequency": np.full(12, 120.0), "K": np.full(12, 2e6)}
+    columns |= {"mean_friction": r.mean_friction, "mean_friction_err": np.full(12, 1e-3)}
+    return table_of(columns)
+
+
+def test_readings_and_a_recording_are_one_likelihood_with_a_stiffness_each(found):
+    (term,) = found.objective.terms
+    fixed = {"mu0": 0.6, "V0": 1e-6, "W0": 1000.0}
+    begin = {name: found.values[name] for name in FREE}
+    both = fit([readings(), term.run], "rice-ruina", FREE, fixed=fixed, start=begin, starts=1)
+    assert both.converged
+    assert both.parameters[f"K[{term.name}]"].unit == "Pa/m"
+    for name in FREE:
+        p = both.parameters[name]
+        assert abs(p.value - TRUE[name]) < 4 * p.se
+        assert p.se < found.parameters[name].se
+
+
+@pytest.mark.parametrize(("free", "fixed"), [([*FREE, "K"], {}), (FREE, {"K": 2e6})])
+def test_a_stiffness_in_another_unit_than_the_readings_is_refused(found, free, fixed):
+    (term,) = found.objective.terms
+    given = {"mu0": 0.6, "V0": 1e-6, "W0": 1000.0, **fixed}
+    with pytest.raises(InputError, match=r"K must be in Pa/m for .*, got that of a table in N/m"):
+        fit([readings(), term.run], "rice-ruina", free, fixed=given)

@@ -1,0 +1,77 @@
+"""Motion through a whole recording against SciPy, values and derivatives."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from asperity.inference.runs.motion import Drive, RunMotion
+from asperity.laws import get_law
+
+VALUES = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6, "K": 4e3, "W0": 1.0}
+#: A step up, a hold, and sliding again under a load that ramps up by 20 %.
+EDGES = np.array([0.0, 20.0, 30.0, 45.0, 70.0])
+PULL = np.array([1.0, 10 / 3, 0.0, 10 / 3])
+LOAD_SLOPE = np.array([0.0, 0.0, 0.0, 0.2 / 25])
+TIMES = np.linspace(0.0, 70.0, 281)
+FREE = ("A", "B", "D0", "K", "alpha", "shift_1", "start_force", "start_state_0")
+AT = {**VALUES, "alpha": 0.2, "shift_1": 0.03, "start_force": 0.002, "start_state_0": -0.3}
+
+
+def by_scipy(values):
+    """F/W of the Linker-Dieterich law, its age as the state, from the printed equations."""
+    p = values
+    edges = EDGES.copy()
+    edges[1] += p["shift_1"]
+
+    def load(t):
+        return 1 + LOAD_SLOPE[3] * max(t - EDGES[3], 0.0)
+
+    def rates(t, y, pull, slope):
+        f, phi = y
+        w = load(t)
+        v = p["V0"] * np.exp((f / w - p["mu0"] - p["B"] * phi) / p["A"])
+        ageing = (p["V0"] * np.exp(-phi) - v) / p["D0"] - p["alpha"] / p["B"] * slope / w
+        return [p["K"] * (3e-6 * pull - v), ageing]
+
+    y = np.array([p["mu0"] + p["start_force"], p["start_state_0"]])
+    friction = np.empty(TIMES.size)
+    for a, b, pull, slope in zip(edges[:-1], edges[1:], PULL, LOAD_SLOPE, strict=True):
+        here = (a <= TIMES) & ((b > TIMES) | (b == edges[-1]))
+        at = np.unique([*TIMES[here], b])
+        solution = solve_ivp(
+            rates, (a, b), y, "LSODA", at, args=(pull, slope), rtol=1e-11, atol=1e-13
+        )
+        friction[here] = solution.y[0, : here.sum()] / [load(t) for t in TIMES[here]]
+        y = solution.y[:, -1]
+    return friction
+
+
+@pytest.fixture(scope="module")
+def computed():
+    drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
+    motion = RunMotion(get_law("linker-dieterich"), 3e-6)
+    return motion(AT, FREE, drive, TIMES)
+
+
+def test_friction_is_that_of_an_independent_integration(computed):
+    # Local errors of 1e-7 relative, of steps that each move the states by some 0.1.
+    np.testing.assert_allclose(computed.friction, by_scipy(AT), atol=2e-7)
+
+
+@pytest.mark.parametrize("name", FREE)
+def test_derivatives_are_those_of_an_independent_integration(computed, name):
+    size = {"K": 4.0, "D0": 1e-8, "shift_1": 1e-2}.get(name, 1e-4)
+    more, less = ({**AT, name: AT[name] + sign * size} for sign in (1, -1))
+    expected = (by_scipy(more) - by_scipy(less)) / (2 * size)
+    found = computed.derivatives[:, FREE.index(name)]
+    # Differences of second order; a shift moves the step across samples.
+    near = np.abs(TIMES - 20.03) > 0.2 if name == "shift_1" else np.ones(TIMES.size, bool)
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(found[near], expected[near], atol=1e-3 * scale)
+
+
+def test_a_motion_that_runs_away_is_no_motion():
+    drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), np.zeros(4))
+    motion = RunMotion(get_law("rice-ruina"), 3e-6)
+    # A twentieth of the critical stiffness (B - A)/D0.
+    assert motion({**VALUES, "K": 12.0}, ("A",), drive, TIMES) is None

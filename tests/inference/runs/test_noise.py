@@ -1,0 +1,60 @@
+"""Autoregressive noise against closed forms."""
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+from scipy.stats import multivariate_normal
+
+from asperity.inference.runs.noise import Autoregression, fitted, whiteness
+
+
+def process(order_two=(1.2, -0.5), n=4000, seed=0):
+    """An AR(2) of innovations of unit variance, started long before."""
+    steps = np.random.default_rng(seed).normal(size=n + 500)
+    return lfilter([1.0], [1.0, -order_two[0], -order_two[1]], steps)[500:]
+
+
+def test_coefficients_and_variance_of_a_known_process():
+    found = fitted([process()], order=2)
+    # Standard errors of the coefficients: sqrt((1 - a2^2)/n) = 0.014.
+    np.testing.assert_allclose(found.coefficients()[-1], [1.2, -0.5], atol=0.05)
+    assert found.innovation == pytest.approx(1.0, abs=0.04)
+
+
+def test_the_likelihood_is_that_of_the_whole_covariance():
+    noise = Autoregression(np.array([0.8, -0.5, 0.1]), 2.5)
+    x = np.random.default_rng(1).normal(size=9)
+    # Autocovariance of the process from its spectrum.
+    frequency = np.arange(4096) / 4096
+    spectrum = noise.spectrum(frequency)
+    covariance = np.fft.ifft(spectrum).real[:9]
+    assert covariance[0] == pytest.approx(2.5, rel=1e-9)
+    expected = multivariate_normal(np.zeros(9), toeplitz(covariance)).logpdf(x)
+    white = noise.whiten(x[:, None])[:, 0]
+    found = -0.5 * (white @ white + 9 * np.log(2 * np.pi)) - noise.log_scale(9)
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_effective_samples_are_those_of_the_mean():
+    # A mean of n samples of an AR(1) has the variance s^2/n (1 + a)/(1 - a) for large n.
+    noise = Autoregression(np.array([0.9]), 1.0)
+    assert noise.effective_samples(1000) == pytest.approx(1000 * 0.1 / 1.9)
+    assert Autoregression(np.zeros(0), 1.0).effective_samples(50) == 50
+
+
+def test_whiteness_tells_noise_from_a_line():
+    x = np.random.default_rng(2).normal(size=2000)
+    assert whiteness([x], 0).p_value > 0.01
+    line = 0.3 * np.cos(0.7 * np.arange(2000))
+    assert whiteness([x + line], 0).p_value < 1e-6
+    assert whiteness([process(n=2000)], 0).p_value < 1e-6
+
+
+def test_whiteness_rejects_as_often_as_it_says():
+    rejected = [
+        whiteness([np.random.default_rng(seed).normal(size=300)], 0).p_value < 0.1
+        for seed in range(300)
+    ]
+    # Two tests together reject at most as often, and not much less.
+    assert 0.03 < np.mean(rejected) < 0.1 + 3 * np.sqrt(0.09 / 300)

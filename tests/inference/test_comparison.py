@@ -1,0 +1,161 @@
+"""Verdicts on synthetic readings of a known law, with errors, outliers and runs of every kind."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from asperity import Slider, periodic_response
+from asperity.inference import compare, fit, table_of
+from asperity.inference.comparison import judge
+from asperity.inference.cross_validation import leave_one_run_out
+from asperity.inference.evidence import evidence_of
+from asperity.inference.outliers import outlying_rows
+
+V = np.repeat([1e-6, 1e-5], 8)
+EPSILON = np.tile(np.linspace(0.05, 0.5, 8), 2)
+MEAN, HARMONIC = 1e-3, 2e-5
+LAWS = ("rice-ruina", "linker-dieterich", "elasto-plastic")
+FREE = ("lambda", "alpha", "eps_ratio", "A")
+
+
+@pytest.fixture(scope="module")
+def made(pmma):
+    """A table of a law, with noise of which the table tells `claimed` times the size."""
+
+    def make(law, seed, *, claimed=1.0, spoiled=None, by=0.0, **numbers):
+        own = {"linker-dieterich": {"alpha": 0.2}}.get(law, {})
+        slider = Slider(pmma.law(law, **own, **numbers), spring=pmma.K, load=pmma.W0)
+        exact = periodic_response(slider, velocity=V, epsilon=0.48 * EPSILON, frequency=120.0)
+        noise = np.random.default_rng(seed)
+        drop = exact.delta_mu + MEAN * noise.normal(size=V.size)
+        columns = {"V": V, "epsilon": EPSILON, "frequency": 120.0}
+        for n in (1, 2):
+            c = getattr(exact, f"mu{n}") * np.exp(1j * getattr(exact, f"phase{n}"))
+            c = c + HARMONIC * (noise.normal(size=V.size) + 1j * noise.normal(size=V.size))
+            if spoiled is not None and n == 1:
+                c[spoiled] *= 1 + by
+            error = claimed * HARMONIC
+            columns |= {f"mu{n}": np.abs(c), f"mu{n}_err": error}
+            columns |= {f"phase{n}": np.angle(c), f"phase{n}_err": error / np.abs(c)}
+        return table_of(columns | {"delta_mu": drop, "delta_mu_err": claimed * MEAN})
+
+    return make
+
+
+@pytest.fixture(scope="module")
+def judged(made, pmma):
+    def judge_it(*args, laws=LAWS, **options):
+        return compare(made(*args, **options), laws, FREE, material=pmma, evidence=False)
+
+    return judge_it
+
+
+@pytest.mark.parametrize("law", ["linker-dieterich", "elasto-plastic"])
+def test_the_law_of_the_data_is_found(judged, law):
+    found = judged(law, 1)
+    assert found.decided
+    assert found.best == law
+    assert all(j.excluded == (name != law) for name, j in found.laws.items())
+
+
+def test_a_special_case_is_never_excluded_by_its_generalisation(judged):
+    # Rice-Ruina is Linker-Dieterich with alpha = 0, and elasto-plastic with lambda = 0.
+    found = judged("rice-ruina", 2)
+    assert not found.decided
+    assert not any(j.excluded for j in found.laws.values())
+    assert "cannot tell" in found.verdict
+
+
+def test_errors_too_small_exclude_no_law_by_their_size(judged):
+    found = judged("rice-ruina", 3, claimed=1 / 3)
+    assert not found.decided
+    assert "too small by a factor of about 3" in found.verdict
+    assert not any(j.excluded for j in found.laws.values())
+
+
+def test_errors_too_large_leave_what_the_data_show(judged):
+    found = judged("elasto-plastic", 4, claimed=3.0)
+    assert found.best == "elasto-plastic"
+    assert any("uncertainties are too large" in w for w in found.laws[found.best].fit.warnings)
+
+
+def test_an_outlier_is_named_and_does_not_decide(judged):
+    found = judged("elasto-plastic", 5, spoiled=5, by=0.4)
+    assert found.left_out == ("row 6",)
+    assert "row 6" in found.verdict
+    assert found.decided
+    assert found.best == "elasto-plastic"
+
+
+def test_a_law_that_is_wrong_everywhere_has_no_outliers(made, pmma):
+    found = fit(made("elasto-plastic", 6), "rice-ruina", ("eps_ratio", "A"), material=pmma)
+    assert found.p_value < 1e-6
+    assert outlying_rows(found.residuals[0]) == []
+    assert not any("check that reading" in w for w in found.warnings)
+
+
+def test_evidence_is_the_integral_of_likelihood_times_prior(made, pmma):
+    found = fit(made("elasto-plastic", 7), "elasto-plastic", ("eps_ratio",), material=pmma)
+    evidence = evidence_of(found)
+    prior = evidence.prior["eps_ratio"]
+    assert prior["kind"] == "uniform in the logarithm"
+    width = math.log(prior["high"] / prior["low"])
+    value, se = found.values["eps_ratio"], found.parameters["eps_ratio"].se
+
+    def density(x):
+        return math.exp(0.5 * (found.chi2 - found.objective.chi2(np.array([x])))) / width
+
+    middle = math.log(value)
+    reach = 8 * se / value
+    integral = quad(density, middle - reach, middle + reach, epsrel=1e-4)[0]
+    expected = found.log_likelihood + math.log(integral)
+    assert evidence.log == pytest.approx(expected, abs=5 * evidence.standard_error + 1e-3)
+    assert evidence.effective_samples > 300
+
+
+def test_left_out_runs_are_predicted_by_a_normal_density(pmma, made):
+    table = made("elasto-plastic", 8)
+    runs = np.where(V < 5e-6, "slow", "fast")
+    table = replace(table, run=runs)
+    found = fit(table, "elasto-plastic", ("eps_ratio",), material=pmma)
+    validation = leave_one_run_out(found)
+    # By quadrature: the mean density of the run over the posterior of the others.
+    for name in ("slow", "fast"):
+        parts = [
+            fit(table.without(runs != n), "elasto-plastic", ("eps_ratio",), material=pmma)
+            for n in ("slow", "fast")
+        ]
+        of_run, others = parts if name == "slow" else parts[::-1]
+        middle = math.log(others.values["eps_ratio"])
+        reach = 8 * others.parameters["eps_ratio"].se / others.values["eps_ratio"]
+
+        def posterior(x, others=others):
+            return math.exp(0.5 * (others.chi2 - others.objective.chi2(np.array([x]))))
+
+        def product(x, of_run=of_run, posterior=posterior):
+            apart = of_run.objective.log_likelihood(np.array([x])) - of_run.log_likelihood
+            return posterior(x) * math.exp(apart)
+
+        low, high = middle - reach, middle + reach
+        ratio = quad(product, low, high, epsrel=1e-4)[0] / quad(posterior, low, high)[0]
+        expected = of_run.log_likelihood + math.log(ratio)
+        assert validation.runs[name] == pytest.approx(expected, abs=0.05)
+    assert validation.log_density == pytest.approx(sum(validation.runs.values()))
+
+
+def test_one_run_cannot_be_left_out(made, pmma):
+    found = fit(made("elasto-plastic", 8), "elasto-plastic", ("eps_ratio",), material=pmma)
+    validation = leave_one_run_out(found)
+    assert math.isnan(validation.log_density)
+    assert "one run" in validation.message
+
+
+def test_second_opinions_stand_beside_the_verdict(made, pmma):
+    table = made("rice-ruina", 9)
+    found = compare(table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma)
+    assert "evidence prefers" in found.verdict
+    assert all(j.evidence.effective_samples > 50 for j in found.laws.values())
+    assert judge({n: j.fit for n, j in found.laws.items()}).decided == found.decided

@@ -1,0 +1,215 @@
+"""Fits recover the truth, with intervals that cover it, and name what data cannot determine."""
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from asperity.errors import InputError
+from asperity.inference import Prior, compare, fit, table_of
+from asperity.inference.table import LockInTable
+
+TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 7e-7, "eps_ratio": 0.48}
+FREE = ("lambda", "eps_ratio", "A")
+
+
+def test_exact_readings_give_the_truth(readings, pmma):
+    found = fit(readings(None), "elasto-plastic", FREE, material=pmma)
+    assert found.converged
+    for name in FREE:
+        # The integration is good to 1e-9, of which the fit makes some 1e-8.
+        assert found.values[name] == pytest.approx(TRUTH[name], rel=1e-6)
+    assert found.chi2 < 1e-6
+
+
+def test_starts_are_found_without_a_material(readings):
+    fixed = {"mu0": 0.5, "V0": 1e-6, "K": 2e5, "W0": 7.0, "D0": 4e-7, "B": 0.026}
+    found = fit(readings(None), "elasto-plastic", FREE, fixed=fixed)
+    assert found.values["lambda"] == pytest.approx(7e-7, rel=1e-5)
+
+
+def coverage(readings, pmma, sets, planted=1.0):
+    """How many of the 68 and 95 % intervals hold the truth, over sets and parameters."""
+    inside = np.zeros(2)
+    for seed in range(sets):
+        found = fit(
+            readings(seed, planted), "elasto-plastic", FREE, material=pmma, start=dict(TRUTH_FREE)
+        )
+        for name in FREE:
+            p = found.parameters[name]
+            for i, (low, high) in enumerate((p.interval_68, p.interval_95)):
+                inside[i] += low <= TRUTH[name] <= high
+    return inside / (sets * len(FREE))
+
+
+TRUTH_FREE = {name: TRUTH[name] for name in FREE}
+
+
+@pytest.mark.slow
+def test_intervals_cover_and_a_factor_of_two_in_the_likelihood_would_not(readings, pmma):
+    sets = 60
+    right = coverage(readings, pmma, sets)
+    # Standard deviation of a share of 60 independent sets, whatever the parameters have in common.
+    spread = np.sqrt(np.array([0.68 * 0.32, 0.95 * 0.05]) / sets)
+    assert (np.abs(right - [0.6827, 0.95]) < 3 * spread).all()
+    # Half the chi-squared is what noise of sqrt(2) times the stated size does.
+    planted = coverage(readings, pmma, sets, planted=np.sqrt(2))
+    assert planted[0] < 0.6827 - 2 * spread[0]
+    assert planted[1] < 0.95 - 2 * spread[1]
+
+
+def test_chi_squared_counts_the_data_once(readings, pmma):
+    found = fit(readings(3), "elasto-plastic", FREE, material=pmma)
+    n = sum(n for _, n in found.observables.values())
+    assert n == 16 * 5
+    assert found.dof == n - len(FREE)
+    assert found.p_value == pytest.approx(chi2.sf(found.chi2, found.dof))
+    assert sum(c for c, _ in found.observables.values()) == pytest.approx(found.chi2)
+    # From the definition: the log of a product of normal densities.
+    table = found.objective.terms[0].table
+    errors = np.concatenate(
+        [
+            table.errors["delta_mu"],
+            *(table.errors[f"mu{n}"] for n in (1, 2)),
+            *(table.values[f"mu{n}"] * table.errors[f"phase{n}"] for n in (1, 2)),
+        ]
+    )
+    expected = -0.5 * found.chi2 - np.log(errors * np.sqrt(2 * np.pi)).sum()
+    assert found.log_likelihood == pytest.approx(expected, rel=1e-10)
+    k = len(FREE)
+    assert found.bic == pytest.approx(-2 * expected + k * np.log(n))
+    assert found.aicc == pytest.approx(-2 * expected + 2 * k + 2 * k * (k + 1) / (n - k - 1))
+
+
+def test_profile_and_normal_intervals_agree_where_the_likelihood_is_normal(readings, pmma):
+    table = readings(4)
+    normal = fit(table, "elasto-plastic", ("lambda", "eps_ratio"), material=pmma)
+    profile = fit(table, "elasto-plastic", ("lambda", "eps_ratio"), material=pmma, profile=True)
+    for name, p in normal.parameters.items():
+        np.testing.assert_allclose(
+            profile.parameters[name].interval_95, p.interval_95, atol=0.1 * p.se
+        )
+
+
+def test_what_the_data_cannot_see_is_named(readings, pmma):
+    # Fast modulation moves the age so little that the memory length does not show.
+    table = readings(5)
+    drop = LockInTable(
+        "drop",
+        table.points,
+        {"delta_mu": table.values["delta_mu"]},
+        {"delta_mu": table.errors["delta_mu"]},
+    )
+    found = fit(drop, "elasto-plastic", ("eps_ratio", "D0"), material=pmma)
+    assert "D0" in found.undetermined
+    assert "eps_ratio" not in found.undetermined
+    assert any("D0 is not determined" in w for w in found.warnings)
+
+
+def test_a_prior_pulls_by_its_weight(readings, pmma):
+    table = readings(6)
+    alone = fit(table, "elasto-plastic", ("lambda",), material=pmma)
+    estimate = alone.parameters["lambda"]
+    prior = Prior(estimate.value + 2 * estimate.se, estimate.se, "a second experiment")
+    both = fit(table, "elasto-plastic", ("lambda",), material=pmma, prior={"lambda": prior})
+    # Two normal estimates of one weight: the middle, and a standard error smaller by sqrt(2).
+    assert both.values["lambda"] == pytest.approx(
+        estimate.value + estimate.se, abs=0.05 * estimate.se
+    )
+    assert both.parameters["lambda"].se == pytest.approx(estimate.se / np.sqrt(2), rel=0.03)
+
+
+def test_an_outlier_is_named(readings, pmma):
+    table = readings(7)
+    table.values["mu1"][5] *= 1.5
+    found = fit(table, "elasto-plastic", FREE, material=pmma)
+    assert any("mu1 of row 6" in w for w in found.warnings)
+    assert found.p_value < 0.01
+
+
+def test_the_wrong_laws_are_excluded_and_the_observable_is_named(readings, pmma):
+    found = compare(
+        readings(8),
+        ["rice-ruina", "elasto-plastic"],
+        ["lambda", "eps_ratio", "A"],
+        material=pmma,
+    )
+    assert found.decided
+    assert found.best == "elasto-plastic"
+    assert found.laws["rice-ruina"].excluded
+    assert "mu1" in found.laws["rice-ruina"].why
+
+
+def test_laws_that_the_data_cannot_tell_apart_stay(readings, pmma):
+    table = readings(9)
+    drop = LockInTable(
+        "drop",
+        table.points,
+        {"delta_mu": table.values["delta_mu"]},
+        {"delta_mu": table.errors["delta_mu"]},
+    )
+    found = compare(drop, ["rice-ruina", "elasto-plastic"], ["eps_ratio"], material=pmma)
+    assert not found.decided
+    assert "cannot tell" in found.verdict
+    assert "what would tell them apart" in found.verdict
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"mu1_err": 0.0}, "mu1_err must be positive, got 0 in row 1"),
+        ({"mu1_err": None}, "got no column mu1_err"),
+        ({"epsilon": 1.0}, "epsilon must"),
+        ({"V": -1e-6}, "V must be positive"),
+        ({"pull": [0.0, 0.1]}, "pull must be 0, since fits are to a harmonic load, got 0.1"),
+        ({"phase1": 0.0, "phase1_err": 0.1, "mu1": None, "mu1_err": None}, "must have mu1"),
+        ({"delta_mu": None, "mu1": None}, "must report at least one of"),
+    ],
+)
+def test_bad_tables_are_refused(changed, said):
+    columns = {
+        "V": [1e-6, 2e-6],
+        "epsilon": [0.1, 0.2],
+        "frequency": 120.0,
+        "delta_mu": [-0.01, -0.02],
+        "delta_mu_err": 1e-3,
+        "mu1": [1e-3, 2e-3],
+        "mu1_err": 1e-5,
+    }
+    columns |= changed
+    with pytest.raises(InputError) as caught:
+        table_of({k: v for k, v in columns.items() if v is not None})
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_row_twice_is_refused():
+    columns = {"V": [1e-6, 1e-6], "epsilon": 0.1, "frequency": 120.0}
+    columns |= {"mu1": 1e-3, "mu1_err": 1e-5}
+    with pytest.raises(InputError, match="row 2 equal to row 1"):
+        table_of(columns)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"free": ("V0",)}, "free mu0 instead"),
+        ({"free": ("alpha",)}, "must be parameters of elasto-plastic"),
+        ({"free": ("A", "A")}, "'A' twice"),
+        ({"free": ("A",), "fixed": {"A": 0.01}}, "free or fixed"),
+        ({"free": ("A",), "fixed": {"alpha": 0.1}}, "fixed must be parameters"),
+        ({"free": ("A",), "fixed": {"tilt": 0.1}}, "fixed must be parameters of a harmonic load"),
+        ({"free": ("tilt",)}, "must be parameters of elasto-plastic, got 'tilt'"),
+        ({"free": ("A",), "start": {"B": 0.1}}, "start must be of free parameters"),
+        ({"free": ("A",), "fixed": {"eps_ratio": 3.0}}, "must be below 1"),
+    ],
+)
+def test_bad_questions_are_refused(readings, pmma, options, said):
+    with pytest.raises(InputError) as caught:
+        fit(readings(None), "elasto-plastic", material=pmma, **options)
+    assert said in str(caught.value)
+
+
+def test_more_parameters_than_data_are_refused(pmma):
+    columns = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0, "mu1": 1e-3, "mu1_err": 1e-5}
+    with pytest.raises(InputError, match="at least as many data"):
+        fit(table_of(columns), "elasto-plastic", ("A", "B"), material=pmma)

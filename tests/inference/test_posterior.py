@@ -1,0 +1,143 @@
+"""Posteriors: the sampler on known densities, and a posterior against its integral."""
+
+import math
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+import xarray as xr
+from arviz_stats.base import array_stats
+from scipy.integrate import quad
+from scipy.special import ndtri
+
+from asperity.errors import InputError
+from asperity.inference import fit
+from asperity.inference.posterior import sample_posterior
+from asperity.inference.posterior.coordinates import Coordinates
+from asperity.inference.posterior.nuts import WARM_UP, first_state, run_block, warmed_up
+from asperity.outputs import Interrupted
+
+INFINITE = math.inf
+
+
+def half_normal(z, data):
+    """x = exp(z_0) half-normal, z_1 normal about x^2 / 4: curved, with its Jacobian."""
+    x = jnp.exp(z[0])
+    return -0.5 * x**2 + z[0] - 0.5 * (z[1] - x**2 / 4) ** 2
+
+
+def gap(z, data):
+    """A standard normal that cannot be computed beyond three."""
+    return jnp.where(z[0] > 3.0, jnp.nan, -0.5 * z[0] ** 2)
+
+
+def drawn(density, start, gradient, value, blocks, chain=0):
+    state, draws, kept = first_state(5, chain, start, value, gradient), [], []
+    for block in range(1, WARM_UP + blocks + 1):
+        warming = block <= WARM_UP
+        state, moves = run_block(density, 0.0, state, adapting=warming)
+        if warming:
+            draws.append(moves.z)
+            state, draws = warmed_up(state, draws, block)
+        else:
+            kept.append(moves)
+    return [np.concatenate(part) for part in zip(*kept, strict=True)]
+
+
+def test_the_sampler_draws_from_the_density():
+    z, *_ = drawn(half_normal, np.zeros(2), np.array([0.0, 0.25]), -0.53125, 80)
+    x = np.exp(z[:, 0])
+    for values, exact in ((x, math.sqrt(2 / math.pi)), (x**2, 1.0), (z[:, 1], 0.25)):
+        error = values.std() / math.sqrt(array_stats.ess(values[None], method="mean"))
+        assert abs(values.mean() - exact) < 4 * error
+    # Quantiles of the half-normal distribution.
+    for p in (0.16, 0.5, 0.84):
+        assert np.mean(x < ndtri(0.5 + p / 2)) == pytest.approx(p, abs=0.04)
+
+
+def test_where_the_density_cannot_be_computed_there_are_no_draws():
+    z, log_density, *_, failed, _ = drawn(gap, np.zeros(1), np.zeros(1), 0.0, 40)
+    assert np.isfinite(log_density).all()
+    assert z.max() <= 3
+    assert 0 < failed.sum() < 0.2 * failed.size
+    assert z.std() == pytest.approx(1.0, abs=0.1)
+
+
+@pytest.mark.parametrize(
+    "bounds", [(-INFINITE, INFINITE), (0.5, INFINITE), (-INFINITE, 0.5), (-1.0, 2.0)]
+)
+def test_coordinates_carry_densities_over(bounds):
+    found = Coordinates.of([bounds])
+    u = np.array([np.clip(0.7, bounds[0], bounds[1])]) - (0.3 if bounds[1] == 0.5 else 0.0)
+    np.testing.assert_allclose(found.to_u(found.to_q(u)), u, rtol=1e-12)
+
+    def carried(q):
+        q = np.array([q])
+        x = float(found.to_u(q)[0])
+        return math.exp(-0.5 * x**2 + float(found.log_slope(q)[0]))
+
+    low, high = (np.clip(b, -12, 12) for b in bounds)
+    expected = quad(lambda x: math.exp(-0.5 * x**2), low, high)[0]
+    assert quad(carried, -40, 40, limit=400, points=[0.0])[0] == pytest.approx(expected, rel=1e-6)
+
+
+@pytest.fixture(scope="module")
+def found(readings, pmma):
+    return fit(readings(11), "elasto-plastic", ("lambda", "eps_ratio"), material=pmma)
+
+
+def test_a_posterior_is_the_normalised_likelihood(found, tmp_path):
+    posterior = sample_posterior(found, chains=2, draws=500, jobs=1)
+    assert not posterior.failed.any()
+    # By quadrature over a grid, in the coordinates in which the prior is flat.
+    values = found.values
+    se = {n: p.se / p.value for n, p in found.parameters.items()}
+    # lambda may be zero, so that its prior is flat in itself; that of eps_ratio in the logarithm.
+    x = values["lambda"] * (1 + se["lambda"] * np.linspace(-6, 6, 13))
+    y = values["eps_ratio"] * np.exp(se["eps_ratio"] * np.linspace(-6, 6, 13))
+    chi2 = [
+        [
+            found.objective.chi2(found.objective.coordinates({"lambda": a, "eps_ratio": b}))
+            for b in y
+        ]
+        for a in x
+    ]
+    weight = np.exp(-0.5 * (np.array(chi2) - found.chi2))
+    for name, grid, axis in (("lambda", x, 1), ("eps_ratio", y, 0)):
+        marginal = weight.sum(axis) / weight.sum()
+        mean = float(marginal @ grid)
+        sd = math.sqrt(float(marginal @ (grid - mean) ** 2))
+        p = posterior.parameters[name]
+        assert p.r_hat < 1.03
+        assert p.mean == pytest.approx(mean, abs=5 * sd / math.sqrt(p.ess_bulk))
+        assert p.sd == pytest.approx(sd, rel=0.15)
+    posterior.to_netcdf(tmp_path / "draws.nc")
+    tree = xr.open_datatree(tmp_path / "draws.nc", engine="h5netcdf")
+    np.testing.assert_array_equal(tree["posterior"]["lambda"], posterior.draws["lambda"])
+    assert tree["posterior"]["lambda"].attrs["units"] == "m"
+    assert set(tree["sample_stats"]) >= {"lp", "diverging", "energy", "acceptance_rate"}
+    tree.close()
+
+
+def test_an_interrupted_run_goes_on_to_the_same_draws(found, tmp_path):
+    options = {"chains": 2, "draws": 100, "seed": 3, "jobs": 1}
+    whole = sample_posterior(found, **options)
+
+    def stop(done, total):
+        if done > 0.4 * total:
+            raise KeyboardInterrupt
+
+    path = tmp_path / "draws.nc"
+    with pytest.raises(Interrupted, match="--resume"):
+        sample_posterior(found, **options, unfinished=path, progress=stop)
+    with pytest.raises(InputError, match="same inputs"):
+        sample_posterior(found, **{**options, "seed": 4}, unfinished=path, resume=True)
+    resumed = sample_posterior(found, **options, unfinished=path, resume=True)
+    for name, draws in whole.draws.items():
+        np.testing.assert_array_equal(resumed.draws[name], draws)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_cannot_be_sampled_is_refused(found):
+    with pytest.raises(InputError, match="chains must be at least 2"):
+        sample_posterior(found, chains=1)

@@ -1,0 +1,156 @@
+"""Tables with covariances, and tables and readings as ``asperity measure`` writes them."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from asperity import Slider, materials, periodic_response
+from asperity.cli.measure.reading import FileRows, ReadingOptions
+from asperity.cli.measure.source import Source
+from asperity.errors import InputError
+from asperity.inference import fit, read_table, table_of
+from asperity.measurement.campaign import run_campaign
+from asperity.measurement.measure import measure
+from asperity.measurement.record import modulated_record
+
+V, EPSILON = [1e-6, 1e-6, 1e-5], [0.1, 0.3, 0.3]
+
+
+@pytest.fixture(scope="module")
+def pmma():
+    return materials.load("bureau2000")
+
+
+def correlated(covariance):
+    """Columns of three rows with the given covariance of mean_friction, mu1 and phase1."""
+    names = ("mean_friction", "mu1", "phase1")
+    columns = {"V": V, "epsilon": EPSILON, "frequency": 120.0}
+    columns |= {"mean_friction": [0.48, 0.44, 0.41], "mu1": [2e-4, 4e-4, 6e-4]}
+    columns |= {"phase1": [1.2, 1.1, 1.0]}
+    for i, first in enumerate(names):
+        columns[f"{first}_err"] = np.sqrt(covariance[i, i])
+        for j, second in enumerate(names[:i]):
+            columns[f"{second}_{first}_cov"] = covariance[i, j]
+    return columns
+
+
+def random_covariance(rng):
+    scale = np.array([1e-3, 2e-5, 0.05])
+    root = rng.normal(size=(3, 3))
+    whole = root @ root.T + 0.3 * np.eye(3)
+    spread = np.sqrt(np.diag(whole))
+    return whole / np.outer(spread, spread) * np.outer(scale, scale)
+
+
+def test_the_likelihood_is_the_normal_density_with_the_covariance(pmma):
+    covariance = random_covariance(np.random.default_rng(0))
+    columns = correlated(covariance)
+    found = fit(table_of(columns), "elasto-plastic", ("lambda",), material=pmma)
+    law = pmma.law("elasto-plastic", lambda_=found.values["lambda"])
+    exact = periodic_response(
+        Slider(law, spring=pmma.K, load=pmma.W0), velocity=V, epsilon=EPSILON, frequency=120.0
+    )
+    turned = exact.mu1 * np.exp(1j * (exact.phase1 - np.array(columns["phase1"])))
+    expected = 0.0
+    for row in range(3):
+        mu1 = columns["mu1"][row]
+        # Parts of the harmonic along the measured phasor and across it.
+        to_parts = np.diag([1.0, 1.0, mu1])
+        expected += multivariate_normal.logpdf(
+            [exact.mean_friction[row], turned[row].real, turned[row].imag],
+            [columns["mean_friction"][row], mu1, 0.0],
+            to_parts @ covariance @ to_parts,
+        )
+    assert found.log_likelihood == pytest.approx(expected, rel=1e-7)
+
+
+def test_impossible_covariances_are_refused():
+    columns = correlated(random_covariance(np.random.default_rng(0)))
+    columns["mu1_phase1_cov"] = 1.01 * columns["mu1_err"] * columns["phase1_err"]
+    with pytest.raises(InputError) as caught:
+        table_of(columns)
+    text = str(caught.value)
+    assert "positive definite" in text
+    assert "row 1" in text
+    assert "1.01 between mu1 and phase1" in text
+    del columns["phase1"], columns["phase1_err"], columns["mean_friction_phase1_cov"]
+    with pytest.raises(InputError, match="no column phase1"):
+        table_of(columns)
+
+
+def drops(rng, *, copied):
+    velocity = np.repeat([1e-6, 3e-6, 1e-5], 4)
+    epsilon = np.tile([0.1, 0.2, 0.3, 0.4], 3)
+    drop = -0.3 * epsilon + 1e-3 * rng.normal(size=12)
+    steady = 0.5 - 0.013 * np.log(velocity / 1e-6)
+    mean = drop + steady if copied else steady - 0.3 * epsilon + 1e-3 * rng.normal(size=12)
+    columns = {"V": velocity, "epsilon": epsilon, "frequency": 120.0}
+    columns |= {"mean_friction": mean, "mean_friction_err": 1e-3}
+    return columns | {"delta_mu": drop, "delta_mu_err": 1e-3}
+
+
+def test_one_measurement_in_two_columns_counts_once():
+    table = table_of(drops(np.random.default_rng(1), copied=True))
+    assert table.observables == ("mean_friction",)
+    assert "counts once" in table.remarks[0]
+    table = table_of(drops(np.random.default_rng(1), copied=False))
+    assert table.observables == ("mean_friction", "delta_mu")
+    assert table.remarks == ()
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    """A recording of two amplitudes in noise, and its samples."""
+    rng = np.random.default_rng(0)
+    time = np.arange(24_000) * 1e-3
+    load, friction = np.full(time.size, 7.0), np.full(time.size, 0.5)
+    for epsilon, start in ((0.1, 4.0), (0.2, 14.0)):
+        on = (time >= start) & (time < start + 6)
+        phi = 2 * np.pi * 40.01 * time
+        load = np.where(on, 7 * (1 + epsilon * np.cos(phi)), load)
+        friction = friction + on * (0.01 * epsilon * np.cos(phi - 1.2) - 0.2 * epsilon)
+    force = 7 * friction + 1e-3 * rng.standard_normal(time.size)
+    path = tmp_path_factory.mktemp("lab") / "run.csv"
+    header = "time (s),normal force (N),shear force (N)"
+    np.savetxt(path, np.stack([time, load, force], axis=1), "%.6f", ",", header=header, comments="")
+    return path
+
+
+def test_a_campaign_goes_straight_into_a_fit(recorded, tmp_path, pmma):
+    chosen = {"modulated": True, "frequency": None, "exact_frequency": False, "harmonics": 2}
+    chosen |= {"window": None, "whole_periods": False, "detrend": "linear"}
+    rows = FileRows(Source({}, {}), ReadingOptions(**chosen))
+    broken = tmp_path / "broken.csv"
+    broken.write_text("no recording\n", encoding="utf-8")
+    run_campaign([broken, recorded], rows, tmp_path / "all.csv", inputs={})
+    with pytest.raises(InputError, match="none for V"):
+        read_table(tmp_path / "all.csv")
+    table = read_table(tmp_path / "all.csv", {"V": "1 um/s"})
+    assert table.rows == 2
+    assert list(table.row_names) == ["row 2", "row 3"]
+    assert list(table.run) == 2 * [str(recorded)]
+    assert "row 1" in table.remarks[0]
+    np.testing.assert_allclose(table.values["mu1"], [1e-3, 2e-3], atol=1e-4)
+    assert ("mean_friction", "delta_mu") in table.covariances
+    # The drop shares the noise of the mean: their correlation is near one.
+    assert 0.3 < table.correlations()[0, 0, 1] < 1
+    found = fit(table, "elasto-plastic", ("lambda",), material=pmma)
+    assert found.converged
+
+
+def test_a_reading_as_json_is_a_table_of_one_row(recorded, tmp_path):
+    record = modulated_record(measure(Source({}, {}).read(recorded)))
+    path = tmp_path / "reading.json"
+    path.write_text(json.dumps(record), encoding="utf-8")
+    table = read_table(path, {"V": 1e-6})
+    assert table.rows == 1
+    assert table.values["mu1"] == pytest.approx(record["mu1"])
+    assert table.errors["phase1"] == pytest.approx(record["uncertainties"]["phase1"])
+    joint = record["observable_covariance"]
+    i, j = joint["names"].index("mu1"), joint["names"].index("phase1")
+    assert table.covariances["mu1", "phase1"] == pytest.approx(joint["matrix"][i][j])
+    path.write_text("{}", encoding="utf-8")
+    with pytest.raises(InputError, match="measure --json"):
+        read_table(path)

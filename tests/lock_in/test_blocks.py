@@ -1,0 +1,195 @@
+"""Sums over blocks: tables against plain columns, pieces against the whole."""
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.lock_in.basis import Basis
+from asperity.lock_in.blocks import even_step, join, sums
+from asperity.lock_in.demodulation import lock_in
+from asperity.lock_in.retune import retuned
+from asperity.lock_in.stream import LockInStream
+from asperity.measurement.window import merged
+
+TIME = 3.0 + np.arange(20_011) * 1e-3
+BASIS = Basis(2 * np.pi * 61.3, 3, 2, 13.0, 10.005)
+
+
+def plain(basis, time):
+    """The columns, written down one by one."""
+    u = (time - basis.centre) / basis.half_width
+    phi = basis.omega * (time - basis.centre)
+    k = np.arange(1, basis.harmonics + 1)[:, None]
+    waves = np.concatenate([np.cos(k * phi), np.sin(k * phi)])
+    drift = np.stack([u**j for j in range(basis.degree + 1)])
+    return np.concatenate([drift, waves, u * waves])
+
+
+def channels(time):
+    rng = np.random.default_rng(0)
+    return [rng.standard_normal(time.size), np.cos(2 * np.pi * 61.3 * time)]
+
+
+def test_columns_are_what_they_are_called() -> None:
+    assert abs(BASIS.columns(TIME) - plain(BASIS, TIME)).max() < 1e-11
+
+
+@pytest.mark.parametrize("blocks", [1, 7, 300, 6000])
+@pytest.mark.parametrize("tables", [True, False])
+def test_sums_of_blocks_are_the_sums_of_all(blocks, tables) -> None:
+    step = even_step(TIME, BASIS.omega * 3) if tables else None
+    assert (step is not None) == tables
+    columns, values = plain(BASIS, TIME), channels(TIME)
+    found = sums(BASIS, TIME, values, blocks=blocks, step=step)
+    gram, moments = found.totals()
+    assert abs(gram - columns @ columns.T).max() < 1e-9 * TIME.size / 1e3
+    assert abs(moments - columns @ np.stack(values, axis=1)).max() < 1e-8
+    assert found.count.sum() == TIME.size
+    assert found.middle @ found.count / TIME.size == pytest.approx(TIME.mean(), rel=1e-12)
+
+
+def jittering(time):
+    return time + 2e-4 * np.random.default_rng(1).uniform(-1, 1, time.size)
+
+
+def with_gaps(time):
+    return jittering(np.where(time > 9, time + 0.7004, time))
+
+
+def at_random(time):
+    return np.sort(np.random.default_rng(2).uniform(time[0], time[-1], time.size))
+
+
+@pytest.mark.parametrize("clock", [jittering, with_gaps, at_random])
+@pytest.mark.parametrize("harmonics", [1, 4, 40])
+@pytest.mark.parametrize("degree", [0, 1, 2])
+def test_uneven_clocks_are_summed_as_written_down(clock, harmonics, degree) -> None:
+    time = clock(TIME)
+    half = float(time[-1] - time[0]) / 2
+    basis = Basis(2 * np.pi * 6.3, harmonics, degree, float(time[0]) + half, half)
+    columns, values = plain(basis, time), channels(time)
+    found = sums(basis, time, values, blocks=3)
+    cuts = np.cumsum(found.count[:-1]).astype(int)
+    # A thousand roundings of a phase of 400 rad times the harmonic, in units of the samples.
+    allowed = 1e-12 * harmonics * found.count[0]
+    for gram, moments, part, *parts in zip(
+        found.gram,
+        found.moments,
+        np.split(columns, cuts, axis=1),
+        *(np.split(v, cuts) for v in values),
+        strict=True,
+    ):
+        assert abs(gram - part @ part.T).max() < allowed
+        assert abs(moments - part @ np.stack(parts, axis=1)).max() < allowed
+
+
+def test_merged_blocks_are_fewer_and_the_same() -> None:
+    found = sums(BASIS, TIME, channels(TIME), blocks=900)
+    fewer = merged(found, 50)
+    assert 45 <= fewer.count.size <= 55
+    for a, b in zip(found.totals(), fewer.totals(), strict=True):
+        assert a == pytest.approx(b, rel=1e-9, abs=1e-9)
+
+
+def test_pieces_are_the_whole() -> None:
+    whole = sums(BASIS, TIME, channels(TIME), blocks=64)
+    values = channels(TIME)
+    pieces = join(
+        [
+            sums(BASIS, TIME[a:b], [v[a:b] for v in values], blocks=5)
+            for a, b in ((0, 5000), (5000, 5001), (5001, 20_011))
+        ]
+    )
+    for a, b in zip(whole.totals(), pieces.totals(), strict=True):
+        assert a == pytest.approx(b, rel=1e-9, abs=1e-9)
+
+
+def test_a_clock_is_even_up_to_a_small_phase() -> None:
+    assert even_step(TIME, BASIS.omega) == pytest.approx(1e-3)
+    late = TIME.copy()
+    late[7000] += 1e-7
+    assert even_step(late, BASIS.omega) is None
+
+
+def test_a_stream_reads_what_one_call_reads(truth) -> None:
+    rng = np.random.default_rng(4)
+    time = np.arange(30_000) * 1e-3
+    load = truth.load(time) + 0.02 * rng.standard_normal(time.size)
+    force = truth.force(time) + 0.01 * rng.standard_normal(time.size)
+    whole = lock_in(time, load, force)
+    stream = LockInStream(whole.frequency, start=time[0], end=time[-1])
+    for piece in np.array_split(np.arange(time.size), 17):
+        stream.add(time[piece], load[piece], force[piece])
+    found = stream.read()
+    assert abs(found.harmonics - whole.harmonics).max() < 1e-14
+    assert found.frequency == pytest.approx(whole.frequency, rel=1e-13)
+    assert found.mean_friction == pytest.approx(whole.mean_friction, rel=1e-13)
+    # Blocks differ, and with them the noise at a distance from the harmonics, a little.
+    for name in ("W0", "frequency", "mu1", "mu2", "mean_friction"):
+        assert found.uncertainty(name) == pytest.approx(whole.uncertainty(name), rel=0.02)
+
+
+def test_a_stream_corrects_its_frequency_to_first_order(truth) -> None:
+    time = np.arange(30_000) * 1e-3
+    off = 1e-2 / (np.pi * 30)  # Hz: a hundredth of a radian at the ends
+    stream = LockInStream(truth.frequency + off, start=time[0], end=time[-1])
+    stream.add(time, truth.load(time), truth.force(time))
+    found = stream.read()
+    # The square of what it was off is left, as a share of the phase at the ends.
+    assert abs(found.frequency - truth.frequency) < 1e-2 * off
+    assert abs(found.harmonics[0] - truth.harmonics[0]) < 1e-4 * abs(truth.harmonics[0])
+
+
+def test_a_stream_refuses_what_it_cannot_read(truth) -> None:
+    time = np.arange(30_000) * 1e-3
+    load, force = truth.load(time), truth.force(time)
+    off = LockInStream(truth.frequency * (1 + 2e-4), start=0.0, end=time[-1])
+    with pytest.raises(InputError, match="must be called before read"):
+        off.read()
+    off.add(time, load, force)
+    with pytest.raises(InputError, match="start again with that"):
+        off.read()
+    with pytest.raises(InputError, match="must get times from"):
+        off.add(time + 1, load, force)
+    with pytest.raises(InputError, match="must get finite values"):
+        off.add(time, load, np.where(time == time[100], np.nan, force))
+    with pytest.raises(InputError, match="end must follow start"):
+        LockInStream(60.0, start=1.0, end=0.0)
+    with pytest.raises(InputError, match="detrend must be"):
+        LockInStream(60.0, start=0.0, end=1.0, detrend="cubic")
+
+
+@pytest.mark.parametrize("change", [1e-6, -3e-4])
+def test_sums_are_retuned_to_second_order_in_a_block(change) -> None:
+    there = Basis(BASIS.omega + change, 3, 2, BASIS.centre, BASIS.half_width)
+    found = retuned(sums(BASIS, TIME, channels(TIME), blocks=500), change)
+    expected = sums(there, TIME, channels(TIME), blocks=500)
+    assert found.basis == there
+    # Half a block is 20 ms, the highest harmonic the third, half the window 10 s.
+    quadratic = (3 * change * 0.02) ** 2 * TIME.size + 1e-9
+    in_slopes = abs(3 * change) * 0.02**2 / 10 * TIME.size + 1e-9
+    n = BASIS.linear
+    for a, b in zip(found.totals(), expected.totals(), strict=True):
+        assert abs(a[:n, :n] - b[:n, :n]).max() < quadratic
+        assert abs(a - b).max() < in_slopes
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-4])
+@pytest.mark.parametrize("frequency", [60.013, 0.0713, 471.3])
+def test_a_long_recording_is_read_once_and_exactly(truth, jitter, frequency) -> None:
+    truth = truth.but(frequency=frequency)
+    rng = np.random.default_rng(0)
+    time = np.arange(140_000) * 5e-4
+    time = time + jitter * rng.uniform(-1, 1, time.size)
+    reading = lock_in(time, truth.load(time), truth.force(time), harmonics=2)
+    assert abs(reading.harmonics - truth.harmonics).max() < 1e-12
+    assert reading.frequency == pytest.approx(frequency, rel=1e-12)
+
+
+def test_a_long_recording_whose_frequency_wanders_is_still_read(truth) -> None:
+    # A quarter of it says something else than the whole: the sums cannot be retuned that far.
+    time = np.arange(140_000) * 5e-4
+    phase = 2 * np.pi * 60 * time + 3.0 * np.cos(2 * np.pi * time / 70)
+    load = 7 * (1 + 0.2 * np.cos(phase))
+    reading = lock_in(time, load, 0.4 * load, harmonics=1)
+    assert reading.harmonics[0] == pytest.approx(0.4 * reading.epsilon, rel=1e-9)

@@ -1,0 +1,147 @@
+"""Stated uncertainties are the true scatter, for white and for coloured noise."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from asperity.lock_in.demodulation import lock_in
+from asperity.lock_in.phasor import Phasor
+
+SEEDS = 300
+NAMES = ("W0", "epsilon", "frequency", "mean_friction", "mu1", "phase1", "mu2", "phase2")
+
+#: Samples, seconds between them, frequency, correlation of neighbours (AR1), noise of the load and
+#: of the force (N), noise of the load that the force shares.
+CASES = {
+    "white": (1500, 1e-3, 53.3, 0.0, 0.02, 0.005, 0.0),
+    "red, 3 ms": (1500, 1e-3, 53.3, 0.7, 0.02, 0.005, 0.0),
+    "red, 20 ms": (1500, 1e-3, 53.3, 0.95, 0.02, 0.005, 0.0),
+    "shared by both": (1500, 1e-3, 53.3, 0.6, 0.05, 0.002, 0.3),
+    "part periods": (700, 1e-3, 23.7, 0.3, 0.02, 0.005, 0.0),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_intervals_cover_the_truth(truth, red_noise, case) -> None:
+    n, dt, frequency, rho, of_load, of_force, shared = CASES[case]
+    truth = truth.but(frequency=frequency, drift=1e-3)
+    time = np.arange(n) * dt
+    load, force = truth.load(time), truth.force(time)
+    rng = np.random.default_rng(20)
+    hits = dict.fromkeys(NAMES, 0)
+    for _ in range(SEEDS):
+        own, other = red_noise(rng, rho, 2, n)
+        reading = lock_in(
+            time,
+            load + of_load * own,
+            force + of_force * other + shared * of_load * own,
+            harmonics=2,
+        )
+        for name in NAMES:
+            value, true = _value(reading, name), _value(truth, name)
+            hits[name] += abs(value - true) < reading.half_width(name)
+    covered = np.array([hits[name] for name in NAMES]) / SEEDS
+    # All together as required; each within what 300 seeds can tell, at 1e-3, of 92 to 98 %.
+    assert 0.92 < covered.mean() < 0.98, hits
+    assert covered.min() >= binom.ppf(1e-3, SEEDS, 0.92) / SEEDS, hits
+    assert covered.max() <= binom.ppf(1 - 1e-3, SEEDS, 0.98) / SEEDS, hits
+
+
+def _value(source, name):
+    if name[-1] in "12":
+        c = source.harmonics[int(name[-1]) - 1]
+        return abs(c) if name.startswith("mu") else np.angle(c)
+    return getattr(source, name)
+
+
+def test_white_noise_has_the_textbook_s_variances(truth) -> None:
+    n, dt, sigma = 3000, 1e-3, 0.02
+    time = np.arange(n) * dt
+    rng = np.random.default_rng(1)
+    told = []
+    for _ in range(20):
+        noise = sigma * rng.standard_normal((2, n))
+        reading = lock_in(time, truth.load(time) + noise[0], truth.force(time) + noise[1])
+        told.append([reading.uncertainty(k) ** 2 for k in ("frequency", "re3", "mean_force")])
+    frequency, third, mean = np.mean(told, axis=0)
+    # Rife and Boorstyn (1974): the Cramer-Rao bound of a line's frequency.
+    amplitude = truth.epsilon * truth.W0
+    bound = 24 * sigma**2 / (amplitude**2 * n * (n * dt) ** 2) / (2 * np.pi) ** 2
+    # Twenty estimates of 40 degrees of freedom are good to 5 %, of 12 to 9 %.
+    assert frequency == pytest.approx(bound, rel=0.15)
+    assert third == pytest.approx(2 * sigma**2 / n / truth.W0**2, rel=0.15)
+    assert mean == pytest.approx(sigma**2 / n, rel=0.3)
+
+
+def test_the_frequency_is_as_good_as_theory_allows(truth) -> None:
+    n, dt, sigma = 2000, 1e-3, 0.1
+    time = np.arange(n) * dt
+    load, force = truth.load(time), truth.force(time)
+    rng = np.random.default_rng(2)
+    errors = [
+        lock_in(time, load + sigma * rng.standard_normal(n), force, harmonics=1).frequency
+        - truth.frequency
+        for _ in range(200)
+    ]
+    amplitude = truth.epsilon * truth.W0
+    bound = np.sqrt(24 * sigma**2 / (amplitude**2 * n)) / (n * dt) / (2 * np.pi)
+    assert np.std(errors) == pytest.approx(bound, rel=0.2)
+
+
+def test_coloured_noise_is_taken_where_it_acts(truth, red_noise) -> None:
+    n, dt, rho, sigma = 4000, 1e-3, 0.97, 0.05
+    time = np.arange(n) * dt
+    load, force = truth.load(time), truth.force(time)
+    rng = np.random.default_rng(3)
+    spectra = np.mean(
+        [
+            lock_in(time, load + sigma * red_noise(rng, rho, 1, n)[0], force).noise.spectra
+            for _ in range(30)
+        ],
+        axis=0,
+    )[:, 0, 0].real
+    for k in (1, 2, 3, 4):
+        angle = 2 * np.pi * k * truth.frequency * dt
+        theory = sigma**2 * (1 - rho**2) / abs(1 - rho * np.exp(-1j * angle)) ** 2
+        assert spectra[k] == pytest.approx(theory, rel=0.12)
+    # The formula for white noise would be wrong by a factor of 30 in the variance at 4f.
+    assert spectra[4] < sigma**2 / 25
+
+
+def test_noise_of_the_load_reaches_the_phase(truth) -> None:
+    n = 2000
+    time = np.arange(n) * 1e-3
+    rng = np.random.default_rng(5)
+    load, force = truth.load(time), truth.force(time)
+    phases, told = [], []
+    for _ in range(100):
+        reading = lock_in(time, load + 0.3 * rng.standard_normal(n), force, harmonics=2)
+        phases.append(reading.phasor(2).phase)
+        told.append(reading.uncertainty("phase2"))
+    # The force has no noise: all of this is the load's, twice over at 2f.
+    assert np.std(phases) == pytest.approx(np.mean(told), rel=0.2)
+    expected = 2 * 0.3 * np.sqrt(2 / n) / (truth.epsilon * truth.W0)
+    assert np.mean(told) == pytest.approx(expected, rel=0.1)
+
+
+def test_noise_that_both_channels_share_is_known_to_be_shared(truth) -> None:
+    n = 2000
+    time = np.arange(n) * 1e-3
+    common = 0.05 * np.random.default_rng(6).standard_normal(n)
+    load = truth.load(time)
+    both = lock_in(time, load + common, 0.4 * (load + common))
+    # F = 0.4 W sample by sample: nothing of the noise is left in the ratio.
+    assert both.uncertainty("mean_friction") < 1e-3 * both.uncertainty("W0") / truth.W0
+    assert both.uncertainty("im1") < 1e-3 * both.uncertainty("epsilon")
+
+
+def test_an_ellipse_that_excludes_zero() -> None:
+    covariance = np.diag([1e-8, 4e-8])
+    phasor = Phasor(3e-4 + 4e-4j, covariance, 60.0)
+    assert phasor.amplitude == pytest.approx(5e-4)
+    # Along the phasor: sqrt(0.36 * 1 + 0.64 * 4) * 1e-4, across: sqrt(0.64 * 1 + 0.36 * 4) * 1e-4.
+    assert phasor.amplitude_uncertainty == pytest.approx(np.sqrt(0.36 + 0.64 * 4) * 1e-4)
+    assert phasor.phase_uncertainty == pytest.approx(np.sqrt(0.64 + 0.36 * 4) * 1e-4 / 5e-4)
+    # (9 + 4)/2 against the 95 % quantile 3.15 of F(2, 60).
+    assert phasor.excludes(0)
+    assert not Phasor(phasor.value / 2, covariance, 60.0).excludes(0)

@@ -1,0 +1,135 @@
+"""Without noise a reading is exact, whatever the window, the clock and the drift."""
+
+import numpy as np
+import pytest
+
+from asperity.lock_in.demodulation import lock_in
+
+#: Rounding of a few thousand samples of size one.
+EXACT = 1e-12
+
+EVEN = np.arange(2000) * 1e-3
+CLOCKS = {
+    "even": EVEN,
+    "long even, by tables": np.arange(40_000) * 1e-3,
+    "part periods": EVEN[:1237],
+    "little more than one period": np.arange(200) * 1e-4,
+    "a late start": 11607.7 + EVEN,
+    "random": np.sort(np.random.default_rng(1).uniform(0, 2, 1500)),
+    "jitter": EVEN + 1e-4 * np.random.default_rng(2).uniform(-1, 1, EVEN.size),
+    "a gap": np.delete(EVEN, slice(400, 1100)),
+    "two rates": np.concatenate([np.arange(300) * 2e-3, 0.6 + np.arange(900) * 1e-3]),
+}
+
+
+def check(reading, truth, exact=EXACT) -> None:
+    expected = np.zeros(reading.harmonics.size, dtype=complex)
+    expected[: len(truth.harmonics)] = truth.harmonics
+    assert abs(reading.harmonics - expected).max() < exact
+    assert reading.frequency == pytest.approx(truth.frequency, rel=exact)
+    assert reading.epsilon == pytest.approx(truth.epsilon, rel=exact)
+    assert abs(reading.W0 - truth.W0) < exact * truth.W0
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_every_clock(truth, clock) -> None:
+    time = CLOCKS[clock]
+    # Rounding of the stamps themselves: 1e-12 s of a late clock is 1e-9 of a period.
+    exact = 1e-9 if clock == "a late start" else EXACT
+    check(lock_in(time, truth.load(time), truth.force(time)), truth, exact)
+
+
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_the_load_s_own_harmonics_bias_nothing(truth, clock) -> None:
+    time = CLOCKS[clock]
+    truth = truth.but(load_harmonics=(0.01 + 0.02j, -0.004j))
+    reading = lock_in(time, truth.load(time), truth.force(time), harmonics=3)
+    check(reading, truth, 1e-9 if clock == "a late start" else EXACT)
+    expected = [truth.epsilon, 0.01 + 0.02j, -0.004j]
+    assert abs(reading.load_harmonics - expected).max() < 1e-9
+
+
+@pytest.mark.parametrize(("detrend", "power"), [("none", 0), ("linear", 1), ("quadratic", 2)])
+def test_drift_is_fitted_and_its_mean_kept(truth, detrend, power) -> None:
+    time = EVEN[:1237]
+    u = np.linspace(-1, 1, time.size)
+    force = truth.force(time) + 0.3 * truth.W0 * u**power
+    reading = lock_in(time, truth.load(time), force, detrend=detrend)
+    check(reading, truth)
+    mean = truth.mean_friction + 0.3 * {0: 1, 1: 0, 2: 1 / 3}[power]
+    assert reading.mean_friction == pytest.approx(mean, rel=EXACT)
+    if power == 1:
+        assert reading.drift[1, 0] == pytest.approx(0.6 * truth.W0, rel=EXACT)
+
+
+def test_drift_of_both_channels(truth) -> None:
+    u = np.linspace(-1, 1, EVEN.size)
+    load, force = truth.load(EVEN) + 0.05 * u, truth.force(EVEN) - 0.1 * u
+    reading = lock_in(EVEN, load, force)
+    check(reading, truth)
+    assert reading.drift[:, 0] == pytest.approx([0.1, -0.2], abs=1e-11)
+
+
+@pytest.mark.parametrize("error", [1e-4, -3e-3, 0.04, -0.05])
+def test_a_wrong_start_is_put_right(truth, error) -> None:
+    start = truth.frequency * (1 + error)
+    reading = lock_in(EVEN, truth.load(EVEN), truth.force(EVEN), frequency=start)
+    check(reading, truth)
+
+
+def test_what_an_error_of_the_frequency_costs(truth) -> None:
+    # pi times error times frequency times duration, at the ends of ten seconds: 0.19 rad, and
+    # an amplitude lower by sinc of it.
+    time = np.arange(10_000) * 1e-3
+    load, force = truth.load(time), truth.force(time)
+    wrong = truth.frequency * (1 + 1e-4)
+    reading = lock_in(time, load, force, frequency=wrong, refine=False)
+    angle = np.pi * 1e-4 * truth.frequency * 10
+    assert reading.epsilon / truth.epsilon == pytest.approx(np.sinc(angle / np.pi), rel=1e-4)
+    check(lock_in(time, load, force, frequency=wrong), truth)
+
+
+def test_few_periods_of_a_slow_modulation(truth) -> None:
+    truth = truth.but(frequency=0.83)
+    time = np.arange(900) * 5e-3
+    check(lock_in(time, truth.load(time), truth.force(time)), truth)
+
+
+def test_phases_are_those_of_the_package(truth) -> None:
+    # F/W0 = mean + mu1 cos(phi + phase1): a force ahead of the load has a positive phase.
+    truth = truth.but(harmonics=(1e-3 * np.exp(0.5j),))
+    reading = lock_in(EVEN, truth.load(EVEN), truth.force(EVEN), harmonics=1)
+    assert reading.phasor(1).phase == pytest.approx(0.5, rel=1e-10)
+    assert reading.phasor(1).amplitude == pytest.approx(1e-3, rel=1e-10)
+    # A load shifted in time changes none of it.
+    later = truth.but(phase=3.0)
+    moved = lock_in(EVEN, later.load(EVEN), later.force(EVEN), harmonics=1)
+    assert moved.phasor(1).phase == pytest.approx(0.5, rel=1e-10)
+
+
+def test_amontons_law_is_read_as_itself(truth) -> None:
+    load = truth.load(EVEN)
+    reading = lock_in(EVEN, load, 0.4 * load)
+    assert reading.harmonics[0] == pytest.approx(0.4 * truth.epsilon, rel=1e-11)
+    assert abs(reading.harmonics[1:]).max() < EXACT
+
+
+def test_a_load_that_is_recorded_as_negative_is_the_same_load(truth) -> None:
+    load, force = truth.load(EVEN), truth.force(EVEN)
+    rng = np.random.default_rng(0)
+    load = load + 0.01 * rng.standard_normal(load.size)
+    one, other = lock_in(EVEN, load, force), lock_in(EVEN, -load, -force)
+    assert other.harmonics == pytest.approx(one.harmonics, abs=1e-14)
+    assert other.epsilon == pytest.approx(one.epsilon, rel=1e-13)
+    assert abs(other.W0 + one.W0) < 1e-12
+    for name in ("epsilon", "mu1", "phase1", "mean_friction", "frequency"):
+        assert other.uncertainty(name) == pytest.approx(one.uncertainty(name), rel=1e-9)
+
+
+def test_plain_averages_would_be_wrong(truth) -> None:
+    # The mistake that the lock-in is for: a window of part periods, multiplied and averaged.
+    time = EVEN[:1237]
+    force = truth.force(time) / truth.W0
+    reference = np.exp(-1j * (2 * np.pi * truth.frequency * time + truth.phase))
+    naive = 2 * np.mean(force * reference)
+    assert abs(naive - truth.harmonics[0]) > 1e-4

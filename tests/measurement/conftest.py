@@ -1,0 +1,90 @@
+"""Velocity steps and holds with known truth: a spring-slider integrated by SciPy, and lab noise."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
+
+from asperity.recording import Channel, Trace
+
+A, B, DC, MU0, V0 = 0.010, 0.014, 8e-6, 0.6, 1e-6
+
+
+def spring_slider(velocities, bounds, times, *, a=A, b=B, dc=DC, stiffness=3e3):
+    """Friction of a quasi-static slider with the ageing law, pulled at each velocity in turn.
+
+    Times lie between the bounds; stiffness is in friction per metre.
+    """
+    out = np.empty(times.size)
+
+    def slip_rate(mu, log_theta):
+        return V0 * np.exp((mu - MU0 - b * (np.log(V0 / dc) + log_theta)) / a)
+
+    state = [MU0 + (a - b) * np.log(velocities[0] / V0), np.log(dc / velocities[0])]
+    for velocity, start, end in zip(velocities, bounds[:-1], bounds[1:], strict=True):
+
+        def rates(_, y, pull=velocity):
+            v = slip_rate(*y)
+            return [stiffness * (pull - v), np.exp(-y[1]) - v / dc]
+
+        found = solve_ivp(
+            rates, (start, end), state, method="LSODA", rtol=1e-8, atol=1e-10, dense_output=True
+        )
+        here = (times >= start) & (times <= end)
+        out[here] = found.sol(times[here])[0]
+        state = found.y[:, -1]
+    return out
+
+
+def rig_noise(rng, size, rate, white=4e-4, red=3e-4, samples=100):
+    """White noise, noise whose integrated autocorrelation is so many samples, and two lines."""
+    keep = np.exp(-2 / samples)
+    made = rng.standard_normal(size + 20 * samples)
+    slow = lfilter([np.sqrt(1 - keep**2)], [1, -keep], made)[20 * samples :]
+    time = np.arange(size) / rate
+    lines = sum(
+        amplitude * np.sin(2 * np.pi * f * time + rng.uniform(0, 2 * np.pi))
+        for f, amplitude in ((0.597, 3e-4), (5.1, 2e-4))
+    )
+    return white * rng.standard_normal(size) + red * slow + lines
+
+
+@pytest.fixture(scope="session")
+def pulled():
+    """Function that pulls a slider: slips of zero are holds of that many seconds."""
+
+    def make(velocities, lengths, rates, *, resolution=5e-8, seed=0, noise=None, slope=0.0, **law):
+        """Time, displacement, friction without noise, the same with noise, and the bounds.
+
+        Lengths are slips (m), or the seconds of a hold; rates are samples per second of each part.
+        """
+        rng = np.random.default_rng(seed)
+        spans = [s / v if v else s for v, s in zip(velocities, lengths, strict=True)]
+        bounds = np.concatenate([[0.0], np.cumsum(spans)])
+        parts = zip(bounds[:-1], bounds[1:], rates, strict=True)
+        time = np.concatenate([np.arange(a, b - 1e-9, 1 / rate) for a, b, rate in parts])
+        slips = [s if v else 0.0 for v, s in zip(velocities, lengths, strict=True)]
+        slip = np.interp(time, bounds, np.concatenate([[0.0], np.cumsum(slips)]))
+        clean = spring_slider(velocities, bounds, time, **law) + slope * slip
+        added = rig_noise(rng, time.size, max(rates)) if noise is None else 0.0
+        if noise:
+            added = noise * rng.standard_normal(time.size)
+        displacement = slip + resolution * rng.standard_normal(time.size)
+        return time, displacement, clean, clean + added, bounds
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def sliding_trace():
+    """Function that makes a trace of friction with displacement or velocity."""
+
+    def make(time, friction, displacement=None, velocity=None):
+        channels = {"friction": Channel(friction, "dimensionless", "", "friction", "")}
+        if displacement is not None:
+            channels["slip"] = Channel(displacement, "length", "m", "slip", "m")
+        if velocity is not None:
+            channels["velocity"] = Channel(velocity, "velocity", "m/s", "velocity", "m/s")
+        return Trace(time, channels)
+
+    return make

@@ -1,0 +1,265 @@
+"""Recordings that are not what they seem: each is named, with a number, and nothing else is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from asperity.lock_in.demodulation import lock_in
+from asperity.measurement.measure import measure
+from asperity.measurement.record import modulated_record
+from asperity.recording import check
+
+RATE, END = 2000.0, 10.0
+
+
+@pytest.fixture
+def made(truth):
+    """Arrays time, load, force of ten steady seconds."""
+
+    def make(seed=0, **changes):
+        source = truth.but(**changes)
+        rng = np.random.default_rng(seed)
+        time = np.arange(int(RATE * END)) / RATE
+        load = source.load(time) + 5e-3 * rng.standard_normal(time.size)
+        return time, load, source.force(time) + 2e-3 * rng.standard_normal(time.size)
+
+    return make
+
+
+def swapped(time, load, force):
+    return time, force, load
+
+
+def flipped(time, load, force):
+    return time, load, -force
+
+
+def in_kilonewton(time, load, force):
+    return time, 1e3 * load, force
+
+
+def off_zero(time, load, force):
+    return time, load - 6.0, force
+
+
+def load_drifts(time, load, force):
+    return time, load + 0.03 * time, force
+
+
+def load_wanders(time, load, force):
+    return time, load + 0.3 * np.sin(np.pi * time), force
+
+
+def irregular_stick_slip(time, load, force):
+    rng = np.random.default_rng(0)
+    speed = np.repeat(2.5 * (1 + 0.4 * rng.standard_normal(200)), time.size // 200)
+    return time, load, force + 0.1 * (np.cumsum(speed) / RATE % 1 - 0.5)
+
+
+def response_changes(time, load, force):
+    phi = 2 * np.pi * 60.013 * time + 0.7
+    return time, load, force + 7e-3 * np.sin(2 * np.pi * 0.15 * time) * np.cos(phi - 1.5)
+
+
+def hum_beside_the_line(time, load, force):
+    return time, load, force + 0.02 * np.cos(2 * np.pi * 60.27 * time)
+
+
+def dropped_bits(time, load, force):
+    load = load.copy()
+    load[np.random.default_rng(1).integers(0, load.size, 20)] = 0.0
+    return time, load, force
+
+
+def sparks(time, load, force):
+    force = force.copy()
+    for at in np.random.default_rng(2).integers(0, force.size - 2, 20):
+        force[at : at + 2] += 1.0
+    return time, load, force
+
+
+def coarse_load(time, load, force):
+    return time, np.round(2 * load) / 2, force
+
+
+def stamps_of_a_millisecond(time, load, force):
+    return np.round(time, 3), load, force
+
+
+#: Defect, the checks that name it, and the verdict of the gravest.
+DOUBTS = {
+    "columns exchanged": (swapped, {"friction", "response", "load harmonics", "mains"}, "bad"),
+    "sign of the force": (flipped, {"friction"}, "suspicious"),
+    "units a thousand apart": (in_kilonewton, {"friction"}, "suspicious"),
+    "zero of the load": (off_zero, {"contact", "friction"}, "bad"),
+    "drift of the load": (load_drifts, {"steady load"}, "suspicious"),
+    "slow wave of the load": (load_wanders, {"steady load"}, "suspicious"),
+    "irregular stick-slip": (irregular_stick_slip, {"steady force"}, "suspicious"),
+    "a response that changes": (
+        response_changes,
+        {"steady response", "shifting response"},
+        "bad",
+    ),
+    "another line beside it": (hum_beside_the_line, {"steady response"}, "bad"),
+    "dropped bits": (dropped_bits, {"spike", "dropouts"}, "suspicious"),
+    "sparks of two samples": (sparks, {"spike"}, "bad"),
+    "steps of the load": (coarse_load, {"resolution", "leakage"}, "suspicious"),
+    "stamps too coarse": (stamps_of_a_millisecond, {"repeated time"}, "bad"),
+}
+
+
+@pytest.mark.parametrize("doubt", DOUBTS)
+def test_what_cannot_be_believed_is_named(made, trace, doubt) -> None:
+    plant, names, verdict = DOUBTS[doubt]
+    found = measure(trace(*plant(*made())), window=(0.0, END))
+    named = {c.name for c in found.checks if c.verdict != "ok"}
+    assert named & names, named
+    assert named <= names | {"stick-slip", "signal", "transient"}
+    assert found.verdict == verdict
+
+
+def test_numbers_of_the_doubts_are_those_planted(made, trace) -> None:
+    def number(name, plant):
+        found = measure(trace(*plant(*made())), window=(0.0, END))
+        return next(c.number for c in found.checks if c.name == name)
+
+    assert number("friction", flipped) == pytest.approx(-0.4, rel=1e-3)
+    assert number("contact", off_zero) == pytest.approx(7 * 0.24, rel=1e-3)
+    # mu1/(mean epsilon) of the exchanged pair: 0.24 * 7/(2e-3 * 7), less 1/0.4 over 1/0.4.
+    assert number("response", swapped) == pytest.approx(0.24 * 0.4 / 2e-3, rel=1e-2)
+    assert number("steady load", load_drifts) == pytest.approx(0.03 * END / 7.15, rel=1e-2)
+    # Half of the line's slope is fitted as drift: ten half-turns hold next to none.
+    assert number("steady load", load_wanders) == pytest.approx(0.3 / 7, rel=0.05)
+    # A sawtooth of 0.1 N has a standard deviation of 0.1/sqrt(12).
+    wave = 0.1 / np.sqrt(12) * np.sqrt(2) / 2.8
+    assert number("steady force", irregular_stick_slip) == pytest.approx(wave, rel=0.1)
+    assert number("resolution", coarse_load) == pytest.approx(0.5 / 1.68, rel=0.05)
+    # Two stamps of a millisecond each: one of two samples is left out, for each that is kept.
+    assert number("repeated time", stamps_of_a_millisecond) == pytest.approx(1.0, rel=0.01)
+
+
+def test_a_force_of_zero_has_a_verdict(made, trace) -> None:
+    time, load, force = made()
+    found = measure(trace(time, load, 0 * force))
+    assert found.verdict == "bad"
+    assert found.reading.mean_friction == 0
+
+
+def test_recordings_that_stand_still_have_a_verdict(made, trace) -> None:
+    time, load, force = made()
+    half = time.size // 2
+    stuck = force.copy()
+    stuck[half:] = stuck[half]
+    for values in (stuck, np.full(time.size, 2.8), load, 0.4 * load):
+        found = measure(trace(time, load, values), frequency=60.0, window=(0.0, END))
+        record = modulated_record(found)
+        assert np.isfinite([record[name] for name in ("W0", "epsilon", "mu1", "mu2")]).all()
+        assert np.isfinite(list(record["intervals_95"].values())).all()
+
+
+def test_harmonics_that_are_folded_onto_those_read_are_told(truth, trace) -> None:
+    # Four samples a period: the third harmonic looks like the first.
+    time = np.arange(4000) / 240.0
+    for frequency, verdict in ((60.0, "suspicious"), (57.3, "ok")):
+        source = truth.but(frequency=frequency)
+        noise = 1e-3 * np.random.default_rng(0).standard_normal((2, time.size))
+        made = (time, source.load(time) + noise[0], source.force(time) + noise[1])
+        found = measure(trace(*made), harmonics=1, frequency=frequency)
+        (said,) = [c for c in found.checks if c.name == "aliasing"]
+        assert said.verdict == verdict, said
+
+
+@pytest.mark.parametrize(
+    "shape", ["white", "sine", "walk", "sawtooth", "steps", "coarse", "begins"]
+)
+def test_signals_without_spikes_have_none(trace, shape) -> None:
+    rng = np.random.default_rng(4)
+    n = 200_000
+    made = {
+        "white": rng.standard_normal(n),
+        "sine": np.cos(0.9 * np.arange(n)),
+        "walk": np.cumsum(rng.standard_normal(n)),
+        "sawtooth": np.arange(n) / 500 % 1 + 1e-4 * rng.standard_normal(n),
+        "steps": np.repeat(rng.integers(0, 9, n // 50), 50) + 1e-3 * rng.standard_normal(n),
+        "begins": 7
+        + 1e-3 * rng.standard_normal(n)
+        + (np.arange(n) % 16_000 > 9_000) * np.cos(0.19 * np.arange(n) + 0.3),
+        "coarse": np.round(0.15 * rng.standard_normal(n)),
+    }[shape]
+    found = trace(np.arange(n) * 1e-4, made, made).findings
+    assert "spike" not in {finding.name for finding in found}
+
+
+def test_a_jittering_clock_has_no_gaps(made, trace) -> None:
+    time, load, force = made()
+    for seed in range(10):
+        off = np.random.default_rng(seed).uniform(-0.3, 0.3, time.size) / RATE
+        found = trace(time + off, load, force).findings
+        assert "gap" not in {finding.name for finding in found}
+    keep = (time < 4) | (time > 4.01)
+    found = check(replace(trace((time + off)[keep], load[keep], force[keep]), findings=()))
+    (gap,) = [finding for finding in found if finding.name == "gap"]
+    assert gap.number == pytest.approx(0.01, rel=0.1)
+
+
+SEEDS = 60
+
+
+def _covered(truth, noises, names):
+    """Share of 95 % intervals that hold the truth, over pairs of noise of load and force."""
+    hits = dict.fromkeys(names, 0)
+    for of_load, of_force in noises:
+        time = np.arange(of_load.size) / RATE
+        load, force = truth.load(time) + of_load, truth.force(time) + of_force
+        reading = lock_in(time, load, force, harmonics=2)
+        for name in names:
+            kind, n = name.rstrip("12"), int(name[-1]) if name[-1] in "12" else 0
+            c = truth.harmonics[n - 1]
+            true = {"mu": abs(c), "phase": np.angle(c)}.get(kind, getattr(truth, kind, 0.0))
+            value = getattr(reading.phasor(n), {"mu": "amplitude"}.get(kind, kind)) if n else None
+            value = getattr(reading, name) if value is None else value
+            hits[name] += abs(value - true) < reading.half_width(name)
+    return {name: count / SEEDS for name, count in hits.items()}
+
+
+def test_noise_that_grows_towards_zero_is_followed_there(truth) -> None:
+    rng = np.random.default_rng(5)
+    n = 2000
+
+    def flicker():
+        # A piece of 1/f noise that began four windows ago.
+        line = np.fft.rfftfreq(4 * n)
+        shape = np.concatenate([[0.0], line[1:] ** -0.5])
+        return 1e-3 * np.fft.irfft(shape * np.fft.rfft(rng.standard_normal(4 * n)))[:n]
+
+    covered = _covered(
+        truth, [(flicker(), flicker()) for _ in range(SEEDS)], ("mean_friction", "mu1", "phase1")
+    )
+    # Binomial scatter of 60 seeds is 3 %; following a spectrum down is no better than it is steep.
+    assert min(covered.values()) > 0.82, covered
+
+
+def test_hum_far_from_the_harmonics_is_in_their_uncertainties(truth) -> None:
+    rng = np.random.default_rng(6)
+    time = np.arange(3000) / RATE
+    noises = []
+    for _ in range(SEEDS):
+        # Whole periods in the window: no line of the window's spectrum sees them but one.
+        wave = [np.cos(2 * np.pi * 50 * time + rng.uniform(0, 7)) for _ in range(2)]
+        noises.append([0.01 * w + 1e-4 * rng.standard_normal(time.size) for w in wave])
+    covered = _covered(truth, noises, ("mean_friction", "mu1", "phase1", "mu2"))
+    assert min(covered.values()) > 0.9, covered
+
+
+def test_a_phase_of_nothing_is_unknown(truth) -> None:
+    quiet = truth.but(harmonics=(2e-3 + 0j, 0j))
+    rng = np.random.default_rng(7)
+    time = np.arange(3000) / RATE
+    noise = 2e-2 * lfilter([1], [1, -0.5], rng.standard_normal((2, time.size)))
+    reading = lock_in(time, quiet.load(time) + noise[0], quiet.force(time) + noise[1])
+    assert not reading.phasor(2).excludes(0)
+    assert reading.half_width("phase2") == pytest.approx(np.pi)
+    assert reading.uncertainty("phase2") <= np.pi / np.sqrt(3)
+    assert reading.half_width("phase1") < np.pi

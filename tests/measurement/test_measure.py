@@ -1,0 +1,324 @@
+"""`measure`: the window, F(0) about it, and every planted defect found."""
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.lock_in.demodulation import lock_in
+from asperity.measurement.measure import measure
+from asperity.measurement.record import modulated_record
+from asperity.recording import Channel, Trace
+
+NAMES = {
+    *("modulation", "periods", "signal", "leakage", "drift", "transient"),
+    *("stick-slip", "load harmonics", "resolution"),
+}
+
+
+def verdicts(found):
+    return {check.name: check.verdict for check in found.checks}
+
+
+def test_a_clean_recording_passes_everything(truth, protocol, trace) -> None:
+    found = measure(trace(*protocol(truth)))
+    assert set(verdicts(found)) >= NAMES
+    assert set(verdicts(found).values()) == {"ok"}
+    assert found.verdict == "ok"
+    reading = found.reading
+    # Five standard uncertainties: the seed is fixed.
+    for name in ("W0", "epsilon", "frequency"):
+        assert abs(getattr(reading, name) - getattr(truth, name)) < 5 * reading.uncertainty(name)
+    for n, c in enumerate(truth.harmonics, 1):
+        phasor = reading.phasor(n)
+        assert abs(phasor.value - c) < 5 * phasor.amplitude_uncertainty
+    assert abs(found.delta_mu + 0.08) < 5 * found.delta_mu_uncertainty
+    assert abs(found.static_friction - 0.4) < 5e-6
+    for level in (found.before, found.after):
+        assert abs(level.value - 2.8) < 5 * level.uncertainty
+
+
+def test_the_window_lies_in_the_modulation_after_the_transient(truth, protocol, trace) -> None:
+    found = measure(trace(*protocol(truth)))
+    reading = found.reading
+    # Eight decay times of 0.3 s, and blocks of 0.07 s: 0.08 e^-8 is within the noise of a block.
+    assert 6.9 < reading.start < 10.0
+    assert 25.7 < reading.end < 26.0
+    assert found.chosen_by == "program"
+    assert [part.modulated for part in found.stretches] == [False, True, False]
+    assert found.stretches[1].amplitude == pytest.approx(truth.epsilon * truth.W0, rel=1e-2)
+
+
+def test_a_window_of_the_user_is_taken_as_it_is(truth, protocol, trace) -> None:
+    found = measure(trace(*protocol(truth)), window=(12.0, 20.0))
+    assert (found.reading.start, found.reading.end) == pytest.approx((12.0, 20.0), abs=1e-9)
+    assert found.chosen_by == "user"
+    assert found.before is not None
+
+
+def test_whole_periods(truth, protocol, trace) -> None:
+    found = measure(trace(*protocol(truth)), window=(12.0, 20.0), only_whole_periods=True)
+    # The last sample stands for the time up to the next: n samples span n steps.
+    periods = found.reading.samples * 1e-3 * truth.frequency
+    assert abs(periods - round(periods)) < 1e-3 * truth.frequency
+    assert 20.0 - found.reading.end < 1 / truth.frequency + 1e-3
+
+
+def test_a_modulated_recording_without_pauses(truth, trace) -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(8000) * 1e-3
+    load = truth.load(time) + 1e-3 * rng.standard_normal(time.size)
+    force = truth.force(time) + 1e-3 * rng.standard_normal(time.size)
+    found = measure(trace(time, load, force))
+    assert found.window == (0, time.size)
+    assert found.before is None
+    assert found.after is None
+    assert np.isnan(found.delta_mu)
+    assert found.verdict == "ok"
+
+
+def test_a_weak_modulation_is_no_pause(truth, trace) -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(30_000) * 1e-3
+    epsilon = np.select([time < 5, time < 12, time < 17], [0.0, 0.005, 0.0], 0.4)
+    load = 7 * (1 + epsilon * np.cos(2 * np.pi * 60 * time))
+    load = load + 1e-3 * rng.standard_normal(time.size)
+    force = truth.force(time) + 1e-3 * rng.standard_normal(time.size)
+    found = measure(trace(time, load, force))
+    amplitudes = [part.amplitude / 7 for part in found.stretches]
+    assert amplitudes == pytest.approx([0, 0.005, 0, 0.4], abs=2e-4)
+    assert 12 < found.before.start < found.before.end < 17
+
+
+def test_the_longest_of_several_amplitudes_is_read(truth, trace) -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(20_000) * 1e-3
+    weak = truth.but(epsilon=0.1)
+    load = np.where(time < 8, weak.load(time), truth.load(time))
+    load = load + 1e-3 * rng.standard_normal(time.size)
+    force = truth.force(time) + 1e-3 * rng.standard_normal(time.size)
+    found = measure(trace(time, load, force))
+    assert found.reading.epsilon == pytest.approx(0.24, abs=1e-4)
+    assert found.reading.start > 8.0
+    amplitudes = [part.amplitude / truth.W0 for part in found.stretches]
+    assert amplitudes == pytest.approx([0.1, 0.24], abs=1e-3)
+
+
+def test_each_amplitude_of_a_protocol_is_held_against_the_rests_beside_it(truth, trace) -> None:
+    # Rests that drift by 2 % in all, so that those beside another amplitude are wrong by as much.
+    rng = np.random.default_rng(8)
+    time = np.arange(60_000) * 1e-3
+    amplitudes, starts = (0.05, 0.1, 0.2), (8.0, 26.0, 44.0)
+    load, friction = np.full(time.size, truth.W0), 0.5 * (1 - 0.02 * time / 60)
+    for amplitude, start in zip(amplitudes, starts, strict=True):
+        on = (time >= start) & (time < start + 8)
+        load = np.where(on, truth.but(epsilon=amplitude).load(time), load)
+        drop = -np.expm1(-np.clip(time - start, 0, None) / 0.3)
+        back = -np.expm1(-np.clip(time - start - 8, 0, None) / 0.3)
+        friction = friction - 0.2 * amplitude * (drop - back)
+    load = load + 2e-3 * rng.standard_normal(time.size)
+    force = truth.W0 * friction + 1e-3 * rng.standard_normal(time.size)
+    recording = trace(time, load, force)
+    for amplitude, start in zip(amplitudes, starts, strict=True):
+        # The last sample of the window is the first of the rest.
+        found = measure(recording, window=(start + 3, start + 8))
+        assert found.reading.epsilon == pytest.approx(amplitude, rel=5e-3)
+        # The mean of the window lies 1.5 s behind the middle of the rests on average.
+        assert found.delta_mu == pytest.approx(-0.2 * amplitude, abs=6e-4)
+        assert verdicts(found)["steady load"] == "ok"
+
+
+def slow(time, load, force):
+    """Stick-slip that the modulation has not suppressed."""
+    return time, load, force + 0.02 * np.sin(2 * np.pi * 2.7 * time)
+
+
+def fast(time, load, force):
+    """Stick-slip under a modulation that is slower."""
+    phi = 2 * np.pi * 0.5 * time
+    return time, 7 * (1 + 0.1 * np.cos(phi)), 2.8 + 0.01 * np.cos(phi) + 0.1 * (2.7 * time % 1)
+
+
+def drifting(time, load, force):
+    return time, load, force * (1 + 2e-3 * time)
+
+
+def second_harmonic(time, load, force):
+    on = (time >= 6) & (time < 26)
+    return time, load + on * 0.1 * np.cos(4 * np.pi * 60.013 * time), force
+
+
+def saturated(time, load, force):
+    return time, np.minimum(load, 8.5), force
+
+
+def unsteady(time, load, force):
+    on = (time >= 6) & (time < 26)
+    phase = 2 * np.pi * 60.013 * time + 0.7 + 0.3 * np.sin(2 * np.pi * 0.2 * time)
+    return time, 7 * (1 + 0.24 * on * np.cos(phase)), force
+
+
+def with_gap(time, load, force):
+    keep = (time < 14) | (time > 14.8)
+    return time[keep], load[keep], force[keep]
+
+
+def with_nan(time, load, force):
+    force = force.copy()
+    force[15_000:15_200] = np.nan
+    return time, load, force
+
+
+def coarse(time, load, force):
+    """Steps of a recorder as large as mu1, and no noise to smooth them."""
+    return time, load, np.round(force / 0.02) * 0.02
+
+
+def noisy(time, load, force):
+    return time, load, force + 3.0 * np.random.default_rng(1).standard_normal(time.size)
+
+
+def repeated_stamps(time, load, force):
+    time = time.copy()
+    time[15_001] = time[15_000]
+    return time, load, force
+
+
+#: Defect, window, name of the check, and verdicts that name it.
+PLANTED = {
+    "stick-slip": (slow, None, "stick-slip", {"suspicious", "bad"}),
+    "stick-slip, faster": (fast, None, "stick-slip", {"bad"}),
+    "drift": (drifting, None, "drift", {"bad"}),
+    "second harmonic of the load": (second_harmonic, None, "load harmonics", {"suspicious", "bad"}),
+    "saturation": (saturated, None, "saturation", {"bad"}),
+    "unsteady exciter": (unsteady, None, "leakage", {"bad"}),
+    "gap": (with_gap, (10, 20), "gap", {"suspicious"}),
+    "missing values": (with_nan, (10, 20), "nan", {"suspicious"}),
+    "coarse steps": (coarse, None, "resolution", {"bad"}),
+    "noise": (noisy, None, "signal", {"bad", "suspicious"}),
+    "transient": (lambda *a: a, (6.3, 14), "transient", {"bad"}),
+    "a few periods": (lambda *a: a, (12.0, 12.06), "periods", {"suspicious"}),
+    "repeated stamps": (repeated_stamps, (10, 20), "repeated time", {"suspicious"}),
+}
+
+
+@pytest.mark.parametrize("defect", PLANTED)
+def test_a_planted_defect_is_found(truth, protocol, trace, defect) -> None:
+    plant, window, name, expected = PLANTED[defect]
+    found = measure(trace(*plant(*protocol(truth))), window=window)
+    (check,) = [check for check in found.checks if check.name == name]
+    assert check.verdict in expected, check
+    assert check.sentence
+
+
+def test_numbers_of_the_checks_are_those_planted(truth, protocol, trace) -> None:
+    def number(name, plant, **more):
+        found = measure(trace(*plant(*protocol(truth))), **more)
+        return next(check.number for check in found.checks if check.name == name), found
+
+    amplitude, _ = number("stick-slip", slow)
+    # A line between two lines of the window is seen up to 15 % too low.
+    assert amplitude == pytest.approx(0.02 / (0.32 * 7), rel=0.15)
+    change, _ = number("drift", drifting)
+    # F(0) at the middles of what was averaged, 0-6 s and about 29-36 s.
+    assert change == pytest.approx(2e-3 * 29.5, rel=0.1)
+    share, found = number("load harmonics", second_harmonic)
+    second = 0.1 / 7
+    assert abs(found.reading.load_harmonics[1]) == pytest.approx(second, rel=1e-2)
+    assert share == pytest.approx(2e-3 / 0.24 * second / 3e-4, rel=2e-2)
+    left, _ = number("transient", lambda *a: a, window=(6.3, 14))
+    assert left == pytest.approx(0.08 * np.exp(-1) / 0.32, rel=0.3)
+
+
+def test_defects_outside_the_window_are_avoided(truth, protocol, trace) -> None:
+    time, load, force = protocol(truth)
+    force = force.copy()
+    force[10_500:10_600] = np.nan
+    found = measure(trace(time, load, force))
+    assert found.reading.start >= 10.6
+    assert found.verdict == "ok"
+    # They are told all the same.
+    assert "nan" in {finding.name for finding in found.samples.findings}
+    assert found.samples.dropped == 100
+
+
+def test_missing_values_are_left_out_and_not_invented(truth, trace) -> None:
+    time = np.arange(6000) * 1e-3
+    load, force = truth.load(time), truth.force(time)
+    force[1000:1100] = np.nan
+    load[2500:2600] = np.inf
+    found = measure(trace(time, load, force), window=(0, 6))
+    assert abs(found.reading.harmonics[0] - truth.harmonics[0]) < 1e-12
+    assert found.samples.dropped == 200
+
+
+def test_a_recorded_friction_coefficient_stands_for_the_force(truth, trace) -> None:
+    time = np.arange(6000) * 1e-3
+    load, force = truth.load(time), truth.force(time)
+    friction = Channel(force / load, "dimensionless", "", "mu", "")
+    found = measure(Trace(time, {"W": Channel(load, "force", "N", "W", "N"), "mu": friction}))
+    assert abs(found.reading.harmonics[0] - truth.harmonics[0]) < 1e-12
+    assert found.samples.names == ("W", "mu x load")
+
+
+def test_a_recording_without_modulation_is_told(truth, trace) -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(8000) * 1e-3
+    load = 7 + 1e-2 * rng.standard_normal(time.size)
+    force = 2.8 + 1e-2 * rng.standard_normal(time.size)
+    with pytest.raises(InputError, match=r"must be modulated.*measure without modulation"):
+        measure(trace(time, load, force))
+    # A user who knows better is told by the verdict.
+    assert verdicts(measure(trace(time, load, force), frequency=60.0))["modulation"] == "bad"
+
+
+def test_a_long_recording_with_a_short_modulation(truth, protocol, trace) -> None:
+    # The modulation's line would drown in averages over the whole, and misses the middle.
+    made = protocol(truth, rate=2000.0, on=(88.0, 96.0), end=100.0)
+    found = measure(trace(*made))
+    assert found.reading.frequency == pytest.approx(truth.frequency, abs=1e-4)
+    assert 88 < found.reading.start < found.reading.end < 96
+
+
+def test_the_record_holds_everything(truth, protocol, trace) -> None:
+    found = measure(trace(*protocol(truth)), harmonics=2)
+    record = modulated_record(found)
+    assert record["mu1"] == found.reading.phasor(1).amplitude
+    assert record["uncertainties"]["phase2"] == found.reading.uncertainty("phase2")
+    matrix = np.array(record["covariance"]["matrix"])
+    names = record["covariance"]["names"]
+    assert matrix.shape == (len(names), len(names))
+    assert matrix == pytest.approx(matrix.T, rel=1e-6, abs=1e-18)
+    assert np.linalg.eigvalsh(matrix / np.sqrt(np.outer(*2 * [np.diag(matrix)]))).min() > -1e-9
+    at = names.index("epsilon")
+    assert record["uncertainties"]["epsilon"] == pytest.approx(np.sqrt(matrix[at, at]))
+
+
+@pytest.mark.parametrize("samples", [3000, 140_000])
+@pytest.mark.parametrize("which", ["load", "force"])
+@pytest.mark.parametrize("refine", [True, False])
+def test_the_lock_in_itself_takes_numbers_only(truth, samples, which, refine) -> None:
+    time = np.arange(samples) * 1e-3
+    signals = {"load": truth.load(time), "force": truth.force(time)}
+    signals[which][samples // 3] = np.nan
+    with pytest.raises(InputError, match="must be finite"):
+        lock_in(time, **signals, frequency=truth.frequency, refine=refine)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"window": (5, 4)}, "window must enclose"),
+        ({"window": (90, 99)}, "window must enclose"),
+        ({"detrend": "cubic"}, "detrend must be none, linear or quadratic"),
+        ({"frequency": 900.0}, "frequency must lie within what the recording resolves"),
+        ({"harmonics": 9}, "harmonics must lie below half the sampling rate"),
+        ({"harmonics": 0}, "harmonics must be at least 1"),
+        ({"force": "W"}, "force must be another channel"),
+        ({"load": "nothing"}, "channel must name a channel"),
+        ({"window": (12.0, 12.017)}, "must hold at least|at least one period"),
+    ],
+)
+def test_bad_input_is_one_sentence(truth, protocol, trace, options, message) -> None:
+    with pytest.raises(InputError, match=message) as caught:
+        measure(trace(*protocol(truth)), **options)
+    assert str(caught.value).count(";") == 1

@@ -1,0 +1,155 @@
+"""Where recordings are cut: over decades of velocity, changes of sampling rate, short holds."""
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.measurement.sliding.measure import measure_sliding
+from asperity.measurement.sliding.segments import displacement_noise, partition
+
+UM = 1e-6
+
+
+def stepped(velocities, lengths, rates, *, resolution=2e-8, seed=0, jump=0.01):
+    """Time, displacement, friction that jumps at every step, and the times of the steps.
+
+    Lengths are slips (m), or seconds where the velocity is zero.
+    """
+    rng = np.random.default_rng(seed)
+    spans = [s / v if v else s for v, s in zip(velocities, lengths, strict=True)]
+    bounds = np.concatenate([[0.0], np.cumsum(spans)])
+    parts = zip(bounds[:-1], bounds[1:], rates, strict=True)
+    time = np.concatenate([np.arange(a, b - 1e-9, 1 / rate) for a, b, rate in parts])
+    slips = [s if v else 0.0 for v, s in zip(velocities, lengths, strict=True)]
+    slip = np.interp(time, bounds, np.concatenate([[0.0], np.cumsum(slips)]))
+    friction = np.full(time.size, 0.6)
+    for k, at in enumerate(bounds[1:-1]):
+        if velocities[k] and velocities[k + 1]:
+            since = np.clip(slip - np.sum(slips[: k + 1]), 0, None)
+            size = jump * np.log(velocities[k + 1] / velocities[k])
+            friction += (
+                (time >= at) * size * (0.3 - np.exp(-since / 2e-6) + 0.7 * np.exp(-since / 8e-6))
+            )
+    friction += 3e-4 * rng.standard_normal(time.size)
+    return time, slip + resolution * rng.standard_normal(time.size), friction, bounds[1:-1]
+
+
+#: Velocities (m/s), slips (m) or seconds of holds, samples per second.
+RECORDS = {
+    "four decades at equal slip": (
+        (0.1 * UM, UM, 10 * UM, 100 * UM),
+        (400 * UM,) * 4,
+        (1, 10, 100, 1000),
+    ),
+    "up and down": (
+        (0.1 * UM, UM, 10 * UM, 100 * UM, 10 * UM, UM),
+        (300 * UM,) * 6,
+        (1, 1, 10, 100, 10, 1),
+    ),
+    "four decades at equal time": (
+        (0.1 * UM, UM, 10 * UM, 100 * UM),
+        (6 * UM, 60 * UM, 600 * UM, 6000 * UM),
+        (10,) * 4,
+    ),
+    "one rate to a hundred": ((UM, 10 * UM), (300 * UM, 300 * UM), (1, 100)),
+    "a hundred seconds to one": ((10 * UM, UM), (300 * UM, 300 * UM), (100, 1)),
+    "steady": ((3 * UM,), (600 * UM,), (50,)),
+    "holds, the first of a second": (
+        (10 * UM, 0, 10 * UM, 0, 10 * UM),
+        (300 * UM, 1.0, 300 * UM, 100.0, 300 * UM),
+        (100, 100, 100, 2, 100),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RECORDS)
+def test_every_change_of_velocity_is_found_and_nothing_else(name) -> None:
+    velocities, lengths, rates = RECORDS[name]
+    time, slip, friction, truth = stepped(velocities, lengths, rates)
+    found = partition(time, slip, friction)
+    # A tenth of a second, where the coarsest samples are a second apart.
+    assert [c.time for c in found.cuts] == pytest.approx(truth.tolist(), abs=0.1)
+    moving = [v for v, hold in zip(found.velocities, found.holds, strict=True) if not hold]
+    assert moving == pytest.approx([v for v in velocities if v], rel=0.02)
+    assert found.holds == tuple(v == 0 for v in velocities)
+    assert found.doubts == ()
+
+
+def test_a_coarse_displacement_is_refined_by_the_force() -> None:
+    # A micron of noise tells the kink of displacement to some tenths of a second only.
+    errors = []
+    for seed in range(8):
+        time, slip, friction, (truth,) = stepped(
+            (UM, 10 * UM), (300 * UM, 300 * UM), (1, 100), resolution=1e-6, seed=seed
+        )
+        (cut,) = partition(time, slip, friction).cuts
+        errors.append(abs(cut.time - truth))
+    assert np.median(errors) < 0.15
+    assert max(errors) < 0.5
+
+
+def test_a_motor_that_takes_seconds_makes_no_segment(sliding_trace) -> None:
+    """Five seconds at 319 nm/s between 200 nm/s and 2 um/s once raised A - B by a quarter."""
+    time, slip, friction, _ = stepped(
+        (0.2 * UM, 0.319 * UM, 2 * UM), (440 * UM, 1.6 * UM, 900 * UM), (7, 7, 7), resolution=2e-7
+    )
+    found = measure_sliding(sliding_trace(time, friction, slip))
+    assert [s.velocity for s in found.segments] == pytest.approx([0.2 * UM, 2 * UM], rel=0.01)
+    (step,) = found.steps
+    assert step.velocity_after / step.velocity_before == pytest.approx(10, rel=0.02)
+
+
+def test_a_disturbance_of_the_motor_is_no_step() -> None:
+    time, slip, friction, (first, *_) = stepped(
+        (3 * UM, 10 * UM, 17 * UM, 10 * UM), (200 * UM, 50 * UM, 8 * UM, 200 * UM), (100,) * 4
+    )
+    found = partition(time, slip, friction)
+    assert [c.time for c in found.cuts] == pytest.approx([first], abs=0.05)
+
+
+def test_a_small_change_can_be_read_in_two_ways(sliding_trace) -> None:
+    time, slip, friction, _ = stepped((3 * UM, 4 * UM), (300 * UM, 300 * UM), (50, 50))
+    found = measure_sliding(sliding_trace(time, friction, slip))
+    check = next(c for c in found.checks if c.name == "segments")
+    assert check.verdict == "suspicious"
+    assert "may be no step" in check.sentence
+
+
+def test_a_recorded_velocity_does_as_well(sliding_trace) -> None:
+    time, _, friction, (truth,) = stepped((UM, 10 * UM), (100 * UM, 300 * UM), (20, 50))
+    noise = 1 + 0.05 * np.random.default_rng(1).standard_normal(time.size)
+    velocity = np.where(time < truth, UM, 10 * UM) * noise
+    found = measure_sliding(sliding_trace(time, friction, velocity=velocity))
+    (step,) = found.steps
+    assert step.time == pytest.approx(truth, abs=0.1)
+    assert (step.velocity_before, step.velocity_after) == pytest.approx((UM, 10 * UM), rel=0.02)
+    assert found.velocity_from == "velocity"
+
+
+def test_times_of_the_user_are_taken_as_they_are(sliding_trace) -> None:
+    time, slip, friction, (truth,) = stepped((3 * UM, 10 * UM), (200 * UM, 300 * UM), (50, 50))
+    trace = sliding_trace(time, friction, slip)
+    found = measure_sliding(trace, steps=[truth - 0.2])
+    assert found.steps[0].time == truth - 0.2
+    assert found.chosen_by == "user"
+    blind = measure_sliding(sliding_trace(time, friction), steps=[truth])
+    assert np.isnan(blind.steps[0].rate_dependence)
+    assert np.isfinite(blind.steps[0].change)
+    for steps in ([-5.0], [1e6]):
+        with pytest.raises(InputError, match="steps must lie inside the recording"):
+            measure_sliding(trace, steps=steps)
+    with pytest.raises(InputError, match="at least 4 samples between"):
+        measure_sliding(trace, steps=[20.0, 20.01])
+    with pytest.raises(InputError, match="must end after they begin"):
+        measure_sliding(trace, holds=[(30.0, 20.0)])
+
+
+def test_the_noise_of_a_displacement_is_found(sliding_trace) -> None:
+    rng = np.random.default_rng(0)
+    time = np.concatenate([np.arange(0, 50, 0.1), np.arange(50, 60, 0.01)])
+    clean = np.interp(time, [0, 50, 60], [0, 150 * UM, 250 * UM])
+    noisy = clean + 1e-7 * rng.standard_normal(time.size)
+    assert displacement_noise(time, noisy) == pytest.approx(1e-7, rel=0.1)
+    # A recorder's step of 1 um has the standard deviation 1/sqrt(12) um.
+    coarse = np.round(clean, 6)
+    assert displacement_noise(time, coarse) == pytest.approx(1e-6 / np.sqrt(12), rel=1e-6)

@@ -1,0 +1,147 @@
+"""Recordings without modulation: segments, levels and steps with known truth."""
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.measurement.sliding.measure import measure_sliding
+from asperity.recording import Channel, Trace
+
+STRESS = 20e6
+
+
+def velocity_step(*, seed=0, noise=5e-4, direct=0.01, change=-0.004, decay=1.5):
+    """Friction through a step from 3 to 10 um/s at 60 s; the rate of sampling rises at 50 s."""
+    rng = np.random.default_rng(seed)
+    time = np.concatenate([np.arange(0, 50, 0.1), np.arange(50, 110, 0.02)])
+    after = np.clip(time - 60, 0, None)
+    slip = 3e-6 * np.minimum(time, 60) + 10e-6 * after
+    stepped = change + (direct - change) * np.exp(-after / decay)
+    friction = 0.6 + np.where(time >= 60, stepped, 0.0)
+    return time, slip, friction + noise * rng.standard_normal(time.size)
+
+
+def recorded(time, **channels):
+    kinds = {
+        "friction": (None, "dimensionless"),
+        "slip": ("m", "length"),
+        "velocity": ("m/s", "velocity"),
+        "normal stress": ("Pa", "pressure"),
+        "shear stress": ("Pa", "pressure"),
+    }
+    made = {}
+    for name, values in channels.items():
+        unit, kind = kinds[name.replace("_", " ")]
+        made[name.replace("_", " ")] = Channel(values, kind, unit or "", name, unit or "")
+    return Trace(time, made)
+
+
+def check(found) -> None:
+    assert len(found.segments) == 2
+    before, after = found.segments
+    assert after.start == pytest.approx(60, abs=0.1)
+    assert (before.velocity, after.velocity) == pytest.approx((3e-6, 10e-6), rel=1e-2)
+    assert before.steady.value == pytest.approx(0.6, abs=1e-4)
+    assert after.steady.value == pytest.approx(0.596, abs=1e-4)
+    assert after.steady.start > 63
+    (step,) = found.steps
+    assert abs(step.change + 0.004) < 5 * step.uncertainty
+    assert step.rate_dependence == pytest.approx(-0.004 / np.log(10 / 3), abs=2e-4)
+    assert step.peak == pytest.approx(0.01, abs=2e-3)
+
+
+@pytest.mark.parametrize("motion", ["slip", "velocity"])
+def test_a_velocity_step(motion) -> None:
+    time, slip, friction = velocity_step()
+    velocity = np.where(time < 60, 3e-6, 10e-6)
+    values = slip if motion == "slip" else velocity
+    noise = 1 + 1e-3 * np.random.default_rng(1).standard_normal(time.size)
+    found = measure_sliding(recorded(time, friction=friction, **{motion: values * noise**0.1}))
+    check(found)
+    assert found.velocity_from == motion
+    assert found.rates[0][0] == pytest.approx(50)
+    assert found.rates[1][0] == pytest.approx(10)
+    assert found.load is None
+
+
+def test_friction_is_the_ratio_of_force_and_load() -> None:
+    time, slip, friction = velocity_step()
+    load = STRESS * (1 + 1e-4 * np.random.default_rng(3).standard_normal(time.size))
+    found = measure_sliding(
+        recorded(time, slip=slip, normal_stress=load, shear_stress=friction * load)
+    )
+    check(found)
+    assert found.load.value == pytest.approx(STRESS, rel=1e-4)
+    assert found.load_unit == "Pa"
+    assert found.verdict == "ok"
+
+
+def test_several_steps_and_back() -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(12_000) * 0.01
+    velocity = 1e-6 * np.select([time < 30, time < 55, time < 90], [1.0, 10.0, 3.0], 1.0)
+    slip = np.cumsum(velocity) * 0.01
+    friction = 0.6 + 0.01 * np.log(velocity / 1e-6) + 1e-4 * rng.standard_normal(time.size)
+    found = measure_sliding(recorded(time, friction=friction, slip=slip))
+    assert [s.start for s in found.segments] == pytest.approx([0, 30, 55, 90], abs=0.1)
+    for step in found.steps:
+        assert step.rate_dependence == pytest.approx(0.01, abs=3e-4)
+    # Downward steps have their extreme below.
+    assert found.steps[1].peak < 0
+
+
+def test_no_motion_is_one_segment() -> None:
+    time, _, friction = velocity_step(direct=0.0, change=0.0)
+    found = measure_sliding(recorded(time, friction=friction))
+    assert len(found.segments) == 1
+    assert np.isnan(found.segments[0].velocity)
+    assert found.steps == ()
+    assert found.friction.value == pytest.approx(0.6, abs=5 * found.friction.uncertainty)
+
+
+def test_steady_velocity_is_one_segment() -> None:
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        time = np.arange(5000) * 0.01
+        slip = 3e-6 * time + 2e-8 * rng.standard_normal(time.size)
+        friction = 0.6 + 1e-3 * rng.standard_normal(time.size)
+        assert len(measure_sliding(recorded(time, friction=friction, slip=slip)).segments) == 1
+
+
+def test_planted_defects() -> None:
+    time, slip, friction = velocity_step()
+    load = STRESS * (1 + 0.05 * np.sin(2 * np.pi * 0.3 * time))
+
+    def verdict(name, **channels):
+        found = measure_sliding(recorded(time, slip=slip, **channels))
+        return next(check.verdict for check in found.checks if check.name == name)
+
+    assert verdict("load", normal_stress=load, shear_stress=friction * STRESS) == "bad"
+    shaken = friction + 5e-3 * np.sin(2 * np.pi * 0.7 * time)
+    assert verdict("oscillation", friction=shaken) == "suspicious"
+    assert verdict("drift", friction=friction + 5e-3 * time) == "bad"
+
+
+def test_a_window() -> None:
+    time, slip, friction = velocity_step()
+    found = measure_sliding(recorded(time, friction=friction, slip=slip), window=(5.0, 55.0))
+    assert len(found.segments) == 1
+    assert found.friction.end == pytest.approx(55, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    ("channels", "options", "message"),
+    [
+        ({"slip": 1}, {}, "name a channel"),
+        ({"shear_stress": 1}, {}, "name a channel"),
+        ({"friction": 1}, {"window": (9, 3)}, "must end after it begins"),
+        ({"friction": 1}, {"window": (3.0, 3.5)}, "at least 32 usable samples"),
+        ({"friction": 1}, {"load": "gauge"}, "name a channel"),
+        ({"shear_stress": 1, "slip": 1}, {"load": "slip"}, "dimension of the load"),
+    ],
+)
+def test_bad_input_is_one_sentence(channels, options, message) -> None:
+    time, _, friction = velocity_step()
+    made = recorded(time, **dict.fromkeys(channels, friction))
+    with pytest.raises(InputError, match=message):
+        measure_sliding(made, **options)

@@ -1,0 +1,96 @@
+"""Where to read: stretches, what has settled, clean runs; and the mean of a noisy level."""
+
+import numpy as np
+import pytest
+
+from asperity.lock_in.reference import fit_frequency, strongest_line
+from asperity.measurement.series import mean_level, steady_from
+from asperity.measurement.verdicts.verdict import judged, worst
+from asperity.measurement.window import clean_run, stretches, whole_periods
+
+
+def test_stretches_are_cut_where_the_amplitude_changes() -> None:
+    time = np.arange(30_000) * 1e-3
+    amplitude = np.select([time < 5, time < 15, time < 22], [0.0, 1.0, 2.0], 0.0)
+    load = 7 + amplitude * np.cos(2 * np.pi * 40 * time)
+    found = stretches(time, load, 40.0)
+    # A block of four periods and one more on each side belong to no stretch.
+    edges = [(time[p.first], time[p.stop - 1]) for p in found]
+    assert np.ravel(edges) == pytest.approx([0, 5, 5, 15, 15, 22, 22, 30], abs=0.25)
+    assert [round(p.amplitude, 6) for p in found] == [0.0, 1.0, 2.0, 0.0]
+
+
+@pytest.mark.parametrize("decay", [3.0, 8.0])
+def test_what_has_not_settled_is_cut(decay) -> None:
+    rng = np.random.default_rng(0)
+    at = np.arange(200)
+    series = np.exp(-at / decay) + 1e-3 * rng.standard_normal(200)
+    cut = steady_from(series, 0)
+    # Down to the noise of a point after 6.9 decay times, of a mean over all after 9.
+    assert 3.5 * decay < cut < 10 * decay
+
+
+@pytest.mark.parametrize("degree", [0, 1])
+def test_a_steady_series_is_kept(degree) -> None:
+    cuts = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        series = rng.standard_normal(150) + degree * np.linspace(0, 9, 150)
+        cuts.append(steady_from(series, degree))
+    assert np.median(cuts) == 0
+    assert max(cuts) <= 75
+
+
+def test_a_clean_run_is_taken_if_it_is_long() -> None:
+    assert clean_run(0, 1000, np.array([300])) == (301, 1000)
+    assert clean_run(0, 1000, np.array([800])) == (0, 800)
+    assert clean_run(0, 1000, np.array([300, 650])) == (0, 1000)
+    assert clean_run(100, 200, np.array([50, 700])) == (100, 200)
+
+
+@pytest.mark.parametrize(("rate", "frequency", "expected"), [(1000, 10, 1000), (1000, 9.9, 909)])
+def test_whole_periods_are_counted_in_samples(rate, frequency, expected) -> None:
+    # A thousand samples last a second: 10 periods, or 9 of 1/9.9 s = 909.09 samples.
+    assert whole_periods(np.arange(1000) / rate, frequency) == expected
+
+
+def test_a_mean_covers_its_truth_in_slow_noise(red_noise) -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(3000) * 1e-3
+    hits = 0
+    for series in red_noise(rng, 0.95, 300, time.size):
+        found = mean_level(time, series)
+        # Student's t of 8 degrees of freedom at 97.5 %.
+        hits += abs(found.value) < 2.306 * found.uncertainty
+    assert 0.92 < hits / 300 < 0.98
+
+
+def test_verdicts_follow_the_limits() -> None:
+    assert [judged("x", n, (1, 2), "").verdict for n in (0.5, 1.5, 2.5)] == [
+        "ok",
+        "suspicious",
+        "bad",
+    ]
+    assert [judged("x", n, (2, 1), "").verdict for n in (0.5, 1.5, 2.5)] == [
+        "bad",
+        "suspicious",
+        "ok",
+    ]
+    assert judged("x", 9, (1, 2), "", significant=False).verdict == "ok"
+    assert worst([judged("x", n, (1, 2), "") for n in (0, 1.5)]) == "suspicious"
+    assert worst([]) == "ok"
+
+
+@pytest.mark.parametrize("frequency", [0.37, 4.2, 61.7, 390.0])
+def test_the_strongest_line_is_found_and_fitted(frequency) -> None:
+    rng = np.random.default_rng(0)
+    time = np.arange(200_000) * 1e-3
+    load = (
+        7 + 0.05 * np.cos(2 * np.pi * frequency * time + 1) + 0.05 * rng.standard_normal(time.size)
+    )
+    line = strongest_line(time, load + 0.01 * time)
+    assert line.frequency == pytest.approx(frequency, abs=0.02)
+    assert line.amplitude == pytest.approx(0.05, rel=0.3)
+    fitted = fit_frequency(time, load, line.frequency, harmonics=1, degree=1, step=None)
+    bound = np.sqrt(24 / time.size) / 200 / (2 * np.pi)
+    assert abs(fitted - frequency) < 5 * bound

@@ -1,0 +1,354 @@
+"""Collocation: order of convergence, the linear algebra under it, and its meshes.
+
+Everything is called within `jax.jit`: operations outside are programs of their own, compiled one by
+one. Cases of one kind have one shape, and so one program.
+"""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+from asperity.algebra import cyclic, small_systems
+from asperity.laws import RiceRuina, get_law
+from asperity.loads import Harmonic
+from asperity.orbit.methods.collocation import condensation
+from asperity.orbit.methods.collocation import mesh as meshes
+from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.methods.collocation.newton import (
+    averaged_orbit,
+    collocation_observables,
+    newton_orbit,
+)
+from asperity.orbit.methods.collocation.scheme import GAUSS, STAGES
+from asperity.slider import QuasiStatic, Slider
+from asperity.slider.problem import checked_problem, flatten
+from asperity.theory.adiabatic import adiabatic_growth
+
+#: Round-off times the condition of a random small matrix.
+EXACT = 1e-11
+#: Points and right-hand sides of the small systems.
+POINTS, COLUMNS = 50, 4
+
+expm_points = jax.jit(small_systems.expm_points)
+product = jax.jit(small_systems.product)
+solve_columns = jax.jit(small_systems.solve_columns)
+spectral_abscissa = jax.jit(small_systems.spectral_abscissa)
+spectral_radius = jax.jit(small_systems.spectral_radius)
+solve_cyclic = jax.jit(cyclic.solve_cyclic)
+evaluate = jax.jit(meshes.evaluate)
+graded_mesh = jax.jit(meshes.graded_mesh, static_argnums=(0, 1))
+split = jax.jit(meshes.split, static_argnums=1)
+equidistributed = jax.jit(meshes.equidistributed, static_argnums=2)
+
+
+@jax.jit
+def solve_columns_and_points(matrix, right):
+    return small_systems.solve_columns(matrix, right), small_systems.solve_points(
+        matrix, right[:, 0]
+    )
+
+
+def normal(*shape, seed=7):
+    return np.random.default_rng(seed).normal(size=shape)
+
+
+def matrices(n, complex_=False, seed=7):
+    real = normal(n, n, POINTS, seed=seed)
+    return real + 1j * normal(n, n, POINTS, seed=seed + 1) if complex_ else real
+
+
+def repeated(matrix):
+    """One matrix at all points."""
+    matrix = np.asarray(matrix, float)
+    return np.broadcast_to(matrix[..., None], (*matrix.shape, POINTS))
+
+
+def each(a):
+    """Points first, as NumPy's linear algebra has it."""
+    return np.moveaxis(np.asarray(a), -1, 0)
+
+
+@pytest.mark.parametrize("complex_", [False, True])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_solve_columns(n, complex_):
+    matrix, right = matrices(n, complex_=complex_), normal(n, COLUMNS, POINTS, seed=9)
+    found, one = map(each, solve_columns_and_points(matrix, right))
+    np.testing.assert_allclose(found, np.linalg.solve(each(matrix), each(right)), rtol=1e-9)
+    np.testing.assert_allclose(one, found[:, :, 0], rtol=EXACT)
+
+
+def test_solve_columns_with_a_zero_pivot():
+    matrix = np.array([[0.0, 2.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 3.0]])
+    found, _ = solve_columns_and_points(repeated(matrix), repeated(np.eye(3, COLUMNS)))
+    np.testing.assert_allclose(each(found)[0, :, :3], np.linalg.inv(matrix), atol=EXACT)
+
+
+def test_a_singular_matrix_is_not_solved_silently():
+    for found in solve_columns_and_points(
+        repeated([[1.0, 2.0], [2.0, 4.0]]), repeated(np.ones((2, COLUMNS)))
+    ):
+        assert not np.isfinite(found).any()
+
+
+@pytest.mark.parametrize("size", [1e-6, 1.0, 20.0])
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_matrix_exponential(n, size):
+    matrix = size * matrices(n)
+    found = each(expm_points(matrix))
+    for one, expected in zip(found, map(expm, each(matrix)), strict=True):
+        np.testing.assert_allclose(one, expected, rtol=0, atol=EXACT * np.abs(expected).max())
+
+
+def test_matrix_exponential_of_a_defective_matrix():
+    expected = np.exp(0.3) * np.array([[1.0, 1.0], [0.0, 1.0]])
+    found = each(expm_points(repeated([[0.3, 1.0], [0.0, 0.3]])))
+    np.testing.assert_allclose(found[0], expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_product(n):
+    a, b = matrices(n), matrices(n, seed=8)
+    np.testing.assert_allclose(each(product(a, b)), each(a) @ each(b), atol=EXACT)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_spectral_radius(n):
+    matrix = matrices(n)
+    values = np.linalg.eigvals(each(matrix))
+    np.testing.assert_allclose(spectral_radius(matrix), np.abs(values).max(1), rtol=3e-3)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 4, 5])
+def test_spectral_abscissa(n):
+    # Similar to random matrices by scales that differ by many orders of magnitude, as those of
+    # force, velocity and friction do.
+    random = matrices(n)
+    scale = 10.0 ** np.random.default_rng(5).uniform(-4, 4, (n, random.shape[2]))
+    for matrix in (random, random * scale[:, None] / scale):
+        expected = np.linalg.eigvals(each(matrix))
+        error = np.abs(spectral_abscissa(matrix) - expected.real.max(1))
+        assert (error < 1e-12 * np.abs(expected).max(1)).all()
+
+
+def test_steady_sliding_on_asperities_is_stable_with_inertia():
+    # Far above Kc the slider swings on its asperities at some 1e5 per radian of 1 mHz, and every
+    # disturbance decays: nothing grows.
+    law = get_law("elasto-plastic")(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6, lambda_=7e-7)
+    slider = Slider(law, spring=np.full(1, 2e6), load=7.0, mass=1.6)
+    flat, _ = flatten(
+        checked_problem(slider, velocity=1e-6, epsilon=0.01, frequency=1e-3, inertia=True)
+    )
+    assert adiabatic_growth(flat)[0] == 0
+
+
+def dense_cyclic(maps, right):
+    """The periodic recurrence d_{i+1} - T_i d_i = r_i as one matrix."""
+    n, _, count, points = maps.shape
+    found = np.zeros_like(right)
+    for p in range(points):
+        matrix = np.zeros((count, n, count, n))
+        for i in range(count):
+            matrix[i, :, (i + 1) % count] += np.eye(n)
+            matrix[i, :, i] -= maps[:, :, i, p]
+        flat = matrix.reshape(count * n, -1)
+        found[..., p] = np.linalg.solve(flat, right[..., p].T.ravel()).reshape(count, n).T
+    return found
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+@pytest.mark.parametrize("count", [1, 2, 17])
+def test_solve_cyclic(n, count):
+    maps = normal(n, n, count, 6) + np.eye(n)[:, :, None, None]
+    right = normal(n, count, 6, seed=8)
+    found = solve_cyclic(maps, right)
+    np.testing.assert_allclose(found, dense_cyclic(maps, right), rtol=1e-8, atol=1e-10)
+
+
+def test_solve_cyclic_where_one_direction_grows_and_another_decays():
+    # 1e3 and 1e-3 an interval: the product of the maps is 1e120 and 1e-120, far beyond doubles.
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)[:, None] + np.array([0.0, 1.0])
+    c, s = np.cos(turn), np.sin(turn)
+    basis = np.array([[c, -s], [s, c]])
+    stretch = np.diag([1e3, 1e-3])
+    after = np.roll(basis, -1, axis=2)
+    maps = np.einsum("ijmp,jk,lkmp->ilmp", after, stretch, basis)
+    right = normal(2, 40, 2)
+    found = np.asarray(solve_cyclic(maps, right))
+    np.testing.assert_allclose(found, dense_cyclic(maps, right), rtol=1e-9, atol=1e-12)
+    assert np.abs(found).max() < 100
+
+
+#: Irregular on purpose. On a mesh that is a smooth map of an even one, quadratures of periodic
+#: functions, hence mean, harmonics and multipliers, converge faster than any power.
+COARSE = np.cumsum([0.0, 0.9, 1.4, 0.6, 1.1, 1.3, 0.7]) / 6.0 * 2 * np.pi
+
+
+#: Parts that each interval of `COARSE` is cut into.
+PARTS = 24
+
+
+def split_mesh(parts):
+    """Each interval of `COARSE` in so many parts, and the rest of `PARTS` without width.
+
+    An interval without width changes nothing; with them all meshes share one program.
+    """
+    corners = np.repeat(np.arange((len(COARSE) - 1) * parts) / parts, PARTS // parts)
+    return np.interp([*corners, len(COARSE) - 1], np.arange(len(COARSE)), COARSE)[
+        :, None
+    ] * np.ones(2)
+
+
+@jax.jit
+def on_mesh(problem, mesh):
+    """Mean, c1, c2, trace of the monodromy matrix and log of its determinant."""
+    orbit = averaged_orbit(*problem, 2, intervals=len(mesh) - 1, grading=0.0)
+    orbit = orbit.moved(mesh=mesh)
+    result = newton_orbit(*problem, orbit, tolerance=1e-12, max_steps=12, largest_change=2.0)
+    read = collocation_observables(*problem, result.orbit, harmonics=2)
+    trace = jnp.trace(read.monodromy) * jnp.exp(read.log_scale)
+    return jnp.stack([read.mean_friction, *read.harmonics, trace, read.log_determinant])
+
+
+def test_order_of_convergence():
+    # Gauss-Legendre collocation with s stages is of order 2s at the nodes, and so are quadratures.
+    law = RiceRuina(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6)
+    pair = np.ones(2)
+    slider = jax.tree.map(lambda a: a * pair, Slider(law, spring=2e5, load=7.0))
+    system = QuasiStatic(slider, np.array([1e-5, 2e-5]), 2 * np.pi * 120.0 * pair)
+    problem = (system, Harmonic(0.1 * pair))
+    exact, *others = (np.asarray(on_mesh(problem, split_mesh(parts))) for parts in (PARTS, 4, 8))
+    coarse, fine = (np.abs(other - exact) for other in others)
+    # Next terms of the error: (h/radius of convergence)^2 of the leading one.
+    np.testing.assert_allclose(np.log2(coarse / fine), 2 * STAGES, atol=0.5)
+
+
+@jax.jit
+def polynomial_orbit(mesh, power):
+    """Orbit whose two states are theta^power and 2 - theta, not periodic."""
+    bare = Orbit(mesh, jnp.zeros((2, mesh.shape[1])), None, None, GAUSS)
+    theta = bare.stage_phases
+    nodes = jnp.stack([mesh[:-1] ** power, -mesh[:-1]])
+    slopes = jnp.stack([power * theta ** (power - 1), -jnp.ones_like(theta)])
+    return bare.moved(nodes=nodes, slopes=slopes)
+
+
+THETA = np.sort(np.random.default_rng(7).uniform(0, 2 * np.pi, (40, 3)), axis=0)
+
+
+def values(orbit):
+    states, slopes = evaluate(orbit, THETA)
+    return np.asarray(states), np.asarray(slopes)
+
+
+@pytest.mark.parametrize("power", [1, 2, 4])
+def test_evaluate_reproduces_polynomials_up_to_the_number_of_stages(power):
+    mesh = graded_mesh(9, 3, 0.5)
+    states, slopes = values(polynomial_orbit(mesh, power))
+    np.testing.assert_allclose(states[0], THETA**power, rtol=EXACT, atol=EXACT)
+    np.testing.assert_allclose(states[1], -THETA, atol=EXACT)
+    np.testing.assert_allclose(slopes[0], power * THETA ** (power - 1), rtol=EXACT)
+
+
+def test_one_power_more_is_no_longer_exact():
+    mesh = graded_mesh(9, 3, 0.5)
+    states, _ = values(polynomial_orbit(mesh, STAGES + 1))
+    assert np.abs(states[0] - THETA ** (STAGES + 1)).max() > 1e-6
+
+
+def test_stage_deviations_are_the_states_at_the_stages():
+    orbit = polynomial_orbit(graded_mesh(9, 3, 0.5), 4)
+    deviations, phases = jax.jit(lambda o: (o.stage_deviations, o.stage_phases))(orbit)
+    phases = np.asarray(phases)
+    np.testing.assert_allclose(deviations[0], phases**4, rtol=EXACT, atol=EXACT)
+    assert phases.shape == (STAGES, 9, 3)
+    np.testing.assert_allclose(phases[:, 0, 0], GAUSS.c * widths(orbit)[0, 0])
+
+
+def widths(orbit):
+    return np.diff(np.asarray(orbit.mesh), axis=0)
+
+
+def test_split_cuts_every_interval_and_keeps_the_orbit():
+    orbit = polynomial_orbit(graded_mesh(9, 3, 0.5), 4)
+    finer = split(orbit, 3)
+    np.testing.assert_allclose(widths(finer), np.repeat(widths(orbit), 3, axis=0) / 3, rtol=EXACT)
+    for before, after in zip(values(orbit), values(finer), strict=True):
+        np.testing.assert_allclose(after, before, rtol=EXACT, atol=EXACT)
+
+
+@partial(jax.jit, static_argnums=0)
+def peaked_orbit(intervals):
+    """A state that rises within 0.1 rad of theta = 4."""
+    mesh = meshes.graded_mesh(intervals, 3, 0.0)
+    bare = Orbit(mesh, jnp.zeros((1, 3)), None, None, GAUSS)
+    nodes = jnp.arctan((mesh[:-1] - 4) / 0.1)[None]
+    slopes = (0.1 / ((bare.stage_phases - 4) ** 2 + 0.01))[None]
+    return bare.moved(nodes=nodes, slopes=slopes)
+
+
+def test_equidistributed_keeps_a_polynomial_orbit():
+    orbit = polynomial_orbit(graded_mesh(9, 3, 0.5), 4)
+    for intervals in (9, 20):
+        moved = equidistributed(orbit, np.ones((2, 9, 3)), intervals)
+        ends = np.asarray(moved.mesh)[[0, -1]]
+        np.testing.assert_array_equal(ends, [[0.0] * 3, [2 * np.pi] * 3])
+        assert (widths(moved) > 0).all()
+        for before, after in zip(values(orbit), values(moved), strict=True):
+            np.testing.assert_allclose(after, before, rtol=EXACT, atol=EXACT)
+
+
+def test_equidistributed_puts_intervals_where_the_orbit_is_steep():
+    orbit = peaked_orbit(200)
+    mesh = np.asarray(equidistributed(orbit, np.ones((1, 200, 3)), 60).mesh)[:, 0]
+    inside = np.histogram(mesh, bins=[3.5, 4.5])[0][0]
+    # Spread evenly there would be 60 / (2 pi), ten.
+    assert inside > 20
+    narrow = np.diff(mesh)[np.searchsorted(mesh, 4.0)]
+    assert narrow < 0.2 * np.diff(mesh).max()
+
+
+def test_scales_choose_the_state_that_matters():
+    orbit = peaked_orbit(200)
+    slopes = np.asarray(orbit.slopes)
+    slopes = np.concatenate([slopes, slopes[:, ::-1, ::-1]])
+    nodes = np.zeros((2, 200, 3))  # only slopes are used
+    both = Orbit(orbit.mesh, np.zeros((2, 3)), nodes, slopes, GAUSS)
+    for weights, at in (([1.0, 0.0], 4.0), ([0.0, 1.0], 2 * np.pi - 4.0)):
+        scales = np.asarray(weights)[:, None, None] * np.ones((2, 200, 3))
+        mesh = np.asarray(equidistributed(both, scales, 60).mesh)[:, 0]
+        finest = mesh[np.argmin(np.diff(mesh))]
+        assert finest == pytest.approx(at, abs=0.15)
+
+
+def test_condensation_is_that_of_each_interval(monkeypatch):
+    """Against the stage equations solved as one dense system, whether in blocks or at once."""
+    n, intervals, points = 3, 12, 5
+    jacobian = 0.3 * normal(n, n, STAGES, intervals, points)
+    right = normal(2, n, STAGES, intervals, points, seed=8)
+    mesh = graded_mesh(intervals, points, 0.4)
+    orbit = Orbit.empty(GAUSS, n, intervals, points).moved(mesh=mesh)
+    local = condensation.LinearisedEquations(None, right[0], right[0], jacobian)
+    entries = STAGES * n * ((STAGES + 1) * n + 2) * points
+    blocks = {}
+    for name, at_a_time in (("whole", intervals), ("blocks", 4)):
+        monkeypatch.setattr(condensation, "_CACHED", at_a_time * entries)
+        # A new function each time: the size of the blocks is a constant of the program.
+        condense = jax.jit(lambda *given: condensation.condense(*given))
+        blocks[name] = jax.tree.map(np.asarray, condense(local, orbit, *right))
+    for m, b in ((0, 0), (7, 3), (11, 4)):
+        J, h = np.moveaxis(jacobian[..., m, b], 2, 0), widths(orbit)[m, b]
+        # Slopes k_j = J_j (y + h sum_l a_jl k_l) + r_j, ordered by stage and state.
+        matrix = np.eye(STAGES * n) - h * np.einsum("jl,jnc->jnlc", GAUSS.a, J).reshape(
+            STAGES * n, -1
+        )
+        known = [J.reshape(STAGES * n, n), *(r[..., m, b].T.reshape(-1, 1) for r in right)]
+        exact = np.linalg.solve(matrix, np.hstack(known)).reshape(STAGES, n, -1)
+        for response, *constants in blocks.values():
+            found = np.concatenate(
+                [response[..., m, b], *(c[:, :, None, m, b] for c in constants)], axis=2
+            )
+            np.testing.assert_allclose(np.swapaxes(found, 0, 1), exact, rtol=1e-10, atol=1e-12)

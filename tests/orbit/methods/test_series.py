@@ -1,0 +1,159 @@
+"""Slow modulation: orbits that are sequences of steady states, by Fourier series solved directly.
+
+The equations are written out once more: f = F/W0, phi = ln(V Phi/D0), theta = omega t.
+"""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import asperity as asp
+from asperity.laws import ElastoPlastic, RiceRuina
+from asperity.orbit import Outcome, multipliers
+from asperity.orbit.floquet import log_multipliers
+from asperity.orbit.methods.series import series_orbits
+from asperity.orbit.multipliers import _monodromy_by_intervals, resolve_multipliers
+from asperity.orbit.solution import SearchOptions, Solution
+from asperity.slider.problem import Problem, flatten
+
+MU0, A, B, D0, V0, W0 = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0
+Kc = (B - A) * W0 / D0
+V = 1e-5
+#: Samples of a waveform, as in the tests of the other methods, which share their programs then.
+SAMPLES = 4096
+MU = MU0 - (B - A) * np.log(V / V0)
+
+
+def respond(ageing, stiffness, epsilon, law=RiceRuina, methods=("series",)):
+    """Response at V/(omega D0) = `ageing` and K/Kc = `stiffness`."""
+    own = {"lambda_": 7e-7} if law is ElastoPlastic else {}
+    slider = asp.Slider(
+        law(mu0=MU0, A=A, B=B, D0=D0, V0=V0, **own), spring=np.multiply(stiffness, Kc), load=W0
+    )
+    frequency = V / (2 * np.pi * np.asarray(ageing) * D0)
+    drive = {"velocity": V, "epsilon": epsilon, "frequency": frequency}
+    return asp.periodic_response(slider, **drive, methods=methods, waveform=SAMPLES)
+
+
+def exponent(f, phi, w):
+    """ln(v/V) of Eq. (1)."""
+    return (f / w - MU - B * phi) / A
+
+
+def test_marching_settles_on_the_same_orbit():
+    ageing, stiffness, epsilon = 40.0, 3.0, 0.5
+    kappa = ageing * stiffness * (B - A)
+    response = respond(ageing, stiffness, epsilon)
+    assert response.converged
+
+    def rates(theta, y):
+        f, phi = y
+        v = np.exp(exponent(f, phi, 1 + epsilon * np.cos(theta)))
+        return [kappa * (1 - v), ageing * (np.exp(-phi) - v)]
+
+    samples, periods = 512, 4
+    grid = 2 * np.pi * np.arange((periods - 1) * samples, periods * samples) / samples
+    end = 2 * np.pi * periods
+    marched = solve_ivp(
+        rates, (0, end), [1.5 * MU, 0.0], "Radau", t_eval=grid, rtol=1e-11, atol=1e-13
+    )
+    spectrum = np.fft.rfft(marched.y[0]) / samples
+    assert response.mean_friction == pytest.approx(spectrum[0].real, rel=1e-9)
+    np.testing.assert_allclose(response.harmonics[:2], 2 * spectrum[1:3], rtol=1e-7)
+
+
+def test_in_the_limit_friction_follows_the_steady_state():
+    """f = w mu_ss(v), v = 1 - f'/kappa, iterated: what is left is of the order of 1/ageing^2."""
+    ageing, stiffness, epsilon = 1e6, 3.0, 0.5
+    theta = 2 * np.pi * np.arange(64) / 64
+    w, f = 1 + epsilon * np.cos(theta), MU
+    order = 1j * np.fft.fftfreq(64, 1 / 64)
+    for _ in range(20):
+        slope = np.fft.ifft(order * np.fft.fft(f * np.ones(64))).real
+        f = w * (MU - (B - A) * np.log(1 - slope / (ageing * stiffness * (B - A))))
+    response = respond(ageing, stiffness, epsilon)
+    np.testing.assert_allclose(response.waveform[0, :: SAMPLES // 64], f, rtol=1e-10)
+
+
+@pytest.mark.parametrize("law", [RiceRuina, ElastoPlastic])
+def test_collocation_finds_the_same(law):
+    random = np.random.default_rng(2)
+    ageing, stiffness = 10 ** random.uniform(-1, 4, 40), 10 ** random.uniform(-1, 2, 40)
+    epsilon = random.uniform(0.01, 0.9, 40)
+    smooth = respond(ageing, stiffness, epsilon, law)
+    rows = np.flatnonzero(smooth.converged)[:12]
+    other = respond(ageing[rows], stiffness[rows], epsilon[rows], law, ("collocation",))
+    both = other.converged
+    assert both.sum() >= 9
+    np.testing.assert_allclose(
+        smooth.mean_friction[rows][both], other.mean_friction[both], rtol=1e-9
+    )
+    one, two = smooth.harmonics[rows, :2][both], other.harmonics[both, :2]
+    assert (np.abs(one - two) < 1e-8 * np.abs(two) + 1e-14).all()
+    one, two = smooth.multipliers[rows][both], other.multipliers[both]
+    seen = np.isfinite(two) & (np.abs(two) > 1e-12)
+    np.testing.assert_allclose(one[seen], two[seen], rtol=1e-8)
+
+
+def test_unstable_for_part_of_the_period():
+    """The series obeys the equations to round-off where a disturbance grows by e^1000 and more."""
+    ageing, stiffness, epsilon = 2e3, 0.98, 0.75
+    response = respond(ageing, stiffness, epsilon)
+    assert response.converged
+    theta = 2 * np.pi * np.arange(128) / 128
+    f, log_slip = response.waveform[:, :: SAMPLES // 128]
+    w = 1 + epsilon * np.cos(theta)
+    phi = (f / w - MU - A * log_slip) / B
+    order = 1j * np.fft.fftfreq(128, 1 / 128)
+    f_slope, phi_slope = (np.fft.ifft(order * np.fft.fft(y)).real for y in (f, phi))
+    v = np.exp(log_slip)
+    assert np.abs(f_slope / (ageing * stiffness * (B - A)) - (1 - v)).max() < 1e-10
+    assert np.abs(phi_slope / ageing - (np.exp(-phi) - v)).max() < 1e-10
+    # The trace of the Jacobian over the period: both multipliers vanish, though sliding is
+    # unstable under more than 0.98 W0.
+    by_force = -stiffness * (B - A) / A * v / w
+    by_age = -np.exp(-phi) + B / A * v
+    assert ageing * 2 * np.pi * (by_force + by_age).mean() < -1000
+    assert (response.multipliers == 0).all()
+
+
+def test_pulses_are_left_to_other_methods():
+    """What a few dozen harmonics cannot hold is not claimed."""
+    left = respond(10.0, 0.5, [0.3, 0.6, 0.9])
+    assert not left.converged.any()
+    assert np.isnan(left.mean_friction).all()
+
+
+def test_multipliers_interval_by_interval_are_those_of_the_whole():
+    """A product of maps is the same in whatever order neighbours are multiplied."""
+    found = respond(40.0, 1.4, 0.4)
+    assert found.converged
+    problem, _ = flatten(Problem(found.motion, found.load))
+    orbit = series_orbits(problem, 1)[0]
+    matrix, log_scale, log_determinant = _monodromy_by_intervals((problem, orbit), parts=9)
+    # The determinant knows nothing of the maps.
+    sign, by_maps = np.linalg.slogdet(matrix[..., 0])
+    assert sign == 1
+    assert by_maps + 2 * log_scale == pytest.approx(log_determinant, rel=1e-9)
+    logs = log_multipliers(matrix, log_scale, log_determinant)
+    # Of multipliers below 1e-12 no more was asked than that they vanish.
+    np.testing.assert_allclose(logs[:, 0], found.log_multipliers, atol=1e-6)
+
+
+def test_what_maps_kept_at_once_leave_unresolved_is_resolved_interval_by_interval(monkeypatch):
+    whole = respond(40.0, 1.4, 0.4)
+    problem, _ = flatten(Problem(whole.motion, whole.load))
+    orbit = series_orbits(problem, 1)[0]
+    intervals = orbit.mesh.shape[0] - 1
+    monkeypatch.setattr(multipliers, "_MOST_AT_ONCE", 3 * intervals)  # too coarse for this orbit
+    only = np.array([0])
+    found = Solution.empty(2, 1, SearchOptions(8, 0, lambda _: None))
+    found.outcome[:] = Outcome.MULTIPLIERS_NOT_RESOLVED
+    monkeypatch.setattr(multipliers, "_MOST_INTERVALS", 0)
+    resolve_multipliers(problem, found, orbit, only)
+    assert found.outcome[0] == Outcome.MULTIPLIERS_NOT_RESOLVED
+    monkeypatch.undo()
+    monkeypatch.setattr(multipliers, "_MOST_AT_ONCE", 3 * intervals)
+    resolve_multipliers(problem, found, orbit, only)
+    assert found.outcome[0] == Outcome.CONVERGED
+    np.testing.assert_allclose(found.log_multipliers[:, 0], whole.log_multipliers, atol=1e-6)

@@ -1,0 +1,328 @@
+"""Inertia, radiation damping and other modulations against SciPy's integration.
+
+The equations are written out here once more, in physical units and states of their own. From the
+states that the package gives for theta = 0 they are integrated over one period, which must close,
+give the same harmonics and, by complex steps in the start, the same multipliers.
+"""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.special import wrightomega
+
+import asperity as asp
+from asperity.errors import InputError
+from asperity.laws import get_law
+from asperity.loads import modulated, sampled
+
+MU0, A, B, D0, V0, LAMBDA = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7e-7
+K, W0, M = 2e5, 7.0, 1.6
+SAMPLES = 2048
+
+
+def slider(elastic, **changed):
+    law = get_law("elasto-plastic" if elastic else "rice-ruina")
+    own = {"lambda_": LAMBDA} if elastic else {}
+    numbers = {"spring": K, "load": W0, "mass": M} | changed
+    return asp.Slider(law(mu0=MU0, A=A, B=B, D0=D0, V0=V0, **own), **numbers)
+
+
+def two_tones(theta):
+    return 1 + 0.3 * np.cos(theta) + 0.1 * np.cos(2 * theta + 0.7)
+
+
+TILT = 0.05
+
+
+@dataclass(frozen=True)
+class Case:
+    """An operating point; shear and pull are what `Excitation` calls so."""
+
+    elastic: bool
+    V: float
+    f: float
+    epsilon: float | None = 0.24
+    inertia: bool = False
+    eta: float | None = None
+    M: float = M
+    modulation: object = None
+    load: object = None
+    shear: object = staticmethod(np.zeros_like)
+    pull: object = staticmethod(np.ones_like)
+
+    def w(self, theta):
+        return self.load(theta) if self.load else 1 + self.epsilon * np.cos(theta)
+
+    @staticmethod
+    def slope(wave, theta):
+        """Derivative of an analytic function of a real phase, exact by a complex step."""
+        return wave(theta + 1e-30j).imag / 1e-30
+
+
+CASES = {
+    "inertial": Case(True, 1e-6, 120.0, inertia=True),
+    "inertial, fast and strong": Case(True, 1e-4, 60.0, 0.5, inertia=True),
+    "inertial and radiating": Case(True, 1e-6, 120.0, inertia=True, eta=500.0),
+    "stiff inertial": Case(False, 1e-6, 120.0, inertia=True),
+    "stiff inertial, fast": Case(False, 2e-5, 120.0, 0.4, inertia=True),
+    "radiating": Case(False, 1e-5, 60.0, 0.3, eta=2000.0),
+    "radiating asperities": Case(True, 1e-6, 120.0, eta=500.0),
+    "two tones": Case(
+        True, 1e-6, 120.0, None, modulation=modulated(0.3, load={2: (0.1, 0.7)}), load=two_tones
+    ),
+    "tilted exciter, modulated pull": Case(
+        True,
+        1e-5,
+        120.0,
+        None,
+        modulation=modulated(0.2, load={2: (0.0, 0.0)}, tilt=TILT, pull=0.5, pull_phase=0.3),
+        load=lambda theta: 1 + 0.2 * np.cos(theta),
+        shear=lambda theta: np.tan(TILT) * 0.2 * np.cos(theta),
+        pull=lambda theta: 1 + 0.5 * np.cos(theta + 0.3),
+    ),
+}
+
+
+def friction(plastic, age):
+    """Eq. (1); `age` is ln(V0 Phi/D0)."""
+    return MU0 + A * np.log(plastic / V0) + B * age
+
+
+def plastic_velocity(mu, age):
+    return V0 * np.exp((mu - MU0 - B * age) / A)
+
+
+def renewal(v, age):
+    """Eq. (2) for ln(V0 Phi/D0)."""
+    return V0 / D0 * np.exp(-age) - v / D0
+
+
+def equations(case):
+    """Rates, spring force over W0 from the states, first states, scales, and whether stiff.
+
+    The states are the elongation of the spring (or of spring and asperities), then those of the
+    moving slider and of its contacts.
+    """
+    omega, eta, mass = 2 * np.pi * case.f, case.eta or 0.0, case.M
+    pull = lambda t: case.V * case.pull(omega * t)  # noqa: E731
+    push = lambda t: W0 * case.shear(omega * t)  # noqa: E731
+    W = lambda t: W0 * case.w(omega * t)  # noqa: E731
+    spring = lambda t, Y: K * Y[0] / W0  # noqa: E731
+    swing = 1e-3 * W0 / K
+
+    def on_asperities(t, Y):
+        x, v, mu, age = Y
+        force = K * x + push(t) - W(t) * mu - eta * v
+        rest = [(v - plastic_velocity(mu, age)) / LAMBDA, renewal(v, age)]
+        return np.array([pull(t) - v, force / mass, *rest])
+
+    def bare(t, Y):
+        x, log_v, age = Y
+        v = np.exp(log_v)
+        force = K * x + push(t) - W(t) * friction(v, age) - eta * v
+        return np.array([pull(t) - v, force / (mass * v), renewal(v, age)])
+
+    def radiating(t, Y):
+        x, age = Y
+        # A W ln(v/V0) + eta v = rest: Wright's omega function.
+        rest = K * x + push(t) - W(t) * (MU0 + B * age)
+        size = A * W(t) / eta
+        v = size * wrightomega(rest / (A * W(t)) + np.log(V0 / size))
+        return np.array([pull(t) - v, renewal(v, age)])
+
+    def radiating_asperities(t, Y):
+        x, mu, age = Y
+        v = (K * x + push(t) - W(t) * mu) / eta
+        return np.array([pull(t) - v, (v - plastic_velocity(mu, age)) / LAMBDA, renewal(v, age)])
+
+    def carried(t, Y):
+        """F_i/W of spring and asperities in series, elongated by Y[0] together."""
+        return (K * Y[0] + push(t)) / (W(t) + K * LAMBDA)
+
+    def relaxed(t, Y):
+        mu, age = carried(t, Y), Y[1]
+        plastic = plastic_velocity(mu, age)
+        # The asperities' elongation mu lambda is stretched by the pull as well as by the load.
+        phase, rate = omega * t, omega * W0
+        stretch = rate * (case.slope(case.shear, phase) - mu * case.slope(case.w, phase))
+        mu_rate = (stretch + K * (pull(t) - plastic)) / (W(t) + K * LAMBDA)
+        return np.array([pull(t) - plastic, renewal(plastic + LAMBDA * mu_rate, age)])
+
+    def series(t, Y):
+        return (W(t) * carried(t, Y) - push(t)) / W0
+
+    if case.inertia and case.elastic:
+        return on_asperities, spring, [swing, case.V, 0.01, 1.0], False
+    if case.inertia:
+        return bare, spring, [swing, 1.0, 1.0], True
+    if case.eta and case.elastic:
+        return radiating_asperities, spring, [swing, 0.01, 1.0], True
+    if case.eta:
+        return radiating, spring, [swing, 1.0], False
+    return relaxed, series, [swing, 1.0], False
+
+
+def first_states(case, start):
+    """The package's states at theta = 0 as those of `equations`."""
+    elongation = start[0] * W0 / K
+    if not case.inertia:
+        return np.array([elongation, *start[1:]])
+    if case.elastic:
+        return np.array([elongation, start[1] * case.V, *start[2:]])
+    return np.array([elongation, start[1] + np.log(case.V), start[2]])
+
+
+@pytest.fixture(scope="module", params=CASES)
+def found(request):
+    """A case, its response, and SciPy's solution over a period from the same start."""
+    case = CASES[request.param]
+    response = asp.periodic_response(
+        slider(case.elastic, mass=case.M),
+        velocity=case.V,
+        frequency=case.f,
+        epsilon=case.epsilon,
+        modulation=case.modulation,
+        inertia=case.inertia,
+        radiation_damping=case.eta,
+    )
+    assert response.result[()] == "converged"
+    rates, force, scale, stiff = equations(case)
+    start = first_states(case, response.start)
+    solution = integrate(rates, start, case, scale, stiff, dense_output=True)
+    return SimpleNamespace(**locals())
+
+
+def integrate(rates, start, case, scale, stiff, **options):
+    method = {"method": "Radau", "rtol": 1e-10} if stiff else {"method": "DOP853", "rtol": 1e-12}
+    atol = 1e-12 * np.array(scale)
+    solution = solve_ivp(rates, (0, 1 / case.f), start, atol=atol, **method, **options)
+    assert solution.success
+    return solution
+
+
+def test_the_period_closes(found):
+    gap = (found.solution.y[:, -1] - found.start) / found.scale
+    assert np.abs(gap).max() < 1e-6
+
+
+def test_mean_and_harmonics(found):
+    t = np.arange(SAMPLES) / SAMPLES / found.case.f
+    spectrum = np.fft.rfft(found.force(t, found.solution.sol(t))) / SAMPLES
+    assert found.response.mean_friction == pytest.approx(spectrum[0].real, rel=1e-9)
+    # Dense output is less accurate than the steps.
+    np.testing.assert_allclose(found.response.harmonics[:2], 2 * spectrum[1:3], rtol=2e-7)
+
+
+def test_multipliers(found):
+    """By complex steps in the start; where SciPy's method must be implicit, by real ones."""
+    case, columns = found.case, []
+    for j, size in enumerate(found.scale):
+        unit = np.eye(len(found.scale))[j] * size
+        ends = [
+            integrate(found.rates, found.start + h * unit, case, found.scale, found.stiff).y[:, -1]
+            for h in ((1e-5, -1e-5) if found.stiff else (1e-30j,))
+        ]
+        change = (ends[0] - ends[1]) / 2e-5 if found.stiff else ends[0].imag / 1e-30
+        columns.append(change / size)
+    expected = np.linalg.eigvals(np.stack(columns, axis=1))
+    multipliers = found.response.multipliers
+    for m in multipliers[np.abs(multipliers) > 1e-3]:
+        assert np.abs(expected - m).min() < (2e-5 if found.stiff else 1e-7) * np.abs(m)
+
+
+@pytest.mark.parametrize("elastic", [True, False])
+def test_without_mass_or_damping_the_quasi_static_answer_returns(elastic):
+    """Differences vanish in proportion to the mass, and to the damping."""
+    drive = {"velocity": 1e-6, "epsilon": 0.24, "frequency": 120.0}
+    plain = asp.periodic_response(slider(elastic), **drive)
+    # On asperities the mass counts by its resonance, otherwise by its momentum.
+    masses = np.array([4e-3, 2e-3]) if elastic else np.array([2e-3, 1e-3])
+    heavy = asp.periodic_response(slider(elastic, mass=masses), inertia=True, **drive)
+    damped = asp.periodic_response(slider(elastic), radiation_damping=[20.0, 10.0], **drive)
+    for response in (heavy, damped):
+        for name in ("mean_friction", "mu1", "mu2"):
+            gap = getattr(response, name) - getattr(plain, name)
+            assert np.abs(gap[1] / getattr(plain, name)) < 2e-3
+            assert gap[0] / gap[1] == pytest.approx(2, abs=0.15)
+
+
+def test_a_sampled_period_is_the_modulation_it_was_sampled_from():
+    theta, samples = np.linspace(0, 7, 50), np.arange(64) * 2 * np.pi / 64
+    built = modulated(0.3, load={2: (0.1, 0.7)}, pull=0.2, pull_phase=-1.0)
+    read = sampled(7.0 * two_tones(samples), velocity=3 * (1 + 0.2 * np.cos(samples - 1.0)))
+    for one, other in zip(built.at(theta), read.at(theta), strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-13)
+    assert read.amplitude == pytest.approx(0.3)
+
+
+def test_slopes_are_derivatives():
+    theta, h = np.linspace(0, 7, 50), 1e-5
+    programme = modulated(0.3, load={3: (0.1, 0.7)}, tilt="10 deg")
+    after, before, here = (programme.at(theta + d) for d in (h, -h, 0.0))
+    np.testing.assert_allclose((after.w - before.w) / (2 * h), here.w_slope, atol=1e-9)
+    np.testing.assert_allclose((after.shear - before.shear) / (2 * h), here.shear_slope, atol=1e-9)
+
+
+def test_one_harmonic_is_the_harmonic_load():
+    drive = {"velocity": 1e-6, "frequency": 120.0}
+    plain = asp.periodic_response(slider(True), epsilon=0.3, **drive)
+    programme = modulated(0.3, load={2: (0.0, 0.0)})
+    built = asp.periodic_response(slider(True), modulation=programme, **drive)
+    for name in ("mean_friction", "mu1", "mu2", "phase1", "phase2"):
+        assert getattr(built, name) == pytest.approx(float(getattr(plain, name)), rel=1e-8)
+    np.testing.assert_allclose(built.multipliers, plain.multipliers, rtol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("build", "said"),
+    [
+        (lambda: modulated(0.7, load={2: (0.4, np.pi)}), "load must stay positive over the period"),
+        (lambda: modulated(0.1, load={1: (0.1, 0.0)}), "load must have harmonics from 2 on, got 1"),
+        (lambda: modulated(0.1, tilt="95 deg"), "tilt must be less than a right angle"),
+        (lambda: modulated(0.1, tilt="5 turns"), "tilt must be an angle in rad or deg"),
+        (lambda: sampled(), "load, velocity or shear must be given"),
+        (lambda: sampled([1.0, np.nan, 1.0]), "load must be at least 3 finite samples"),
+        (lambda: sampled(velocity=[-1.0, -2.0, -1.0]), "velocity must have a positive mean"),
+    ],
+)
+def test_impossible_modulations_are_refused(build, said):
+    with pytest.raises(InputError, match=said):
+        build()
+
+
+def test_inertia_needs_a_mass_and_damping_a_value():
+    drive = {"velocity": 1e-6, "epsilon": 0.1, "frequency": 120.0}
+    with pytest.raises(InputError, match=r"slider\.M must be positive, got 0 kg; give the mass"):
+        asp.periodic_response(slider(True, mass=0.0), inertia=True, **drive)
+    with pytest.raises(InputError, match="radiation_damping must be positive"):
+        asp.periodic_response(slider(True), radiation_damping=0.0, **drive)
+    with pytest.raises(InputError, match="exactly one of epsilon and modulation"):
+        asp.periodic_response(slider(True), velocity=1e-6, frequency=120.0)
+
+
+@pytest.mark.parametrize("more", [{"inertia": True}, {"radiation_damping": 500.0}])
+def test_a_law_without_rate_has_no_dynamics_to_add_inertia_to(more):
+    null = asp.Slider(get_law("amontons")(mu0=0.5), spring=K, load=W0, mass=M)
+    with pytest.raises(InputError, match="law must depend on the velocity where inertia"):
+        asp.periodic_response(null, velocity=1e-6, epsilon=0.1, frequency=120.0, **more)
+
+
+def test_a_law_without_rate_balances_the_shear_force():
+    """F = mu W - T: what the tilted exciter pushes the spring need not pull."""
+    null = asp.Slider(get_law("amontons")(mu0=0.5), spring=K, load=W0)
+    tilted = modulated(0.2, load={2: (0.0, 0.0)}, tilt=TILT)
+    response = asp.periodic_response(null, velocity=1e-6, frequency=120.0, modulation=tilted)
+    assert response.mu1 == pytest.approx(0.2 * (0.5 - np.tan(TILT)), rel=1e-12)
+
+
+def test_provenance_writes_the_modulation_out():
+    programme = modulated(0.2, load={2: (0.1, 0.0)}, pull=0.5)
+    response = asp.periodic_response(
+        slider(False), velocity=1e-5, frequency=120.0, modulation=programme
+    )
+    assert response.provenance["modulation"] == (
+        "w(t) = 1 + (0.2) cos(1 w t) + (0.1) cos(2 w t), V(t)/V = 1 + (0.5) cos(1 w t)"
+    )

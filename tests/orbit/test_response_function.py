@@ -1,0 +1,306 @@
+"""The differentiable response: derivatives against differences, outcomes, one program for all."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, fsolve
+
+from asperity import Slider, periodic_response, response_function
+from asperity.errors import InputError
+from asperity.laws import ElastoPlastic, RiceRuina, get_law, law_parameters, registered
+from asperity.loads import modulated
+from asperity.orbit import Outcome
+
+#: Richardson's extrapolation of central differences over 0.2 % and 0.1 %, relative to the
+#: largest derivative by the logarithm of a parameter: what it leaves is of the fourth order.
+DIFFERENCES = 1e-7
+STEP = 2e-3
+#: Agreement of two computations of one derivative.
+ROUND_OFF = 1e-9
+#: Of the response, as `periodic_response` has it.
+PROMISED = 1e-8
+
+BASE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
+BASE |= {"lambda": 7e-7, "alpha": 0.2, "c": 0.5, "B2": 0.005, "D2": 1.5e-6}
+BASE |= {"V1": 1e-8, "V2": 1e-4, "L": 1e-8, "V_star": 1e-7}
+MACHINE = {"K": 2e5, "W0": 7.0, "M": 1.6, "frequency": 120.0}
+#: V and epsilon of fast modulation; four points, as many as programs are compiled for at least.
+FAST = {"V": np.array([1e-6, 3e-6, 2e-6, 1e-6]), "epsilon": np.array([0.03, 0.05, 0.08, 0.01])}
+#: One law for each way to the multipliers: of two states and of more.
+WITH_MULTIPLIERS = ("elasto-plastic", "two-state")
+RATE_DEPENDENT = sorted(name for name, law in registered().items() if law.rate_dependent)
+
+
+def point(law, **drive):
+    own = {name: BASE[name] for name in law_parameters(get_law(law))}
+    return own | MACHINE | FAST | drive
+
+
+def columns(values):
+    """All outputs as real columns, (points, columns)."""
+    complex_ones = np.concatenate([values.harmonics, values.log_multipliers], axis=-1)
+    return np.column_stack([values.mean_friction, complex_ones.real, complex_ones.imag])
+
+
+def force(values):
+    """Mean and harmonics alone."""
+    return columns(values._replace(log_multipliers=values.log_multipliers[..., :0]))
+
+
+def differences(model, parameters, name, columns=columns):
+    """Derivative by the logarithm of a parameter, (points, columns)."""
+    at = [
+        columns(model(parameters | {name: parameters[name] * (1 + STEP * share)}))
+        for share in (1.0, -1.0, 0.5, -0.5)
+    ]
+    coarse, fine = (at[0] - at[1]) / (2 * STEP), (at[2] - at[3]) / STEP
+    return (4 * fine - coarse) / 3
+
+
+def worst_difference(model, parameters, names=None, columns=columns):
+    values, jacobian = model.value_and_jacobian(parameters)
+    assert (values.outcome == Outcome.CONVERGED).all()
+    names = names or [n for n in model.parameters if n != "M"]
+    computed = {n: columns(jacobian[n]) * np.reshape(parameters[n], (-1, 1)) for n in names}
+    expected = {n: differences(model, parameters, n, columns) for n in names}
+    largest = np.max([np.abs(c) for c in computed.values()], axis=0)
+    # Parts of a logarithm that cannot change, as the argument of a real multiplier, change by 0.
+    scale = np.where(largest > 1e-12, largest, 1.0)
+    return max((np.abs(computed[n] - expected[n]) / scale).max() for n in names)
+
+
+@pytest.mark.parametrize("law", RATE_DEPENDENT)
+def test_derivatives_of_every_law(law):
+    model = response_function(law, multipliers=law in WITH_MULTIPLIERS, search=False)
+    assert worst_difference(model, point(law)) < DIFFERENCES
+
+
+class TestElastoPlastic:
+    """Of one law, so that all of these share their programs."""
+
+    model = response_function("elasto-plastic", multipliers=True, search=False)
+    parameters = point("elasto-plastic")
+
+    plain = response_function("elasto-plastic", harmonics=1, search=False)
+
+    def mean(self, parameters):
+        return self.plain(parameters).mean_friction.sum()
+
+    def arrays(self):
+        return {n: jnp.asarray(v) * jnp.ones(4) for n, v in self.parameters.items()}
+
+    def test_values_of_the_periodic_response(self):
+        law = ElastoPlastic(
+            **{f"{n}_" if n == "lambda" else n: BASE[n] for n in law_parameters(ElastoPlastic)}
+        )
+        expected = periodic_response(
+            Slider(law, spring=2e5, load=7.0),
+            velocity=FAST["V"],
+            epsilon=FAST["epsilon"],
+            frequency=120.0,
+        )
+        values = self.model(self.parameters)
+        np.testing.assert_allclose(values.mean_friction, expected.mean_friction, rtol=PROMISED)
+        np.testing.assert_allclose(values.harmonics, expected.harmonics[:, :2], rtol=PROMISED)
+        gap = np.abs(values.log_multipliers - expected.log_multipliers)
+        assert gap.max() < PROMISED
+
+    def test_forward_and_reverse_mode_agree(self):
+        parameters = self.arrays()
+        random = np.random.default_rng(11)
+        tangents = {n: v * random.normal(size=4) for n, v in parameters.items()}
+        values, moved = jax.jvp(lambda p: self.plain(p).harmonics, (parameters,), (tangents,))
+        weights = random.normal(size=(2, *values.shape))
+        cotangent = jnp.asarray(weights[0] + 1j * weights[1])
+        _, pull = jax.vjp(lambda p: self.plain(p).harmonics, parameters)
+        (gradient,) = pull(cotangent)
+        # JAX pulls back without complex conjugation.
+        along = sum((gradient[n] * tangents[n]).sum() for n in parameters)
+        assert along == pytest.approx(float((cotangent * moved).sum().real), rel=ROUND_OFF)
+
+    def test_second_derivatives(self):
+        def by_epsilon(epsilon):
+            return jax.grad(lambda e: self.mean(self.arrays() | {"epsilon": e}))(epsilon)
+
+        epsilon = jnp.asarray(FAST["epsilon"])
+        hessian = jax.hessian(lambda e: self.mean(self.arrays() | {"epsilon": e}))(epsilon)
+        assert np.abs(hessian - np.diag(np.diag(hessian))).max() == 0
+        coarse, fine = (
+            (by_epsilon(epsilon * (1 + h)) - by_epsilon(epsilon * (1 - h))) / (2 * h * epsilon)
+            for h in (STEP, STEP / 2)
+        )
+        np.testing.assert_allclose(np.diag(hessian), (4 * fine - coarse) / 3, rtol=1e-7)
+
+    def test_new_numbers_compile_nothing(self):
+        self.model(self.parameters)
+        self.model.value_and_jacobian(self.parameters)
+        count = 0
+
+        def listen(event, *_, **__):
+            nonlocal count
+            count += event.endswith("backend_compile_duration")
+
+        jax.monitoring.register_event_duration_secs_listener(listen)
+        try:
+            for scale in (0.9, 1.1):
+                moved = {n: scale * np.asarray(v) for n, v in self.parameters.items()}
+                self.model(moved)
+                self.model.value_and_jacobian(moved)
+        finally:
+            jax.monitoring.unregister_event_duration_listener(listen)
+        assert count == 0
+
+    def test_point_that_is_not_found_is_not_a_number_and_harms_no_other(self):
+        # Slow modulation, which the fast method leaves to the search.
+        moved = self.parameters | {"frequency": np.array([120.0, 0.01, 120.0, 120.0])}
+        values, jacobian = self.model.value_and_jacobian(moved)
+        assert list(values.outcome == Outcome.CONVERGED) == [True, False, True, True]
+        for numbers in (values, *jacobian.values()):
+            assert np.isnan(numbers.mean_friction[1])
+            assert np.isnan(numbers.harmonics[1]).all()
+            assert np.isfinite(np.delete(numbers.mean_friction, 1)).all()
+            assert np.isfinite(np.delete(numbers.harmonics, 1, axis=0)).all()
+
+    def test_traced_value_against_its_rule(self):
+        moved = self.arrays() | {"A": jnp.array([0.013, -0.013, 0.013, 0.013])}
+        outcome = jax.jit(lambda p: self.plain(p).outcome)(moved)
+        assert outcome[1] == Outcome.INVALID
+        assert (outcome[np.array([0, 2, 3])] == Outcome.CONVERGED).all()
+
+    @pytest.mark.parametrize(
+        ("change", "message"),
+        [
+            ({"mu": 0.5}, "parameters must have known names, got 'mu'; did you mean 'mu0'"),
+            ({"K": np.ones(2)}, r"arrays of one shape \(points,\), got K \(2,\)"),
+            ({"K": np.ones((3, 1))}, r"arrays of one shape \(points,\)"),
+            ({"A": -1.0}, r"parameters\['A'\] must be positive, got -1"),
+            ({"epsilon": 1.0}, r"parameters\['epsilon'\] must be at least 0 and below 1"),
+        ],
+    )
+    def test_bad_input_is_refused(self, change, message):
+        with pytest.raises(InputError, match=message):
+            self.model(self.parameters | change)
+
+    def test_missing_parameters_are_named(self):
+        given = {n: v for n, v in self.parameters.items() if n not in ("K", "epsilon")}
+        with pytest.raises(InputError, match="got none for K, epsilon"):
+            self.model(given)
+
+    def test_numbers_give_numbers(self):
+        values = self.model(self.parameters | {"V": 1e-6, "epsilon": 0.24})
+        assert values.mean_friction.shape == ()
+        assert values.harmonics.shape == (2,)
+
+
+def test_law_without_dynamics_is_refused():
+    with pytest.raises(InputError, match="law must depend on the velocity, got amontons"):
+        response_function("amontons")
+
+
+#: Parameters that differ in how they enter the equations; mass or damping comes with them.
+NAMES = ["A", "D0", "K", "V", "epsilon"]
+
+
+@pytest.mark.parametrize("law", ["rice-ruina", "elasto-plastic"])
+class TestInertiaAndDamping:
+    """Both at once, so that one program has both; by the fast method."""
+
+    def model(self, law):
+        return response_function(law, inertia=True, radiation_damping=True, search=False)
+
+    def test_derivatives(self, law):
+        parameters = point(law, eta=2e4)
+        assert worst_difference(self.model(law), parameters, [*NAMES, "M", "eta"]) < DIFFERENCES
+
+    def test_values_of_the_periodic_response(self, law):
+        values = self.model(law)(point(law, eta=2e4))
+        own = {n + "_" * (n == "lambda"): BASE[n] for n in law_parameters(get_law(law))}
+        expected = periodic_response(
+            Slider(get_law(law)(**own), spring=2e5, load=7.0, mass=1.6),
+            velocity=FAST["V"],
+            epsilon=FAST["epsilon"],
+            frequency=120.0,
+            inertia=True,
+            radiation_damping=2e4,
+        )
+        np.testing.assert_allclose(values.mean_friction, expected.mean_friction, rtol=PROMISED)
+        np.testing.assert_allclose(values.harmonics, expected.harmonics[:, :2], rtol=PROMISED)
+
+
+def test_damping_against_independent_integration():
+    # Without asperities and inertia: eta v takes part of the force, Rice (1993).
+    numbers = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
+    K, W0, V, frequency, epsilon, eta = 2e5, 7.0, 2e-6, 120.0, 0.1, 1e5
+
+    def rates(theta, state):
+        force, phi = state
+        w = 1 + epsilon * np.cos(theta)
+
+        def excess(q):
+            strength = numbers["mu0"] + numbers["A"] * (q + np.log(V / numbers["V0"]))
+            age = numbers["B"] * (phi - np.log(V / numbers["V0"]))
+            return w * (strength + age) + eta * V / W0 * np.exp(q) - force
+
+        v = np.exp(brentq(excess, -200.0, 20.0, xtol=1e-15, rtol=1e-15))
+        omega = 2 * np.pi * frequency
+        return [V * K / (omega * W0) * (1 - v), V / (omega * numbers["D0"]) * (np.exp(-phi) - v)]
+
+    def period(start, samples=None):
+        return solve_ivp(rates, (0, 2 * np.pi), start, "DOP853", samples, rtol=1e-12, atol=1e-14)
+
+    def gap(start):
+        return period(start).y[:, -1] - start
+
+    steady = numbers["mu0"] + (numbers["A"] - numbers["B"]) * np.log(V / numbers["V0"])
+    start = fsolve(gap, [steady + eta * V / W0 - 0.02, 0.1], xtol=1e-13)
+    samples = period(start, 2 * np.pi * np.arange(256) / 256).y[0]
+    spectrum = np.fft.rfft(samples) / 256
+    values = response_function("rice-ruina", radiation_damping=True, search=False)(
+        numbers | {"K": K, "W0": W0, "V": V, "frequency": frequency, "epsilon": epsilon, "eta": eta}
+    )
+    assert values.mean_friction == pytest.approx(spectrum[0].real, rel=1e-9)
+    assert values.harmonics == pytest.approx(2 * spectrum[1:3], rel=1e-7)
+
+
+def test_load_that_is_neither_harmonic_nor_even():
+    load = modulated(epsilon=0.1, load={2: (0.04, 0.7)}, pull=0.2)
+    model = response_function("rice-ruina", modulation=load, search=False)
+    parameters = {n: v for n, v in point("rice-ruina").items() if n != "epsilon"}
+    coefficients = [n for n in model.parameters if n.startswith(("load", "pull"))]
+    given = {n: v for n, v in zip(coefficients, values_of(load), strict=True) if v}
+    assert worst_difference(model, parameters | given, [*NAMES[:-1], *given]) < DIFFERENCES
+    expected = periodic_response(
+        Slider(RiceRuina(**{n: BASE[n] for n in law_parameters(RiceRuina)}), spring=2e5, load=7.0),
+        velocity=FAST["V"],
+        modulation=load,
+        frequency=120.0,
+        methods=("collocation",),
+    )
+    values = model(parameters)
+    np.testing.assert_allclose(values.mean_friction, expected.mean_friction, rtol=PROMISED)
+    np.testing.assert_allclose(values.harmonics, expected.harmonics[:, :2], rtol=PROMISED)
+
+
+def values_of(load):
+    """Coefficients in the order of their names."""
+    return [v for series in (load.load, load.shear, load.pull) for pair in series for v in pair]
+
+
+#: As `DIFFERENCES`, of orbits that are solved to some 1e-10, over a step of 1e-3.
+SEARCHED = 1e-6
+
+
+@pytest.mark.parametrize(
+    ("law", "options", "more"),
+    [
+        ("rice-ruina", {"inertia": True}, {}),
+        ("rice-ruina", {"radiation_damping": True}, {"eta": 500.0}),
+    ],
+)
+def test_derivatives_at_orbits_of_the_search(law, options, more):
+    # Asked for multipliers too, which with inertia or damping the search alone gives.
+    model = response_function(law, multipliers=True, **options)
+    names = ["A", "K", "eta" if more else "M"]
+    assert worst_difference(model, point(law) | more, names, force) < SEARCHED

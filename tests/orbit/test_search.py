@@ -1,0 +1,110 @@
+"""The search as a list of methods, and the outcome of points without an orbit."""
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.laws import RiceRuina
+from asperity.loads import Harmonic
+from asperity.orbit.instability import mark_too_unstable
+from asperity.orbit.methods.branch_following.from_steady_sliding import RUNAWAY, BranchProgress
+from asperity.orbit.methods.collocation import frequency_path
+from asperity.orbit.methods.collocation import method as collocation
+from asperity.orbit.methods.collocation.initial_guess import InitialGuess
+from asperity.orbit.methods.method import Method
+from asperity.orbit.outcome import Outcome
+from asperity.orbit.search import find_orbits
+from asperity.orbit.solution import SearchOptions, Solution
+from asperity.slider import equation_of_motion
+from asperity.slider.problem import Problem, flatten
+
+A, B, D0, W0, V = 0.013, 0.026, 4e-7, 7.0, 1e-4
+KC = (B - A) * W0 / D0
+OPTIONS = SearchOptions(1, 0, lambda _: None)
+
+
+def points(stiffness, frequency, epsilon):
+    """One point for each stiffness."""
+    slider = asp.Slider(RiceRuina(mu0=0.5, A=A, B=B, D0=D0, V0=1e-6), spring=stiffness, load=W0)
+    ones = np.ones(len(stiffness))
+    motion = equation_of_motion(slider, V * ones, 2 * np.pi * frequency * ones)
+    return flatten(Problem(motion, Harmonic(epsilon * ones)))[0]
+
+
+@pytest.mark.parametrize(
+    ("lost", "share", "said"),
+    [
+        (Outcome.NO_ORBIT, 0.5, 0.2),
+        (Outcome.NO_ORBIT, 1.001, 0.4),
+        (Outcome.NOT_RESOLVED, 3e-8, 0.4),
+    ],
+)
+def test_what_nothing_could_hold_is_called_too_unstable(lost, share, said):
+    # D0/V = 4 ms and a period of 10 s: far below Kc disturbances grow by far more than e^15.
+    problem = points(np.array([2.0, 2.0, 0.1]) * KC, 0.1, 0.4)
+    solution = Solution.empty(2, 3, OPTIONS)
+    rows = np.array([2, 0])
+    solution.outcome[rows], solution.detail[rows] = lost, share
+    solution.outcome[1] = Outcome.CONVERGED
+    mark_too_unstable(problem, solution)
+    assert solution.outcome.tolist() == [lost, Outcome.CONVERGED, Outcome.SENSITIVE]
+    assert solution.detail[2] == pytest.approx(said, rel=1e-12)
+    assert solution.detail[0] == share
+
+
+def test_a_branch_may_run_ahead_a_little_where_it_is_about_to_arrive():
+    progress = BranchProgress.from_steady(4)
+    progress.fastest[:] = RUNAWAY + np.array([0.2, 0.2, 0.9, -0.1])
+    continues = progress.continues(np.array([0.995, 0.9, 0.995, 0.9]))
+    assert continues.tolist() == [True, False, False, True]
+
+
+class Stub(Method):
+    """Gives every point the same outcome."""
+
+    name, choice = "stub", "stub"
+
+    def __init__(self, outcome, detail):
+        self.outcome, self.detail, self.given = outcome, detail, []
+
+    def suits(self, problem):
+        return True
+
+    def solve(self, problem, options):
+        solution = Solution.empty(2, len(problem.system.V), options)
+        self.given.append(len(problem.system.V))
+        solution.outcome[:], solution.detail[:] = self.outcome, self.detail
+        if self.outcome == Outcome.CONVERGED:
+            solution.mean_friction[:] = self.detail
+        return solution
+
+
+def search(*methods):
+    problem = points(np.array([2.0, 3.0]) * KC, 40.0, 0.6)
+    return find_orbits(problem, 2, harmonics=1, phases=0, progress=lambda _: None, methods=methods)
+
+
+def test_a_failed_method_keeps_the_earlier_outcome():
+    solution = search(Stub(Outcome.FOLDED, 0.3), Stub(Outcome.NO_ORBIT, 0.0))
+    assert solution.outcome.tolist() == [Outcome.FOLDED] * 2
+    assert solution.detail.tolist() == [0.3] * 2
+
+
+def test_points_go_from_method_to_method_until_one_solves_them():
+    solving, late = Stub(Outcome.CONVERGED, 0.5), Stub(Outcome.CONVERGED, 0.6)
+    solution = search(Stub(Outcome.FOLDED, 0.3), solving, late)
+    assert (solving.given, late.given) == ([2], [])
+    assert solution.mean_friction.tolist() == [0.5, 0.5]
+    assert solution.method.tolist() == ["stub", "stub"]
+
+
+def test_an_unresolved_orbit_of_another_branch_is_not_reported(monkeypatch):
+    problem = points(np.array([2.0]) * KC, 40.0, 0.6)
+    another = InitialGuess.none(problem, 1)._replace(found=np.array([True]))
+
+    def unresolved(problem, solution, orbit, index, options, meshes):
+        solution.outcome[index], solution.detail[index] = Outcome.NOT_RESOLVED, np.inf
+
+    monkeypatch.setattr(frequency_path, "orbits_from_high_frequency", lambda *_: another)
+    monkeypatch.setattr(collocation, "refine", unresolved)
+    assert not frequency_path.FrequencyPath().solve(problem, OPTIONS).informed[0]

@@ -1,0 +1,214 @@
+"""Where results go: checked first, complete or absent at the end, resumed when interrupted."""
+
+import json
+import os
+import socket
+from pathlib import Path
+
+import pytest
+
+from asperity.errors import InputError
+from asperity.outputs import (
+    Interrupted,
+    UnfinishedText,
+    output_file,
+    output_files,
+    undisturbed,
+    written_file,
+)
+
+
+def a_folder(path: Path) -> None:
+    path.mkdir()
+
+
+def a_pipe(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def a_socket(path: Path) -> None:
+    server = socket.socket(socket.AF_UNIX)
+    here = Path.cwd()
+    os.chdir(path.parent)  # the address of a socket has at most 107 characters
+    try:
+        server.bind(path.name)
+    finally:
+        os.chdir(here)
+        server.close()
+
+
+def a_dangling_link_nowhere(path: Path) -> None:
+    path.symlink_to(path.parent / "nowhere" / "file")
+
+
+def a_circle_of_links(path: Path) -> None:
+    path.symlink_to(path)
+
+
+@pytest.mark.parametrize(
+    "made", [a_folder, a_pipe, a_socket, a_dangling_link_nowhere, a_circle_of_links]
+)
+def test_what_is_no_file_is_refused(tmp_path: Path, made) -> None:
+    made(tmp_path / "out.csv")
+    with pytest.raises(InputError, match=r"^--out must") as error:
+        output_file(tmp_path / "out.csv", "--out")
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("made", [a_folder, a_pipe])
+@pytest.mark.parametrize("beside", ["out.csv.partial", "out.csv.partial.json", "out.new.csv"])
+def test_what_is_in_the_way_beside_it_is_refused(tmp_path: Path, made, beside: str) -> None:
+    made(tmp_path / beside)
+    with pytest.raises(InputError, match=f"leave room for '{beside}'"):
+        output_file(tmp_path / "out.csv", "--out")
+
+
+@pytest.mark.parametrize(
+    "path", ["", ".", "..", "/", "a\0b", "x" * 300, "no/out.csv", "file/out.csv", "out/", "\ud800"]
+)
+def test_paths_that_are_no_file_names(tmp_path: Path, monkeypatch, path: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    (tmp_path / "out").mkdir()
+    with pytest.raises(InputError, match=r"^out must"):
+        output_file(path)
+
+
+def test_an_input_is_not_overwritten(tmp_path: Path) -> None:
+    source = tmp_path / "in.csv"
+    source.write_text("mine", encoding="utf-8")
+    (tmp_path / "link.csv").symlink_to(source)
+    (tmp_path / "hard.csv").hardlink_to(source)
+    for name in ("in.csv", "link.csv", "hard.csv"):
+        with pytest.raises(InputError, match="another file than the table"):
+            output_file(tmp_path / name, inputs={"table": source})
+
+
+def test_two_outputs_are_two_files(tmp_path: Path) -> None:
+    (tmp_path / "link.csv").symlink_to(tmp_path / "run.csv")
+    paths = {"--out": tmp_path / "run.csv", "--csv": None, "--record": tmp_path / "link.csv"}
+    with pytest.raises(InputError, match="--record must be another file than --out"):
+        output_files(paths)
+    assert output_files({"--out": tmp_path / "run.csv"}) == {"--out": tmp_path / "run.csv"}
+
+
+def write_half(target: Path) -> None:
+    with written_file(target, "--plot") as file:
+        file.write_text("half", encoding="utf-8")
+        raise KeyboardInterrupt
+
+
+def test_a_file_is_complete_or_absent(tmp_path: Path) -> None:
+    target = tmp_path / "a.png"
+    with pytest.raises(KeyboardInterrupt):
+        write_half(target)
+    assert list(tmp_path.iterdir()) == []
+    with written_file(target) as file:
+        assert file.suffix == ".png"
+        file.write_text("whole", encoding="utf-8")
+        assert not target.exists()
+    with pytest.raises(KeyboardInterrupt):
+        write_half(target)
+    assert target.read_text(encoding="utf-8") == "whole"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+def test_an_error_of_the_file_system_is_a_sentence(tmp_path: Path) -> None:
+    with (
+        pytest.raises(InputError, match=r"^--plot must be a file that can be written"),
+        written_file(tmp_path / "no" / "a.png", "--plot") as file,
+    ):
+        file.write_text("", encoding="utf-8")
+
+
+INPUTS = {"law": "rice-ruina", "numbers": {"A": 0.01, "K": 1e5}}
+
+
+def test_blocks_go_on_where_they_ended(tmp_path: Path) -> None:
+    target = tmp_path / "out.csv"
+    first = UnfinishedText(target, INPUTS)
+    assert first.start(resume=False) == {}
+    first.append("a\nb\n", 2, failed=1)
+    first.append("c\n", 1, failed=0)
+    with first.data.open("ab") as stream:
+        stream.write(b"half a li")
+    second = UnfinishedText(target, INPUTS)
+    second.start(resume=True)
+    assert (second.rows, second.progress["failed"], second.text()) == (3, 1, "a\nb\nc\n")
+    second.append("d\n", 1, failed=1)
+    second.finish()
+    assert target.read_text(encoding="utf-8") == "a\nb\nc\nd\n"
+    assert list(tmp_path.iterdir()) == [target]
+
+
+@pytest.mark.parametrize(
+    ("inputs", "told"),
+    [
+        ({**INPUTS, "law": "amontons"}, 'law = "rice-ruina" there and "amontons" here'),
+        ({**INPUTS, "numbers": {"A": 0.01, "K": 2e5}}, "numbers.K = 100000.0 there and 200000.0"),
+        ({**INPUTS, "numbers": {"A": 0.01}}, "numbers.K = 100000.0 there and nothing here"),
+        ({**INPUTS, **dict.fromkeys("abcde", 1)}, "2 other differences"),
+    ],
+)
+def test_blocks_of_other_inputs_are_refused_with_the_difference(
+    tmp_path: Path, inputs, told: str
+) -> None:
+    first = UnfinishedText(tmp_path / "out.csv", INPUTS)
+    first.start(resume=False)
+    first.append("a\n", 1)
+    with pytest.raises(InputError, match="must belong to the same inputs") as error:
+        UnfinishedText(tmp_path / "out.csv", inputs).start(resume=True)
+    assert told in str(error.value)
+    with pytest.raises(InputError, match="go on with --resume"):
+        UnfinishedText(tmp_path / "out.csv", INPUTS).start(resume=False)
+    assert first.text() == "a\n"
+
+
+def test_blocks_of_another_version_are_refused(tmp_path: Path) -> None:
+    first = UnfinishedText(tmp_path / "out.csv", INPUTS)
+    first.start(resume=False)
+    first.append("a\n", 1)
+    record = json.loads(first.record.read_text())
+    record["inputs"]["version"] = "0.0.1"
+    first.record.write_text(json.dumps(record))
+    with pytest.raises(InputError, match=r'version = "0\.0\.1" there'):
+        UnfinishedText(tmp_path / "out.csv", INPUTS).start(resume=True)
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", '{"inputs": {}}', '{"inputs": 3, "progress": 4}'])
+def test_a_damaged_record_is_not_trusted(tmp_path: Path, text: str) -> None:
+    first = UnfinishedText(tmp_path / "out.csv", INPUTS)
+    first.start(resume=False)
+    first.append("a\n", 1)
+    first.record.write_text(text)
+    with pytest.raises(InputError, match="got a damaged one"):
+        UnfinishedText(tmp_path / "out.csv", INPUTS).start(resume=True)
+
+
+def test_blocks_shorter_than_their_record_are_not_trusted(tmp_path: Path) -> None:
+    first = UnfinishedText(tmp_path / "out.csv", INPUTS)
+    first.start(resume=False)
+    first.append("abc\n", 1)
+    first.data.write_text("ab")
+    with pytest.raises(InputError, match="got a damaged one"):
+        UnfinishedText(tmp_path / "out.csv", INPUTS).start(resume=True)
+
+
+def test_nothing_finished_leaves_nothing(tmp_path: Path) -> None:
+    output = UnfinishedText(tmp_path / "out.csv", INPUTS)
+    output.start(resume=True)
+    output.discard_if_empty()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interruption_says_how_to_go_on() -> None:
+    assert "with 8 of 12 rows finished; repeat the command with --resume" in str(
+        Interrupted("8 of 12 rows")
+    )
+    assert "nothing was written" in str(Interrupted())
+
+
+def test_undisturbed_work_hands_back_results_and_errors() -> None:
+    assert undisturbed(lambda: 3) == 3
+    with pytest.raises(ZeroDivisionError):
+        undisturbed(lambda: 1 / 0)

@@ -1,0 +1,197 @@
+"""The virtual experiment: readings of simulated recordings against orbits they know nothing of."""
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.stats import binom
+
+import asperity as asp
+from asperity.air import AirLayer, effective_modulation
+from asperity.papers.bureau2000 import virtual as study
+from asperity.papers.bureau2000.virtual import recordings
+from asperity.papers.bureau2000.virtual.numbers import RecoveredQuantity, ratio, with_model
+from asperity.papers.bureau2000.virtual.pressure import collapse
+from asperity.papers.bureau2000.virtual.recordings import QUANTITIES
+
+PMMA = asp.materials.load("bureau2000")
+SLOW, FAST = "1 um/s", "10 um/s"
+#: B of the machine: 0.6 of its stated 0.01 below the stated 0.026.
+B = 0.020
+SLIDER = asp.Slider(PMMA.law("elasto-plastic", B=B), spring=PMMA.K, load=PMMA.W0, mass=PMMA.M)
+
+
+@pytest.fixture(scope="module")
+def experiment():
+    return study.experiment()
+
+
+@pytest.fixture(scope="module")
+def figures(experiment):
+    return {figure.name: figure for figure in (compute(experiment) for compute in study.VIRTUAL)}
+
+
+def borne(frequency, vacuum=False):
+    """eps_eff/eps with the appendix' layer under the patch that gives 0.48 at 120 Hz, 2.51 cm."""
+    layer = None if vacuum else AirLayer(P0=1e5, h0=6.5e-6, eta=1e-5, R=2.5140636870386906e-2)
+    return float(effective_modulation(frequency, W0=7.0, M=1.6, lambda_z=0.4e-6, layer=layer))
+
+
+def test_the_machine_slides_steadily_without_modulation():
+    """K > (B - A (1 + lambda K/W0)) W0/D0; at the central B it is not so."""
+
+    def critical(B):
+        return (B - 0.013 * (1 + 0.7e-6 * 0.2e6 / 7)) * 7 / 0.4e-6
+
+    assert critical(B) < PMMA.K < critical(0.026)
+    np.testing.assert_allclose(recordings.slider().law.B, B, rtol=1e-12)
+    assert abs(B - PMMA.B) < PMMA["B"].si_uncertainty
+
+
+def test_the_series_are_those_of_the_paper(experiment):
+    assert list(experiment) == [SLOW, FAST, "3.16 um/s", "31.6 um/s", "100 um/s", "1 mbar", "1 atm"]
+    for series in study.all_series():
+        rows = experiment[series.name]
+        pressure = {"vacuum": series.name == "1 mbar"}
+        assert series.frequency == (200.0 if series.name in ("1 mbar", "1 atm") else 120.0)
+        np.testing.assert_allclose(
+            rows["epsilon_eff"], borne(series.frequency, **pressure) * rows["epsilon_set"],
+            rtol=1e-9,
+        )  # fmt: skip
+        assert 0.5 in series.epsilons
+        assert len(set(series.seeds)) == 3
+    seeds = [seed for series in study.all_series() for seed in series.seeds]
+    assert len(set(seeds)) == len(seeds)
+
+
+def test_the_machine_has_the_share_of_all_figures():
+    assert abs(study.all_series()[0].transfer) == pytest.approx(0.48, rel=1e-9)
+
+
+def test_the_load_is_read_as_commanded(experiment):
+    for rows in experiment.values():
+        np.testing.assert_allclose(rows["epsilon"], rows["epsilon_set"], rtol=1e-3)
+
+
+def test_bars_hold_the_orbits(experiment, figures):
+    """The orbits are solved without a recording; no bar is wide enough to hold anything."""
+    points = pd.concat([figure.points for figure in figures.values()])
+    points = points[points["epsilon_set"] > 0].drop_duplicates(["series", "epsilon_set"])
+    assert len(points) == sum(map(len, experiment.values()))
+    for name in QUANTITIES:
+        error = np.abs(points[name] - points[f"{name}_model"])
+        hits = error < study.NORMAL * points[f"{name}_uncertainty"]
+        # At least what 95 % intervals hold, within what so many can tell at 1e-3.
+        assert hits.sum() >= binom.ppf(1e-3, len(hits), 0.95), name
+    for rows in experiment.values():
+        strongest = rows.iloc[-1]
+        for name, share in (("mean_friction", 0.01), ("delta_mu", 0.06), ("mu1", 0.02)):
+            assert strongest[f"{name}_uncertainty"] < share * abs(strongest[name]), name
+
+
+def test_runs_scatter_as_their_noise_asks(experiment):
+    """The gauge's noise alone: sqrt(2/N) of its rms, filtered, on an amplitude."""
+    rows = experiment[FAST]
+    samples = rows["window"] * 120 * 35 / 6
+    # White up to the recorder's low-pass at 300 Hz of a first-order spectrum of 1 kHz.
+    spectral = 2 * 10e-9**2 / (np.pi * 1000)  # m^2/Hz one-sided, at frequencies far below 1 kHz
+    expected = PMMA.K / PMMA.W0 * np.sqrt(spectral / rows["window"])
+    assert (samples > 300).all()
+    stated = rows["mu1_stated"] / expected
+    assert (stated > 0.7).all()
+    assert (stated < 1.6).all()
+
+
+def test_the_table_of_points(figures):
+    for figure in figures.values():
+        assert list(figure.points.columns) == list(study.POINT_COLUMNS)
+        assert "SIMULATED" in figure.caption
+        assert figure.alt.startswith("Simulated")
+        assert figure.failed == 0
+        uncertainty = figure.points[["mean_friction_stated", "mean_friction_scatter"]].max(axis=1)
+        np.testing.assert_array_equal(figure.points["mean_friction_uncertainty"], uncertainty)
+
+
+def test_the_model_beside_a_point_is_that_of_its_operating_point(figures):
+    for figure in figures.values():
+        for _, row in figure.points.iterrows():
+            if row["epsilon_set"] == 0:
+                assert row["mean_friction_model"] == pytest.approx(
+                    0.5 - (B - 0.013) * np.log(row["V"] / 1e-6), rel=1e-12
+                )
+    row = figures["virtual-05"].of("1 mbar").iloc[-1]
+    orbit = asp.periodic_response(
+        SLIDER, velocity=1e-5, epsilon=0.5 * borne(200.0, vacuum=True), frequency=200.0
+    )
+    for name in ("delta_mu", "mu1", "mu2"):
+        assert row[f"{name}_model"] == pytest.approx(float(getattr(orbit, name)), rel=1e-7)
+
+
+def test_a_point_without_a_line_is_an_error(figures):
+    figure = figures["virtual-02"]
+    off = figure.points.assign(V=2e-6)
+    with pytest.raises(KeyError, match="no operating point at 2e-06 m/s"):
+        with_model(off, figure.data)
+
+
+def test_what_the_recordings_say_is_what_the_machine_has(figures):
+    recovered = [quantity for figure in figures.values() for quantity in figure.recovered]
+    assert len(recovered) == 13
+    # Of thirteen 95 % intervals one may miss; none by far.
+    assert sum(not quantity.agrees for quantity in recovered) <= 2
+    assert all(abs(f.value - f.true_value) < 4 * f.uncertainty for f in recovered)
+
+
+def test_the_statements_of_the_paper_on_the_simulated_points(figures):
+    share = {f.what: f.value for f in figures["virtual-02"].recovered}
+    assert share[f"Share of the mean that ε = 0.5 takes, {SLOW}"] == pytest.approx(0.2, abs=0.01)
+    slopes = figures["virtual-03"].scalars
+    assert slopes["slope_0"] == pytest.approx(0.013 - B, rel=0.02)
+    second = [figures["virtual-04"].last_point(name, "mu2")[0] for name in (SLOW, FAST)]
+    first = [figures["virtual-04"].last_point(name, "mu1")[0] for name in (SLOW, FAST)]
+    assert second[0] < second[1]
+    assert all(0.1 < b / a < 0.2 for a, b in zip(first, second, strict=True))
+
+
+def test_the_factor_between_air_and_vacuum(figures):
+    (quantity,) = figures["virtual-05"].recovered
+    assert quantity.true_value == pytest.approx(borne(200.0) / borne(200.0, vacuum=True), rel=1e-9)
+    assert quantity.uncertainty < 0.01 * quantity.value
+    assert abs(quantity.value - quantity.true_value) < 3 * quantity.uncertainty
+
+
+def drops(factor, epsilons):
+    """Points of any smooth curve, at epsilons that the contacts feel `factor`-fold."""
+    u = factor * np.array(epsilons)
+    drop = -0.07 * (np.sqrt(1 + (14 * u) ** 2) - 1) - 0.05 * u**2
+    return pd.DataFrame(
+        {"epsilon": epsilons, "delta_mu": drop, "delta_mu_uncertainty": 1e-4 + 0 * u}
+    )
+
+
+def test_collapse_finds_a_factor_that_is_known():
+    vacuum, air = drops(1.0, [0.05, 0.1, 0.2, 0.35, 0.5]), drops(0.37, [0.1, 0.2, 0.35, 0.5])
+    factor, sigma = collapse(vacuum, air)
+    assert factor == pytest.approx(0.37, rel=1e-6)
+    assert 0 < sigma < 0.01
+
+
+def test_a_wrong_share_is_not_agreed_to(figures):
+    """As if the full disc of the appendix lay under the slider: 0.20 instead of 0.40."""
+    (quantity,) = figures["virtual-05"].recovered
+    assert not RecoveredQuantity("", quantity.value, quantity.uncertainty, 0.20, "").agrees
+
+
+def test_a_quotient_and_its_uncertainty():
+    value, sigma, true_value = ratio((2.0, 0.02, 2.1), (4.0, 0.04, 4.2))
+    assert (value, true_value) == (0.5, 0.5)
+    assert sigma == pytest.approx(0.5 * np.hypot(0.01, 0.01), rel=1e-12)
+
+
+def test_names_of_quantities_are_columns(experiment):
+    for rows in experiment.values():
+        assert all(f"{name}_uncertainty" in rows for name in QUANTITIES)
+
+
+def test_the_same_seeds_make_the_same_points(experiment):
+    again = recordings._points(study.all_series()[1])
+    pd.testing.assert_frame_equal(again, experiment[FAST])

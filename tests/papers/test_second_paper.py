@@ -1,0 +1,86 @@
+"""A second paper is one folder and an entry point: nothing of the package changes for it."""
+
+import importlib
+import json
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from asperity.cli.main import main
+from asperity.errors import InputError
+from asperity.papers import available, find_paper
+
+TOY = Path(__file__).parent / "toy2020"
+
+
+@pytest.fixture
+def installed(tmp_path, monkeypatch):
+    """The toy paper as an installed distribution that registers it."""
+    site = tmp_path / "site"
+    shutil.copytree(TOY, site / "toy_papers_2020")
+    metadata = site / "toy_papers-1.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: toy-papers\nVersion: 1\n")
+    (metadata / "entry_points.txt").write_text("[asperity.papers]\ntoy2020 = toy_papers_2020\n")
+    monkeypatch.syspath_prepend(str(site))
+    importlib.invalidate_caches()
+    for name in [name for name in sys.modules if name.startswith("toy_papers_2020")]:
+        monkeypatch.delitem(sys.modules, name)
+    return site / "toy_papers_2020"
+
+
+def test_papers_are_found_in_their_folders_and_by_entry_points(installed):
+    assert {"bureau2000", "toy2020"} <= set(available())
+    assert find_paper("toy2020").contents.paper.short == "Toy (2020)"
+    with pytest.raises(InputError, match=r"got 'toy2002'; did you mean 'toy2020'\?"):
+        find_paper("toy2002")
+
+
+def test_verdicts_and_conclusions_of_the_second_paper(installed):
+    paper = find_paper("toy2020")
+    frequency, weight = claims = paper.ledger(sensitivity=True)
+    assert frequency.numbers == {"frequency": pytest.approx(1.5915494)}
+    assert (frequency.verdict, weight.verdict) == ("reproduced", "differs")
+    (varied,) = frequency.sensitivity
+    assert varied.numbers["frequency"] == pytest.approx((1.50987, 1.66924), abs=1e-4)
+    assert varied.verdicts == ("differs", "reproduced")
+    (headline,) = paper.headlines(claims)
+    assert headline.standing == "holds at the central values"
+    assert headline.found == "1.592 Hz."
+
+
+def test_the_second_paper_is_reproduced_by_its_name(installed, tmp_path):
+    out = tmp_path / "report"
+    shown = CliRunner().invoke(main, ["reproduce", "toy2020", "--out", str(out)])
+    assert shown.exit_code == 0, shown.output
+    assert "Toy (2020), reproduced by asperity" in shown.output
+    files = {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file()}
+    pictures = {"figures/swing.png", "figures/swing.pdf", "data/swing.csv"}
+    assert files == {"index.html", "claims.json", "claims.csv", *pictures}
+    page = (out / "index.html").read_text(encoding="utf-8")
+    assert "A block on a spring" in page
+    assert "Bureau" not in page
+    record = json.loads((out / "claims.json").read_text(encoding="utf-8"))
+    assert record["counts"]["test"]["reproduced"] == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('id = "weight"', 'id = "frequency"', "claim.id must be unique, got 'frequency' twice"),
+        ('claims = ["frequency"]', 'claims = ["mass"]', "must name claims of the file, got 'mass'"),
+        ('depends_on = ["K"]', 'depends_on = ["M"]', "must name an uncertainty of the file"),
+        ('kind = "test"', 'kind = "guess"', "kind must be valid"),
+        ("[[claim]]", "[[claim]", "must be TOML"),
+    ],
+)
+def test_a_mistake_in_the_words_is_refused(installed, old, new, message):
+    words = installed / "claims.toml"
+    text = words.read_text(encoding="utf-8")
+    assert old in text
+    words.write_text(text.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        _ = find_paper("toy2020").contents

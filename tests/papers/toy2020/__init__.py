@@ -1,0 +1,1 @@
+"""A paper about a block on a spring, to prove that a second paper is one folder."""

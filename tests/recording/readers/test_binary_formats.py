@@ -1,0 +1,287 @@
+"""HDF5, MATLAB and TDMS: the planted recording comes back from each way to write it."""
+
+from __future__ import annotations
+
+import sys
+
+import h5py
+import numpy as np
+import pytest
+import scipy.io
+
+from asperity.errors import InputError
+from asperity.recording import read
+
+nptdms = pytest.importorskip("nptdms")
+
+
+def assert_planted(trace, planted, rtol=1e-15):
+    assert trace.findings == ()
+    assert np.allclose(trace.time, planted.time, rtol=rtol, atol=1e-18)
+    for role in ("W", "F"):
+        channel = trace.channel(role)
+        assert (channel.kind, channel.unit) == ("force", "N")
+        assert np.allclose(channel.values, getattr(planted, role), rtol=rtol, atol=0)
+
+
+# HDF5
+
+
+def h5_datasets(file, planted):
+    for name, values, unit in (
+        ("time", planted.time * 1e3, "ms"),
+        ("load", planted.W / 1e3, "kN"),
+        ("shear", planted.F, "N"),
+    ):
+        file[name] = values
+        file[name].attrs["units"] = unit
+
+
+def h5_columns_of_one(file, planted):
+    h5_datasets(file, planted)
+    for name in ("time", "load", "shear"):
+        values, unit = file[name][()], file[name].attrs["units"]
+        del file[name]
+        file[name] = values[:, None]
+        file[name].attrs["Unit"] = np.bytes_(unit)
+
+
+def h5_table(file, planted):
+    table = np.zeros(planted.time.size, [("time_s", "f8"), ("W_N", "f8"), ("F_N", "f8")])
+    table["time_s"], table["W_N"], table["F_N"] = planted
+    file["runs/first"] = table
+
+
+def h5_matrix(file, planted):
+    file["data"] = np.column_stack(planted)
+    file["data"].attrs["columns"] = ["Time", "Load", "Shear"]
+    file["data"].attrs["units"] = ["s", "N", "N"]
+
+
+def h5_wide_matrix(file, planted):
+    file["data"] = np.vstack(planted)
+    file["data"].attrs["channel_names"] = "Time (s), Load (N), Shear (N)"
+
+
+def h5_rate(file, planted):
+    file["W"], file["F"] = planted.W, planted.F
+    file.attrs["sample_rate"] = 1000.0
+    file["W"].attrs["unit"] = file["F"].attrs["unit"] = "N"
+
+
+def h5_group(file, planted):
+    group = file.create_group("experiment/run 3")
+    h5_datasets(group, planted)
+    file["experiment"].attrs["operator"] = "somebody"
+
+
+@pytest.mark.parametrize(
+    "write",
+    [h5_datasets, h5_columns_of_one, h5_table, h5_matrix, h5_wide_matrix, h5_rate, h5_group],
+)
+def test_hdf5(tmp_path, planted, write):
+    # The extension says nothing.
+    path = tmp_path / "recording.dat"
+    with h5py.File(path, "w") as file:
+        write(file, planted)
+    assert_planted(read(path), planted)
+
+
+def test_text_beside_the_numbers_of_hdf5_does_not_matter(tmp_path, planted):
+    path = tmp_path / "recording.h5"
+    with h5py.File(path, "w") as file:
+        h5_datasets(file, planted)
+        file["operator"] = ["first", "second"]
+        file["remark"] = "text of variable length"
+    trace = read(path)
+    assert np.allclose(trace.channel("W").values, planted.W, rtol=1e-15)
+
+
+def test_netcdf(tmp_path, planted):
+    """What a trace itself is written to comes back as it was."""
+    source = tmp_path / "a.h5"
+    with h5py.File(source, "w") as file:
+        h5_datasets(file, planted)
+    target = tmp_path / "b.nc"
+    read(source).to_dataset().to_netcdf(target, engine="h5netcdf")
+    assert_planted(read(target), planted)
+
+
+def test_recordings_of_different_length_must_be_chosen(tmp_path, planted):
+    path = tmp_path / "two.h5"
+    with h5py.File(path, "w") as file:
+        h5_datasets(file.create_group("fast"), planted)
+        half = type(planted)(*(v[::2] for v in planted))
+        h5_datasets(file.create_group("slow"), half)
+    with pytest.raises(InputError, match=r"'fast' \(400 rows\), 'slow' \(200 rows\); choose one"):
+        read(path)
+    assert_planted(read(path, group="fast"), planted)
+    assert len(read(path, group="/slow")) == 200
+    with pytest.raises(InputError, match=r"read\.group must be a group.*did you mean 'slow'"):
+        read(path, group="sloe")
+
+
+def test_a_vector_of_another_length_is_left_out_and_named(tmp_path, planted):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        h5_datasets(file, planted)
+        file["calibration"] = np.arange(3.0)
+    trace = read(path)
+    assert [f.name for f in trace.findings] == ["other length"]
+    assert list(trace.channels) == ["load", "shear"]
+
+
+@pytest.mark.parametrize("part", [0.1, 0.5, 0.99])
+def test_hdf5_that_is_cut_is_refused(tmp_path, planted, cut, part):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        h5_datasets(file, planted)
+    with pytest.raises(InputError, match=r"must be a whole file, got 'cut_a.h5', which HDF5"):
+        read(cut(path, part))
+
+
+# MATLAB
+
+
+def mat_vectors(planted):
+    return {
+        "t": planted.time[:, None],
+        "W": planted.W,
+        "F": planted.F / 1e3,
+        "t_unit": "s",
+        "W_units": "N",
+        "F_units": "kN",
+    }
+
+
+def mat_struct(planted):
+    units = {"time": "s", "load": "N", "shear": "N"}
+    data = {"time": planted.time, "load": planted.W, "shear": planted.F, "units": units}
+    return {"run": data, "operator": "somebody"}
+
+
+def mat_matrix(planted):
+    names = np.array(["Time (s)", "Load (N)", "Shear (N)"], dtype=object)
+    return {"data": np.column_stack(planted), "names": names}
+
+
+def mat_rate(planted):
+    return {"W_N": planted.W, "F_N": planted.F, "fs": 1000.0}
+
+
+@pytest.mark.parametrize("write", [mat_vectors, mat_struct, mat_matrix, mat_rate])
+@pytest.mark.parametrize("compressed", [False, True])
+def test_matlab_5(tmp_path, planted, write, compressed):
+    path = tmp_path / "recording.mat"
+    scipy.io.savemat(path, write(planted), do_compression=compressed)
+    assert_planted(read(path), planted)
+
+
+def test_matlab_4(tmp_path, planted):
+    path = tmp_path / "recording.mat"
+    contents = {"t": planted.time, "W": planted.W, "F": planted.F}
+    scipy.io.savemat(path, contents, format="4")
+    assert_planted(read(path, units={"t": "s", "W": "N", "F": "N"}), planted)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+def test_of_a_matlab_file_that_is_cut_whole_variables_are_read(tmp_path, planted, cut, compressed):
+    path = tmp_path / "a.mat"
+    contents = {"time_s": planted.time, "W_N": planted.W, "F_N": planted.F}
+    scipy.io.savemat(path, contents, do_compression=compressed)
+    trace = read(cut(path, 0.95))
+    assert [(f.name, f.severity) for f in trace.findings] == [("truncated", "error")]
+    assert list(trace.channels) == ["W"]
+    assert np.array_equal(trace.channel("W").values, planted.W)
+    with pytest.raises(InputError, match="which is cut within its first variable"):
+        read(cut(path, 0.1))
+
+
+def matlab_73(path, planted):
+    """As MATLAB writes it: a user block of 512 bytes, rows for columns, texts as numbers."""
+    with h5py.File(path, "w", userblock_size=512) as file:
+        run = file.create_group("run")
+        run.attrs["MATLAB_class"] = np.bytes_("struct")
+        units = run.create_group("units")
+        units.attrs["MATLAB_class"] = np.bytes_("struct")
+        for name, values in zip(("time", "load", "shear"), planted, strict=True):
+            run[name] = values[None, :]
+            run[name].attrs["MATLAB_class"] = np.bytes_("double")
+            text = "s" if name == "time" else "N"
+            units[name] = np.array([[ord(c)] for c in text], dtype=np.uint16)
+            units[name].attrs["MATLAB_class"] = np.bytes_("char")
+        file.create_group("#refs#")["a"] = np.arange(2.0)
+    with path.open("r+b") as file:
+        file.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+def test_matlab_73(tmp_path, planted, cut):
+    path = tmp_path / "a.mat"
+    matlab_73(path, planted)
+    trace = read(path)
+    assert trace.provenance["format"] == "matlab 7.3"
+    assert_planted(trace, planted)
+    with pytest.raises(InputError, match="must be a whole file"):
+        read(cut(path, 0.5))
+
+
+# TDMS
+
+
+def write_tdms(path, planted, segments=4, time=False, group="run"):
+    clock = {"wf_increment": 1e-3, "wf_start_offset": 0.0}
+    with nptdms.TdmsWriter(path) as writer:
+        for rows in np.array_split(np.arange(planted.time.size), segments):
+            channels = {"Load": (planted.W / 1e3, "kN"), "Shear": (planted.F, "N")}
+            if time:
+                channels = {"Time": (planted.time, "s"), **channels}
+            writer.write_segment(
+                [
+                    nptdms.ChannelObject(
+                        group,
+                        name,
+                        values[rows],
+                        properties={"unit_string": unit, **({} if time else clock)},
+                    )
+                    for name, (values, unit) in channels.items()
+                ]
+            )
+    return path
+
+
+@pytest.mark.parametrize("time", [False, True])
+def test_tdms(tmp_path, planted, time):
+    assert_planted(read(write_tdms(tmp_path / "a.tdms", planted, time=time)), planted)
+
+
+@pytest.mark.parametrize("part", [0.3, 0.5, 0.8, 0.995])
+def test_tdms_that_is_cut_gives_its_whole_rows(tmp_path, planted, cut, part, caplog):
+    trace = read(cut(write_tdms(tmp_path / "a.tdms", planted), part))
+    assert [(f.name, f.severity) for f in trace.findings] == [("truncated", "error")]
+    assert 50 < len(trace) < 400
+    assert np.array_equal(trace.channel("F").values, planted.F[: len(trace)])
+    assert np.allclose(trace.channel("W").values, planted.W[: len(trace)], rtol=1e-15)
+    assert caplog.records == []
+
+
+def test_tdms_cut_before_any_value_is_refused(tmp_path, planted, cut):
+    with pytest.raises(InputError, match="must be a whole file"):
+        read(cut(write_tdms(tmp_path / "a.tdms", planted), 0.02))
+
+
+def test_tdms_without_its_library_is_one_sentence(tmp_path, planted, monkeypatch):
+    path = write_tdms(tmp_path / "a.tdms", planted)
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    with pytest.raises(InputError, match=r"install npTDMS, as 'pip install asperity\[lab\]' does"):
+        read(path)
+
+
+def test_what_is_no_recording_is_refused(tmp_path):
+    path = tmp_path / "picture.png"
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + bytes(range(256)) * 20)
+    with pytest.raises(InputError, match="looks like none of them"):
+        read(path)
+    with pytest.raises(InputError, match="must be a file"):
+        read(tmp_path / "nothing.csv")
+    with pytest.raises(InputError, match=r"read.format must be a format"):
+        read(path, format="png")

@@ -1,0 +1,179 @@
+"""Columns, units and roles, whatever the format: what the user says, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.recording import read
+from asperity.recording.readers.labels import split_labels
+
+
+@pytest.fixture
+def recording(tmp_path):
+    def write(head, *rows):
+        path = tmp_path / "recording.csv"
+        path.write_text("\n".join([head, *rows]) + "\n")
+        return path
+
+    return write
+
+
+ROWS = ("0,1,2,3", "1,2,3,5", "2,4,4,4", "3,3,5,1")
+
+
+def names(trace):
+    return [f.name for f in trace.findings]
+
+
+@pytest.mark.parametrize(
+    ("label", "name", "unit"),
+    [
+        ("Force [N]", "Force", "N"),
+        ("Displ(microns)", "Displ", "microns"),
+        ("v/(um/s)", "v", "um/s"),
+        ("v/um/s", "v", "um/s"),
+        ("velocity_um_s", "velocity", "um/s"),
+        ("time_s", "time", "s"),
+        ("x_m", "x", "m"),
+        ("V (um s^-1)", "V", "um s^-1"),
+        ("mu [-]", "mu", "-"),
+        ("Signal (V)", "Signal", "V"),
+        ("Load, kN", "Load", "kN"),
+        ("disp in mm", "disp", "mm"),
+        ("dW/dt", "dW/dt", ""),
+        ("F/W", "F/W", ""),
+        ("mu_s", "mu_s", ""),
+        ("theta_ss", "theta_ss", ""),
+        ("D_c", "D_c", ""),
+        ("sigma_n", "sigma_n", ""),
+        ("x_1", "x_1", ""),
+    ],
+)
+def test_headings_are_taken_apart_where_they_hold_a_unit(label, name, unit):
+    assert split_labels([label]) == [(name, unit)]
+
+
+def test_an_index_n_is_no_newton_beside_another_index():
+    assert split_labels(["t_s", "F_N", "F_T"]) == [("t", "s"), ("F_N", ""), ("F_T", "")]
+    assert split_labels(["t_s", "F_N", "W_N"]) == [("t", "s"), ("F", "N"), ("W", "N")]
+
+
+@pytest.mark.parametrize(
+    ("unit", "kind", "si"),
+    [
+        ("microns", "length", 1e-6),
+        ("mic", "length", 1e-6),
+        ("inch", "length", 0.0254),
+        ("MPa", "pressure", 1e6),
+        ("mPa", "pressure", 1e-3),
+        ("mpa", "pressure", 1e6),
+        ("psi", "pressure", 6894.757293168361),
+        ("kgf", "force", 9.80665),
+        ("KN", "force", 1e3),
+        ("mN", "force", 1e-3),
+        ("MN", "force", 1e6),
+        ("um/sec", "velocity", 1e-6),
+        ("mm/min", "velocity", 1e-3 / 60),
+        ("N/mm", "stiffness", 1e3),
+        ("%", "dimensionless", 0.01),
+        (".", "dimensionless", 1.0),
+        ("kHz", "frequency", 1e3),
+    ],
+)
+def test_units_as_laboratories_write_them(recording, unit, kind, si):
+    trace = read(recording(f"time_s,a ({unit}),b (s),c (-)", *ROWS))
+    channel = trace.channels["a"]
+    assert channel.kind == kind
+    assert np.allclose(channel.values, np.array([1, 2, 4, 3]) * si, rtol=1e-15)
+    assert (channel.recorded_unit, channel.recorded_name) == (unit, f"a ({unit})")
+
+
+@pytest.mark.parametrize("unit", ["V", "counts", "deg", "°C", "MPa/s", "t"])
+def test_what_is_no_unit_here_leaves_the_values_and_is_named(recording, unit):
+    trace = read(recording(f"time_s,a ({unit}),b (s),c (-)", *ROWS))
+    assert names(trace) == ["unknown unit"]
+    assert trace.channels["a"].kind is None
+    assert trace.channels["a"].unit == ""
+    assert np.array_equal(trace.channels["a"].values, [1, 2, 4, 3])
+    known = read(recording(f"time_s,a ({unit}),b (s),c (-)", *ROWS), units={"a": "-2.5 kN"})
+    assert known.findings == ()
+    assert np.array_equal(known.channels["a"].values, [-2500, -5000, -10000, -7500])
+
+
+def test_units_go_by_name_by_heading_and_by_role(recording):
+    path = recording("t,Load,Shear (V),Displ", *ROWS)
+    trace = read(
+        path,
+        columns={"F": "Shear"},
+        units={"t": "ms", "W": "kN", "Shear (V)": "3 N", "displacement": "um"},
+    )
+    assert trace.findings == ()
+    assert np.allclose(trace.time, [0, 1e-3, 2e-3, 3e-3], rtol=1e-15)
+    assert np.array_equal(trace.channel("W").values, [1e3, 2e3, 4e3, 3e3])
+    assert np.array_equal(trace.channel("shear force").values, [6, 9, 12, 15])
+    assert np.allclose(trace.channel("slip").values, [3e-6, 5e-6, 4e-6, 1e-6], rtol=1e-15)
+
+
+def test_a_unit_against_the_file_is_taken_and_named(recording):
+    trace = read(recording("time_s,W_N,F_N,x_um", *ROWS), units={"W": "kN"})
+    assert names(trace) == ["unit overridden"]
+    assert trace.channel("W").values[0] == 1000
+
+
+def test_ambiguous_columns_are_named_and_chosen(recording):
+    path = recording("time_s,Shear left (N),Shear right (N),W_N", *ROWS)
+    with pytest.raises(InputError, match=r"'Shear left' or 'Shear right'; choose when reading"):
+        read(path).channel("F")
+    for choice in ("Shear right", "Shear right (N)", "shear RIGHT", 2):
+        trace = read(path, columns={"F": choice})
+        assert trace.channel("F").recorded_name == "Shear right (N)"
+    two = recording("time 1 (s),time 2 (s),W_N,F_N", *ROWS)
+    with pytest.raises(InputError, match=r"'time 1' and 'time 2', which both can be it"):
+        read(two)
+    assert np.array_equal(read(two, columns={"time": "time 2"}).time, [1, 2, 4, 3])
+
+
+def test_a_rate_goes_before_the_times_of_the_file(recording):
+    trace = read(recording("time_s,W_N,F_N,x_um", *ROWS), rate="4 Hz")
+    assert np.array_equal(trace.time, [0, 0.25, 0.5, 0.75])
+    assert "time" in trace.channels
+    assert trace.provenance["time"] == "rate of 4 Hz, as asked"
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"columns": {"F": "x"}}, r"columns\['F'\] must be a .*force.*, got 'x', a length"),
+        ({"columns": {"time": "W"}}, r"columns\['time'\] must be a time, got 'W', a force"),
+        ({"columns": {"F": "Sheer"}}, r"columns\['F'\] must be a column, got 'Sheer'"),
+        ({"columns": {"F": 4}}, r"columns\['F'\] must be a column, got 4; .* 0 to 3"),
+        ({"columns": {"torque": 1}}, r"columns must name roles, got 'torque'"),
+        ({"units": {"W": "apples"}}, r"units\['W'\] must be a unit, got 'apples'"),
+        ({"units": {"Y": "N"}}, r"units must be a column, got 'Y'"),
+        ({"rate": 0.0}, r"read\.rate must be positive"),
+        ({"rate": "10 rpm"}, r"read\.rate must be"),
+    ],
+)
+def test_what_the_user_says_wrongly_is_one_sentence(recording, options, message):
+    path = recording("time_s,W_N,F_N,x_um", *ROWS)
+    with pytest.raises(InputError, match=message) as refused:
+        read(path, **options)
+    assert str(refused.value).count(". ") == 0
+
+
+def test_two_columns_of_one_name_stay_apart(recording):
+    trace = read(recording("time_s,Force (N),Force (N),W_N", *ROWS))
+    assert list(trace.channels) == ["Force", "Force (2)", "W"]
+    assert names(trace) == ["repeated name"]
+    assert np.array_equal(trace.channels["Force (2)"].values, [2, 3, 4, 5])
+
+
+def test_conversion_is_rounded_once(recording):
+    """3 um is the double nearest to 3e-6, which three times the double nearest to 1e-6 is not."""
+    rows = [f"{i},{i},{i},{i}" for i in range(1, 60)]
+    trace = read(recording("time_s,x_um,delay_ms,p_MPa", *rows))
+    for name, power in (("x", -6), ("delay", -3), ("p", 6)):
+        expected = [float(f"{i}e{power}") for i in range(1, 60)]
+        assert np.array_equal(trace.channels[name].values, expected)

@@ -1,0 +1,184 @@
+"""Mutated files of every format: a recording or one sentence, and no warning of any library.
+
+The suite turns warnings into errors, so that a library's warning fails these tests.
+"""
+
+from __future__ import annotations
+
+import gzip
+import io
+import struct
+
+import h5py
+import nptdms
+import numpy as np
+import pytest
+import scipy.io
+
+from asperity.errors import InputError
+from asperity.recording import read
+
+ROWS = 60
+TIME = np.arange(ROWS) / 100
+LOAD = 7 + np.round(np.cos(TIME), 4)
+SHEAR = 2.8 + np.round(0.1 * np.sin(TIME), 4)
+
+
+def table(head: str, line: str) -> bytes:
+    rows = (line.format(t=t, w=w, f=f) for t, w, f in zip(TIME, LOAD, SHEAR, strict=True))
+    return (head + "".join(rows)).encode()
+
+
+def stamps() -> bytes:
+    rows = (
+        f"2024-03-0{1 + i // 40} 10:0{i % 10}:{i:02d}.5,{w:.4f},{f:.4f}\n"
+        for i, (w, f) in enumerate(zip(LOAD, SHEAR, strict=True))
+    )
+    return ("time,W (N),F (N)\n" + "".join(rows)).encode()
+
+
+def durations() -> bytes:
+    rows = (f"{i} S;{w:.4f};{w:.4f}\n" for i, w in enumerate(LOAD))
+    return ("time;W (N);F (N)\n" + "".join(rows)).encode()
+
+
+def matlab(version: str, compressed: bool = False) -> bytes:
+    file = io.BytesIO()
+    content = {"time": TIME, "W": LOAD, "F": SHEAR}
+    scipy.io.savemat(file, content, format=version, do_compression=compressed, oned_as="column")
+    return file.getvalue()
+
+
+def hdf5() -> bytes:
+    file = io.BytesIO()
+    with h5py.File(file, "w") as made:
+        for name, values in (("time", TIME), ("W", LOAD), ("F", SHEAR)):
+            made.create_dataset(name, data=values).attrs["units"] = "s" if name == "time" else "N"
+    return file.getvalue()
+
+
+def tdms() -> bytes:
+    file = io.BytesIO()
+    with nptdms.TdmsWriter(file) as writer:
+        waves = {"wf_increment": 0.01, "wf_samples": ROWS}
+        writer.write_segment(
+            [nptdms.ChannelObject("g", n, v, waves) for n, v in (("W", LOAD), ("F", SHEAR))]
+        )
+    return file.getvalue()
+
+
+def look(dtype: str) -> bytes:
+    channels = [("Time", "sec", TIME), ("Nor_load", "N", LOAD), ("Shr_load", "N", SHEAR)]
+    raw = struct.pack(">20siiif", b"p1", ROWS, len(channels), 0, 0.01)
+    for name, unit, values in channels:
+        raw += struct.pack(">13s13sf50si", name.encode(), unit.encode(), 1.0, b"none", values.size)
+    for _ in range(16 - len(channels)):
+        raw += struct.pack(">13s13sf50si", b"no_val", b"no_val", 0.0, b"none", 0)
+    return raw + b"".join(values.astype(dtype).tobytes() for _, _, values in channels)
+
+
+PLAIN = table("time (s),W (N),F (N)\n", "{t:.3f},{w:.4f},{f:.4f}\n")
+FILES = {
+    "a.csv": PLAIN,
+    "german.csv": table("Zeit;Auflast;Reibungskraft\ns;N;N\n", "{t};{w};{f}\n").replace(b".", b","),
+    "blanks.txt": table("# t W F\n", "  {t:.3f} {w:.4f} {f:.4f}\n"),
+    "quoted.csv": table('"time","W","F"\n', '"{t:.3f}","{w:.4f}","{f:.4f}"\n'),
+    "stamps.csv": stamps(),
+    "durations.csv": durations(),
+    "wide.csv": PLAIN.decode().encode("utf-16"),
+    "packed.csv": gzip.compress(PLAIN, mtime=0),
+    "five.mat": matlab("5"),
+    "packed.mat": matlab("5", compressed=True),
+    "four.mat": matlab("4"),
+    "a.h5": hdf5(),
+    "a.tdms": tdms(),
+    "look4": look(">f4"),
+    "look8": look("<f8"),
+}
+
+
+def damaged(content: bytes, rng: np.random.Generator) -> bytes:
+    """Some bytes changed, a piece left out or doubled, the end cut."""
+    broken = bytearray(content)
+    for at in rng.integers(0, len(broken), rng.integers(1, 6)):
+        # Half of the damage is in the beginning, where headers are.
+        place = at if rng.random() < 0.5 else at % 200
+        broken[place] = rng.choice([0, 10, 27, 34, 44, 127, 255, broken[place] ^ 1 << 6])
+    if rng.random() < 0.3:
+        at, length = rng.integers(0, len(broken)), rng.integers(1, 40)
+        broken[at : at + length] = broken[at : at + length] * int(rng.integers(0, 3))
+    if rng.random() < 0.4:
+        broken = broken[: rng.integers(1, len(broken) + 1)]
+    return bytes(broken)
+
+
+@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_damaged_file_is_a_recording_or_one_sentence(tmp_path, name, seed):
+    rng = np.random.default_rng([seed, *name.encode()])
+    path = tmp_path / name
+    for _ in range(30):
+        path.write_bytes(damaged(FILES[name], rng) or b"\0")
+        try:
+            trace = read(path)
+        except InputError as error:
+            said = [str(error)]
+        else:
+            said = [str(finding) for finding in trace.findings] + list(trace.channels)
+        for text in said:
+            assert text.isprintable(), text
+            assert len(text) < 1400
+
+
+@pytest.mark.parametrize("name", [n for n in FILES if n != "durations.csv"])
+def test_the_whole_files_are_recordings(tmp_path, name):
+    path = tmp_path / name
+    path.write_bytes(FILES[name])
+    trace = read(path)
+    assert len(trace) == ROWS
+    grave = [f for f in trace.findings if f.severity == "error"]
+    assert not [f for f in grave if f.name != "backward time"]
+    assert np.allclose(trace.channel("W").values, LOAD, rtol=1e-6)
+
+
+@pytest.mark.parametrize("version", ["4", "5"])
+@pytest.mark.parametrize("compressed", [False, True])
+def test_of_a_matlab_file_that_is_cut_whole_variables_are_read_and_the_cut_is_said(
+    tmp_path, version, compressed
+):
+    if version == "4" and compressed:
+        pytest.skip("version 4 packs nothing")
+    raw = matlab(version, compressed)
+    path = tmp_path / "cut.mat"
+    said, refused = 0, []
+    for size in np.linspace(1, len(raw) - 1, 40).astype(int):
+        path.write_bytes(raw[:size])
+        try:
+            trace = read(path, rate="100 Hz")
+        except InputError as error:
+            refused.append(str(error))
+        else:
+            # A cut between two variables leaves no trace in the file.
+            said += "truncated" in {f.name for f in trace.findings}
+            assert all(c.values.size == ROWS for c in trace.channels.values())
+    assert said > 10
+    assert all("must be a whole file" in message for message in refused), refused
+
+
+def test_json_and_documents_are_refused_at_once(tmp_path):
+    for name, text in (
+        ("a.json", '[{"t": 1, "F": 2.5}]'),
+        ("b.json", '{"time": [' + "1.0, " * 60_000 + "2.0]}"),
+        ("c.json", "[" + "1.5, " * 60_000 + "2.0]"),
+        ("d.html", "<!DOCTYPE html><table><tr><td>1</td><td>2</td></tr></table>"),
+    ):
+        path = tmp_path / name
+        path.write_text(text)
+        with pytest.raises(InputError, match=r"which is (JSON|XML or HTML); save it as CSV"):
+            read(path)
+
+
+def test_headings_in_brackets_are_no_json(tmp_path):
+    path = tmp_path / "a.csv"
+    path.write_bytes(table("[s], [N], [kN]\n", "{t:.3f},{w:.4f},{f:.4f}\n"))
+    assert len(read(path, columns={"time": 0})) == ROWS

@@ -1,0 +1,232 @@
+"""Texts as recorders of other laboratories write them, whole, packed, cut and damaged."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import struct
+
+import numpy as np
+import pytest
+import scipy.io
+
+from asperity.errors import InputError
+from asperity.recording import read
+
+ROWS = 60
+TIME = np.arange(ROWS) / 1000
+LOAD = np.round(7012 + 1700 * np.cos(0.23 * np.arange(ROWS)), 3)
+SHEAR = np.round(2806 + 20 * np.cos(0.23 * np.arange(ROWS) + 1), 3)
+
+
+def rows(stamps, *more, sep=",", load=LOAD, shear=SHEAR, form="{:.3f}"):
+    cells = zip(stamps, map(form.format, load), map(form.format, shear), *more, strict=True)
+    return "".join(sep.join(row) + "\n" for row in cells)
+
+
+def seconds(form="{:.4f}"):
+    return list(map(form.format, TIME))
+
+
+def clock(begin=40271.0):
+    """Times of day from 11:11:11 on."""
+    of_day = [(begin + t) % 86400 for t in TIME]
+    return [f"{int(t // 3600):02d}:{int(t % 3600 // 60):02d}:{t % 60:06.3f}" for t in of_day]
+
+
+NAMES = "Time (s),Normal force (N),Shear force (N)\n"
+PLAIN = NAMES + rows(seconds())
+LVM = (
+    "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tNo\n***End_of_Header***\t\n\t\n"
+    "Channels\t2\t\t\nSamples\t60\t60\t\nY_Unit_Label\tNewtons\tNewtons\t\n"
+    "X0\t0.0\t0.0\t\nDelta_X\t0.001000\t0.001000\t\n***End_of_Header***\t\t\t\n"
+    "X_Value\tNormal Force\tShear Force\tComment\n"
+)
+
+#: Contents of a file, and the findings that it must make besides none.
+TEXTS = {
+    "thousands in quotes": (
+        NAMES
+        + "".join(
+            f'{t:.4f},"{w:,.3f}","{f:,.3f}"\n' for t, w, f in zip(TIME, LOAD, SHEAR, strict=True)
+        ),
+        set(),
+    ),
+    "thousands in German": (
+        "Zeit (s);Normalkraft (N);Reibkraft (N)\n"
+        + "".join(
+            f"{t:.4f};{w:,.3f};{f:,.3f}\n".translate(str.maketrans(",.", ".,"))
+            for t, w, f in zip(TIME, LOAD, SHEAR, strict=True)
+        ),
+        set(),
+    ),
+    "LabVIEW without times": (LVM + rows([""] * ROWS, sep="\t"), set()),
+    "minutes and seconds": (NAMES + rows([c[3:] for c in clock()]), set()),
+    "over midnight": (NAMES + rows(clock(begin=86399.97)), set()),
+    "American dates": (NAMES + rows([f"5/2/2019 {c}" for c in clock()]), set()),
+    "days that can be months": (
+        NAMES + rows([f"{'01' if i < 30 else '02'}.02.2019 {c}" for i, c in enumerate(clock())]),
+        None,
+    ),
+    "American afternoon": (NAMES + rows([f"05/02/2019 {c} PM" for c in clock()]), set()),
+    "German dates": (
+        "Zeit;Normalkraft (N);Reibkraft (N)\n"
+        + rows([f"02-05-2019 {c}" for c in clock()], sep=";").replace(".", ","),
+        set(),
+    ),
+    "headings again": (
+        NAMES
+        + "".join(rows(seconds()).splitlines(True)[:30])
+        + NAMES
+        + "".join(rows(seconds()).splitlines(True)[30:]),
+        {"text row"},
+    ),
+    "remarks below": (PLAIN + "\nEnd of test\nOperator: me\n", {"text row"}),
+    "types below the names": (
+        "Time;Normal force;Shear force\ns;N;N\nfloat;float;float\n" + rows(seconds(), sep=";"),
+        set(),
+    ),
+    "names in single quotes": (
+        "'Time (s)','Normal force (N)','Shear force (N)'\n" + rows(seconds()),
+        set(),
+    ),
+    "a long header": ("Setting: some words and a value\n" * 4000 + PLAIN, set()),
+    "axial force": (PLAIN.replace("Normal force", "Axial Force"), set()),
+    "UTF-16 without its mark": (PLAIN.encode("utf-16-le"), set()),
+    "UTF-16 of the other order": (PLAIN.encode("utf-16-be"), set()),
+    "gzip": (gzip.compress(PLAIN.encode()), set()),
+    "gzip in two pieces": (
+        gzip.compress(PLAIN[:600].encode()) + gzip.compress(PLAIN[600:].encode()),
+        set(),
+    ),
+}
+
+
+def written(tmp_path, content, name="recording.txt"):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    return path
+
+
+@pytest.mark.parametrize("text", TEXTS)
+def test_other_recorders(tmp_path, text):
+    content, told = TEXTS[text]
+    trace = read(written(tmp_path, content))
+    assert len(trace) == ROWS
+    # Twelve digits of a stamp of the day are left.
+    if told is not None:
+        assert trace.time == pytest.approx(TIME, abs=2e-9)
+        assert {f.name for f in trace.findings} == told
+    assert np.array_equal(trace.channel("W").values, LOAD)
+    assert np.array_equal(trace.channel("F").values, SHEAR)
+
+
+def test_of_two_orders_of_day_and_month_the_shorter_recording_is_meant(tmp_path):
+    # The first and the second of February, or the second of January and that of February.
+    trace = read(written(tmp_path, TEXTS["days that can be months"][0]))
+    assert trace.time[-1] == pytest.approx(86400 + TIME[-1], abs=1e-6)
+    american = TEXTS["days that can be months"][0].replace(".02.2019", "/2/2019")
+    american = american.replace("\n01/2", "\n1/30").replace("\n02/2/2019", "\n1/31/2019")
+    trace = read(written(tmp_path, american))
+    assert trace.time[-1] == pytest.approx(86400 + TIME[-1], abs=1e-6)
+
+
+@pytest.mark.parametrize("part", [0.3, 0.6, 0.95])
+def test_gzip_that_is_cut_gives_its_whole_rows(tmp_path, part):
+    packed = gzip.compress(PLAIN.encode())
+    trace = read(written(tmp_path, packed[: int(part * len(packed))]))
+    assert "truncated" in {f.name for f in trace.findings}
+    kept = len(trace)
+    assert 0 < kept <= ROWS
+    assert np.array_equal(trace.channel("W").values, LOAD[:kept])
+    assert np.array_equal(trace.channel("F").values, SHEAR[:kept])
+
+
+def test_gzip_that_is_damaged_is_named(tmp_path):
+    packed = bytearray(gzip.compress(PLAIN.encode()))
+    packed[-6] ^= 1
+    trace = read(written(tmp_path, bytes(packed)))
+    assert "truncated" in {f.name for f in trace.findings}
+    with pytest.raises(InputError, match="whole file"):
+        read(written(tmp_path, bytes(packed[:9])))
+
+
+def test_a_binary_format_that_is_packed_is_refused_with_what_to_do(tmp_path):
+    with pytest.raises(InputError, match=r"must hold a text if it is packed.*; unpack it"):
+        read(written(tmp_path, gzip.compress(matlab()), "run.mat.gz"))
+
+
+@pytest.mark.parametrize("head", [b"PK\x03\x04", b"BZh91AY", b"\xfd7zXZ\0", b"7z\xbc\xaf\x27\x1c"])
+def test_archives_are_refused_with_what_to_do(tmp_path, head):
+    with pytest.raises(InputError, match="unpack it, or save the sheet as CSV"):
+        read(written(tmp_path, head + bytes(range(256))))
+
+
+def test_a_cut_in_a_quoted_number_leaves_its_row_out(tmp_path):
+    quoted = NAMES + "".join(
+        f'"{t:.4f}","{w:.3f}","{f:.3f}"\n' for t, w, f in zip(TIME, LOAD, SHEAR, strict=True)
+    )
+    length = len('"0.0590","1234.567","1234.567"\n')
+    for lost in range(1, length):
+        trace = read(written(tmp_path, quoted[:-lost]))
+        kept = len(trace)
+        assert np.array_equal(trace.channel("F").values, SHEAR[:kept])
+        # A row that lacks nothing but its line end is whole.
+        assert kept == ROWS - 1 + (lost == 1)
+        assert ("truncated" in {f.name for f in trace.findings}) == (lost > 1)
+
+
+def test_a_quote_without_end_is_one_sentence(tmp_path):
+    lines = PLAIN.splitlines(True)
+    lines[7] = '"' + lines[7]
+    with pytest.raises(InputError, match="a quote is opened and never closed"):
+        read(written(tmp_path, "".join(lines)))
+
+
+def test_blanks_where_a_row_should_be_are_named(tmp_path):
+    aligned = " Time(s)  Load(N)  Shear(N)\n" + "".join(
+        f"{t:8.4f}{w:12.3f}{f:12.3f}\n" for t, w, f in zip(TIME, LOAD, SHEAR, strict=True)
+    )
+    (found,) = read(written(tmp_path, aligned + "  ")).findings
+    assert (found.name, found.severity) == ("truncated", "warning")
+
+
+def matlab():
+    """A file that is not compressed, with numbers, texts, a cell and a struct."""
+    file = io.BytesIO()
+    content = {"time": TIME, "W": LOAD, "F": SHEAR, "units": {"W": "N", "F": "N", "time": "s"}}
+    content |= {"notes": np.array(["a", "bb"], dtype=object), "z": TIME * 1j, "n": np.int16([1, 2])}
+    scipy.io.savemat(file, content)
+    return file.getvalue()
+
+
+def test_the_elements_of_a_matlab_file_are_checked_before_the_library_trusts_them(tmp_path):
+    raw = matlab()
+    trace = read(written(tmp_path, raw, "whole.mat"))
+    assert np.array_equal(trace.channel("W").values, LOAD)
+    # The type of the first variable's numbers, and their count: 128 of the file, 8 of the variable,
+    # 16 of flags, 16 of dimensions, 8 of a short name.
+    place = 128 + 8 + 16 + 16 + 8
+    assert struct.unpack_from("<II", raw, place) == (9, 8 * ROWS)
+    for kind, size in ((99, 8 * ROWS), (9, 8 * ROWS - 8), (7, 8 * ROWS), (9, 1 << 31)):
+        broken = bytearray(raw)
+        struct.pack_into("<II", broken, place, kind, size)
+        with pytest.raises(InputError, match="damaged"):
+            read(written(tmp_path, bytes(broken), "broken.mat"))
+
+
+@pytest.mark.parametrize("content", [PLAIN.encode(), matlab()], ids=["text", "matlab"])
+def test_damage_anywhere_is_a_recording_or_one_sentence(tmp_path, content):
+    rng = np.random.default_rng(3)
+    for _ in range(150):
+        broken = bytearray(content)
+        for at in rng.integers(0, len(broken), rng.integers(1, 5)):
+            broken[at] = rng.choice([0, 10, 34, 44, 255, broken[at] ^ 1 << rng.integers(8)])
+        cut = broken[: rng.integers(1, len(broken) + 1)] if rng.random() < 0.5 else broken
+        path = written(tmp_path, bytes(cut), "damaged.mat" if content[:6] == b"MATLAB" else "d.csv")
+        told = ""
+        try:
+            read(path)
+        except InputError as error:
+            told = str(error)
+        assert "\n" not in told

@@ -1,0 +1,121 @@
+"""Readers of other packages, found by their entry points."""
+
+from __future__ import annotations
+
+import json
+import os
+import runpy
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.recording import read
+from asperity.recording.readers.plugins import reader_points
+
+ROOT = Path(__file__).parents[3]
+EXAMPLE = ROOT / "examples" / "lab_reader.py"
+
+
+def installed(folder: Path, points: str) -> None:
+    """What an installer leaves of a package with entry points."""
+    about = folder / "lab_reader-1.0.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: lab-reader\nVersion: 1.0\n")
+    (about / "entry_points.txt").write_text(f"[asperity.readers]\n{points}\n")
+
+
+@pytest.fixture
+def package(tmp_path, monkeypatch):
+    """Install a module of some text under an entry point, for one test."""
+
+    def make(points: str, **modules: str) -> None:
+        folder = tmp_path / "installed"
+        folder.mkdir()
+        installed(folder, points)
+        for name, text in modules.items():
+            (folder / f"{name}.py").write_text(text)
+        monkeypatch.syspath_prepend(str(folder))
+        reader_points.cache_clear()
+
+    yield make
+    for name in ("lab_reader", "broken_reader"):
+        sys.modules.pop(name, None)
+    reader_points.cache_clear()
+
+
+@pytest.fixture
+def recording(tmp_path):
+    path = tmp_path / "run1.gbx"
+    runpy.run_path(str(EXAMPLE))["write_example"](path)
+    return path
+
+
+def test_a_file_is_recognised_and_read(package, recording):
+    package("gaugebox = lab_reader", lab_reader=EXAMPLE.read_text())
+    for trace in (read(recording), read(recording, format="gaugebox")):
+        assert trace.sample_rate == pytest.approx(1000)
+        assert trace.channel("W").unit == "N"
+        assert trace.channel("W").recorded_name == "load cell"
+        assert trace.channel("F").values.mean() == pytest.approx(2.8, abs=1e-3)
+        assert trace.provenance["format"] == "gaugebox"
+
+
+def test_the_command_line_takes_the_format(tmp_path, recording):
+    folder = tmp_path / "installed"
+    folder.mkdir()
+    installed(folder, "gaugebox = lab_reader")
+    shutil.copy(EXAMPLE, folder)
+    path = os.pathsep.join([str(folder), str(ROOT / "src"), os.environ.get("PYTHONPATH", "")])
+    done = subprocess.run(
+        [sys.executable, "-m", "asperity", "measure", recording, "--format", "gaugebox", "--json"],
+        capture_output=True,
+        text=True,
+        env=os.environ | {"PYTHONPATH": path},
+    )
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert found["mu1"] == pytest.approx(0.05 / 7, rel=1e-2)
+    assert found["provenance"]["format"] == "gaugebox"
+
+
+def test_other_files_are_read_as_before(package, tmp_path):
+    package("gaugebox = lab_reader", lab_reader=EXAMPLE.read_text())
+    path = tmp_path / "a.csv"
+    path.write_text("time (s),F (N)\n" + "".join(f"{i / 10},{i}.5\n" for i in range(20)))
+    assert np.array_equal(read(path).channel("F").values, np.arange(20) + 0.5)
+
+
+RAISES = "def is_format(path):\n    return True\ndef read(path):\n    raise RuntimeError('no')\n"
+NOTHING = "def is_format(path):\n    return True\ndef read(path):\n    return [1, 2]\n"
+UNEQUAL = (
+    "import numpy as np\nfrom asperity.recording.readers import RawColumn, RawRecording\n"
+    "def is_format(path):\n    return True\n"
+    "def read(path):\n"
+    "    return RawRecording([RawColumn('t', np.arange(3.0)), RawColumn('F', np.arange(4.0))])\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("module", "rule"),
+    [
+        (RAISES, "could not read .RuntimeError: no."),
+        (NOTHING, "must be a reader that returns a RawRecording"),
+        (UNEQUAL, "must be a reader of columns of one length"),
+        ("def read(path): ...\n", "must be a reader with is_format"),
+        ("import nothing_of_this_name\n", "must be a reader that can be loaded"),
+    ],
+)
+def test_a_reader_with_a_mistake_is_one_sentence(package, recording, module, rule):
+    package("broken = broken_reader", broken_reader=module)
+    with pytest.raises(InputError, match=rule):
+        read(recording, format="broken")
+
+
+def test_a_format_that_nobody_reads_is_answered_with_those_that_are_known(recording):
+    with pytest.raises(InputError, match=r"read.format must be a format, got 'gaugebox'"):
+        read(recording, format="gaugebox")

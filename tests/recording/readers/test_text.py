@@ -1,0 +1,389 @@
+"""Tables of text as laboratories write them; what is planted in them comes back, or is named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.recording import read
+
+
+def table(planted, sep=",", decimal=".", end="\n", last="", scale=(1, 1, 1)):
+    rows = []
+    for row in zip(*planted, strict=True):
+        cells = [
+            f"{value * s:.6f}".replace(".", decimal) for value, s in zip(row, scale, strict=True)
+        ]
+        rows.append(sep.join(cells) + last)
+    return end.join(rows) + end
+
+
+def written(tmp_path, text, encoding="utf-8", name="recording.csv"):
+    path = tmp_path / name
+    path.write_bytes(text if isinstance(text, bytes) else text.encode(encoding))
+    return path
+
+
+def names(trace):
+    return [f.name for f in trace.findings]
+
+
+HEADS = {
+    "brackets": "Time (s),Load [N],Shear force {N}\n",
+    "slash": "t/s,W/N,F/N\n",
+    "suffix": "time_s,W_N,F_N\n",
+    "comma": '"Time, s","Load, N","Shear, N"\n',
+    "in": "Time in s,Normal load in N,Shear force in N\n",
+    "unit row": "Time,Normal force,Shear force\ns,N,N\n",
+    "unit row in brackets": "Time,Load,Shear\n(s),[N],[N]\n",
+    "words": "Time (sec),Load (Newton),Shear (newtons)\n",
+    "comment": "# time_s,load_N,shear_N\n",
+    "percent": "% rig 3\n% time [s],load [N],shear [N]\n",
+    "preamble": "Rig: BRAVA\nOperator,somebody\n\nTime (s),Load (N),Shear (N)\n",
+    "comment above": "# recorded on a Monday, by hand\ntime_s,W_N,F_N\n",
+    "quoted": '"Time (s)","Load (N)","Shear (N)"\n',
+    "blanks": "  Time (s) , Load (N) , Shear (N) \n",
+}
+
+
+@pytest.mark.parametrize("head", HEADS.values(), ids=HEADS.keys())
+def test_headings(tmp_path, planted, head):
+    trace = read(written(tmp_path, head + table(planted)))
+    assert trace.findings == ()
+    assert np.array_equal(trace.time, planted.time)
+    for role in ("W", "F"):
+        channel = trace.channel(role)
+        assert np.array_equal(channel.values, getattr(planted, role))
+        assert (channel.kind, channel.unit) == ("force", "N")
+    assert trace.sample_rate == pytest.approx(1000, rel=1e-12)
+
+
+LAYOUTS = {
+    "tab": ("\t", "."),
+    "semicolon": (";", "."),
+    "semicolon, decimal comma": (";", ","),
+    "tab, decimal comma": ("\t", ","),
+    "bar": ("|", "."),
+    "blanks": ("   ", "."),
+    "blanks, decimal comma": ("  ", ","),
+    "comma and blank": (", ", "."),
+}
+
+
+@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"], ids=["LF", "CRLF", "CR"])
+@pytest.mark.parametrize(("sep", "decimal"), LAYOUTS.values(), ids=LAYOUTS.keys())
+def test_layouts(tmp_path, planted, sep, decimal, end):
+    head = sep.join(["Time (s)", "Load (kN)", "Shear (mN)"]) + end
+    scale = (1, 1e-3, 1e3)
+    trace = read(written(tmp_path, head + table(planted, sep, decimal, end, scale=scale)))
+    assert trace.findings == ()
+    assert np.allclose(trace.time, planted.time, rtol=1e-15, atol=0)
+    # Kilonewton with six decimals end at a millinewton.
+    assert np.allclose(trace.channel("W").values, planted.W, rtol=0, atol=0.6e-3)
+    assert np.allclose(trace.channel("F").values, planted.F, rtol=1e-14, atol=0)
+
+
+@pytest.mark.parametrize(
+    "encoding", ["utf-8", "utf-8-sig", "latin-1", "utf-16", "utf-16-le with mark"]
+)
+def test_encodings(tmp_path, planted, encoding):
+    text = "Time (s)\tKraft größer [µN]\n" + table(planted[:2], "\t", scale=(1, 1e6))
+    if encoding.endswith("mark"):
+        path = written(tmp_path, b"\xff\xfe" + text.encode("utf-16-le"))
+    else:
+        path = written(tmp_path, text, encoding)
+    trace = read(path)
+    assert list(trace.channels) == ["Kraft größer"]
+    assert np.allclose(trace.channels["Kraft größer"].values, planted.W, rtol=1e-14, atol=0)
+    assert trace.findings == ()
+
+
+def test_a_delimiter_at_the_end_of_every_line_makes_no_column(tmp_path, planted):
+    for head in ("time_s;W_N;F_N;\n", "time_s;W_N;F_N\n"):
+        trace = read(written(tmp_path, head + table(planted, ";", last=";")))
+        assert list(trace.channels) == ["W", "F"]
+        assert trace.findings == ()
+
+
+def test_a_named_column_may_be_empty(tmp_path, planted):
+    trace = read(written(tmp_path, "time_s;W_N;F_N;T_K\n" + table(planted, ";", last=";")))
+    assert list(trace.channels) == ["W", "F", "T"]
+    assert names(trace) == ["nan"]
+
+
+def test_without_a_header_the_first_column_is_time_and_the_finding_says_so(tmp_path, planted):
+    path = written(tmp_path, table(planted, "\t"))
+    trace = read(path)
+    assert list(trace.channels) == ["column 1", "column 2"]
+    assert names(trace) == ["no header", "unknown unit", "unknown unit", "unknown unit"]
+    assert np.array_equal(trace.time, planted.time)
+    chosen = read(
+        path,
+        columns={"time": 0, "load": 1, "F": "column 2"},
+        units={"time": "ms", "W": "N", "column 2": "kN"},
+    )
+    assert chosen.findings == ()
+    assert np.allclose(chosen.time, planted.time / 1000, rtol=1e-15)
+    assert np.array_equal(chosen.channel("W").values, planted.W)
+    assert np.array_equal(chosen.channel("force").values, planted.F * 1000)
+
+
+def test_without_a_header_a_first_column_that_falls_is_refused(tmp_path):
+    path = written(tmp_path, "3,1\n2,1\n1,2\n")
+    with pytest.raises(InputError, match=r"columns\['time'\] must be a column.*rate='10 kHz'"):
+        read(path)
+    trace = read(path, rate="2 Hz")
+    assert np.array_equal(trace.time, [0, 0.5, 1])
+
+
+def test_the_text_of_xlook(tmp_path, planted):
+    """Rows counted, headings of fixed width, units and counts of records below them."""
+    head = "number of records = 400\n        col 1       col 2       col 3\n"
+    head += "     " + "".join(f"{name:>12}" for name in ("LP_disp", "Shr_stress", "Time")) + "\n"
+    head += "     " + "".join(f"{unit:>12}" for unit in ("micron", "MPa", "sec")) + "\n"
+    head += "     " + "".join(f"{'400recs':>12}" for _ in range(3)) + "\n"
+    body = "".join(
+        f"{i:>5}{w:>12.6f}{f:>12.6f}{t:>12.6f}\n"
+        for i, (t, w, f) in enumerate(zip(*planted, strict=True))
+    )
+    trace = read(written(tmp_path, head + body, name="p001_data.txt"))
+    assert np.array_equal(trace.time, planted.time)
+    assert np.allclose(trace.channel("displacement").values, planted.W * 1e-6, rtol=1e-15)
+    assert np.allclose(trace.channel("F").values, planted.F * 1e6, rtol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("stamp", "step"),
+    [
+        (lambda i: f"2024-02-29 23:59:{59 + i / 100:09.6f}" if i < 100 else None, 0.01),
+        (lambda i: f"2024-02-29T12:00:{i / 100:09.6f}", 0.01),
+        (lambda i: f"00:{i // 60:02d}:{i % 60:02d}.250", 1.0),
+    ],
+    ids=["date and time", "ISO", "clock"],
+)
+def test_dates_become_seconds_since_the_first(tmp_path, stamp, step):
+    rows = [f"{stamp(i)},{i}.5\n" for i in range(50)]
+    trace = read(written(tmp_path, "Time,W (N)\n" + "".join(rows)))
+    assert np.allclose(trace.time, np.arange(50) * step, atol=1e-9)
+
+
+def test_a_column_of_words_is_left_out_and_named(tmp_path, planted):
+    body = table(planted, last=",sliding")
+    trace = read(written(tmp_path, "time_s,W_N,F_N,phase\n" + body))
+    assert names(trace) == ["text column"]
+    assert list(trace.channels) == ["W", "F"]
+
+
+def test_missing_cells_and_words_among_numbers_are_named(tmp_path, planted):
+    lines = table(planted).splitlines()
+    lines[7] = "0.007000,,2.8"
+    lines[9] = "0.009000,NaN,2.8"
+    lines[11] = "0.011000,overload,2.8"
+    trace = read(written(tmp_path, "time_s,W_N,F_N\n" + "\n".join(lines) + "\n"))
+    assert names(trace) == ["text in numbers", "nan"]
+    text, nan = trace.findings
+    assert (text.number, nan.number) == (1, 3)
+    assert "'overload' in row 11" in text.sentence
+    assert "row 7" in nan.where
+    assert np.array_equal(np.flatnonzero(np.isnan(trace.channel("W").values)), [7, 9, 11])
+
+
+def test_rows_with_too_many_cells_are_named(tmp_path, planted):
+    lines = table(planted).splitlines()
+    lines[5] += ",9"
+    trace = read(written(tmp_path, "time_s,W_N,F_N\n" + "\n".join(lines) + "\n"))
+    assert names(trace) == ["malformed row", "gap"]
+    assert len(trace) == len(planted.time) - 1
+
+
+@pytest.mark.parametrize("behind", ["comma", "cell", "row", "point"])
+def test_a_file_cut_in_the_middle_is_named_and_its_whole_rows_are_right(tmp_path, planted, behind):
+    whole = "time_s,W_N,F_N\n" + table(planted)
+    start = whole.index("0.200000,")
+    ends = {
+        "comma": start + len("0.200000,"),
+        "cell": start + len("0.200000,8.5"),
+        "row": whole.index("\n", start) - 3,
+        "point": start + 2,
+    }
+    trace = read(written(tmp_path, whole[: ends[behind]]))
+    assert names(trace) == ["truncated"]
+    assert trace.findings[0].severity == "error"
+    assert len(trace) == 200
+    assert np.array_equal(trace.channel("F").values, planted.F[:200])
+
+
+def test_a_number_of_free_length_at_a_missing_line_end_is_not_trusted(tmp_path):
+    """0.12 may have been 0.125: no other row says how long it should be."""
+    trace = read(written(tmp_path, "time_s,W_N\n0,0.5\n1,0.125\n2,0.25\n3,0.12"))
+    assert names(trace)[0] == "truncated"
+    assert np.array_equal(trace.channel("W").values, [0.5, 0.125, 0.25])
+
+
+def test_few_rows_do_not_say_how_long_a_number_should_be(tmp_path):
+    """The last number may have been 2.825, whatever the one row above it looks like."""
+    trace = read(written(tmp_path, "time_s,W_N\n0,2.8\n1,2.8"))
+    assert "truncated" in names(trace)
+    assert len(trace) == 1
+
+
+def test_a_missing_line_end_alone_costs_no_row(tmp_path, planted):
+    trace = read(written(tmp_path, "time_s,W_N,F_N\n" + table(planted).rstrip("\n")))
+    assert trace.findings == ()
+    assert len(trace) == len(planted.time)
+
+
+def test_empty_bytes_behind_the_last_row_are_named(tmp_path, planted):
+    text = ("time_s,W_N,F_N\n" + table(planted)).encode() + bytes(4096)
+    trace = read(written(tmp_path, text))
+    assert names(trace) == ["truncated"]
+    assert np.array_equal(trace.channel("F").values, planted.F)
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("", "must hold a recording"),
+        ("Time (s),Load (N)\n", "must hold a table of numbers"),
+        ("once upon a time\nthere was a slider\n", "must hold a table of numbers"),
+    ],
+)
+def test_files_without_numbers_are_refused(tmp_path, text, rule):
+    with pytest.raises(InputError, match=rf"recording.path {rule}"):
+        read(written(tmp_path, text))
+
+
+def test_the_users_word_goes_before_what_the_file_shows(tmp_path):
+    path = written(tmp_path, "t;x\n1,5;2\n2,5;4\n")
+    assert np.array_equal(read(path, decimal=",", delimiter=";").time, [1.5, 2.5])
+    with pytest.raises(InputError, match=r"read.decimal must be"):
+        read(path, decimal="·")
+    with pytest.raises(InputError, match=r"read.delimiter must be"):
+        read(path, delimiter="tabs")
+
+
+def test_the_text_of_labview(tmp_path, planted):
+    """Two headers, units above the names, and a column of comments that no row has."""
+    head = "LabVIEW Measurement\t\nWriter_Version\t2\nSeparator\tTab\n***End_of_Header***\t\n\t\n"
+    head += "Channels\t2\t\nSamples\t400\t400\t\nY_Unit_Label\tNewton\tkN\t\nX0\t0.0\t0.0\t\n"
+    head += "***End_of_Header***\t\t\nX_Value\tLoad\tShear\tComment\n"
+    trace = read(written(tmp_path, head + table(planted, "\t"), name="a.lvm"))
+    assert trace.findings == ()
+    assert np.array_equal(trace.time, planted.time)
+    assert np.array_equal(trace.channel("W").values, planted.W)
+    assert np.array_equal(trace.channel("F").values, planted.F * 1000)
+
+
+def test_quoted_numbers_under_quoted_units(tmp_path, planted):
+    body = table(planted, '","').replace("\n", '"\n"')[:-1]
+    text = '"Time ","Normal load","Shear load"\n"(sec)","(N)","(kN)"\n"' + body
+    trace = read(written(tmp_path, text))
+    assert trace.findings == ()
+    assert np.array_equal(trace.channel("F").values, planted.F * 1000)
+
+
+@pytest.mark.parametrize("number", ["{:.6f}", "{!r}", "{:.5e}", "{:.0f}"])
+def test_no_cut_anywhere_gives_a_wrong_number(tmp_path, number):
+    """At every byte: what is read is the beginning of the truth, or the file is refused."""
+    rng = np.random.default_rng(3)
+    truth = np.round(rng.normal(size=(12, 3)) * 1000, 3)
+    truth[:, 0] = np.arange(12)
+    rows = [",".join(number.format(float(v)) for v in row) for row in truth]
+    whole = "time_s,W_N,F_N\n" + "\n".join(rows) + "\n"
+    shown = np.array([[float(cell) for cell in row.split(",")] for row in rows])
+    ends = {i for i, c in enumerate(whole) if c == "\n"}
+    for length in range(60, len(whole)):
+        trace = read(written(tmp_path, whole[:length]))
+        assert np.array_equal(trace.time, shown[: len(trace), 0])
+        assert np.array_equal(trace.channel("F").values, shown[: len(trace), 2])
+        if length not in ends and length - 1 not in ends:
+            assert "truncated" in names(trace), whole[:length][-20:]
+
+
+@pytest.mark.parametrize(
+    "head",
+    [
+        "Zeit (s);Auflast (N);Reibungskraft (N)",
+        "Zeit;Normalkraft;Schubkraft\ns;N;N",
+        "temps (s);force normale (N);frottement (N)",
+        "tempo [s];carico [N];attrito [N]",
+        "Tiempo (s);fuerza normal (N);fuerza de rozamiento (N)",
+        "t (s);\u03c3n (Pa);\u03c4 (Pa)",
+        "t (s);Last (N);Tau (N)",
+    ],
+)
+def test_names_in_other_languages_and_letters(tmp_path, planted, head):
+    trace = read(written(tmp_path, head + "\n" + table(planted, ";")))
+    assert np.array_equal(trace.channel("W").values, planted.W)
+    assert np.array_equal(trace.channel("F").values, planted.F)
+
+
+def test_a_coefficient_of_friction_in_french_has_no_unit_to_state(tmp_path, planted):
+    trace = read(written(tmp_path, "temps (s);charge (N);frottement\n" + table(planted, ";")))
+    assert trace.channel("friction").kind == "dimensionless"
+    assert trace.channel("W").recorded_name == "charge (N)"
+
+
+def test_decimal_commas_in_quotes_between_commas(tmp_path, planted):
+    rows = table(planted, ";").replace(".", ",").splitlines()
+    quoted = "\n".join(",".join(f'"{cell}"' for cell in row.split(";")) for row in rows)
+    trace = read(written(tmp_path, '"time (s)","W (N)","F (N)"\n' + quoted + "\n"))
+    assert np.array_equal(trace.time, planted.time)
+    assert np.array_equal(trace.channel("W").values, planted.W)
+    assert trace.provenance["decimal"] == ","
+
+
+@pytest.mark.parametrize(
+    ("head", "names", "number"),
+    [
+        ("time (s),W (N)", ["W", "column 2"], 1),
+        ("time (s),W (N),F (N),velocity (m/s),spare", ["W", "F"], 2),
+    ],
+)
+def test_names_of_another_number_than_columns_are_kept_and_said(
+    tmp_path, planted, head, names, number
+):
+    trace = read(written(tmp_path, f"Rig 3, sample 12\n{head}\n" + table(planted, ",")))
+    assert list(trace.channels) == names
+    assert np.array_equal(trace.channel("W").values, planted.W)
+    (finding,) = [f for f in trace.findings if f.name == "heading mismatch"]
+    assert (finding.severity, finding.number) == ("warning", number)
+
+
+def test_a_remark_above_a_table_without_names_gives_none(tmp_path, planted):
+    trace = read(written(tmp_path, "Rig 3, sample 12\n" + table(planted, ",")))
+    assert list(trace.channels) == ["column 1", "column 2"]
+
+
+def test_a_first_row_with_surplus_cells_moves_no_column(tmp_path, planted):
+    text = "time (s),W (N),F (N)\n0.0,1.0,2.0,3.0\n" + table(planted, ",")
+    trace = read(written(tmp_path, text))
+    assert np.array_equal(trace.channel("W").values, planted.W)
+    assert [f.name for f in trace.findings if f.severity == "error"] == ["malformed row"]
+
+
+def test_a_table_of_20000_columns(tmp_path):
+    values = np.round(np.random.default_rng(0).normal(size=(6, 20_000)), 4)
+    values[:, 0] = np.arange(6) / 100
+    names = ["time (s)", "W (N)", "F (N)", *(f"channel {i}" for i in range(3, 20_000))]
+    rows = "\n".join(",".join(map(str, row)) for row in values.tolist())
+    trace = read(written(tmp_path, ",".join(names) + "\n" + rows + "\n"))
+    assert len(trace.channels) == 19_999
+    assert np.array_equal(trace.channel("channel 19999").values, values[:, -1])
+    # What is the same of all of them is said once.
+    (finding,) = [f for f in trace.findings if f.name == "unknown unit"]
+    assert finding.number == 19_997
+
+
+def test_the_recorder_of_a_triaxial_rig(tmp_path):
+    file = Path(__file__).parents[4] / "shared" / "data" / "liverpool_raw_header_mismatch.txt"
+    if not file.is_file():
+        pytest.skip("the recordings of other laboratories are not here")
+    trace = read(file)
+    assert trace.channels["Conf.Press."].unit == "Pa"
+    assert trace.channels["Force."].unit == "N"
+    (finding,) = [f for f in trace.findings if f.name == "heading mismatch"]
+    assert finding.number == 9

@@ -1,0 +1,202 @@
+"""Channels made by expressions: their numbers, their units, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.recording import Channel, Trace, check, derive, read
+from asperity.recording.recipe import load_recipe
+
+TIME = np.arange(50) / 10
+
+
+@pytest.fixture
+def rig():
+    """A triaxial cell with names that have dots and blanks, volts of a gauge and plain numbers."""
+    rng = np.random.default_rng(0)
+    channels = {
+        "Conf.Press.": Channel(4e7 + 1e5 * rng.normal(size=50), "pressure", "Pa", "Conf.Press."),
+        "Up.Pore.Press.": Channel(1e7 + 1e5 * rng.normal(size=50), "pressure", "Pa"),
+        "Dwn Pore": Channel(1.1e7 + 1e5 * rng.normal(size=50), "pressure", "Pa"),
+        "Axial force": Channel(2e4 + 1e3 * rng.normal(size=50), "force", "N"),
+        "Gauge": Channel(rng.normal(size=50), None, "", "Gauge (V)", "V"),
+        "count": Channel(np.ones(50), None, "", "count", ""),
+        "slip": Channel(1e-6 * TIME**2, "length", "m"),
+    }
+    made = Trace(TIME, channels)
+    return Trace(TIME, channels, check(made))
+
+
+def values(trace, name):
+    return trace.channels[name].values
+
+
+CASES = {
+    "Conf.Press - (Up.Pore.Press + 'Dwn Pore')/2": (
+        lambda c: c["Conf.Press."] - (c["Up.Pore.Press."] + c["Dwn Pore"]) / 2,
+        "Pa",
+    ),
+    "'Axial force' / (20 mm * 36 mm)": (lambda c: c["Axial force"] / 7.2e-4, "Pa"),
+    "'Axial force'/(20 mm*36 mm)": (lambda c: c["Axial force"] / 7.2e-4, "Pa"),
+    "2.4 N/V * Gauge": (lambda c: 2.4 * c["Gauge"], "N"),
+    "Gauge * 2.4[N/V] - 3 N": (lambda c: 2.4 * c["Gauge"] - 3, "N"),
+    "1 kN * count * 25 %": (lambda c: 250 * c["count"], "N"),
+    "zero('Axial force', 0 s, 1 s)": (
+        lambda c: c["Axial force"] - c["Axial force"][TIME <= 1].mean(),
+        "N",
+    ),
+    "'Axial force' - median('Axial force')": (
+        lambda c: c["Axial force"] - np.median(c["Axial force"]),
+        "N",
+    ),
+    "-'Axial force'^2 / 1 N": (lambda c: -(c["Axial force"] ** 2), "N"),
+    "sqrt(abs('Axial force')^2)": (lambda c: np.abs(c["Axial force"]), "N"),
+    "derivative(slip)": (lambda c: np.gradient(c["slip"], TIME), "m/s"),
+    "2 - 3 - 4": (lambda c: np.full(50, -5.0), ""),
+    "2^3^2 / 2 * 3": (lambda c: np.full(50, 768.0), ""),
+    "time / 2": (lambda c: TIME / 2, "s"),
+}
+
+
+@pytest.mark.parametrize("text", [t for t, (truth, _) in CASES.items() if truth])
+def test_numbers_and_units(rig, text):
+    truth, unit = CASES[text]
+    made = derive(rig, {"made": text})
+    expected = truth({name: c.values for name, c in rig.channels.items()})
+    assert np.allclose(values(made, "made"), expected, rtol=1e-13, atol=0)
+    assert made.channels["made"].unit == unit
+    assert made.provenance["derived channels"] == {"made": text}
+
+
+def test_the_integral_of_a_derivative_is_the_change(rig):
+    made = derive(rig, {"change": "integral(derivative(slip))"})
+    # The trapezoidal rule is exact for the slope of a parabola; its ends are one-sided differences.
+    assert np.allclose(values(made, "change"), values(rig, "slip"), atol=2e-8)
+    assert made.channels["change"].unit == "m"
+
+
+def test_a_channel_called_like_a_role_plays_it(rig):
+    made = derive(rig, {"load": "Conf.Press - Up.Pore.Press", "force": "'Axial force'/(5 cm^2)"})
+    assert made.channel("W") is made.channels["load"]
+    assert made.channel("shear stress") is made.channels["force"]
+    later = derive(made, {"friction": "force / load"})
+    assert np.array_equal(
+        later.channel("mu").values, values(later, "force") / values(later, "load")
+    )
+
+
+def test_a_recorded_channel_of_the_same_name_is_kept(rig):
+    made = derive(rig, {"Axial force": "2 * 'Axial force'"})
+    assert np.array_equal(values(made, "Axial force"), 2 * values(rig, "Axial force"))
+    assert np.array_equal(values(made, "Axial force (recorded)"), values(rig, "Axial force"))
+
+
+def test_time_from_a_column_of_intervals():
+    steps = np.full(20, 0.25)
+    trace = Trace(
+        np.arange(20.0), {"dt": Channel(steps, "time", "s"), "F": Channel(steps, "force")}
+    )
+    made = derive(trace, {"time": "cumulative(dt) - 0.25 s"})
+    assert np.allclose(made.time, 0.25 * np.arange(20))
+    assert made.sample_rate == pytest.approx(4.0)
+
+
+def test_what_was_found_in_a_channel_is_found_in_what_is_made_of_it(rig):
+    flat = np.clip(np.cumsum(np.random.default_rng(1).normal(size=50)), -1.5, 1.5)
+    channels = {**rig.channels, "Gauge": Channel(flat, None, "", "Gauge", "V")}
+    trace = Trace(TIME, channels)
+    trace = Trace(TIME, channels, check(trace))
+    assert "saturation" in {f.name for f in trace.findings}
+    # Noise of another channel hides the flat top.
+    made = derive(trace, {"force": "1 N/V * Gauge + 'Axial force' / 1000"})
+    (found,) = {f.name for f in made.findings if f.where.startswith("force")}
+    assert found == "source saturation"
+    assert "source saturation" in {f.name for f in made.slice("1 s", "4 s").findings}
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("Conf.Press + 3 N", "must add like to like"),
+        ("Conf.Pres", "did you mean 'Conf.Press.'"),
+        ("2 *", "must be complete"),
+        ("(2 * slip", r"must have a '\)'"),
+        ("2 slip slip", "must have units that are known"),
+        ("slip; import os", "must be an expression"),
+        ("__import__('os').system('true')", "must be an expression"),
+        ("__import__('os')", "must be made of channels that are there"),
+        ("slip.__class__", "must be made of channels that are there"),
+        ("slip^slip", "must have plain numbers as exponents"),
+        ("2^9999", "must have exponents up to 16"),
+        ("(" * 5000 + "1" + ")" * 5000, "must have at most 2000 characters"),
+        ("-" * 900 + "1", "levels of brackets"),
+        ("mean(slip, 1 s)", "must give mean 1 or 3 values"),
+        ("zero(slip, 60 s, 70 s)", "must have stretches that hold samples"),
+        ("zero(slip, 0 mm, 7 mm)", "must have stretches in time"),
+        ("3 degC * count", "must have units that are known"),
+        ("", "must be an expression"),
+    ],
+)
+def test_what_is_no_expression_is_one_sentence(rig, text, rule):
+    with pytest.raises(InputError, match=rule) as refused:
+        derive(rig, {"made": text})
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("role", ["load", "force", "velocity", "friction", "time"])
+def test_a_role_takes_what_it_measures(rig, role):
+    with pytest.raises(InputError, match=rf"channels\['{role}'\] must be a .*, got one in"):
+        derive(rig, {role: "slip * slip"})
+
+
+def recording(tmp_path):
+    rows = "".join(f"{t:.3f};{7 + t % 0.3:.4f};{0.1 * t:.4f}\n".replace(".", ",") for t in TIME)
+    path = tmp_path / "run1.csv"
+    path.write_text("Zeit (s);Druck (MPa);Kanal 3\n" + rows)
+    return path
+
+
+def test_a_recipe_names_everything_once(tmp_path):
+    recipe = tmp_path / "lab.toml"
+    recipe.write_text(
+        'title = "rig 3"\ndelimiter = ";"\ndecimal = ","\n[units]\n"Kanal 3" = "2 kN"\n'
+        '[channels]\nforce = "\'Kanal 3\' / (20 cm^2)"\n[columns]\nW = "Druck"\n'
+    )
+    trace = read(recording(tmp_path), recipe=recipe)
+    assert np.allclose(trace.channel("F").values, np.round(0.1 * TIME, 4) * 2000 / 20e-4)
+    assert trace.channel("W").unit == "Pa"
+    assert trace.provenance["recipe"]["channels"] == {"force": "'Kanal 3' / (20 cm^2)"}
+    # What is given besides goes before it.
+    other = read(recording(tmp_path), recipe=recipe, channels={"force": "'Kanal 3' / (1 m^2)"})
+    assert np.allclose(other.channel("F").values * 500, trace.channel("F").values)
+    assert read(recording(tmp_path), recipe=load_recipe(recipe)).provenance == trace.provenance
+
+
+@pytest.mark.parametrize(
+    ("text", "rule"),
+    [
+        ("[chanels]\nx = '1'", "recipe.chanels must be a known field.*did you mean 'channels'"),
+        ("[channels]\nx = 3", "recipe.channels.x must be a valid string, got 3 in 'lab.toml'"),
+        ("x = [", "recipe must be valid TOML"),
+    ],
+)
+def test_a_recipe_with_a_mistake_is_one_sentence(tmp_path, text, rule):
+    recipe = tmp_path / "lab.toml"
+    recipe.write_text(text)
+    with pytest.raises(InputError, match=rule):
+        read(recording(tmp_path), recipe=recipe)
+
+
+def test_a_recipe_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="recipe must be a file"):
+        read(recording(tmp_path), recipe=tmp_path / "none.toml")
+
+
+def test_a_derived_clock_needs_no_column_of_times(tmp_path):
+    path = tmp_path / "steps.csv"
+    path.write_text("dt (ms),F (N)\n" + "".join(f"{1 + i % 2},{i}.5\n" for i in range(30)))
+    trace = read(path, channels={"time": "cumulative(dt)"})
+    assert np.allclose(np.diff(trace.time[:5]), [2e-3, 1e-3, 2e-3, 1e-3])
+    assert trace.provenance["time"] == "derived: cumulative(dt)"

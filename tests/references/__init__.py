@@ -1,0 +1,1 @@
+"""Independent references that tests of several rooms share."""

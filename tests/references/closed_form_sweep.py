@@ -1,0 +1,88 @@
+"""Sweeps without processes: a solve in closed form, and workers that are this process."""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.parameters import OUTPUTS
+from asperity.sweep import SweepPlan
+from asperity.sweep.run.executors import Workers
+from asperity.sweep.solve import Findings, SolveKind
+from asperity.sweep.solve.outcome import SweepOutcome
+
+
+class ClosedForm(SolveKind):
+    """mu1 = epsilon K, mu2 = epsilon^2 K; the second stage gets the points with epsilon > 0.6."""
+
+    name = "periodic"
+    outputs = (OUTPUTS["mu1"], OUTPUTS["mu2"])
+    defaults = ("mu1", "mu2")
+    batch = 3
+
+    def __init__(self) -> None:
+        self.solved: set[tuple[float, float]] = set()
+
+    def chunk_points(self, grid: Any) -> int:
+        return 10
+
+    def first(self, points: Any, record: Any) -> Findings:
+        found = self._solve(points)
+        found.fail(np.flatnonzero(points.values["epsilon"] > 0.6), SweepOutcome.NOT_COMPUTED)
+        return found
+
+    def second(self, points: Any, record: Any) -> Findings:
+        return self._solve(points)
+
+    def _solve(self, points: Any) -> Findings:
+        epsilon, K = points.values["epsilon"], points.values["K"]
+        self.solved |= set(zip(K.tolist(), epsilon.tolist(), strict=True))
+        found = Findings.empty(("mu1", "mu2"), len(points))
+        found.numbers["mu1"][:], found.numbers["mu2"][:] = epsilon * K, epsilon**2 * K
+        found.outcome[:] = SweepOutcome.CONVERGED
+        # A whole chunk without one answer, and a few single ones.
+        found.fail(np.flatnonzero(K == 3.0), 4, 0.25)
+        found.fail(np.flatnonzero(epsilon > 0.9), SweepOutcome.STOPPED, 2.5)
+        return found
+
+
+class ThisProcess(Workers):
+    """Tasks are done when they are handed out."""
+
+    count = 2
+    about = "this process"
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        try:
+            future.set_result(task(*args))
+        except Exception as error:  # as an executor does
+            future.set_exception(error)
+        return future
+
+    def close(self, *, kill: bool) -> None:
+        pass
+
+
+def plan_of(epsilon: int = 20, stiffness: tuple[float, ...] = (1.0, 2.0, 3.0)) -> SweepPlan:
+    return SweepPlan(
+        law="rice-ruina",
+        material="bureau2000",
+        parameters={"V": 1e-6, "frequency": 120.0},
+        axes={
+            "K": {"values": stiffness},
+            "epsilon": {"from": 0.05, "to": 0.05 * epsilon - (0.02 if epsilon == 20 else 0.0),
+                        "count": epsilon},
+        },
+    )  # fmt: skip
+
+
+def files_of(store: Path) -> dict[str, bytes]:
+    """Everything in a store but its attributes, which say who made it."""
+    return {
+        str(file.relative_to(store)): file.read_bytes()
+        for file in sorted(store.rglob("*"))
+        if file.is_file() and file != store / "zarr.json"
+    }

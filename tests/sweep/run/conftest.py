@@ -1,0 +1,17 @@
+"""Sweeps whose points have a closed form, solved in this process."""
+
+import pytest
+
+from asperity.sweep.solve import SOLVES
+from references.closed_form_sweep import ClosedForm
+
+
+@pytest.fixture
+def closed_form(monkeypatch: pytest.MonkeyPatch) -> ClosedForm:
+    from asperity.sweep.run import tasks
+
+    found = ClosedForm()
+    monkeypatch.setitem(SOLVES, "periodic", found)
+    monkeypatch.setenv("NPROC", "1")
+    tasks._worker.cache_clear()
+    return found

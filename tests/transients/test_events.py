@@ -1,0 +1,145 @@
+"""What happens on the way, and what ends it: located, named, and never followed by nonsense."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from asperity.loads import Modulate, Programme, RampLoad, Slide, StepLoad
+from asperity.transients import transient
+
+START = {"load": "7 N", "velocity": "1 um/s"}
+LAMBDA = 6.2e-7
+
+
+def finite(found) -> bool:
+    columns = (found.force, found.velocity, found.displacement, found.states)
+    return all(np.isfinite(c).all() for c in columns)
+
+
+def test_stick_slip_with_inertia(physical) -> None:
+    """Period and range of the force, over cycles of slip at a thousand times the drive."""
+    p = physical.Experiment(K=1e5, M=1.6)
+    start, V = p.steady(1e-5, 7.0), 1.1e-5
+
+    def crossing(t, y, *_):
+        return y[3] - np.log(1e-4)
+
+    crossing.direction = 1
+    phase = physical.level(14.0, 7.0, V)
+    with np.errstate(over="ignore", invalid="ignore"):  # of steps that are then refused
+        true = solve_ivp(
+            p.rates, (0, 14), start, "LSODA", rtol=1e-10, atol=[1e-16, 1e-11, 1e-16, 1e-10],
+            events=crossing, args=(phase.load, phase.pull),
+        )  # fmt: skip
+    programme = Programme(Slide("14 s", V), load="7 N", velocity="10 um/s")
+    found = transient(p.slider, programme, inertia=True, slip_velocity=1e-4)
+    starts, ends = found.event_times("slip start"), found.event_times("slip end")
+    expected = true.t_events[0]
+    assert len(expected) >= 6
+    np.testing.assert_allclose(np.diff(starts)[2:], np.diff(expected)[2:], rtol=1e-6)
+    assert len(starts) - len(ends) in (0, 1)
+    assert np.all(ends > starts[: len(ends)])
+    np.testing.assert_allclose(np.interp(starts, found.time, found.velocity), 1e-4, rtol=1e-2)
+    late_true, late = true.t > 6, found.time > 6
+    force = p.K * true.y[0][late_true]
+    assert found.force[late].max() == pytest.approx(force.max(), rel=1e-5)
+    assert found.force[late].min() == pytest.approx(force.min(), rel=1e-5)
+
+
+def test_a_hundred_cycles_with_radiation_damping_repeat_themselves(physical) -> None:
+    p = physical.Experiment(K=1e5, eta=1e3, lambda_=LAMBDA)
+    programme = Programme(Slide("90 s", "11 um/s"), load="7 N", velocity="10 um/s")
+    coarse, fine = (
+        transient(p.slider, programme, radiation_damping=p.eta, slip_velocity=1e-4, rtol=r)
+        for r in (1e-8, 1e-10)
+    )
+    periods = [np.diff(r.event_times("slip start"))[10:] for r in (coarse, fine)]
+    assert len(periods[0]) > 100
+    np.testing.assert_allclose(periods[1], periods[1].mean(), rtol=1e-6)
+    assert periods[0].mean() == pytest.approx(periods[1].mean(), rel=1e-6)
+
+
+def test_a_runaway_without_inertia_is_named(physical) -> None:
+    p = physical.Experiment(K=1e5, lambda_=LAMBDA)
+    programme = Programme(Slide("1 s"), Slide("60 s", "1.1 um/s"), **START)
+    found = transient(p.slider, programme, sampling="1 kHz")
+    assert found.termination.kind == "runaway"
+    assert "switch inertia on" in found.stopped
+    assert finite(found)
+    assert found.time[-1] <= found.termination.time == found.events[-1].time
+
+    def fast(t, y, *_):  # a slip of a millionth of a second before the singularity
+        soft = p.lambda_ * p.K / 7.0
+        v = p._velocities(p.K * y[0], 7.0, 0.0, 1.1e-6, y[1], [])[0]
+        return (v * (1 + soft) - soft * 1.1e-6) - 1.0
+
+    fast.terminal = True
+    phase = physical.level(60.0, 7.0, 1.1e-6)
+    true = solve_ivp(
+        p.rates, (0, 60), p.steady(1e-6, 7.0), "DOP853", rtol=1e-11, atol=1e-18, events=fast,
+        args=(phase.load, phase.pull),
+    )  # fmt: skip
+    assert found.termination.time - 1 == pytest.approx(true.t_events[0][0], rel=1e-6)
+    assert found.force.min() > p.K * true.y[0, -1] - 1e-3
+
+
+@pytest.mark.parametrize(
+    ("step", "time"),
+    [
+        (RampLoad("-1 N", "1 s"), 1.875),
+        # 1 + 1.2 cos = 0
+        (Modulate("0.5 s", 1.2, "10 Hz"), 1 + np.arccos(-1 / 1.2) / (20 * np.pi)),
+    ],
+)
+def test_loss_of_contact_is_named(physical, step, time) -> None:
+    p = physical.Experiment(lambda_=LAMBDA)
+    found = transient(p.slider, Programme(Slide("1 s"), step, Slide("1 s"), **START))
+    assert found.termination.kind == "loss of contact"
+    assert found.termination.time == pytest.approx(time, rel=1e-9)
+    assert "contact was lost" in found.stopped
+    assert finite(found)
+    assert np.all(found.load > 0)
+    assert found.load[-1] < 1e-4
+
+
+def test_a_step_to_no_load_loses_contact_at_once(physical) -> None:
+    p = physical.Experiment(lambda_=LAMBDA)
+    programme = Programme(Slide("1 s"), StepLoad("1 uN"), Slide("1 s"), **START)
+    found = transient(p.slider, programme)
+    assert (found.termination.kind, found.termination.time) == ("loss of contact", 1.0)
+    assert np.all(found.load > 0)
+
+
+def test_reversal_is_named_where_the_law_has_none(physical) -> None:
+    p = physical.Experiment(lambda_=LAMBDA)
+    programme = Programme(Slide("1 s"), Slide("10 s", "-10 um/s"), **START)
+    found = transient(p.slider, programme)
+    assert found.termination.kind == "reversal"
+    assert "regularised" in found.stopped
+    # Stuck by then, the spring and the asperities are two springs in series.
+    series = 1 / (1 / p.K + LAMBDA / 7.0)
+    assert found.termination.time > 1 + 3.5 / series / 1e-5 - 0.1
+    assert abs(found.force[-1]) < 1e-6
+    assert finite(found)
+
+
+def test_steady_sliding_is_noticed(physical) -> None:
+    p = physical.Experiment(lambda_=LAMBDA)
+    programme = Programme(Slide("2 s"), Slide("30 s", "3 um/s"), **START)
+    found = transient(p.slider, programme, steady_tolerance=1e-4, sampling="100 Hz")
+    first, second = found.event_times("steady")
+    assert first == 0
+    assert 2.1 < second < 30
+    after = found.time > second
+    np.testing.assert_allclose(found.velocity[after], 3e-6, rtol=1.1e-4)
+    shortly_before = (found.time > 2) & (found.time < second - 0.5)
+    assert np.abs(found.velocity[shortly_before] / 3e-6 - 1).max() > 1e-3
+
+
+def test_a_load_step_starts_a_slip_at_the_break_point(physical) -> None:
+    p = physical.Experiment(lambda_=LAMBDA)
+    programme = Programme(Slide("1 s"), StepLoad("6 N"), Slide("1 s"), **START)
+    found = transient(p.slider, programme, slip_velocity="10 um/s")
+    assert found.event_times("slip start")[0] == 1.0
+    (end,) = found.event_times("slip end")
+    assert 1 < end < 1.1
