@@ -1,6 +1,7 @@
 """The page in a notebook's cell, and what results show of themselves there."""
 
 import http.client
+import logging
 from urllib.parse import parse_qs, urlsplit
 
 import pytest
@@ -72,3 +73,18 @@ def test_a_background_server_answers():
     assert answer.status == 200
     assert b"asperity" in answer.read()
     connection.close()
+
+
+def test_the_logging_of_the_process_stays_as_it_is():
+    from asperity.app.server import serve_in_background
+
+    class Handler(logging.Handler):
+        closed = False
+
+        def close(self):
+            self.closed = True
+
+    handler = Handler()
+    serve_in_background()
+    assert not handler.closed
+    assert any(kept() is handler for kept in logging._handlerList)

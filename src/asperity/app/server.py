@@ -100,6 +100,9 @@ def server_on(listening: socket.socket, *, in_notebook: bool = False, prepare: b
 
     config = uvicorn.Config(
         build(listening.getsockname()[1], in_notebook=in_notebook, prepare=prepare),
+        # uvicorn's own configuration would close every logging handler of the process, and with
+        # them, through absl's, the streams of a notebook.
+        log_config=None,
         log_level="warning",
         server_header=False,
         date_header=False,
