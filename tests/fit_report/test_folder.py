@@ -2,13 +2,17 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.coverage import CASES, TRUE, runs_of
 
 from asperity import Slider, materials, periodic_response
-from asperity.fit_report import write_report
+from asperity.errors import InputError
+from asperity.fit_report import write_comparison, write_report
 from asperity.inference import fit, table_of
+from asperity.inference.comparison import judge
 
 
 @pytest.fixture(scope="module")
@@ -51,3 +55,45 @@ def test_a_folder_that_cannot_be_written_stays_as_it_was(found, tmp_path):
     with pytest.raises(ValueError, match="folder"):
         write_report(tmp_path / "report", found)
     assert (tmp_path / "report").read_text(encoding="utf-8") == "a file"
+
+
+def nothing_is_fetched(page):
+    return not re.findall(r'(?:src|href)="(?!#)[^"]*"', page) and "@import" not in page
+
+
+def test_a_comparison_has_a_page_of_all_laws(found, tmp_path):
+    worse = replace(found, aicc=found.aicc + 50, law="another law")
+    compared = judge({"elasto-plastic": found, "another law": worse})
+    write_comparison(tmp_path / "report", compared)
+    names = sorted(p.name for p in (tmp_path / "report").iterdir())
+    assert names == ["another law.toml", "comparison.json", "elasto-plastic.toml", "report.html"]
+    record = json.loads((tmp_path / "report" / "comparison.json").read_text(encoding="utf-8"))
+    assert record["laws"]["another law"]["excluded"]
+    page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    assert compared.verdict[:40] in page
+    assert "excluded: its AICc is 50" in page
+    assert nothing_is_fetched(page)
+    # A panel for the drop and one for the harmonic.
+    assert page.count("<svg") == 1
+
+
+def test_recordings_are_shown_with_the_motion(tmp_path):
+    (run,) = runs_of(CASES["steps"], 1)
+    own = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1)
+    write_report(tmp_path / "fit", own)
+    write_comparison(tmp_path / "laws", judge({"rice-ruina": own, "the same": own}))
+    for folder in ("fit", "laws"):
+        page = (tmp_path / folder / "report.html").read_text(encoding="utf-8")
+        assert page.count("<svg") == 1
+        assert "AR(" in page
+        assert nothing_is_fetched(page)
+    # A stiffness under a stress is none of a material, whose springs are in N/m.
+    material = (tmp_path / "fit" / "material.toml").read_text(encoding="utf-8")
+    assert "[numbers.D0]" in material
+    assert "[numbers.K]" not in material
+
+
+def test_a_comparison_without_a_fit_is_refused(found, tmp_path):
+    none = judge({n: replace(found, converged=False, message="no orbit") for n in ("a", "b")})
+    with pytest.raises(InputError, match="must have a converged fit"):
+        write_comparison(tmp_path / "report", none)

@@ -2,11 +2,13 @@
 
 import math
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 import xarray as xr
 from arviz_stats.base import array_stats
+from benchmarks.coverage import CASES, TRUE, runs_of
 from scipy.integrate import quad
 from scipy.special import ndtri
 
@@ -15,6 +17,7 @@ from asperity.inference import fit
 from asperity.inference.posterior import sample_posterior
 from asperity.inference.posterior.coordinates import Coordinates
 from asperity.inference.posterior.nuts import WARM_UP, first_state, run_block, warmed_up
+from asperity.inference.posterior.sampling import whitened_posterior
 from asperity.outputs import Interrupted
 
 INFINITE = math.inf
@@ -141,3 +144,21 @@ def test_an_interrupted_run_goes_on_to_the_same_draws(found, tmp_path):
 def test_what_cannot_be_sampled_is_refused(found):
     with pytest.raises(InputError, match="chains must be at least 2"):
         sample_posterior(found, chains=1)
+
+
+def test_the_density_of_a_recording_is_that_of_its_fit():
+    (run,) = runs_of(CASES["steps"], 1)
+    found = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1)
+    whitened = whitened_posterior(found)
+    density, data = whitened.compiled()
+    both = jax.jit(jax.value_and_grad(density))
+    drawn = np.random.default_rng(0).normal(size=(2, whitened.mode.size))
+    first, second = ((both(z, data), whitened.log_density(z)) for z in drawn)
+    # The fit whitens and differentiates by NumPy. Both leave out the same constant.
+    assert float(first[0][0] - second[0][0]) == pytest.approx(first[1][0] - second[1][0], abs=1e-6)
+    for (_, gradient), (_, expected) in (first, second):
+        np.testing.assert_allclose(gradient, expected, atol=1e-5)
+    # The compiled motion does not pass through a gauge, and says so.
+    found.objective.terms[0].gauge = (1, 2.0)
+    with pytest.raises(InputError, match="gauge must be left out for a posterior"):
+        whitened.compiled()

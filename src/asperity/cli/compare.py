@@ -26,12 +26,14 @@ if its AICc exceeds the lowest by 10 or more.
 @click.command(epilog=_EPILOG)
 @click.option("--laws", default="all", metavar="NAMES", help="Laws to compare: a,b,c or all.")
 @fit_options
+@click.option("--report", type=Path, metavar="DIR", help="Folder for a page and materials.")
 def compare(
     data: tuple[Path, ...],
     laws: str,
     free: list[str],
     options: Mapping[str, Any],
     reading: FitData,
+    report: Path | None,
     as_json: bool,
 ) -> int:
     """Fit several laws to the same readings and say which the data exclude."""
@@ -42,6 +44,10 @@ def compare(
     read = reading.read(data, options["fixed"])
     found = inference.compare(read, checked_laws(laws), free, **options)
     without = found.not_compared
+    if report is not None and any(j.fit.converged for j in found.laws.values()):
+        from asperity.fit_report import write_comparison
+
+        write_comparison(report, found)
     if as_json:
         click.echo(to_json(comparison_record(found)))
     else:

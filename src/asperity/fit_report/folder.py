@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
 from datetime import UTC, datetime
 from html import escape
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -15,13 +13,20 @@ import numpy as np
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.fit_report.bands import bands_of
-from asperity.fit_report.pictures import data_figure, residual_figure
+from asperity.fit_report.page import document, figure, table
+from asperity.fit_report.pictures import data_figure, residual_figure, run_figure
 from asperity.inference import Fit, Posterior
 from asperity.inference.forward import LockInTerm
 from asperity.inference.record import fit_record
+from asperity.inference.runs.term import RunTerm
 from asperity.materials import citation
 from asperity.outputs.folder import written_folder
 from asperity.parameters import law_parameters, point_parameters
+
+RUN_CAPTION = (
+    "Friction of the recording, thinned where it has many samples, and the motion of the law with "
+    "offset and trend of the gauge; below, what is left."
+)
 
 
 def write_report(folder: Path, found: Fit, posterior: Posterior | None = None) -> None:
@@ -67,6 +72,8 @@ def material_text(found: Fit) -> str:
             continue
         value = estimate.value if estimate else float(fixed[0])
         parameter = known[name]
+        if estimate and estimate.unit != parameter.unit:
+            continue  # the stiffness of a recording under a stress, or over the load
         lines += [
             "",
             f"[numbers.{name}]",
@@ -83,7 +90,6 @@ def material_text(found: Fit) -> str:
 
 def page(found: Fit, posterior: Posterior | None) -> str:
     """The page as text, with its figures in it and nothing to fetch."""
-    style = files("asperity.papers.report").joinpath("page.css").read_text(encoding="utf-8")
     name = found.objective.terms[0].name
     sections = {
         "Verdict": _verdict(found, posterior),
@@ -91,31 +97,12 @@ def page(found: Fit, posterior: Posterior | None) -> str:
         **({"Posterior": _posterior(posterior)} if posterior else {}),
         "Correlations": _correlations(found),
         "Data and fit": _figures(found, posterior),
-        "Data": _data(found),
-        "Provenance": _provenance(found),
+        "Data": data_tables(found),
+        "Provenance": provenance(found),
     }
-    body = "\n".join(
-        f'<section aria-label="{title}"><h2>{title}</h2>\n{content}\n</section>'
-        for title, content in sections.items()
+    return document(
+        f"Fit of {found.law} to {name}", "A fit", f"{found.law} fitted to {name}", sections
     )
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>Fit of {escape(found.law)} to {escape(name)}</title>\n<style>\n{style}\n"
-        "table{border-collapse:collapse;display:block;overflow-x:auto}"
-        "td,th{padding:.15rem .7rem;text-align:right;white-space:nowrap}"
-        "td:first-child,th:first-child{text-align:left}svg{max-width:100%;height:auto;background:#fff}</style>\n"
-        f'</head>\n<body>\n<header><p class="kicker">A fit</p><h1>{escape(found.law)} fitted to '
-        f"{escape(name)}</h1></header>\n<main>\n{body}\n</main>\n"
-        f"<footer>Written by asperity {__version__}.</footer>\n</body>\n</html>\n"
-    )
-
-
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    def cells(row: Sequence[str], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{escape(c)}</{tag}>" for c in row) + "</tr>"
-
-    return f"<table>{cells(head, 'th')}{''.join(cells(row, 'td') for row in rows)}</table>"
 
 
 def _verdict(found: Fit, posterior: Posterior | None) -> str:
@@ -125,9 +112,14 @@ def _verdict(found: Fit, posterior: Posterior | None) -> str:
         f"{found.p_value:.3g}: the law {'describes' if good else 'does not describe'} these data "
         "within their uncertainties."
     ]
+    if any(isinstance(term, RunTerm) for term in found.objective.terms):
+        lines = [
+            "The noise of a recording is estimated from what the law leaves, so that chi-squared "
+            f"does not judge the law; AICc {found.aicc:.6g} compares it with others."
+        ]
     warnings = [*found.warnings, *(posterior.warnings if posterior else ())]
     listed = "".join(f"<li>{escape(w)}</li>" for w in warnings)
-    observables = _table(
+    observables = table(
         ("observable", "chi-squared", "data"),
         [(n, f"{c:.4g}", str(k)) for n, (c, k) in found.observables.items()],
     )
@@ -146,7 +138,7 @@ def _estimates(found: Fit) -> str:
         )
         for n, p in found.parameters.items()
     ]
-    return _table(("", "estimate", "standard error", "68 %", "95 %", "unit"), rows)
+    return table(("", "estimate", "standard error", "68 %", "95 %", "unit"), rows)
 
 
 def _posterior(found: Posterior) -> str:
@@ -163,7 +155,7 @@ def _posterior(found: Posterior) -> str:
         for n, p in found.parameters.items()
     ]
     head = ("", "mean", "standard deviation", "95 %", "R-hat", "ESS bulk", "ESS tail")
-    return _table(head, rows)
+    return table(head, rows)
 
 
 def _correlations(found: Fit) -> str:
@@ -171,7 +163,7 @@ def _correlations(found: Fit) -> str:
     rows = [
         (n, *(f"{x:+.3f}" for x in row)) for n, row in zip(names, found.correlation, strict=True)
     ]
-    return _table(("", *names), rows)
+    return table(("", *names), rows)
 
 
 def _figures(found: Fit, posterior: Posterior | None) -> str:
@@ -179,33 +171,56 @@ def _figures(found: Fit, posterior: Posterior | None) -> str:
     for term, residuals in zip(found.objective.terms, found.residuals, strict=True):
         if isinstance(term, LockInTerm):
             source = "posterior" if posterior else "normal approximation"
-            figure = data_figure(term.table, bands_of(found, term, posterior))
-            parts.append(
-                f"<figure>{figure}<figcaption>Readings with standard uncertainties; medians and 95 "
-                f"% bands of the prediction by the {source}.</figcaption></figure>"
-            )
-            figure = residual_figure(residuals, term.table.row_names)
-            parts.append(f"<figure>{figure}<figcaption>Residuals.</figcaption></figure>")
+            parts += [
+                figure(
+                    data_figure(term.table, bands_of(found, term, posterior)),
+                    "Readings with standard uncertainties; medians and 95 % bands of the "
+                    f"prediction by the {source}.",
+                ),
+                figure(residual_figure(residuals, term.table.row_names), "Residuals."),
+            ]
+        elif isinstance(term, RunTerm):
+            drawn = run_figure(term.run, {found.law: term.fitted_friction(found.values)})
+            parts.append(figure(drawn, RUN_CAPTION))
     return "\n".join(parts)
 
 
-def _data(found: Fit) -> str:
+def data_tables(found: Fit) -> str:
+    """The data of a fit: readings of a table, drive and noise of a recording."""
     parts = []
     for term in found.objective.terms:
         if isinstance(term, LockInTerm):
-            table = term.table
-            columns: dict[str, Any] = {**table.points}
-            for name in table.values:
-                columns |= {name: table.values[name], f"{name}_err": table.errors[name]}
+            read = term.table
+            columns: dict[str, Any] = {**read.points}
+            for name in read.values:
+                columns |= {name: read.values[name], f"{name}_err": read.errors[name]}
             rows = [
-                (str(table.row_names[i]), *(f"{c[i]:.6g}" for c in columns.values()))
-                for i in range(table.rows)
+                (str(read.row_names[i]), *(f"{c[i]:.6g}" for c in columns.values()))
+                for i in range(read.rows)
             ]
-            parts.append(_table(("", *columns), rows))
+            parts.append(table(("", *columns), rows))
+        elif isinstance(term, RunTerm):
+            parts.append(_recording(term))
     return "\n".join(parts)
 
 
-def _provenance(found: Fit) -> str:
+def _recording(term: RunTerm) -> str:
+    """Drive and noise of a recording."""
+    run, noise = term.run, term.noise
+    ends = np.array([0.0, *(run.drive.edges[k] for k in run.cuts), run.time[-1]])
+    rows = [
+        (f"{begin:.6g}", f"{end:.6g}", f"{1e6 * v:.6g}" if v else "hold")
+        for begin, end, v in zip(ends[:-1], ends[1:], run.velocities, strict=True)
+    ]
+    said = (
+        f"{run.name}: {noise['samples']} samples, of which {noise['effective_samples']:.4g} are "
+        f"independent; noise {noise['model']}, whiteness p = {noise['whiteness_p']:.2g}."
+    )
+    return f"<p>{escape(said)}</p>" + table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
+
+
+def provenance(found: Fit) -> str:
+    """What was fixed, when and by which program, and where the law is from."""
     fixed = [
         (n, f"{np.min(v):.6g}" + ("" if np.ptp(v) == 0 else f" to {np.max(v):.6g}"))
         for n, v in found.objective.fixed.items()
@@ -219,5 +234,5 @@ def _provenance(found: Fit) -> str:
     names = ", ".join(term.name for term in found.objective.terms)
     return (
         f"<p>asperity {__version__}, {made}; data: {escape(names)}; numbers that were fixed, in "
-        f"SI:</p>{_table(('', 'value'), fixed)}<p>The law:</p>{sources}"
+        f"SI:</p>{table(('', 'value'), fixed)}<p>The law:</p>{sources}"
     )

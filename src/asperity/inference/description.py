@@ -21,10 +21,14 @@ Float = NDArray[np.float64]
 _SAME_CHI2, _SAME_COORDINATE = 1e-3, 1e-2
 #: Other minima this close in chi-squared are reported: 3 standard deviations.
 _RIVAL = 9.0
+#: Minima this near, in standard errors of everything but nuisances, give the same answer.
+_NEAR = 0.5
 #: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
 _UNDETERMINED = 1.0
 #: Below this probability chi-squared says that the law or the uncertainties are wrong.
 _MISFIT = 0.01
+#: Standard deviations between data and a prior that are worth a warning.
+_CONTRADICTED = 3.0
 #: A bound is reached if the estimate is nearer to it than this share of its standard error.
 _AT_BOUND = 1e-3
 
@@ -128,11 +132,34 @@ def described_fit(
         bic=deviance + k * math.log(n),
         observables=_observables(data),
         residuals=tuple(data),
-        optima=_rivals(objective, minima),
+        optima=_rivals(objective, minima, sd),
         warnings=(),
         objective=objective,
     )
-    return _with_warnings(found)
+    return _with_warnings(found, _contradicted(objective, u, covariance))
+
+
+def _contradicted(objective: Objective, u: Float, covariance: Float) -> list[str]:
+    """Sentences on priors that the data contradict.
+
+    A prior's residual r at the maximum has the variance 1 - j C j^T, with its derivative j and
+    the covariance C of the coordinates.
+    """
+    values, slopes = objective.prior_residuals(u)
+    with_prior = [k for k in objective.unknowns if k.prior is not None]
+    said = []
+    for unknown, r, j in zip(with_prior, values, slopes, strict=True):
+        prior = unknown.prior
+        assert prior is not None  # by the choice of unknowns
+        apart = abs(r) / math.sqrt(max(1 - float(j @ covariance @ j), 1e-6))
+        if not unknown.nuisance and apart > _CONTRADICTED:
+            said.append(
+                f"the prior of {unknown.name}, {prior.mean:.4g} +- {prior.sd:.2g} "
+                f"{unknown.parameter.unit}".rstrip()
+                + f", is contradicted by the data by {apart:.3g} standard deviations: one of them "
+                "is wrong, and the other parameters follow it; fit without it and compare"
+            )
+    return said
 
 
 def _observables(data: Sequence[Residuals]) -> dict[str, tuple[float, int]]:
@@ -182,10 +209,17 @@ def _interval(
     return unknown.end(ends[0]), unknown.end(ends[1])
 
 
-def _rivals(objective: Objective, minima: Sequence[tuple[Float, float]]) -> tuple[Optimum, ...]:
+def _rivals(
+    objective: Objective, minima: Sequence[tuple[Float, float]], sd: Float
+) -> tuple[Optimum, ...]:
+    """Other minima that the data do not exclude and that would be other answers."""
+    asked = np.array([not k.nuisance for k in objective.unknowns])
     kept = [minima[0]]
     for u, chi2 in minima[1:]:
         if chi2 - minima[0][1] > _RIVAL:
+            continue
+        away = np.abs(u - minima[0][0])[asked] / sd[asked]
+        if away.max(initial=0.0) < _NEAR:
             continue
         if all(
             abs(chi2 - other) > _SAME_CHI2 or np.abs(u - v).max() > _SAME_COORDINATE
@@ -195,9 +229,8 @@ def _rivals(objective: Objective, minima: Sequence[tuple[Float, float]]) -> tupl
     return tuple(Optimum(chi2, objective.named(u)) for u, chi2 in kept[1:])
 
 
-def _with_warnings(found: Fit) -> Fit:
-    """The fit with what its user must know beside the numbers."""
-    said = []
+def _with_warnings(found: Fit, said: list[str]) -> Fit:
+    """The fit with what its user must know beside the numbers, after what was said before."""
     if found.dof > 0 and found.p_value < _MISFIT:
         worst = max(found.observables, key=lambda n: _excess(*found.observables[n]))
         said.append(

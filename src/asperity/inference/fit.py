@@ -22,10 +22,12 @@ from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.result import Fit
 from asperity.inference.runs.assembly import (
     RunOptions,
+    contradicted_stiffness,
     require_newtons,
     require_seen,
     run_terms,
     shared_stiffness,
+    stiffness_in,
     usual_ranges,
 )
 from asperity.inference.runs.run import RecordedRun, run_of
@@ -128,9 +130,36 @@ def fit(
         if not math.isfinite(minima[0][1]):
             return failed_fit(objective)
         found = described_fit(objective, minima, profile=profile)
-        said = "the noise and the parameters did not agree after several rounds"
-        return found if agreed else replace(found, warnings=(*found.warnings, said))
+        said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
+        if "K" in (fixed or {}) and table is None:
+            freed = fit(
+                recordings,
+                law,
+                free,
+                fixed={n: v for n, v in (fixed or {}).items() if n != "K"},
+                material=material,
+                prior=prior,
+                start={**(start or {}), **_begun(found, recordings, fixed or {})},
+                inertia=inertia,
+                radiation_damping=radiation_damping,
+                runs=runs,
+                starts=1,
+                seed=seed,
+            )
+            said += contradicted_stiffness(found, freed, recordings, (fixed or {})["K"])
+        return replace(found, warnings=(*said, *found.warnings))
     return described_fit(objective, minima, profile=profile)
+
+
+def _begun(
+    found: Fit, recordings: Sequence[RecordedRun], fixed: Mapping[str, Any]
+) -> dict[str, Any]:
+    """Where a fit with the stiffness free begins: at one with it fixed."""
+    laws = {k.name: found.values[k.name] for k in found.objective.unknowns if not k.nuisance}
+    several = len(recordings) > 1
+    return laws | {
+        f"K[{run.name}]" if several else "K": stiffness_in(run, fixed["K"]) for run in recordings
+    }
 
 
 def listed_data(data: Data | Iterable[Data]) -> list[LockInTable | RecordedRun]:

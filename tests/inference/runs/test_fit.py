@@ -137,6 +137,37 @@ def test_a_prior_of_the_stiffness_over_the_load_is_one_of_the_stiffness():
         fit(run, "rice-ruina", FREE, prior={"K": replace(over_load, unit="N/m")})
 
 
+def test_samples_that_are_far_off_are_left_out_and_named(found):
+    (run,) = runs_of(CASE, 1)
+    spoiled = run.friction.copy()
+    # Some 10 to 30 standard deviations of the noise.
+    spoiled[[300, 705, 1100]] += [0.02, -0.03, 0.05]
+    bad = fit(replace(run, friction=spoiled), "rice-ruina", FREE, start=TRUE, starts=1)
+    (said,) = (w for w in bad.warnings if "left out" in w)
+    assert "3 samples" in said
+    assert "30, 70.5, 110 s" in said
+    for name in TRUE:
+        assert bad.values[name] == pytest.approx(found.values[name], rel=0.02)
+
+
+def test_a_fixed_stiffness_that_the_recording_contradicts_is_named():
+    (run,) = runs_of(CASE, 1)
+    wrong = fit(run, "rice-ruina", FREE, fixed={"K": 2 * TRUE["K"]}, start=TRUE, starts=1)
+    (said,) = (w for w in wrong.warnings if "the fixed K" in w)
+    assert "contradicted by run" in said
+    assert "D0" in said
+    right = fit(run, "rice-ruina", FREE, fixed={"K": TRUE["K"]}, start=TRUE, starts=1)
+    assert not any("the fixed K" in w for w in right.warnings)
+
+
+def test_a_prior_that_the_recording_contradicts_is_named(found):
+    (term,) = found.objective.terms
+    for factor, contradicted in ((1.8, True), (1.0, False)):
+        given = {"K": Prior(factor * TRUE["K"], 0.1 * TRUE["K"], "published")}
+        other = fit(term.run, "rice-ruina", FREE, prior=given, start=TRUE, starts=1)
+        assert any("prior of K" in w for w in other.warnings) == contradicted
+
+
 def readings():
     """Exact lock-in readings of a slider with the law of the recordings, on a spring of its own."""
     V = np.repeat([1e-6, 3e-6, 1e-5], 4)

@@ -1,4 +1,4 @@
-"""The posterior density of a fit to lock-in readings, as a compiled program needs it.
+"""The posterior density of a fit, as a compiled program needs it.
 
 The sampler walks in z, where the posterior is near a normal density of unit covariance about zero:
 q = mode + root @ z, with the unbounded coordinates q of `asperity.inference.posterior.coordinates`
@@ -8,7 +8,6 @@ and a root of the covariance that the curvature at the mode stands for (Laplace)
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
@@ -17,13 +16,12 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.inference.forward import LockInTerm
-from asperity.inference.objective import Objective
+from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.posterior.coordinates import Coordinates
+from asperity.inference.posterior.recordings import RunLikelihood, likelihood_of_run
+from asperity.inference.posterior.tables import LockInLikelihood, likelihood_of_table
 from asperity.inference.prior_density import PriorDensity
-from asperity.inference.residuals import Prediction, columns_of
-from asperity.laws import Law
-from asperity.orbit import response_function
-from asperity.parameters import law_parameters
+from asperity.inference.runs.term import RunTerm
 
 Float = NDArray[np.float64]
 
@@ -43,9 +41,8 @@ class DensityData(NamedTuple):
     logarithmic : bool array, shape (n,)
         Where the coordinate u is the logarithm of the parameter.
     scale, prior_mean, prior_precision : array, shape (n,)
-    fixed : dict of str to array, shape (rows,)
-    matrix, target : array
-        As of `Weights`; rows that fill up have weights of 0.
+    terms : tuple
+        Of each set of data, as its likelihood reads them.
     """
 
     mode: Any
@@ -55,30 +52,23 @@ class DensityData(NamedTuple):
     scale: Any
     prior_mean: Any
     prior_precision: Any
-    fixed: dict[str, Any]
-    matrix: Any
-    target: Any
+    terms: tuple[Any, ...]
 
 
 @dataclass(frozen=True)
-class LockInDensity:
+class PosteriorDensity:
     """Logarithm of the posterior density of z, but for a constant.
 
     Attributes
     ----------
-    law : type of Law
     names : tuple of str
         Free parameters.
-    inertia, radiation_damping : bool
-    search : bool
-        Whether orbits that the fast method does not find are searched for, which takes long.
+    likelihoods : tuple
+        Of each set of data: functions of the parameters by name and of its arrays.
     """
 
-    law: type[Law]
     names: tuple[str, ...]
-    inertia: bool
-    radiation_damping: bool
-    search: bool
+    likelihoods: tuple[LockInLikelihood | RunLikelihood, ...]
 
     def __call__(self, z: Array, data: DensityData) -> Array:
         """Log density at z, of shape (n,)."""
@@ -87,30 +77,11 @@ class LockInDensity:
         x = jnp.where(data.logarithmic, jnp.exp(u), u * data.scale)
         prior = -0.5 * ((x - data.prior_mean) * data.prior_precision) ** 2
         volume = jnp.where((data.prior_precision > 0) & data.logarithmic, u, 0.0)
-        columns = columns_of(self._predicted(x, data), jnp)
-        residuals = jnp.einsum("rsc,rc->rs", data.matrix, columns) - data.target
-        likelihood = -0.5 * jnp.sum(residuals**2)
-        return likelihood + jnp.sum(prior + volume + data.coordinates.log_slope(q))
-
-    def _predicted(self, x: Array, data: DensityData) -> Prediction:
-        free = dict(zip(self.names, x, strict=True))
-        given = {n: v for n, v in data.fixed.items() if n != "eps_ratio"}
-        applied = data.fixed["epsilon"]
-        ratio = free.get("eps_ratio", data.fixed.get("eps_ratio", 1.0))
-        given |= {n: v + 0 * applied for n, v in free.items() if n != "eps_ratio"}
-        given["epsilon"] = applied * ratio
-        function = _response(self.law, self.inertia, self.radiation_damping, self.search)
-        values = function({n: v for n, v in given.items() if n in function.parameters})
-        fields = {f.rstrip("_"): f for f in self.law.__dataclass_fields__}
-        own = self.law(**{fields[n]: given[n] for n in law_parameters(self.law)})
-        return Prediction(values.mean_friction, own.mu_ss(given["V"]), values.harmonics)
-
-
-@cache
-def _response(law: type[Law], inertia: bool, radiation_damping: bool, search: bool) -> Any:
-    return response_function(
-        law, inertia=inertia, radiation_damping=radiation_damping, search=search
-    )
+        total = jnp.sum(prior + volume + data.coordinates.log_slope(q))
+        values = dict(zip(self.names, x, strict=True))
+        for likelihood, own in zip(self.likelihoods, data.terms, strict=True):
+            total = total + likelihood(values, own)
+        return total
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,14 +160,15 @@ class Whitened:
                     break
         return q, information
 
-    def compiled(self) -> tuple[LockInDensity, DensityData]:
-        """The density as a compiled program evaluates it, and its data."""
-        (term,) = (t for t in self.objective.terms if isinstance(t, LockInTerm))
-        forward, weights = term.forward, term.weights
-        rows = term.table.rows
-        size = max(4, 1 << (rows - 1).bit_length())
-        more = ((0, size - rows),)
-        fixed = {n: np.pad(v, more, mode="edge") for n, v in forward.fixed.items()}
+    def compiled(self) -> tuple[PosteriorDensity, DensityData]:
+        """The density as a compiled program evaluates it, and its data.
+
+        Raises
+        ------
+        InputError
+            If a recording is compared through a gauge, which the program does not know.
+        """
+        parts = [_compiled(term, self.objective.names) for term in self.objective.terms]
         unknowns = self.objective.unknowns
         data = DensityData(
             self.mode,
@@ -206,18 +178,17 @@ class Whitened:
             np.array([k.scale for k in unknowns]),
             self.prior.mean,
             self.prior.precision,
-            fixed,
-            np.pad(weights.matrix, (*more, (0, 0), (0, 0))),
-            np.pad(weights.target, (*more, (0, 0))),
+            tuple(arrays for _, arrays in parts),
         )
-        density = LockInDensity(
-            self.objective.law,
-            self.objective.names,
-            forward.inertia,
-            forward.radiation_damping,
-            forward.uses_search,
-        )
-        return density, data
+        return PosteriorDensity(self.objective.names, tuple(own for own, _ in parts)), data
+
+
+def _compiled(term: DataTerm, names: tuple[str, ...]) -> tuple[Any, Any]:
+    """The likelihood of a set of data for a compiled program, and its arrays."""
+    if isinstance(term, RunTerm):
+        return likelihood_of_run(term, names)
+    assert isinstance(term, LockInTerm)  # there is no third kind
+    return likelihood_of_table(term)
 
 
 def _root(information: Float) -> Float:

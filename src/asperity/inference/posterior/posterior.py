@@ -18,6 +18,7 @@ from asperity.inference.intervals import Interval
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.nuts import Transitions
 from asperity.inference.result import Fit
+from asperity.inference.runs.term import RunTerm
 
 Float = NDArray[np.float64]
 
@@ -239,20 +240,28 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
         )
     if failed > _FEW_FAILED * stats.failed.size:
         said.append(
-            f"{failed} of {stats.failed.size} trajectories ended where the fast method finds no "
-            "periodic orbit at some row; the posterior is cut off there"
+            f"{failed} of {stats.failed.size} trajectories ended where the law has no motion that "
+            "the program can compute (at some row of a table the fast method finds no periodic "
+            "orbit, or through a recording sliding runs away); the posterior is cut off there"
         )
     return said
 
 
 def _observed(found: Fit) -> dict[str, Float]:
-    terms = [t for t in found.objective.terms if isinstance(t, LockInTerm)]
-    return {
+    terms = found.objective.terms
+    observed = {
         name: column
         for term in terms
+        if isinstance(term, LockInTerm)
         for columns in (term.table.points, term.table.values)
         for name, column in columns.items()
     }
+    for term in terms:
+        if isinstance(term, RunTerm):
+            suffix = f"[{term.name}]" if len(terms) > 1 else ""
+            observed[f"time{suffix}"] = term.run.time
+            observed[f"friction{suffix}"] = term.run.friction
+    return observed
 
 
 def _plain(x: float) -> float | None:

@@ -17,12 +17,12 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.inference.forward import LockInTerm
-from asperity.inference.posterior.density import Whitened
+from asperity.inference.posterior.density import DensityData, Whitened
 from asperity.inference.posterior.nuts import (
     BLOCK,
     WARM_UP,
@@ -100,18 +100,14 @@ def sample_posterior(
     for name, value, least in (("chains", chains, 2), ("draws", draws, 100)):
         if value < least:
             raise InputError(f"{name} must be at least {least}, got {value}; ask for more")
-    if not all(isinstance(term, LockInTerm) for term in found.objective.terms):
-        raise InputError(
-            "data must be tables of lock-in readings for a posterior, got recordings too; take the "
-            "intervals by profile likelihood"
-        )
     whitened = whitened_posterior(found)
     blocks = WARM_UP + -(-draws // BLOCK)
     report = progress or (lambda done, total: None)
-    store = _Store(unfinished, _inputs(found, whitened, chains, draws, seed), resume)
+    density, data = whitened.compiled()
+    store = _Store(unfinished, _inputs(found, whitened, data, chains, draws, seed), resume)
     # The same to the last digit as where an interrupted run began.
     whitened = store.whitening(whitened)
-    density, data = whitened.compiled()
+    data = data._replace(mode=whitened.mode, root=whitened.root)
     runs = [_Chain(whitened, seed, chain, store.blocks(chain)) for chain in range(chains)]
     done = sum(len(run.kept) for run in runs)
     report(done * BLOCK, chains * blocks * BLOCK)
@@ -259,13 +255,14 @@ def _array(record: dict[str, Any]) -> Any:
     return np.array(record["values"], dtype=record["dtype"])
 
 
-def _inputs(found: Fit, whitened: Whitened, chains: int, draws: int, seed: int) -> dict[str, Any]:
+def _inputs(
+    found: Fit, whitened: Whitened, data: DensityData, chains: int, draws: int, seed: int
+) -> dict[str, Any]:
     """What the draws depend on, as a record of an unfinished run."""
-    (term,) = found.objective.terms
-    assert isinstance(term, LockInTerm)
     digest = hashlib.sha256()
-    for array in (term.weights.matrix, term.weights.target, *term.forward.fixed.values()):
-        digest.update(np.ascontiguousarray(array).tobytes())
+    for array in jax.tree.leaves(data.terms):
+        # A recording's noise is estimated anew, and the same but for the last digits.
+        digest.update(np.asarray(array, np.float32).tobytes())
     return {
         "law": found.law,
         "prior": whitened.prior.record(),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError, closest
+from asperity.inference.result import Fit
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm, cut_delays
 from asperity.inference.unknowns import Prior, Unknown, unknown_of
@@ -22,6 +23,8 @@ _STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
 _USUAL_STIFFNESS = (5e2, 5e4)
 #: Samples that a run needs, per free parameter.
 _SAMPLES_PER_PARAMETER = 8
+#: Decrease of AICc with the stiffness free that contradicts a fixed one.
+_CONTRADICTED_AICC = 6.0
 LINEAR = ("offset", "trend", "bend", "drift")
 #: Standard deviations of the departures of the initial friction and states from steady sliding.
 _START_FORCE, _START_STATE = 0.05, 2.0
@@ -252,6 +255,45 @@ def require_newtons(runs: Sequence[RecordedRun]) -> None:
                 f"K must be in {run.stiffness_unit} for {run.name}, got that of a table in N/m; "
                 "leave K out of the free and the fixed parameters, and give the table a column of K"
             )
+
+
+def contradicted_stiffness(
+    found: Fit, freed: Fit, runs: Sequence[RecordedRun], given: Any
+) -> list[str]:
+    """Sentences on a fixed stiffness that recordings contradict.
+
+    Parameters
+    ----------
+    found, freed : Fit
+        With the stiffness fixed, and the same with it free.
+    runs : sequence of RecordedRun
+    given : str or float
+        The fixed stiffness.
+    """
+    if not freed.converged or found.aicc - freed.aicc < _CONTRADICTED_AICC:
+        return []
+    said = []
+    for run in runs:
+        estimate = freed.parameters.get("K" if len(runs) == 1 else f"K[{run.name}]")
+        if estimate is None:
+            continue
+        fixed = stiffness_in(run, given)
+        low, high = estimate.interval_95
+        if low <= fixed <= high:
+            continue
+        moved = ", ".join(
+            f"{n} {freed.values[n]:.4g} instead of {found.values[n]:.4g}"
+            for n in ("A", "B", "D0")
+            if n in found.values and n in freed.values
+        )
+        said.append(
+            f"the fixed K of {fixed:.4g} {estimate.unit} is contradicted by {run.name}, which has "
+            f"{estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %): AICc falls by "
+            f"{found.aicc - freed.aicc:.3g} with K free"
+            + (f", which gives {moved}" if moved else "")
+            + "; leave K free, or give it a prior"
+        )
+    return said
 
 
 def _initial(

@@ -139,17 +139,11 @@ class RunMotion:
         times : array, shape (n,)
             Of the samples, from the beginning of the drive (s).
         """
-        padded = _padded(drive)
         n = times.size
-        size = 1024 * int(np.ceil(n / 1024))
-        at = np.concatenate([times, np.full(size - n, times[-1])])
         given: dict[str, Any] = {name: np.float64(value) for name, value in values.items()}
-        if self._equations is None:
-            # Its numbers are replaced by those of `given` in the compiled program.
-            self._equations = self._template(given)
-        motion = self._equations
-        friction, slopes, steps, done = _through(
-            motion, {k: given[k] for k in free}, given, padded, at, room=_ROOMS[self._room]
+        motion, padded, at = self.prepared(given, drive, times)
+        friction, slopes, steps, done = through(
+            motion, {k: given[k] for k in free}, given, padded, at, room=self.room
         )
         if not bool(done):
             return None
@@ -159,6 +153,24 @@ class RunMotion:
         if not (np.isfinite(f).all() and np.isfinite(jacobian).all()):
             return None
         return Motions(f, jacobian, int(steps))
+
+    def prepared(
+        self, given: Mapping[str, Any], drive: Drive, times: Float
+    ) -> tuple[Motion, Drive, Float]:
+        """What `through` takes: equation of motion, drive and times, filled up to a few lengths.
+
+        The numbers of the equation are replaced by those that `through` is given.
+        """
+        if self._equations is None:
+            self._equations = self._template(given)
+        size = 1024 * int(np.ceil(times.size / 1024))
+        at = np.concatenate([times, np.full(size - times.size, times[-1])])
+        return self._equations, _padded(drive), at
+
+    @property
+    def room(self) -> int:
+        """Steps of the integrator at most."""
+        return _ROOMS[self._room]
 
     def allow_more_steps(self) -> None:
         """Take as many steps as there is memory for, from now on."""
@@ -208,7 +220,7 @@ def _padded(drive: Drive) -> Drive:
 
 
 @eqx.filter_jit
-def _through(
+def through(
     motion: Motion,
     free: dict[str, Any],
     given: dict[str, Any],
@@ -217,7 +229,29 @@ def _through(
     *,
     room: int,
 ) -> tuple[Array, dict[str, Array], Array, Array]:
-    """Friction, its derivatives by name, number of steps, and whether the end was reached."""
+    """Friction at the samples under given numbers, differentiated forwards.
+
+    Parameters
+    ----------
+    motion : Motion
+        Whose numbers are replaced by `given`.
+    free : dict of str to array, shape ()
+        Parameters for derivatives.
+    given : dict of str to array, shape ()
+        All parameters, as of `RunMotion`.
+    drive : Drive
+    times : array, shape (n,)
+    room : int
+        Steps at most.
+
+    Returns
+    -------
+    friction : array, shape (n,)
+    derivatives : dict of str to array, shape (n,)
+    steps : array, shape ()
+    done : array, shape ()
+        Whether the end was reached.
+    """
 
     def friction(moving: dict[str, Array]) -> tuple[Array, tuple[Array, Array, Array]]:
         values = {**given, **moving}

@@ -75,6 +75,37 @@ class Autoregression:
             scale *= 1 - self.reflection[t] ** 2
         return np.asarray(out)
 
+    def departures_of_single_samples(self, white: Float) -> Float:
+        """How far each sample alone is off what the others predict, in standard deviations.
+
+        Parameters
+        ----------
+        white : array, shape (n,)
+            Innovations.
+
+        Notes
+        -----
+        The estimate of a spike at each sample over its standard error (Fox, J. R. Stat. Soc. B
+        34, 350, 1972).
+        """
+        a = np.concatenate([[1.0], -self.coefficients()[-1]])
+        ends = np.concatenate([white, np.zeros(self.order)])
+        along = np.correlate(ends, a, mode="valid")
+        reached = np.minimum(np.arange(white.size, 0, -1), self.order + 1)
+        return np.asarray(along / np.sqrt(np.cumsum(a**2))[reached - 1])
+
+    def taps(self, n: int) -> Float:
+        """Weights c of `whiten` for n samples: w_t = sum_k c[t, k] x_(t-k), shape (n, p + 1)."""
+        orders = self.coefficients()
+        found = np.zeros((n, self.order + 1))
+        found[:] = np.concatenate([[1.0], -orders[-1]]) / self.innovation
+        scale = self.variance
+        for t in range(min(self.order, n)):
+            found[t] = 0.0
+            found[t, : t + 1] = np.concatenate([[1.0], -orders[t]]) / math.sqrt(scale)
+            scale *= 1 - self.reflection[t] ** 2
+        return found
+
     def log_scale(self, n: int) -> float:
         """Sum of the logarithms of the standard deviations of the innovations of n samples."""
         logs = np.log1p(-(self.reflection**2))

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import norm
 
 from asperity.inference.residuals import Residuals
 from asperity.inference.runs.motion import RunMotion
@@ -24,8 +25,13 @@ Float = NDArray[np.float64]
 _NOT_WHITE = 1e-3
 #: A peak of the innovations less probable than this is a line; so many are removed.
 _LINE, _LINES = 1e-4, 6
+#: A sample that is farther off than this by chance, over the whole run, is an outlier; the largest
+#: share of samples that are left out as such.
+_OUTLIER, _MOST_OUTLIERS = 1e-4, 0.01
 #: Times of velocity changes are known to this many sampling intervals.
 _CUT_INTERVALS = 2.0
+#: Outliers that a warning names.
+_NAMED = 5
 #: Samples that the quickest part of the gauge's response is resolved by.
 _FILTER_SAMPLES = 8.0
 
@@ -53,6 +59,13 @@ class RunTerm:
     inertia, radiation_damping : bool
     order : int, optional
         Of the noise; chosen by the data by default.
+
+    Attributes
+    ----------
+    models : list of Autoregression
+        Noise of each stretch of one sampling rate.
+    basis : array, shape (n, columns)
+        Whitened linear nuisances and lines, orthonormal.
     """
 
     failure = (
@@ -78,7 +91,7 @@ class RunTerm:
         self.run, self.law, self.fixed = run, law, dict(fixed)
         self.linear, self.nuisances = linear, nuisances
         self._own = dict(own or {})
-        self._gauge, self._order = gauge, order
+        self.gauge, self._order = gauge, order
         self.motion = RunMotion(
             law, run.velocity, inertia=inertia, radiation_damping=radiation_damping
         )
@@ -86,7 +99,8 @@ class RunTerm:
         self._columns = _linear_columns(run, linear)
         self._whiteness = math.nan
         self._lines: list[float] = []
-        self._models = [self._first_noise(a, b) for a, b in run.stretches]
+        self._outliers: list[int] = []
+        self.models = [self._first_noise(a, b) for a, b in run.stretches]
         self._prepare()
 
     @property
@@ -97,22 +111,23 @@ class RunTerm:
     @property
     def profiled(self) -> int:
         """Parameters beyond the coordinates: linear nuisances and the noise."""
-        return self._columns.shape[1] + sum(m.order + 1 for m in self._models)
+        return self._columns.shape[1] + sum(m.order + 1 for m in self.models)
 
     @property
     def noise(self) -> dict[str, Any]:
         """Order, standard deviation and effective samples of the noise."""
         sizes = [b - a for a, b in self.run.stretches]
-        orders = [m.order for m in self._models]
+        orders = [m.order for m in self.models]
         return {
             "model": "AR(" + ", ".join(map(str, orders)) + ")",
             "samples": int(sum(sizes)),
             "effective_samples": round(
-                sum(m.effective_samples(n) for m, n in zip(self._models, sizes, strict=True)), 1
+                sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
             "lines_removed": list(self._lines),
+            "outliers": [float(self.run.time[k]) for k in sorted(self._outliers)],
             "whiteness_p": self._whiteness,
-            "standard_deviation": [math.sqrt(m.variance) for m in self._models],
+            "standard_deviation": [math.sqrt(m.variance) for m in self.models],
         }
 
     def search_from_now_on(self) -> None:
@@ -128,10 +143,10 @@ class RunTerm:
             return None
         difference, jacobian = raw
         white = self._whitened(np.column_stack([difference, jacobian]))
-        white -= self._basis @ (self._basis.T @ white)
+        white -= self.basis @ (self.basis.T @ white)
         n = difference.size
         scale = sum(
-            m.log_scale(b - a) for m, (a, b) in zip(self._models, self.run.stretches, strict=True)
+            m.log_scale(b - a) for m, (a, b) in zip(self.models, self.run.stretches, strict=True)
         )
         return Residuals(
             white[:, 0], white[:, 1:], np.full(n, "friction"), np.arange(n, dtype=np.intp), scale
@@ -142,20 +157,20 @@ class RunTerm:
         given = {**self.fixed, "W0": self.run.W0}
         free = []
         for name in values:
-            inner = self._inner(name)
+            inner = self.inner(name)
             if inner is not None:
                 given[inner] = values[name]
                 free.append(name)
-        inner_names = tuple(str(self._inner(name)) for name in free)
+        inner_names = tuple(str(self.inner(name)) for name in free)
         at = self.run.time
-        if self._gauge is not None:
+        if self.gauge is not None:
             at, rate = self._filter_times()
         computed = self.motion(given, inner_names, self.run.drive, at)
         if computed is None:
             return None
         whole = np.column_stack([computed.friction, computed.derivatives])
-        if self._gauge is not None:
-            poles = low_pass(*self._gauge)
+        if self.gauge is not None:
+            poles = low_pass(*self.gauge)
             whole = np.column_stack(
                 [between(filtered(c, rate, *poles), rate, self.run.time) for c in whole.T]
             )
@@ -173,7 +188,7 @@ class RunTerm:
         while True:
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             count = self._columns.shape[1] + int(np.any(raw[1], axis=0).sum())
-            self._models = [
+            self.models = [
                 fitted(
                     [left[a:b] - left[a:b].mean()],
                     order=self._order,
@@ -184,10 +199,40 @@ class RunTerm:
             self._prepare()
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             white = self._whitened(left[:, None])[:, 0]
-            if self._order == 0 or not self._add_line(white):
+            if not (self._add_outliers(white) or (self._order != 0 and self._add_line(white))):
                 break
         innovations = [white[a:b] for a, b in self.run.stretches]
-        self._whiteness = whiteness(innovations, max(m.order for m in self._models)).p_value
+        self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
+        return True
+
+    def _add_outliers(self, white: Float) -> bool:
+        """Leave out the samples that are too far off alone, if there are any.
+
+        A sample is left out by a linear nuisance of its own, so that those beside it keep their
+        correlation.
+        """
+        size = white.size
+        room = int(_MOST_OUTLIERS * size) - len(self._outliers)
+        limit = float(norm.isf(_OUTLIER / (2 * size)))
+        found: list[int] = []
+        for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
+            apart = np.abs(model.departures_of_single_samples(white[a:b]))
+            known = [k - a for k in self._outliers if a <= k < b]
+            apart[known] = 0.0
+            reach = max(3, model.order)
+            for k in np.argsort(-apart):
+                if apart[k] <= limit or len(found) >= room:
+                    break
+                # Beside a sample that is far off, others seem to be.
+                if all(abs(k + a - other) > reach for other in found):
+                    found.append(int(k) + a)
+        if not found:
+            return False
+        columns = np.zeros((size, len(found)))
+        columns[found, np.arange(len(found))] = 1.0
+        self._columns = np.column_stack([self._columns, columns])
+        self._outliers += found
+        self._prepare()
         return True
 
     def _add_line(self, white: Float) -> bool:
@@ -222,6 +267,19 @@ class RunTerm:
             for i, name in enumerate(self.linear)
         }
 
+    def fitted_friction(self, values: Mapping[str, float]) -> Float:
+        """Friction at the samples by the law with linear nuisances and lines; NaN without motion.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Free parameters and nuisances of the fit, in SI.
+        """
+        raw = self.departures(values)
+        if raw is None:
+            return np.full(self.run.time.size, np.nan)
+        return np.asarray(self.run.friction + raw[0] + self._columns @ self._coefficients(raw[0]))
+
     def warnings(self, residuals: Residuals) -> list[str]:
         """What the residual says about the noise."""
         said = []
@@ -237,10 +295,28 @@ class RunTerm:
                 f"{self.name} has {effective:.3g} independent samples only, its noise is so slow; "
                 "a longer window would help"
             )
+        if self._outliers:
+            said.append(self._said_of_outliers())
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said
 
-    def _inner(self, name: str) -> str | None:
+    def _said_of_outliers(self) -> str:
+        times = [f"{self.run.time[k]:.6g}" for k in sorted(self._outliers)]
+        count = len(times)
+        shown = ", ".join(times[:_NAMED]) + (", ..." if count > _NAMED else "")
+        many = count >= int(_MOST_OUTLIERS * self.run.time.size)
+        those, were = (f"{count} samples", "were") if count > 1 else ("a sample", "was")
+        return (
+            f"{those} of {self.name} {were} left out as farther off than noise can be, at {shown} "
+            "s after the first sample"
+            + (
+                "; there are more, so that the noise is not normal and intervals may not hold"
+                if many
+                else ""
+            )
+        )
+
+    def inner(self, name: str) -> str | None:
         """Name of a parameter in the motion; None if this run does not depend on it."""
         if name in self._own:
             return self._own[name]
@@ -252,25 +328,25 @@ class RunTerm:
 
     def _prepare(self) -> None:
         white = self._whitened(self._columns)
-        self._basis, self._triangle = np.linalg.qr(white)
+        self.basis, self._triangle = np.linalg.qr(white)
         self._white_columns = white
 
     def _whitened(self, columns: Float) -> Float:
         return np.concatenate(
             [
                 m.whiten(columns[a:b])
-                for m, (a, b) in zip(self._models, self.run.stretches, strict=True)
+                for m, (a, b) in zip(self.models, self.run.stretches, strict=True)
             ]
         )
 
     def _coefficients(self, difference: Float) -> Float:
         white = self._whitened(difference[:, None])[:, 0]
-        return np.asarray(-np.linalg.solve(self._triangle, self._basis.T @ white))
+        return np.asarray(-np.linalg.solve(self._triangle, self.basis.T @ white))
 
     def _filter_times(self) -> tuple[Float, float]:
-        assert self._gauge is not None  # asked for by the caller
+        assert self.gauge is not None  # asked for by the caller
         time = self.run.time
-        rate = max(1 / float(np.median(np.diff(time))), _FILTER_SAMPLES * self._gauge[1])
+        rate = max(1 / float(np.median(np.diff(time))), _FILTER_SAMPLES * self.gauge[1])
         count = math.ceil(time[-1] * rate) + 1
         return np.minimum(np.arange(count) / rate, time[-1]), rate
 

@@ -1,0 +1,144 @@
+"""The folder of a comparison: report.html, comparison.json, and a material of each law."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+
+from asperity.errors import InputError
+from asperity.fit_report.bands import bands_of
+from asperity.fit_report.folder import RUN_CAPTION, data_tables, material_text, provenance
+from asperity.fit_report.page import document, figure, table
+from asperity.fit_report.pictures import laws_figure, run_figure
+from asperity.inference import Fit
+from asperity.inference.comparison import Comparison
+from asperity.inference.forward import LockInTerm
+from asperity.inference.record import comparison_record
+from asperity.inference.runs.term import RunTerm
+from asperity.outputs.folder import written_folder
+
+
+def write_comparison(folder: Path, found: Comparison) -> None:
+    """Write everything that a comparison says into a folder, completely or not at all.
+
+    Parameters
+    ----------
+    folder : Path
+    found : Comparison
+        With one converged fit at least.
+
+    Raises
+    ------
+    InputError
+        If no fit has converged, or the folder cannot be written.
+    """
+    fits = {name: j.fit for name, j in found.laws.items() if j.fit.converged}
+    if not fits:
+        raise InputError(
+            f"comparison must have a converged fit for a report, got none; {found.verdict}"
+        )
+    with written_folder(folder) as staging:
+        record = json.dumps(comparison_record(found), indent=2)
+        (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
+        (staging / "report.html").write_text(page(found, fits), encoding="utf-8")
+        for name, own in fits.items():
+            (staging / f"{name}.toml").write_text(material_text(own), encoding="utf-8")
+
+
+def page(found: Comparison, fits: Mapping[str, Fit]) -> str:
+    """The page as text, with its figures in it and nothing to fetch.
+
+    Parameters
+    ----------
+    found : Comparison
+    fits : mapping of str to Fit
+        Those that converged.
+    """
+    first = next(iter(fits.values()))
+    names = " and ".join(term.name for term in first.objective.terms)
+    sections = {
+        "Verdict": f"<p>{escape(found.verdict)}</p>" + _laws(found),
+        "Data and laws": _figures(fits),
+        "Estimates": _estimates(fits),
+        "Data": data_tables(first),
+        "Provenance": "".join(
+            f"<h3>{escape(name)}</h3>{provenance(own)}" for name, own in fits.items()
+        ),
+    }
+    return document(f"Laws compared on {names}", "A comparison", f"Laws on {names}", sections)
+
+
+def _laws(found: Comparison) -> str:
+    converged = [j.fit.aicc for j in found.laws.values() if j.fit.converged]
+    lowest = min(converged)
+    rows: list[tuple[str, ...]] = []
+    for name, j in found.laws.items():
+        own = j.fit
+        if not own.converged:
+            rows.append((name, "", "", "", "", "", "", own.message))
+            continue
+        evidence = f"{j.evidence.log:.2f} +- {j.evidence.standard_error:.2g}" if j.evidence else ""
+        rows.append(
+            (
+                name,
+                f"{own.chi2:.4g}",
+                str(own.dof),
+                f"{own.p_value:.2g}",
+                f"{own.aicc - lowest:.4g}",
+                f"{j.weight:.2g}",
+                evidence,
+                f"excluded: {j.why}" if j.excluded else "",
+            )
+        )
+    rows += [(name, *[""] * 6, f"not compared: {why}") for name, why in found.not_compared.items()]
+    head = ("law", "chi-squared", "dof", "p", "AICc - lowest", "weight", "ln evidence", "")
+    return table(head, rows)
+
+
+def _figures(fits: Mapping[str, Fit]) -> str:
+    first = next(iter(fits.values()))
+    parts = []
+    for i, term in enumerate(first.objective.terms):
+        if isinstance(term, LockInTerm):
+            bands = {}
+            for name, own in fits.items():
+                its = own.objective.terms[i]
+                assert isinstance(its, LockInTerm)  # all laws have the same data
+                bands[name] = bands_of(own, its, None)
+            caption = (
+                "Readings with standard uncertainties; medians and 95 % bands of the prediction of "
+                "each law, by the normal approximation."
+            )
+            parts.append(figure(laws_figure(term.table, bands), caption))
+        elif isinstance(term, RunTerm):
+            curves = {}
+            for name, own in fits.items():
+                run = own.objective.terms[i]
+                assert isinstance(run, RunTerm)  # the same
+                curves[name] = run.fitted_friction(own.values)
+            parts.append(figure(run_figure(term.run, curves), RUN_CAPTION))
+    return "\n".join(parts)
+
+
+def _estimates(fits: Mapping[str, Fit]) -> str:
+    rows = [
+        (
+            law,
+            name,
+            f"{p.value:.6g}",
+            f"{p.se:.2g}",
+            f"{p.interval_95[0]:.5g} to {p.interval_95[1]:.5g}",
+            p.unit,
+        )
+        for law, own in fits.items()
+        for name, p in own.parameters.items()
+    ]
+    warned = "".join(
+        f"<li>{escape(law)}: {escape(said)}</li>"
+        for law, own in fits.items()
+        for said in own.warnings
+    )
+    found = table(("law", "", "estimate", "standard error", "95 %", "unit"), rows)
+    return found + (f"<ul>{warned}</ul>" if warned else "")

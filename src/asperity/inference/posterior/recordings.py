@@ -1,0 +1,143 @@
+"""Likelihood of a recording as a compiled program evaluates it.
+
+The motion is differentiated forwards, as in a fit: the likelihood hands its gradient to the
+sampler, which would differentiate it backwards. Noise and lines are those of the estimate, and
+linear nuisances are integrated out under flat priors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from asperity.errors import InputError
+from asperity.inference.runs.motion import Drive, through
+from asperity.inference.runs.term import RunTerm
+
+
+class RunArrays(NamedTuple):
+    """Numbers of a recording; samples that fill up have taps of 0.
+
+    Attributes
+    ----------
+    motion : Motion
+        Equation of motion whose law and slider are replaced; arrays only.
+    fixed : dict of str to array, shape ()
+        Parameters of the motion that are not free.
+    drive : Drive
+    times, recorded : array, shape (n,)
+    taps : array, shape (n, order + 1)
+        Whitening: w_t = sum_k taps[t, k] x_(t-k).
+    basis : array, shape (n, columns)
+        Whitened linear nuisances, orthonormal.
+    """
+
+    motion: Any
+    fixed: dict[str, Any]
+    drive: Drive
+    times: Any
+    recorded: Any
+    taps: Any
+    basis: Any
+
+
+@dataclass(frozen=True)
+class RunLikelihood:
+    """Log likelihood of a recording under the noise of the estimate, but for a constant.
+
+    Attributes
+    ----------
+    equation : Motion
+        What of the equation of motion is no number.
+    own : tuple of (str, str)
+        Free parameters that this recording depends on, and their names in the motion.
+    room : int
+        Steps of the integrator at most.
+    """
+
+    equation: Any
+    own: tuple[tuple[str, str], ...]
+    room: int
+
+    def __call__(self, values: Mapping[str, Array], data: RunArrays) -> Array:
+        """Log likelihood of parameters by name; NaN where the motion cannot be computed."""
+        motion = eqx.combine(data.motion, self.equation)
+
+        def both(x: Array) -> tuple[Array, Array]:
+            moving = {inner: x[i] for i, (_, inner) in enumerate(self.own)}
+            friction, slopes, _, done = through(
+                motion, moving, {**data.fixed, **moving}, data.drive, data.times, room=self.room
+            )
+            white = _whitened(data.taps, friction - data.recorded)
+            white = white - data.basis @ (data.basis.T @ white)
+            value = jnp.where(done, -0.5 * jnp.sum(white**2), jnp.nan)
+            back = _transposed(data.taps, white)
+            return value, -jnp.stack([slopes[inner] @ back for _, inner in self.own])
+
+        @jax.custom_vjp
+        def likelihood(x: Array) -> Array:
+            return both(x)[0]
+
+        likelihood.defvjp(both, lambda gradient, change: (change * gradient,))
+        return likelihood(jnp.stack([values[name] for name, _ in self.own]))
+
+
+def _whitened(taps: Array, x: Array) -> Array:
+    def add(total: Array, part: tuple[Array, Array]) -> tuple[Array, None]:
+        k, weights = part
+        return total + weights * jnp.roll(x, k), None
+
+    return jax.lax.scan(add, jnp.zeros_like(x), (jnp.arange(taps.shape[1]), taps.T))[0]
+
+
+def _transposed(taps: Array, x: Array) -> Array:
+    def add(total: Array, part: tuple[Array, Array]) -> tuple[Array, None]:
+        k, weights = part
+        return total + jnp.roll(weights * x, -k), None
+
+    return jax.lax.scan(add, jnp.zeros_like(x), (jnp.arange(taps.shape[1]), taps.T))[0]
+
+
+def likelihood_of_run(term: RunTerm, names: tuple[str, ...]) -> tuple[RunLikelihood, RunArrays]:
+    """The likelihood of a recording, and its arrays.
+
+    Raises
+    ------
+    InputError
+        If the recording is compared through a gauge.
+    """
+    if term.gauge is not None:
+        raise InputError(
+            f"gauge must be left out for a posterior, got one for {term.name}: the compiled "
+            "motion does not pass through it; leave it out, or take intervals by profile likelihood"
+        )
+    own = tuple((n, inner) for n in names if (inner := term.inner(n)) is not None)
+    fixed = {n: np.float64(v) for n, v in {**term.fixed, "W0": term.run.W0}.items()}
+    # Any numbers serve for the template: those of the parameters take their place.
+    motion, drive, times = term.motion.prepared(
+        {**fixed, **{inner: np.float64(1.0) for _, inner in own if inner not in fixed}},
+        term.run.drive,
+        term.run.time,
+    )
+    n, size = term.run.time.size, times.size
+    taps = np.zeros((size, max(m.order for m in term.models) + 1))
+    for model, (a, b) in zip(term.models, term.run.stretches, strict=True):
+        taps[a:b, : model.order + 1] = model.taps(b - a)
+    arrays, equation = eqx.partition(motion, eqx.is_array_like)
+    more = (0, size - n)
+    return RunLikelihood(equation, own, term.motion.room), RunArrays(
+        jax.tree.map(np.asarray, arrays),
+        fixed,
+        drive,
+        times,
+        np.pad(term.run.friction, more),
+        taps,
+        np.pad(term.basis, (more, (0, 0))),
+    )
