@@ -44,8 +44,8 @@ def exact_response(material):
     )
 
 
-def noisy_table(exact, rng, shared, *, told):
-    """A table; with `told`, it has the covariance of the mean and the first harmonic."""
+def noisy_table(exact, rng, shared, *, correlated):
+    """A table; with `correlated`, it has the covariance of the mean and the first harmonic."""
     drop, *harmonics = exact
     common = rng.normal(size=V.size)
     columns = {"V": V, "epsilon": EPSILON, "frequency": FREQUENCY}
@@ -57,7 +57,7 @@ def noisy_table(exact, rng, shared, *, told):
         c = c + HARMONIC * (noise[0] + 1j * noise[1])
         columns |= {f"mu{n}": np.abs(c), f"mu{n}_err": HARMONIC}
         columns |= {f"phase{n}": np.angle(c), f"phase{n}_err": HARMONIC / np.abs(c)}
-        if n == 1 and told:
+        if n == 1 and correlated:
             along = np.cos(np.angle(c)) * shared * MEAN * HARMONIC
             across = -np.sin(np.angle(c)) * shared * MEAN * HARMONIC / np.abs(c)
             columns |= {"delta_mu_mu1_cov": along, "delta_mu_phase1_cov": across}
@@ -138,10 +138,10 @@ def main():
     }
     print("| data, method | sets | 68.3 % | 95 % | Monte Carlo | s a set |")
     print("|---|---|---|---|---|---|")
-    for name, (shared, told) in tables.items():
+    for name, (shared, correlated) in tables.items():
         cases = []
         for seed in range(chosen.sets):
-            table = noisy_table(exact, np.random.default_rng(seed), shared, told=told)
+            table = noisy_table(exact, np.random.default_rng(seed), shared, correlated=correlated)
             # One start suffices: the truth is known here.
             cases.append((table,))
 
@@ -149,7 +149,7 @@ def main():
             return fit_problem(table, material)
 
         coverage(f"{name}: fit", lambda t: by_fit(problem(t)), cases)
-        if not told and not shared:
+        if not correlated and not shared:
             coverage(f"{name}: least squares of moduli", lambda t: by_moduli(problem(t)), cases)
             some = cases[: chosen.posterior]
             coverage(

@@ -1,4 +1,4 @@
-"""Ageing or slip? Two laws with one linear response, told apart by the mean under modulation.
+"""Ageing or slip? Two laws with one linear response, distinguished by the mean under modulation.
 
 Friction is that of Eq. (1) of Bureau et al. (2000) in both. The state grows at rest in the ageing
 law, and moves only while the slider slips in that of Ruina (1983):

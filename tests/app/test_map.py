@@ -31,7 +31,7 @@ def test_the_grid_is_that_of_the_package(ask):
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"x": {"name": "K", "low": 1, "high": 2}}, "axes must be two numbers"),
         ({"x": {"name": "alpha", "low": 1, "high": 2}}, "must be given its own parameters"),
@@ -45,11 +45,11 @@ def test_the_grid_is_that_of_the_package(ask):
         ({"air": {}}, "map.air must be left out"),
     ],
 )
-def test_what_cannot_be_mapped_gets_a_sentence(ask, change, told):
+def test_what_cannot_be_mapped_gets_a_sentence(ask, change, message):
     asked = {**ASKED, "numbers": {**ASKED["numbers"], "epsilon": 0.1}, **change}
     answer = ask("map/text", asked)
     assert answer.status == 400
-    assert told in answer.json["error"]
+    assert message in answer.json["error"]
     assert ask("map", asked).status == 400
 
 

@@ -41,7 +41,7 @@ def test_the_page_starts_at_the_slider(address, visit):
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ({"slider": "elasto-plastic"}, "slider must be a Slider"),
         ({"velocity": "-1 um/s"}, "velocity must be positive"),
@@ -49,8 +49,8 @@ def test_the_page_starts_at_the_slider(address, visit):
         ({"height": 1}, "height must be"),
     ],
 )
-def test_what_cannot_be_shown_is_told(address, arguments, told):
-    with pytest.raises(InputError, match=told):
+def test_what_cannot_be_shown_gets_a_sentence(address, arguments, message):
+    with pytest.raises(InputError, match=message):
         asp.explore(**arguments)
 
 

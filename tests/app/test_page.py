@@ -106,9 +106,9 @@ def test_the_copied_command_gives_the_same_numbers(explored):
     numbers = {"V": 2e-6, "epsilon": 0.2, "frequency": "90 Hz", "A": 0.012, "K": 3e5}
     answer = explored({"law": "rice-ruina", "numbers": numbers, "air": {"h0": "9 um"}})
     arguments = shlex.split(answer["command"])[1:]
-    told = CliRunner().invoke(main, [*arguments, "--json"]).stdout
+    result = CliRunner().invoke(main, [*arguments, "--json"]).stdout
     for name in ("mean_friction", "mu1", "mu2", "phase1"):
-        assert json.loads(told)[name] == pytest.approx(answer["point"][name], rel=1e-9)
+        assert json.loads(result)[name] == pytest.approx(answer["point"][name], rel=1e-9)
 
 
 def test_figures_are_saved_as_svg_png_and_csv(visit, tmp_path):
@@ -162,10 +162,10 @@ def test_a_signal_ends_the_server_in_order(tmp_path):
 def test_a_port_that_is_taken_is_told(server):
     from click.testing import CliRunner
 
-    told = CliRunner().invoke(main, ["serve", "--port", str(server.port)])
-    assert told.exit_code == 2
-    assert "--port must be free" in told.stderr
-    assert "Traceback" not in told.stderr
+    result = CliRunner().invoke(main, ["serve", "--port", str(server.port)])
+    assert result.exit_code == 2
+    assert "--port must be free" in result.stderr
+    assert "Traceback" not in result.stderr
 
 
 def test_without_the_extra_there_is_a_sentence(monkeypatch):
@@ -174,9 +174,9 @@ def test_without_the_extra_there_is_a_sentence(monkeypatch):
     from asperity.app import extra
 
     monkeypatch.setattr(extra, "_PACKAGES", ("no_such_package_anywhere",))
-    told = CliRunner().invoke(main, ["serve"])
-    assert told.exit_code == 2
-    assert "pip install 'asperity[app]'" in told.stderr
+    result = CliRunner().invoke(main, ["serve"])
+    assert result.exit_code == 2
+    assert "pip install 'asperity[app]'" in result.stderr
 
 
 def test_the_link_of_a_view_restores_it(visit):

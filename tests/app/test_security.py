@@ -108,11 +108,11 @@ def test_no_parameter_names_a_file(ask, tmp_path, material):
 def test_what_is_no_question_gets_a_sentence(ask, body):
     answer = ask("explore", body)
     assert answer.status == 400, answer.body
-    told = answer.json["error"]
-    assert " must " in told
-    assert "; " in told
-    assert "Traceback" not in told
-    assert len(told) < 600
+    message = answer.json["error"]
+    assert " must " in message
+    assert "; " in message
+    assert "Traceback" not in message
+    assert len(message) < 600
 
 
 def test_a_body_that_is_too_large_is_refused(ask, raw, server):
@@ -124,8 +124,8 @@ def test_a_body_that_is_too_large_is_refused(ask, raw, server):
     whole = head.encode() + b"Transfer-Encoding: chunked\r\n\r\n" + 2 * chunk + b"0\r\n\r\n"
     assert "413" in raw(whole)
     for length in ("-1", "1e9", "99999999999999999999"):
-        told = raw(f"{head}Content-Length: {length}\r\n\r\n".encode())
-        assert told.split()[1] in ("400", "413")
+        reply = raw(f"{head}Content-Length: {length}\r\n\r\n".encode())
+        assert reply.split()[1] in ("400", "413")
 
 
 @pytest.mark.parametrize("method", ["PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "GET"])

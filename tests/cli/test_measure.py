@@ -69,12 +69,12 @@ def test_text_says_the_same(asperity, recording) -> None:
     result = asperity("measure", recording, "--harmonics", "2")
     assert result.exit_code == 0
     lines = [line.split() for line in result.stdout.splitlines()]
-    told = {words[0]: words[1:] for words in lines if words}
-    assert abs(float(told["mu1"][0]) - MU1) < 5 * float(told["mu1"][2])
-    assert abs(float(told["frequency"][0]) - F) < 5 * float(told["frequency"][3])
-    assert "mu2" in told
-    assert "mu3" not in told
-    assert "quality" in told
+    printed = {words[0]: words[1:] for words in lines if words}
+    assert abs(float(printed["mu1"][0]) - MU1) < 5 * float(printed["mu1"][2])
+    assert abs(float(printed["frequency"][0]) - F) < 5 * float(printed["frequency"][3])
+    assert "mu2" in printed
+    assert "mu3" not in printed
+    assert "quality" in printed
     checks = record(asperity("measure", recording, "--harmonics", "2", "--json"))["checks"]
     names = {check["name"] for check in checks if check["verdict"] == "ok"}
     assert sum(words[0] == "ok" for words in lines if words) == len(names)

@@ -75,9 +75,9 @@ def test_a_material_shows_every_number_with_its_source(asperity) -> None:
         assert f"\n{name} " in text
         assert str(number) in text
         assert record["numbers"][name]["place"] == number.place
-    told = record["numbers"]["D0"]
-    assert (told["value"], told["uncertainty"], told["unit"]) == (0.4, 0.04, "um")
-    assert (told["kind"], told["si"]["value"], told["si"]["unit"]) == ("published", 4e-7, "m")
+    D0 = record["numbers"]["D0"]
+    assert (D0["value"], D0["uncertainty"], D0["unit"]) == (0.4, 0.04, "um")
+    assert (D0["kind"], D0["si"]["value"], D0["si"]["unit"]) == ("published", 4e-7, "m")
 
 
 def test_sources_are_cited(asperity) -> None:

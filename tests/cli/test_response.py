@@ -52,13 +52,13 @@ def test_provenance_says_version_numbers_with_units_and_source(asperity) -> None
     shown = asperity(
         "response", *POINT, "--material", "bureau2000", "--set", "K=0.3 N/um", "--json"
     )
-    told = strict(shown.stdout)["provenance"]
-    assert told["version"] == asp.__version__
-    assert told["law"] == "elasto-plastic"
-    assert told["relative_tolerance"] == 1e-8
-    assert told["parameters"]["K"] == {"value": 3e5, "unit": "N/m", "from": "command line"}
-    assert told["parameters"]["lambda"] == {"value": 7e-7, "unit": "m", "from": "bureau2000"}
-    assert told["citation"]["bureau2000"].startswith("@article{bureau2000,")
+    provenance = strict(shown.stdout)["provenance"]
+    assert provenance["version"] == asp.__version__
+    assert provenance["law"] == "elasto-plastic"
+    assert provenance["relative_tolerance"] == 1e-8
+    assert provenance["parameters"]["K"] == {"value": 3e5, "unit": "N/m", "from": "command line"}
+    assert provenance["parameters"]["lambda"] == {"value": 7e-7, "unit": "m", "from": "bureau2000"}
+    assert provenance["citation"]["bureau2000"].startswith("@article{bureau2000,")
 
 
 def test_text_shows_numbers_with_units(asperity) -> None:

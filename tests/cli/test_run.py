@@ -46,10 +46,10 @@ def test_a_run_with_text_and_picture(asperity, protocol, tmp_path) -> None:
     assert result.exit_code == 0, result.output
     assert result.stderr.startswith("asperity: writing 1001 rows, about 206 kB, to ")
     assert result.stderr.count("\n") == 1
-    told = json.loads(result.stdout)
-    assert told == {
+    summary = json.loads(result.stdout)
+    assert summary == {
         "rows": 1001,
-        "events": told["events"],
+        "events": summary["events"],
         "time": 0.5,
         "duration": 0.5,
         "stopped": None,
@@ -137,7 +137,7 @@ def test_all_mistakes_are_exit_code_2_and_a_line_each(asperity, protocol, tmp_pa
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["none.toml", "--out", "run.nc"], "protocol must be a file"),
         (["protocol.toml"], "--out"),
@@ -146,12 +146,12 @@ def test_all_mistakes_are_exit_code_2_and_a_line_each(asperity, protocol, tmp_pa
         (["protocol.toml", "--out", "nowhere/run.nc"], "folder that exists"),
     ],
 )
-def test_bad_input_is_one_sentence(asperity, protocol, monkeypatch, arguments, told) -> None:
+def test_bad_input_is_one_sentence(asperity, protocol, monkeypatch, arguments, message) -> None:
     monkeypatch.chdir(protocol.parent)
     result = asperity("run", *(a.format(protocol.parent.name) for a in arguments))
     assert result.exit_code == 2
     assert result.stderr.count("\n") == 1
-    assert told in result.stderr
+    assert message in result.stderr
 
 
 @pytest.mark.parametrize("load", ["0 N", "-1 N", "-0.0 N", "1e-9 N", "1e-300 N"])

@@ -74,8 +74,8 @@ def test_every_command_and_option_has_its_place(command) -> None:
     page = PAGES["command_line.md"]
     assert f"## asperity {command}" in page
     own = [part for part in re.split(r"^## ", page, flags=re.M) if f"asperity {command}" in part]
-    told = set(re.findall(r"(?<![\w-])--?[\w-]+", "\n".join(own)))
-    assert set(options(command)) <= told
+    named = set(re.findall(r"(?<![\w-])--?[\w-]+", "\n".join(own)))
+    assert set(options(command)) <= named
     assert f"asperity {command}" in README
 
 
@@ -89,9 +89,9 @@ def test_every_public_name_is_in_the_reference(name) -> None:
 @pytest.mark.parametrize("room", ["air", "laws", "materials", "orbit", "parameters", "units"])
 def test_every_public_name_of_a_room_is_in_the_reference(room) -> None:
     module = importlib.import_module(f"asperity.{room}")
-    told = set(re.findall(rf":: asperity\.(?:{room}\.)?(\w+)", API))
+    named = set(re.findall(rf":: asperity\.(?:{room}\.)?(\w+)", API))
     # A type alias has no page of its own.
-    assert set(module.__all__) - {"State"} <= told | {"KINDS"}
+    assert set(module.__all__) - {"State"} <= named | {"KINDS"}
 
 
 @pytest.mark.parametrize(
@@ -173,7 +173,7 @@ def test_formulas_become_mathml_and_unknown_commands_are_told(extension, caplog)
     pytest.importorskip("latex2mathml")
     module = extension("mathml")
     assert module.to_mathml(r"\arg c_n", display=False).startswith("<math")
-    told = []
-    module._log = type("Log", (), {"warning": lambda self, *a, **k: told.append(a)})()
+    named = []
+    module._log = type("Log", (), {"warning": lambda self, *a, **k: named.append(a)})()
     module.to_mathml(r"\nosuchcommand x", display=True)
-    assert told
+    assert named

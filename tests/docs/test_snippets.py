@@ -121,8 +121,8 @@ def test_json_keys_of_a_response_are_those_of_the_page() -> None:
 def test_json_keys_of_the_air_are_those_of_the_page() -> None:
     record = json.loads(invoke("air", "--material", "bureau2000", "-f", "120 Hz", "--json").stdout)
     text = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
-    told = set(re.findall(r"`(\w+)`", text.partition("JSON keys\nare")[2].partition("\n\n")[0]))
-    assert told == set(record) | set(record["points"][0])
+    listed = set(re.findall(r"`(\w+)`", text.partition("JSON keys\nare")[2].partition("\n\n")[0]))
+    assert listed == set(record) | set(record["points"][0])
 
 
 def test_result_columns_of_a_table_are_those_of_the_page(workplace) -> None:
@@ -130,8 +130,8 @@ def test_result_columns_of_a_table_are_those_of_the_page(workplace) -> None:
     invoke("response", "--table", "in.csv", "--out", "out.csv", "--material", "bureau2000")
     with Path("out.csv").open(encoding="utf-8") as file:
         columns = next(csv.reader(file))
-    told = documented("docs/command_line.md", "The output has the columns of the input")
-    assert told - {"converged"} == set(columns[4:]) - {"converged"}
+    listed = documented("docs/command_line.md", "The output has the columns of the input")
+    assert listed - {"converged"} == set(columns[4:]) - {"converged"}
     assert "converged" in columns
 
 

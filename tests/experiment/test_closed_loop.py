@@ -105,15 +105,15 @@ def run(law, exciter, epsilons, velocity, sliding, modulated, *, rate, harmonics
         outer, inner = exciter.steps(epsilon, modulated, RISE)
         applied += [outer, Slide(sliding)]
         borne += [inner, Slide(sliding)]
-    programme, told = (
+    borne_load, measured_load = (
         Programme(*steps, load=float(PMMA.W0), velocity=velocity) for steps in (borne, applied)
     )
     # Twice as fine as the protocol's own: the tribometer's cubics then err by 2e-6 of the load,
     # far below what this test can see; at the usual rate by 4e-5, which it does see.
-    columns, last = signals(slider(law), programme, 2 * motion_rate(with_noise), ("force",))
+    columns, last = signals(slider(law), borne_load, 2 * motion_rate(with_noise), ("force",))
     assert last.stopped is None
     time = columns["time"]
-    seen = {FORCE: columns["force"], LOAD: told.load(time)}
+    seen = {FORCE: columns["force"], LOAD: measured_load.load(time)}
     return Motion(
         with_noise, exciter, epsilons, velocity, sliding, modulated, harmonics, time, seen
     )
@@ -187,16 +187,16 @@ def _value(reading, name):
 
 def hits(tables, law, known_gain=True):
     """Name to a list of whether the interval holds the truth."""
-    told = {}
+    covering = {}
     for velocity, series in tables:
         for name, error, half in errors_and_half_widths(series, truth(law, velocity, known_gain)):
-            told.setdefault(name, []).append(abs(error) < half)
-    return told
+            covering.setdefault(name, []).append(abs(error) < half)
+    return covering
 
 
-def covered(told, names=NAMES):
+def covered(covering, names=NAMES):
     """Share of intervals that hold the truth, all quantities together."""
-    return float(np.mean([hit for name in names for hit in told[name]]))
+    return float(np.mean([hit for name in names for hit in covering[name]]))
 
 
 def recorded(law, folder, velocities=tuple(RUNS)):
@@ -215,13 +215,13 @@ def tables(tmp_path_factory):
 
 
 def test_intervals_hold_the_response(tables) -> None:
-    told = {law: hits(tables[law], law) for law in LAWS}
+    covering = {law: hits(tables[law], law) for law in LAWS}
     for law in LAWS:
-        assert 0.92 < covered(told[law]) < 0.98, law
+        assert 0.92 < covered(covering[law]) < 0.98, law
         # What F(0) drifts between before and after is in the uncertainty of the drop, so that its
         # interval may be wider than noise asks for, and not narrower.
-        assert np.mean(told[law]["delta_mu"]) > 0.92, law
-    together = {name: [h for law in LAWS for h in told[law][name]] for name in NAMES}
+        assert np.mean(covering[law]["delta_mu"]) > 0.92, law
+    together = {name: [h for law in LAWS for h in covering[law][name]] for name in NAMES}
     assert 0.92 < covered(together) < 0.98
     # None of them hides behind the others: what so many recordings can tell, at 1e-3, of 92 %.
     for name, held in together.items():
@@ -257,9 +257,9 @@ def test_the_protocol_in_one_call_reads_the_same(tables) -> None:
 @pytest.mark.parametrize("law", LAWS)
 def test_a_wrong_gain_is_not_covered(tables, law) -> None:
     """As if the gauge of the force were as fast as the load cell."""
-    told = hits(tables[law], law, known_gain=False)
-    assert covered(told) < 0.8
-    assert np.mean(told["mu1"]) < 0.1
+    covering = hits(tables[law], law, known_gain=False)
+    assert covered(covering) < 0.8
+    assert np.mean(covering["mu1"]) < 0.1
 
 
 def test_white_noise_is_not_what_the_gauge_has(tables, monkeypatch, tmp_path) -> None:

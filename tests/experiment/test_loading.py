@@ -82,15 +82,15 @@ def test_a_planted_slope_is_read_in_the_presence_of_drift() -> None:
 
 
 @pytest.mark.parametrize(
-    ("options", "told"),
+    ("options", "message"),
     [
         ({"low": 0.7}, "must lie between 0 and 1 and rise"),
         ({"cycles": 1}, "at least 2"),
         ({"velocity": "2 um"}, "velocity"),
     ],
 )
-def test_bad_input_is_named(options, told) -> None:
-    with pytest.raises(InputError, match=told):
+def test_bad_input_is_named(options, message) -> None:
+    with pytest.raises(InputError, match=message):
         loading_recording(SLIDER, TRIBOMETER, **{"velocity": "2 um/s", **options})
 
 

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from asperity.laws import RiceRuina
 
 class {name}(RiceRuina):
-    name = "{told}"
+    name = "{registered}"
 
 number = 3
 """
@@ -32,7 +32,7 @@ def a_registry_of_its_own(monkeypatch):
 @pytest.fixture
 def law_file(tmp_path) -> Path:
     path = tmp_path / "my_law.py"
-    path.write_text(LAW.format(name="Mine", told="mine"), encoding="utf-8")
+    path.write_text(LAW.format(name="Mine", registered="mine"), encoding="utf-8")
     return path
 
 
@@ -50,7 +50,7 @@ def test_a_law_in_a_module(law_file, monkeypatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "told"),
+    ("place", "message"),
     [
         ("{file}:Nine", "did you mean 'Mine'?"),
         ("{file}:number", "must be a subclass of asperity.laws.Law"),
@@ -64,13 +64,13 @@ def test_a_law_in_a_module(law_file, monkeypatch) -> None:
         ("{folder}:Mine", "file that exists"),
     ],
 )
-def test_a_wrong_place_is_one_sentence(law_file, place: str, told: str) -> None:
+def test_a_wrong_place_is_one_sentence(law_file, place: str, message: str) -> None:
     broken = law_file.with_name("broken.py")
     broken.write_text("1 / 0", encoding="utf-8")
     text = place.format(file=law_file, broken=broken, folder=law_file.parent)
     with pytest.raises(InputError) as error:
         known_law(text)
-    assert told in str(error.value)
+    assert message in str(error.value)
 
 
 def test_a_law_without_all_of_its_equations(tmp_path) -> None:

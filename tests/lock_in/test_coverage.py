@@ -58,12 +58,12 @@ def test_white_noise_has_the_textbook_s_variances(truth) -> None:
     n, dt, sigma = 3000, 1e-3, 0.02
     time = np.arange(n) * dt
     rng = np.random.default_rng(1)
-    told = []
+    stated = []
     for _ in range(20):
         noise = sigma * rng.standard_normal((2, n))
         reading = lock_in(time, truth.load(time) + noise[0], truth.force(time) + noise[1])
-        told.append([reading.uncertainty(k) ** 2 for k in ("frequency", "re3", "mean_force")])
-    frequency, third, mean = np.mean(told, axis=0)
+        stated.append([reading.uncertainty(k) ** 2 for k in ("frequency", "re3", "mean_force")])
+    frequency, third, mean = np.mean(stated, axis=0)
     # Rife and Boorstyn (1974): the Cramer-Rao bound of a line's frequency.
     amplitude = truth.epsilon * truth.W0
     bound = 24 * sigma**2 / (amplitude**2 * n * (n * dt) ** 2) / (2 * np.pi) ** 2
@@ -113,15 +113,15 @@ def test_noise_of_the_load_reaches_the_phase(truth) -> None:
     time = np.arange(n) * 1e-3
     rng = np.random.default_rng(5)
     load, force = truth.load(time), truth.force(time)
-    phases, told = [], []
+    phases, stated = [], []
     for _ in range(100):
         reading = lock_in(time, load + 0.3 * rng.standard_normal(n), force, harmonics=2)
         phases.append(reading.phasor(2).phase)
-        told.append(reading.uncertainty("phase2"))
+        stated.append(reading.uncertainty("phase2"))
     # The force has no noise: all of this is the load's, twice over at 2f.
-    assert np.std(phases) == pytest.approx(np.mean(told), rel=0.2)
+    assert np.std(phases) == pytest.approx(np.mean(stated), rel=0.2)
     expected = 2 * 0.3 * np.sqrt(2 / n) / (truth.epsilon * truth.W0)
-    assert np.mean(told) == pytest.approx(expected, rel=0.1)
+    assert np.mean(stated) == pytest.approx(expected, rel=0.1)
 
 
 def test_noise_that_both_channels_share_is_known_to_be_shared(truth) -> None:

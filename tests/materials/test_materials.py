@@ -1,4 +1,4 @@
-"""Published numbers: what is in the files, and what a bad file is told."""
+"""Published numbers: what is in the files, and the message for a bad file."""
 
 import math
 import pickle

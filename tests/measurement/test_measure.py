@@ -236,7 +236,7 @@ def test_defects_outside_the_window_are_avoided(truth, protocol, trace) -> None:
     found = measure(trace(time, load, force))
     assert found.reading.start >= 10.6
     assert found.verdict == "ok"
-    # They are told all the same.
+    # They are reported all the same.
     assert "nan" in {finding.name for finding in found.samples.findings}
     assert found.samples.dropped == 100
 
@@ -267,7 +267,7 @@ def test_a_recording_without_modulation_is_told(truth, trace) -> None:
     force = 2.8 + 1e-2 * rng.standard_normal(time.size)
     with pytest.raises(InputError, match=r"must be modulated.*measure without modulation"):
         measure(trace(time, load, force))
-    # A user who knows better is told by the verdict.
+    # The verdict says so to a user who knows better.
     assert verdicts(measure(trace(time, load, force), frequency=60.0))["modulation"] == "bad"
 
 

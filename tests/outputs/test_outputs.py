@@ -142,7 +142,7 @@ def test_blocks_go_on_where_they_ended(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("inputs", "told"),
+    ("inputs", "message"),
     [
         ({**INPUTS, "law": "amontons"}, 'law = "rice-ruina" there and "amontons" here'),
         ({**INPUTS, "numbers": {"A": 0.01, "K": 2e5}}, "numbers.K = 100000.0 there and 200000.0"),
@@ -151,14 +151,14 @@ def test_blocks_go_on_where_they_ended(tmp_path: Path) -> None:
     ],
 )
 def test_blocks_of_other_inputs_are_refused_with_the_difference(
-    tmp_path: Path, inputs, told: str
+    tmp_path: Path, inputs, message: str
 ) -> None:
     first = UnfinishedText(tmp_path / "out.csv", INPUTS)
     first.start(resume=False)
     first.append("a\n", 1)
     with pytest.raises(InputError, match="must belong to the same inputs") as error:
         UnfinishedText(tmp_path / "out.csv", inputs).start(resume=True)
-    assert told in str(error.value)
+    assert message in str(error.value)
     with pytest.raises(InputError, match="go on with --resume"):
         UnfinishedText(tmp_path / "out.csv", INPUTS).start(resume=False)
     assert first.text() == "a\n"

@@ -352,19 +352,19 @@ def test_a_derivation_that_was_wrong_would_be_no_misprint(model, monkeypatch):
 def test_a_wrong_model_would_turn_the_verdicts_on_the_measurements(model):
     right = model.outputs(EXT)
     wrong = replace(right, mu1=(right.mu1[0] / 30, right.mu1[1]))
-    told = Model(model.numbers)
-    told.outputs = lambda law, **_: wrong
+    changed = Model(model.numbers)
+    changed.outputs = lambda law, **_: wrong
     for name in ("mu1-order", "drop-over-mu1"):
-        assert _one(name, told).verdict == "differs"
+        assert _one(name, changed).verdict == "differs"
     lacking = features.missed(model, features.at_strongest(wrong))
     assert {"mu1", "mu1 against V", "drop over mu1", "mu2 over mu1"} <= set(lacking)
     assert features.missed(model, features.at_strongest(right)) == []
 
 
 def test_inertia_that_was_negligible_would_be_reproduced(model):
-    told = Model(model.numbers)
-    told.inertial_outputs = lambda: told.outputs(EXT)
-    assert _one("inertia-negligible-elastic", told).verdict == "reproduced"
+    changed = Model(model.numbers)
+    changed.inertial_outputs = lambda: changed.outputs(EXT)
+    assert _one("inertia-negligible-elastic", changed).verdict == "reproduced"
 
 
 def test_claims_and_checks_belong_together():

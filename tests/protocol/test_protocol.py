@@ -96,18 +96,18 @@ def test_all_mistakes_are_told_at_once(write) -> None:
     path = write(text)
     with pytest.raises(ProtocolError) as caught:
         load_protocol(path)
-    told = caught.value.mistakes
-    assert len(told) == 4
-    assert told[0].startswith("parameters.K must carry a unit, got 0.5")
-    assert told[1].startswith("step 1 must be a step, got 'slyde for 0.5 s'")
-    assert told[2].startswith("step 2.1.duration must carry a unit, got '0.2'")
-    assert told[3].startswith("step 3.load must be a force")
+    mistakes = caught.value.mistakes
+    assert len(mistakes) == 4
+    assert mistakes[0].startswith("parameters.K must carry a unit, got 0.5")
+    assert mistakes[1].startswith("step 1 must be a step, got 'slyde for 0.5 s'")
+    assert mistakes[2].startswith("step 2.1.duration must carry a unit, got '0.2'")
+    assert mistakes[3].startswith("step 3.load must be a force")
     assert f"got 4 (in '{path}')" in str(caught.value)
-    assert all(mistake in str(caught.value) for mistake in told)
+    assert all(mistake in str(caught.value) for mistake in mistakes)
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "message"),
     [
         ("hold 0.2 s", "hold -0.2 s", "step 2.1.duration must be positive, got -0.2 s"),
         ("title", "titel", "titel must be a known field, got 'one of everything'; did you mean"),
@@ -125,11 +125,11 @@ def test_all_mistakes_are_told_at_once(write) -> None:
         ("rtol = 1e-8", "rtol = 1e-8\nrtol = 1e-9", "must be valid TOML"),
     ],
 )
-def test_one_mistake_is_one_sentence(write, old, new, told) -> None:
+def test_one_mistake_is_one_sentence(write, old, new, message) -> None:
     assert old in FILE
     with pytest.raises(InputError) as caught:
         load_protocol(write(FILE.replace(old, new, 1)))
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_steps_that_take_no_time_are_refused(write) -> None:

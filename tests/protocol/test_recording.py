@@ -69,7 +69,7 @@ def test_the_tribometer_does_not_change_the_motion(write) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "message"),
     [
         ("cut_off", "cutoff", "tribometer.cutoff must be a known field, got '400 Hz'; did you"),
         ("spring gauge", "spring gage", "got 'spring gage'; did you mean 'spring gauge'"),
@@ -83,11 +83,11 @@ def test_the_tribometer_does_not_change_the_motion(write) -> None:
         ("sensors", "sensor", "tribometer.sensors must have a table"),
     ],
 )
-def test_a_mistake_says_where(write, old, new, told) -> None:
+def test_a_mistake_says_where(write, old, new, message) -> None:
     assert old in TABLE
     with pytest.raises(InputError) as caught:
         load_protocol(write(TABLE.replace(old, new)))
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
 def test_a_recording_needs_even_samples(write) -> None:

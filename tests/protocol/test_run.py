@@ -51,18 +51,18 @@ def test_the_file_holds_the_motion(short, whole) -> None:
 
 def test_the_file_says_where_it_comes_from(short, whole) -> None:
     with xarray.open_dataset(whole) as run:
-        told = run.attrs
-        assert told["title"] == "a short run"
-        assert told["law"] == "elasto-plastic"
-        assert told["asperity_version"]
-        assert "K = 500000.0 N/m" in told["parameters"]
-        assert "K: protocol" in told["origin_of_parameters"]
-        assert "A: bureau2000" in told["origin_of_parameters"]
-        assert told["protocol"] == "; ".join(short.lines)
-        assert "Bureau" in told["citation"]
-        assert told["relative_tolerance"] == 1e-9
-        assert told["steps"] > 100
-        assert told["stopped"] == "end of the programme"
+        attributes = run.attrs
+        assert attributes["title"] == "a short run"
+        assert attributes["law"] == "elasto-plastic"
+        assert attributes["asperity_version"]
+        assert "K = 500000.0 N/m" in attributes["parameters"]
+        assert "K: protocol" in attributes["origin_of_parameters"]
+        assert "A: bureau2000" in attributes["origin_of_parameters"]
+        assert attributes["protocol"] == "; ".join(short.lines)
+        assert "Bureau" in attributes["citation"]
+        assert attributes["relative_tolerance"] == 1e-9
+        assert attributes["steps"] > 100
+        assert attributes["stopped"] == "end of the programme"
         assert {run[name].attrs["units"] for name in ("force", "load")} == {"N"}
         assert run.time.attrs["units"] == "s"
 

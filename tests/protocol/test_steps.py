@@ -47,7 +47,7 @@ def test_every_example_is_valid(form) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("hodl 10 s", ["step 4 must be a step", "'hodl 10 s'", "'hold 10 s'"]),
         ("modulat 5 % at 8 Hz for 1 s", ["'modulate 24 % at 120 Hz for 20 s'"]),
@@ -65,10 +65,10 @@ def test_every_example_is_valid(form) -> None:
         ("fly to the moon", ["'fly to the moon'", "'hold 10 s'"]),
     ],
 )
-def test_a_mistake_says_where_and_gives_an_example(text, told) -> None:
+def test_a_mistake_says_where_and_gives_an_example(text, message) -> None:
     with pytest.raises(InputError) as caught:
         parse_step(text, "step 4", HERE)
-    for part in told:
+    for part in message:
         assert part in str(caught.value)
 
 
@@ -80,7 +80,7 @@ def test_a_line_that_repeats() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("repeat hold 1 s", "how often"),
         ("repeat 0 times: hold 1 s", "how often"),
@@ -91,10 +91,10 @@ def test_a_line_that_repeats() -> None:
         ("repeat 1000000 times: hold 1 s", "at most 100000 steps"),
     ],
 )
-def test_a_repetition_that_is_none(text, told) -> None:
+def test_a_repetition_that_is_none(text, message) -> None:
     planned, mistakes = plan([text], HERE)
     assert len(mistakes) == 1
-    assert told in mistakes[0]
+    assert message in mistakes[0]
     assert planned == []
 
 
@@ -115,15 +115,15 @@ def test_a_recorded_load_and_velocity_are_followed(tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("header", "cell", "told"),
+    ("header", "cell", "message"),
     [
         ("time (s),load", "7", "write the unit into its heading"),
         ("time (s),load (N)", "nan", "got none in row 1"),
         ("time (s),load (N)", "7\n5.0,8", "without 'backward time'"),
     ],
 )
-def test_a_recording_that_cannot_be_followed(tmp_path, header, cell, told) -> None:
+def test_a_recording_that_cannot_be_followed(tmp_path, header, cell, message) -> None:
     rows = [f"{0.1 * i:.1f},{cell if i == 1 else 7.5 + i}" for i in range(8)]
     (tmp_path / "rec.csv").write_text("\n".join([header, *rows, ""]), encoding="utf-8")
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=message):
         parse_step("follow load from rec.csv", "step 1", tmp_path)

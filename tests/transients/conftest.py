@@ -47,7 +47,7 @@ class Experiment:
 
     @property
     def options(self) -> dict:
-        """What `transient` is told of inertia and damping."""
+        """Arguments of `transient` for inertia and damping."""
         return {"inertia": self.M > 0, "radiation_damping": self.eta or None}
 
     def friction(self, v: float, log_age: float) -> float:

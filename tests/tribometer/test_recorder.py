@@ -142,7 +142,7 @@ def test_an_uneven_clock_comes_back_from_tdms(laboratory, tmp_path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("act", "told"),
+    ("act", "message"),
     [
         (lambda t, p: write(t, p / "x.xlsx"), r"write\.path must end in the name of a format"),
         (lambda t, p: write(t, p / "x.csv", units={"load": "N"}), "must name channels"),
@@ -155,8 +155,8 @@ def test_an_uneven_clock_comes_back_from_tdms(laboratory, tmp_path) -> None:
         (lambda t, p: recorded(Recorder(rate=1e3, ranges={"normal force": (8, 0)})), "must rise"),
     ],
 )
-def test_bad_input_is_named(laboratory, tmp_path, act, told) -> None:
-    with pytest.raises(InputError, match=told):
+def test_bad_input_is_named(laboratory, tmp_path, act, message) -> None:
+    with pytest.raises(InputError, match=message):
         act(laboratory, tmp_path)
 
 

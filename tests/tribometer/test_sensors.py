@@ -79,7 +79,7 @@ def test_an_accelerometer_sees_only_what_changes() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "told"),
+    ("make", "message"),
     [
         (lambda: LoadCell(bandwidth=0), "LoadCell.bandwidth must be positive, got 0 Hz"),
         (lambda: LoadCell(bandwidth="1 kHz", noise="2 nm"), "LoadCell.noise must be a force"),
@@ -89,6 +89,6 @@ def test_an_accelerometer_sees_only_what_changes() -> None:
         (lambda: quiet(LoadCell(bandwidth="11 kHz"), TIME), "at most half the sampling rate"),
     ],
 )
-def test_bad_sensors_are_named(make, told) -> None:
-    with pytest.raises(InputError, match=told):
+def test_bad_sensors_are_named(make, message) -> None:
+    with pytest.raises(InputError, match=message):
         make()

@@ -2,7 +2,7 @@
 
 A file is known by a random name that only who sent it knows. What the sender calls it is a text for
 messages and never becomes part of a path; of its ending, one of a list is kept, since some formats
-are told apart by it.
+are recognised by it.
 """
 
 from __future__ import annotations

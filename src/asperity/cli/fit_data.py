@@ -1,4 +1,4 @@
-"""Data of ``asperity fit``: tables of readings and recordings, told apart by what they hold."""
+"""Data of ``asperity fit``: tables of readings and recordings, distinguished by their content."""
 
 from __future__ import annotations
 

@@ -77,15 +77,15 @@ def _provenance(response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]
     from asperity.parameters import point_parameters
 
     units = point_parameters(type(response.slider.law))
-    told = response.provenance
+    provenance = response.provenance
     return {
-        "version": told.pop("asperity_version"),
-        **told,
+        "version": provenance.pop("asperity_version"),
+        **provenance,
         "parameters": {
             name: {"value": number.value, "unit": units[name].unit, "from": number.origin}
             for name, number in numbers.items()
         },
-        "citation": {key.strip(): citation(key.strip()) for key in told["source"].split(",")},
+        "citation": {key.strip(): citation(key.strip()) for key in provenance["source"].split(",")},
     }
 
 

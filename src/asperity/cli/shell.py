@@ -1,4 +1,4 @@
-"""A group of commands that are imported when called, and whose mistakes are told in a sentence."""
+"""A group of commands, each imported when it is called; an error is one sentence."""
 
 from __future__ import annotations
 

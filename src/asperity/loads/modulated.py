@@ -178,7 +178,7 @@ def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Se
             raise InputError(
                 f"{name} must have a positive mean, got {scale:g}; give it in the sense of sliding"
             )
-    # At half the number of samples, cos and sin are not told apart.
+    # At half the number of samples, cos and sin cannot be distinguished.
     top = (len(samples) - 1) // 2
     kept = spectrum[1 : min(top, harmonics or top) + 1] / scale
     size = np.abs(kept).max(initial=0.0)

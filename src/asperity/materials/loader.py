@@ -93,8 +93,8 @@ def _rule(mistake: Any) -> tuple[str, str]:
         return "be a known field", closest(wrong, model.model_fields)
     if mistake["type"] == "missing":
         return "be given", "add the field"
-    told = _one_line(mistake["msg"]).removeprefix("Input should be ")
-    return f"be {told}", "correct the value"
+    rule = _one_line(mistake["msg"]).removeprefix("Input should be ")
+    return f"be {rule}", "correct the value"
 
 
 def _value(mistake: Any) -> str:

@@ -34,7 +34,7 @@ def measure_recording(
     Parameters
     ----------
     recording : Trace or path
-        What `asperity.read` returns, or a file that it can read without being told more.
+        What `asperity.read` returns, or a file that it reads without further arguments.
     modulated : bool
         Whether the load was modulated. If not, velocity steps and holds are measured.
     load, force : str

@@ -95,9 +95,9 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     findings = findings or check(two)
     two = replace(two, findings=findings)
     time, values = trace.time, (W.values, F.values)
-    told = {finding.name for finding in findings}
+    names_found = {finding.name for finding in findings}
     keep = None
-    if told & {"nan", "infinite", "backward time", "repeated time"}:
+    if names_found & {"nan", "infinite", "backward time", "repeated time"}:
         keep = _kept(time, values)
         time, values = time[keep], (values[0][keep], values[1][keep])
     if time.size < 16:
@@ -105,7 +105,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
             f"measure.trace must hold at least 16 usable samples, got {time.size}; give a longer "
             "recording or window"
         )
-    defects = _defects(time, values, told, keep)
+    defects = _defects(time, values, names_found, keep)
     dropped = len(trace) - time.size
     return Samples(time, *values, W.unit, names, defects, findings, dropped, unread, two)
 
@@ -161,19 +161,19 @@ def _kept(time: Array, values: tuple[Array, Array]) -> NDArray[np.bool_]:
 def _defects(
     time: Array,
     values: tuple[Array, Array],
-    told: set[str],
+    names_found: set[str],
     keep: NDArray[np.bool_] | None,
 ) -> NDArray[np.intp]:
     found = [np.empty(0, dtype=np.intp)]
     if keep is not None:
         rows = np.flatnonzero(keep)
         found.append(np.flatnonzero(np.diff(rows) > 1) + 1)
-    if "gap" in told:
+    if "gap" in names_found:
         steps = np.diff(time)
         found.append(np.flatnonzero(steps > _GAP * np.median(steps)) + 1)
-    if "spike" in told:
+    if "spike" in names_found:
         found += [spikes(channel) for channel in values]
-    if "saturation" in told:
+    if "saturation" in names_found:
         for channel in values:
             for extreme in (channel.max(), channel.min()):
                 at = channel == extreme

@@ -65,8 +65,8 @@ class Form:
         return re.compile(named, re.IGNORECASE)
 
 
-def _step_load(told: Mapping[str, Any], folder: Path) -> Step:
-    return StepLoad(told["load"])
+def _step_load(parts: Mapping[str, Any], folder: Path) -> Step:
+    return StepLoad(parts["load"])
 
 
 def _list(text: str) -> tuple[str, ...]:
@@ -74,17 +74,17 @@ def _list(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(","))
 
 
-def _modulate(told: Mapping[str, Any], folder: Path) -> Step:
-    return Modulate(**told)
+def _modulate(parts: Mapping[str, Any], folder: Path) -> Step:
+    return Modulate(**parts)
 
 
 #: Every form that a step can take.
 FORMS = (
-    Form("hold[for] {duration}", "hold 10 s", lambda told, folder: Hold(**told)),
+    Form("hold[for] {duration}", "hold 10 s", lambda parts, folder: Hold(**parts)),
     Form(
         "slide[at {velocity}] for {duration}",
         "slide at 10 um/s for 60 s",
-        lambda told, folder: Slide(**told),
+        lambda parts, folder: Slide(**parts),
     ),
     Form(
         "modulate {epsilon} at {frequency} for {duration}[rising in {rise}][falling in {fall}]",
@@ -95,27 +95,27 @@ FORMS = (
     Form(
         "ramp load to {load} in {duration}",
         "ramp load to 9 N in 5 s",
-        lambda told, folder: RampLoad(told["load"], told["duration"]),
+        lambda parts, folder: RampLoad(parts["load"], parts["duration"]),
     ),
     Form(
         "ramp velocity to {velocity} in {duration}",
         "ramp velocity to 100 um/s in 5 s",
-        lambda told, folder: RampVelocity(told["velocity"], told["duration"]),
+        lambda parts, folder: RampVelocity(parts["velocity"], parts["duration"]),
     ),
     Form(
         "slide-hold-slide for {holds} sliding {sliding}",
         "slide-hold-slide for 1 s, 10 s, 100 s sliding 20 s",
-        lambda told, folder: SlideHoldSlide(_list(told["holds"]), told["sliding"]),
+        lambda parts, folder: SlideHoldSlide(_list(parts["holds"]), parts["sliding"]),
     ),
     Form(
         "velocity steps {velocities} over {slip}",
         "velocity steps 1 um/s, 10 um/s, 1 um/s over 100 um",
-        lambda told, folder: VelocitySteps(_list(told["velocities"]), told["slip"]),
+        lambda parts, folder: VelocitySteps(_list(parts["velocities"]), parts["slip"]),
     ),
     Form(
         "follow {channels} from {file}",
         "follow load from recording.csv",
-        lambda told, folder: follow(told["channels"], told["file"], folder),
+        lambda parts, folder: follow(parts["channels"], parts["file"], folder),
     ),
 )
 
@@ -144,8 +144,8 @@ def parse_step(text: str, name: str, folder: Path) -> Step:
     for form in forms:
         match = form.expression.fullmatch(line)
         if match is not None:
-            told = {key: value for key, value in match.groupdict().items() if value is not None}
-            return form.build(_quantities(told, name, line, form.example), folder)
+            parts = {key: value for key, value in match.groupdict().items() if value is not None}
+            return form.build(_quantities(parts, name, line, form.example), folder)
     examples = " or ".join(f"'{form.example}'" for form in forms)
     raise InputError(f"{name} must be a whole step, got '{line}'; write it like {examples}")
 
@@ -175,11 +175,11 @@ def _meant(line: str, name: str) -> list[Form]:
 
 
 def _quantities(
-    told: Mapping[str, str], name: str, line: str, example: str
+    parts: Mapping[str, str], name: str, line: str, example: str
 ) -> dict[str, float | str]:
     """Values in SI; what is no quantity stays a text."""
     found: dict[str, float | str] = {}
-    for key, text in told.items():
+    for key, text in parts.items():
         if key not in _KINDS:
             found[key] = text
             continue

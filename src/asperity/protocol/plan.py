@@ -40,7 +40,7 @@ def plan(steps: Sequence[Any], folder: Path) -> tuple[list[Planned], list[str]]:
 
 def check_levels(planned: Sequence[Planned], level: Level) -> Iterator[str]:
     """What is wrong with the values of the steps, each under the load and velocity it finds."""
-    told: set[str] = set()
+    reported: set[str] = set()
     for one in planned:
         try:
             _, level = one.step.lay_out(level, one.place)
@@ -50,8 +50,8 @@ def check_levels(planned: Sequence[Planned], level: Level) -> Iterator[str]:
                     "zero, without which there is no contact"
                 )
         except InputError as error:
-            if one.place not in told:
-                told.add(one.place)
+            if one.place not in reported:
+                reported.add(one.place)
                 yield f"{error} (in '{one.text}')"
 
 

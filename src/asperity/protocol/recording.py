@@ -118,7 +118,7 @@ def record_run(setup: Setup, run: str | Path) -> Trace:
         if "load point" in setup.exposed.values():
             wanted |= {"force", "displacement"}
         motion = {name: np.asarray(file.variables[name][:]) for name in wanted}
-        told = {str(name): value for name, value in file.attrs.items()}
+        provenance = {str(name): value for name, value in file.attrs.items()}
     if "load point" in setup.exposed.values():
         stretched = (motion["force"] - motion["force"][:1]) / setup.stiffness
         motion["load point"] = motion["displacement"] + stretched
@@ -126,7 +126,7 @@ def record_run(setup: Setup, run: str | Path) -> Trace:
     # A motion that has ended early ends between two samples of its clock.
     even = time.size - 1 if time.size > 3 and _last_is_odd(time) else time.size
     signals = {channel: values[:even] for channel, values in signals.items()}
-    return setup.tribometer.record(time[:even], signals, seed=setup.seed, provenance=told)
+    return setup.tribometer.record(time[:even], signals, seed=setup.seed, provenance=provenance)
 
 
 def _last_is_odd(time: np.ndarray) -> bool:

@@ -165,9 +165,9 @@ class Tribometer:
                     f"for {grid.shape}; give one value for each time"
                 )
             channels[name] = self._channel(name, sensor, values, rate, instants, random)
-        told = {"format": "virtual tribometer", **(provenance or {})}
-        trace = Trace(stamps, channels, provenance=told)
-        return Trace(stamps, channels, check(trace), told)
+        origin = {"format": "virtual tribometer", **(provenance or {})}
+        trace = Trace(stamps, channels, provenance=origin)
+        return Trace(stamps, channels, check(trace), origin)
 
     def _clock(self, grid: Array, random: np.random.Generator) -> tuple[Array, Array]:
         """Time stamps, and the instants since the first sample at which really is sampled."""

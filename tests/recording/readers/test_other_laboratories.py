@@ -110,13 +110,13 @@ def written(tmp_path, content, name="recording.txt"):
 
 @pytest.mark.parametrize("text", TEXTS)
 def test_other_recorders(tmp_path, text):
-    content, told = TEXTS[text]
+    content, expected = TEXTS[text]
     trace = read(written(tmp_path, content))
     assert len(trace) == ROWS
     # Twelve digits of a stamp of the day are left.
-    if told is not None:
+    if expected is not None:
         assert trace.time == pytest.approx(TIME, abs=2e-9)
-        assert {f.name for f in trace.findings} == told
+        assert {f.name for f in trace.findings} == expected
     assert np.array_equal(trace.channel("W").values, LOAD)
     assert np.array_equal(trace.channel("F").values, SHEAR)
 
@@ -224,9 +224,9 @@ def test_damage_anywhere_is_a_recording_or_one_sentence(tmp_path, content):
             broken[at] = rng.choice([0, 10, 34, 44, 255, broken[at] ^ 1 << rng.integers(8)])
         cut = broken[: rng.integers(1, len(broken) + 1)] if rng.random() < 0.5 else broken
         path = written(tmp_path, bytes(cut), "damaged.mat" if content[:6] == b"MATLAB" else "d.csv")
-        told = ""
+        expected = ""
         try:
             read(path)
         except InputError as error:
-            told = str(error)
-        assert "\n" not in told
+            expected = str(error)
+        assert "\n" not in expected

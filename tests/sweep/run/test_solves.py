@@ -70,9 +70,9 @@ def test_points_that_cannot_be_solved_say_why(tmp_path: Path) -> None:
         },
         outputs=("mu1",),
     )
-    told = store_status(tmp_path / "s.zarr").outcomes
+    message = store_status(tmp_path / "s.zarr").outcomes
     # Inertia without mass, and a load that does not stay positive.
-    assert told == {"converged": 1, "invalid": 2, "contact_lost": 1}
+    assert message == {"converged": 1, "invalid": 2, "contact_lost": 1}
 
 
 def test_thresholds_without_modulation_are_the_closed_form(tmp_path: Path) -> None:
@@ -120,7 +120,7 @@ def test_transients_become_named_numbers(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("fields", "told"),
+    ("fields", "message"),
     [
         ({"axes": {"epsilom": {"values": (0.1,)}}}, "did you mean 'epsilon'"),
         ({"axes": {"epsilon": {"values": (0.1,), "count": 3}}}, "axis must have one of"),
@@ -138,7 +138,7 @@ def test_transients_become_named_numbers(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_mistakes_are_told_before_anything_is_written(
-    tmp_path: Path, fields: dict[str, Any], told: str
+    tmp_path: Path, fields: dict[str, Any], message: str
 ) -> None:
     whole = {
         "law": "rice-ruina",
@@ -146,6 +146,6 @@ def test_mistakes_are_told_before_anything_is_written(
         "parameters": {"V": 1e-6, "frequency": 120.0},
         "axes": {"epsilon": {"values": (0.1,)}, "K": {"values": (3e5,)}},
     }
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=message):
         run_sweep(SweepPlan(**{**whole, **fields}), tmp_path / "s.zarr", workers=ThisProcess())
     assert list(tmp_path.iterdir()) == []

@@ -66,12 +66,12 @@ def test_another_reader_needs_neither_asperity_nor_xarray(
         "a = g['mu1']; print(a.shape, a.metadata.dimension_names, a.attrs['units'], a[1, 3]);"
         "print([m for m in sys.modules if m.startswith(('asperity', 'xarray'))])"
     )
-    told = subprocess.run(
+    lines = subprocess.run(
         [sys.executable, "-W", "error", "-c", script, str(tmp_path / "s.zarr")],
         capture_output=True, text=True, check=True, cwd=tmp_path,
     ).stdout.splitlines()  # fmt: skip
     epsilon = open_store(tmp_path / "s.zarr")["epsilon"].values[3]
-    assert told == [f"(3, 20) ('K', 'epsilon') 1 {2.0 * float(epsilon)!r}", "[]"]
+    assert lines == [f"(3, 20) ('K', 'epsilon') 1 {2.0 * float(epsilon)!r}", "[]"]
 
 
 @pytest.mark.parametrize("consolidated", [None, False, True])
@@ -343,12 +343,12 @@ def test_an_error_of_the_solver_is_the_outcome_of_its_point(
         return solve(points)
 
     monkeypatch.setattr(closed_form, "_solve", fragile)
-    told: list[str] = []
-    run(tmp_path / "s.zarr", log=told.append)
+    lines: list[str] = []
+    run(tmp_path / "s.zarr", log=lines.append)
     status = store_status(tmp_path / "s.zarr")
     assert status.outcomes["solver_error"] == 3
     assert status.done == POINTS
-    assert "ZeroDivisionError: of the solver" in told[0]
+    assert "ZeroDivisionError: of the solver" in lines[0]
 
 
 def test_statistics_are_those_of_all_numbers(tmp_path: Path, closed_form: ClosedForm) -> None:

@@ -249,8 +249,8 @@ def _print(found: Any, recording: Path, provenance: dict[str, Any], as_json: boo
     modulated = hasattr(found, "reading")
     if as_json:
         record = modulated_record(found) if modulated else sliding_record(found)
-        told = {"recording": str(recording), "version": __version__, **provenance}
-        click.echo(to_json({**record, "provenance": told}))
+        provenance_record = {"recording": str(recording), "version": __version__, **provenance}
+        click.echo(to_json({**record, "provenance": provenance_record}))
     else:
         click.echo((modulated_text if modulated else sliding_text)(found, recording.name))
 

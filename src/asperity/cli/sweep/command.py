@@ -173,10 +173,10 @@ def status(store: Path, as_json: bool) -> int:
 
 
 def _run_text(run: dict[str, Any]) -> str:
-    told = f"{run['workers']} on {run['host']}, asperity {run['asperity']}"
+    text = f"{run['workers']} on {run['host']}, asperity {run['asperity']}"
     if not run.get("ended"):
-        return f"{told}, not ended"
-    return f"{told}, {run['points_solved']:,} points in {run['seconds']:.1f} s"
+        return f"{text}, not ended"
+    return f"{text}, {run['points_solved']:,} points in {run['seconds']:.1f} s"
 
 
 @sweep.command()

@@ -123,9 +123,9 @@ def amplitude_motion(
         applied += [outer, Slide(off)]
         borne += [inner, Slide(off)]
     W0 = np.asarray(slider.W0).item()
-    programme = Programme(*borne, load=W0, velocity=speed)
-    told = Programme(*applied, load=W0, velocity=speed)
-    columns, last = signals(slider, programme, rate, ("force",), **options)
+    borne_load = Programme(*borne, load=W0, velocity=speed)
+    applied_load = Programme(*applied, load=W0, velocity=speed)
+    columns, last = signals(slider, borne_load, rate, ("force",), **options)
     if last.stopped is not None:
         raise InputError(
             f"amplitude_series.slider must slide to the end of the protocol, got a motion that "
@@ -133,6 +133,6 @@ def amplitude_motion(
         )
     time = columns["time"]
     return AmplitudeMotion(
-        time, columns["force"], told.load(time), tuple(map(float, epsilons)),
+        time, columns["force"], applied_load.load(time), tuple(map(float, epsilons)),
         speed, off, on, exciter, last.provenance,
     )  # fmt: skip

@@ -99,7 +99,7 @@ def recorded_run(
     Parameters
     ----------
     recording : Trace or path
-        What `asperity.read` returns, or a file that it can read without being told more.
+        What `asperity.read` returns, or a file that it reads without further arguments.
     name : str, optional
         By default the name of the file.
     window : (float, float), optional

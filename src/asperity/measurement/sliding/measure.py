@@ -446,7 +446,7 @@ def _step_checks(steps: list[VelocityStep]) -> list[Check]:
             share,
             LIMITS["settling"],
             f"after the step at {slow.time:.6g} s the transient takes {100 * share:.2g} % of the "
-            "slip that can be compared; a slower one cannot be told from the trend",
+            "slip that can be compared; a slower one cannot be distinguished from the trend",
         ),
     ]
 

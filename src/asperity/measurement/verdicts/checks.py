@@ -100,17 +100,17 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
         change = after.value - before.value
         doubt = float(np.hypot(before.uncertainty, after.uncertainty))
         share = change / _nonzero(before.value)
-        told = f"F(0) after the modulation differs by {_percent(share)} from F(0) before it"
+        sentence = f"F(0) after the modulation differs by {_percent(share)} from F(0) before it"
         significant = abs(change) > 3 * doubt
     else:
         change = float(reading.drift[1].sum())
         share = change / _nonzero(reading.mean_force)
-        told = (
+        sentence = (
             f"the force drifts by {_percent(share)} over the window; F(0) before and after is not "
             "in the recording"
         )
         significant = abs(change) > 10 * reading.uncertainty("mean_force")
-    return judged("drift", abs(share), LIMITS["drift"], told, significant=significant)
+    return judged("drift", abs(share), LIMITS["drift"], sentence, significant=significant)
 
 
 def transient(reading: LockInReading) -> Check:
@@ -150,16 +150,16 @@ def transient(reading: LockInReading) -> Check:
 def stick_slip(reading: LockInReading, time: Array, force: Array) -> Check:
     """Whether the force oscillates slowly, by itself."""
     line = slow_line(reading, time, force)
-    number, told, seen = 0.0, "no slow oscillation stands out", False
+    number, sentence, seen = 0.0, "no slow oscillation stands out", False
     if line is not None:
         number = line.amplitude / max(abs(reading.mean_force), 1e-300)
         seen = line.amplitude > _LINE * line.background
         if seen:
-            told = (
+            sentence = (
                 f"the force oscillates at {line.frequency:.4g} Hz, no harmonic, by "
                 f"{_percent(number)} of its mean"
             )
-    return judged("stick-slip", number, LIMITS["stick-slip"], told, significant=seen)
+    return judged("stick-slip", number, LIMITS["stick-slip"], sentence, significant=seen)
 
 
 def resolution(reading: LockInReading, load: Array, force: Array) -> Check:
@@ -201,7 +201,7 @@ def findings(found: list[Finding], samples: int, span: float) -> list[Check]:
 
 
 def _finding(found: Finding, samples: int, span: float) -> Check:
-    told = found.sentence.rstrip(".") + (f" ({found.where})" if found.where else "")
+    sentence = found.sentence.rstrip(".") + (f" ({found.where})" if found.where else "")
     # Shares of the window, where the number of the finding can be made one.
     shares = {
         "saturation": 1.0,
@@ -209,11 +209,11 @@ def _finding(found: Finding, samples: int, span: float) -> Check:
         "gap": 1 / span,
     }
     if found.name in shares:
-        return judged(found.name, found.number * shares[found.name], LIMITS[found.name], told)
+        return judged(found.name, found.number * shares[found.name], LIMITS[found.name], sentence)
     if found.name in LIMITS:
-        return judged(found.name, found.number, LIMITS[found.name], told)
+        return judged(found.name, found.number, LIMITS[found.name], sentence)
     grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[found.severity]
-    return judged(found.name, 1.0, grave, told)
+    return judged(found.name, 1.0, grave, sentence)
 
 
 def _correlation(series: Array) -> float:

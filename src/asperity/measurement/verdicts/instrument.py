@@ -40,7 +40,7 @@ def held_samples(reading: LockInReading, load: Array, force: Array) -> Check:
     The value of each run of k equal samples belongs to its beginning: a harmonic of frequency f
     lags by pi f (k - 1)/rate and is smaller by the sinc of that.
     """
-    number, told = 0.0, "no channel repeats its samples"
+    number, sentence = 0.0, "no channel repeats its samples"
     rate = (reading.samples - 1) / (reading.end - reading.start)
     for name, values in (("load", load), ("force", force)):
         length = _held_length(values[:_PIECE])
@@ -49,11 +49,11 @@ def held_samples(reading: LockInReading, load: Array, force: Array) -> Check:
         lag = np.pi * reading.frequency * (length - 1) / rate
         if lag >= number:
             number = float(lag)
-            told = (
+            sentence = (
                 f"the {name} repeats each value {length:.3g} times on average: it is converted "
                 f"more slowly than recorded, and its first harmonic lags by {lag:.2g} rad"
             )
-    return judged("held samples", number, LIMITS["held samples"], told)
+    return judged("held samples", number, LIMITS["held samples"], sentence)
 
 
 def _held_length(values: Array) -> float | None:
@@ -75,7 +75,7 @@ def _held_length(values: Array) -> float | None:
 
 def dropouts(load: Array, force: Array) -> Check:
     """Whether a channel falls to exactly zero where it is far from zero otherwise."""
-    number, told = 0.0, "no channel drops to zero"
+    number, sentence = 0.0, "no channel drops to zero"
     for name, values in (("load", load), ("force", force)):
         zeros = values == 0
         count = int(np.count_nonzero(zeros))
@@ -87,11 +87,11 @@ def dropouts(load: Array, force: Array) -> Check:
         if abs(middle) <= _AWAY * scatter or zeros.mean() <= number:
             continue
         number = float(zeros.mean())
-        told = (
+        sentence = (
             f"{count} of {values.size} samples of the {name} are exactly zero, where {middle:.4g} "
             "is usual: the signal was lost there"
         )
-    return judged("dropouts", number, LIMITS["dropouts"], told)
+    return judged("dropouts", number, LIMITS["dropouts"], sentence)
 
 
 def flat_top(reading: LockInReading, time: Array, load: Array) -> Check:
@@ -105,7 +105,7 @@ def flat_top(reading: LockInReading, time: Array, load: Array) -> Check:
     count = np.bincount(index, minlength=_PHASES)
     line = np.polynomial.Polynomial.fit(time, load, 1)
     rest = load - line(time)
-    number, told, seen = 0.0, "the load's waveform has too few samples for its shape", False
+    number, sentence, seen = 0.0, "the load's waveform has too few samples for its shape", False
     if count.min() >= 4:
         folded = np.bincount(index, rest, minlength=_PHASES) / count
         square = np.bincount(index, (rest - folded[index]) ** 2, minlength=_PHASES) / count
@@ -118,11 +118,11 @@ def flat_top(reading: LockInReading, time: Array, load: Array) -> Check:
         }
         side = max(shares, key=shares.__getitem__)
         number = shares[side]
-        told = (
+        sentence = (
             f"the load stays within {_NEAR:.0%} of its {side} for {number:.2g} of the period, "
             "where a sine does for 0.064; a longer stay is clipping, or a waveform that is no sine"
         )
-    return judged("flat top", number, LIMITS["flat top"], told, significant=seen)
+    return judged("flat top", number, LIMITS["flat top"], sentence, significant=seen)
 
 
 def made_force(
@@ -143,13 +143,13 @@ def made_force(
     own = 2 * abs(np.mean(friction * (turn - np.mean(turn))))
     whole = abs(reading.epsilon * reading.mean_friction)
     number = float(own / whole) if whole else np.inf
-    told = (
+    sentence = (
         f"the force was made from friction x load ('{name}'); the recorded coefficient is "
         f"modulated by {number:.2g} of epsilon times its mean"
     )
     if number < LIMITS["made force"][0]:
-        told += (
+        sentence += (
             ". It hardly follows the load: if the recorder divided by a mean load, mu1 and phase1 "
             "are those of the load and not of the friction; use the recorded shear force"
         )
-    return (judged("made force", number, LIMITS["made force"], told),)
+    return (judged("made force", number, LIMITS["made force"], sentence),)

@@ -43,22 +43,22 @@ def mains(reading: LockInReading, samples: Samples, parts: list[Stretch]) -> Che
     ]
     number = float(abs(reading.epsilon))
     if not near:
-        told = f"{f:.6g} Hz is no harmonic of 50 or 60 Hz"
-        return judged("mains", number, LIMITS["mains"], told, significant=False)
+        sentence = f"{f:.6g} Hz is no harmonic of 50 or 60 Hz"
+        return judged("mains", number, LIMITS["mains"], sentence, significant=False)
     switched = False
     for part in parts:
         cut = slice(part.first, part.stop)
         line, doubt = _line(samples.time[cut], samples.load[cut], f)
         quiet = not part.modulated and doubt < np.inf
         switched |= quiet and line + doubt < _SWITCHED * number * abs(reading.W0)
-    told = (
+    sentence = (
         f"the modulation, epsilon = {number:.3g} at {f:.6g} Hz, lies at a harmonic of the mains "
         f"({near[0]:g} Hz); so small a one may be hum in the load's signal and no modulation"
         if number < LIMITS["mains"][0] and not switched
         else f"the modulation lies at a harmonic of the mains ({near[0]:g} Hz), and is "
         + ("switched off in the pauses" if switched else "larger than hum usually is")
     )
-    return judged("mains", number, LIMITS["mains"], told, significant=not switched)
+    return judged("mains", number, LIMITS["mains"], sentence, significant=not switched)
 
 
 def lines_in_the_pauses(
@@ -94,24 +94,24 @@ def lines_in_the_pauses(
             # What is smaller than the uncertainty of the harmonic changes nothing that is reported.
             seen = line > _SEEN * doubt and line > own.amplitude_uncertainty * abs(reading.W0)
             if found is None or (seen, number) > (found[2], found[0]):
-                told = (
+                sentence = (
                     f"without modulation the force has a line of {number:.2g} mu{n} W0 at {f:.6g} "
                     "Hz: mains, cross-talk or the drive, which is part of what is read"
                 )
-                found = number, told, seen
+                found = number, sentence, seen
     if found is None:
         return ()
-    number, told, seen = found
+    number, sentence, seen = found
     if not seen:
-        told = "without modulation the force has no line at f and 2f that stands out"
+        sentence = "without modulation the force has no line at f and 2f that stands out"
     limits = LIMITS["lines in the pauses"]
-    return (judged("lines in the pauses", number, limits, told, significant=seen),)
+    return (judged("lines in the pauses", number, limits, sentence, significant=seen),)
 
 
 def hum(reading: LockInReading, time: Array, force: Array) -> Check:
     """Whether hum at other harmonics of the mains says that there is some at the modulation too."""
     f = reading.frequency
-    number, told, seen = 0.0, "no hum is to be expected at the modulation or its double", False
+    number, sentence, seen = 0.0, "no hum is to be expected at the modulation or its double", False
     for base in _MAINS:
         orders = [
             n
@@ -130,11 +130,11 @@ def hum(reading: LockInReading, time: Array, force: Array) -> Check:
             share = line / max(reading.phasor(n).amplitude * abs(reading.W0), 1e-300)
             if line > _SEEN * doubt and share > number:
                 number, seen = share, True
-                told = (
+                sentence = (
                     f"hum at {m * base:g} Hz is {share:.2g} of mu{n} W0; mains have harmonics, and "
                     f"{n * f:.6g} Hz is one of them: mu{n} may hold hum"
                 )
-    return judged("hum", number, LIMITS["hum"], told, significant=seen)
+    return judged("hum", number, LIMITS["hum"], sentence, significant=seen)
 
 
 def _line(time: Array, values: Array, frequency: float) -> tuple[float, float]:

@@ -35,17 +35,17 @@ def friction(reading: LockInReading) -> Check:
     """Whether the mean friction is one."""
     number = reading.mean_friction
     limits = LIMITS["high friction" if number > LIMITS["low friction"][0] else "low friction"]
-    told = (
+    sentence = (
         f"the mean of F/W0 is {number:.4g}, where contacts have {LIMITS['low friction'][0]:g} to 2"
     )
     if number < 0:
-        told += (
+        sentence += (
             "; load and force have opposite signs, which turns every phase by pi: a unit such as "
             "'-1 N' for one of them turns it back"
         )
     elif number < LIMITS["low friction"][0] or number > LIMITS["high friction"][0]:
-        told += "; check the units, the zeros and which column is which"
-    return judged("friction", number, limits, told)
+        sentence += "; check the units, the zeros and which column is which"
+    return judged("friction", number, limits, sentence)
 
 
 def response(reading: LockInReading) -> Check:
@@ -82,13 +82,13 @@ def aliasing(reading: LockInReading, rate: float) -> Check:
         - np.arange(n + 1) * reading.frequency
     )
     away = np.abs(away) * span
-    number, told = float(span * rate), "no higher harmonic is folded onto one that is read"
+    number, sentence = float(span * rate), "no higher harmonic is folded onto one that is read"
     if away.size:
         number = float(away.min())
         at = np.unravel_index(int(np.argmin(away)), away.shape)
-        told = (
+        sentence = (
             f"at {rate:.5g} samples per second harmonic {folded[at[0]]} of the load looks like "
             f"{'the mean' if at[1] == 0 else f'harmonic {at[1]}'}, {number:.3g} lines of the "
             "window away; closer than two, what is read holds both"
         )
-    return judged("aliasing", number, LIMITS["aliasing"], told)
+    return judged("aliasing", number, LIMITS["aliasing"], sentence)

@@ -29,8 +29,8 @@ def shifting_response(reading: LockInReading, time: Array, force: Array) -> Chec
     """
     pieces = int(min(_PIECES, reading.periods // _FEWEST_PERIODS))
     if pieces < 3:
-        told = "the window is too short to be read in pieces"
-        return judged("shifting response", 0.0, LIMITS, told)
+        sentence = "the window is too short to be read in pieces"
+        return judged("shifting response", 0.0, LIMITS, sentence)
     omega = 2 * np.pi * reading.frequency
     orders = range(1, reading.harmonics.size + 1)
     middle = (reading.start + reading.end) / 2

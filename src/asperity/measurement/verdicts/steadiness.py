@@ -59,13 +59,13 @@ def steady_load(reading: LockInReading, time: Array, load: Array) -> Check:
     slow, seen = _wander(reading, time, load, 0)
     drift = float(reading.drift[0].sum())
     number = max(abs(drift), slow) / max(abs(reading.W0), 1e-300)
-    told = "drifts" if abs(drift) > slow else "wanders"
+    motion = "drifts" if abs(drift) > slow else "wanders"
     significant = seen if slow >= abs(drift) else abs(drift) > 10 * reading.uncertainty("W0")
     return judged(
         "steady load",
         number,
         LIMITS["steady load"],
-        f"the mean load {told} by {_percent(number)} in the window, apart from its modulation",
+        f"the mean load {motion} by {_percent(number)} in the window, apart from its modulation",
         significant=significant,
     )
 

@@ -60,9 +60,9 @@ class AxisTable(BaseModel):
         given = {name for name in type(self).model_fields if getattr(self, name) is not None}
         forms = [form for form in allowed if form.replace("from", "from_") in given]
         if len(forms) != 1 or given - allowed[forms[0]]:
-            told = ", ".join(sorted(name.rstrip("_") for name in given)) or "nothing"
+            shown = ", ".join(sorted(name.rstrip("_") for name in given)) or "nothing"
             raise InputError(
-                f"axis must have one of from-to-count, values, zip, cases or draw, got {told}; "
+                f"axis must have one of from-to-count, values, zip, cases or draw, got {shown}; "
                 "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }"
             )
         needed = {"from": ("to", "count"), "draw": ("over", "count")}.get(forms[0], ())

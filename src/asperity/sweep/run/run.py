@@ -176,11 +176,11 @@ def _opened(
         store = extend(store, grid.record)
         store.update_attributes(plan_text=text)
         return store
-    told = differences(store.record, grid.record)
+    changed = differences(store.record, grid.record)
     way = "its axes may only become longer" if extending else (
         "change the plan back, choose another store, or add points to the end of axes with --extend"
     )  # fmt: skip
-    raise InputError(f"{path.name} must have the same plan, got {told}; {way}")
+    raise InputError(f"{path.name} must have the same plan, got {changed}; {way}")
 
 
 def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:

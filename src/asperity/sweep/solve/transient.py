@@ -114,8 +114,8 @@ class TransientSolve(SolveKind):
             every = points.take(rows).values
             for k, row in enumerate(rows):
                 one = {n: float(v[k]) for n, v in values.items()}
-                told = {n: float(v[k]) for n, v in every.items()} | one
-                _integrate(law, one, told, int(row), record["settings"], found)
+                named = {n: float(v[k]) for n, v in every.items()} | one
+                _integrate(law, one, named, int(row), record["settings"], found)
         return found
 
 
@@ -130,12 +130,12 @@ def _values(points: Points, law: str) -> dict[str, np.ndarray]:
 def _integrate(
     law: str,
     values: dict[str, float],
-    told: Mapping[str, float],
+    named: Mapping[str, float],
     row: int,
     settings: Mapping[str, Any],
     found: Findings,
 ) -> None:
-    lines = [line.format_map(_WithUnits(told)) for line in settings["steps"]]
+    lines = [line.format_map(_WithUnits(named)) for line in settings["steps"]]
     steps, mistakes = planned_steps(lines, Path())
     if mistakes:
         raise InputError("; ".join(mistakes))
