@@ -104,6 +104,16 @@ def test_every_number_has_a_place_and_every_source_an_entry(pmma: Material) -> N
     assert cited <= set(materials.available_citations())
 
 
+@pytest.mark.parametrize("source", ["mylab2026", "A. Author, J. Friction 1, 1 (2026)"])
+def test_a_source_without_an_entry_stands_for_itself(source: str) -> None:
+    assert materials.cited_works(source) == {source: source}
+
+
+def test_the_works_of_several_keys() -> None:
+    works = materials.cited_works("bureau2000, mylab2026")
+    assert works == {"bureau2000": materials.citation("bureau2000"), "mylab2026": "mylab2026"}
+
+
 def test_citations_are_whole_entries() -> None:
     for key in materials.available_citations():
         entry = materials.citation(key)

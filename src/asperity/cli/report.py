@@ -73,7 +73,7 @@ def response_record(
 
 
 def _provenance(response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]) -> dict[str, Any]:
-    from asperity.materials import citation
+    from asperity.materials import cited_works
     from asperity.parameters import point_parameters
 
     units = point_parameters(type(response.slider.law))
@@ -85,7 +85,7 @@ def _provenance(response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]
             name: {"value": number.value, "unit": units[name].unit, "from": number.origin}
             for name, number in numbers.items()
         },
-        "citation": {key.strip(): citation(key.strip()) for key in provenance["source"].split(",")},
+        "citation": cited_works(provenance["source"]),
     }
 
 

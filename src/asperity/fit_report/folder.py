@@ -19,7 +19,7 @@ from asperity.inference import Fit, Posterior
 from asperity.inference.forward import LockInTerm
 from asperity.inference.record import fit_record
 from asperity.inference.runs.term import RunTerm
-from asperity.materials import citation
+from asperity.materials import cited_works
 from asperity.outputs.folder import written_folder
 from asperity.parameters import law_parameters, point_parameters
 
@@ -227,9 +227,8 @@ def provenance(found: Fit) -> str:
     ]
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     sources = "".join(
-        f"<pre>{escape(citation(key.strip()))}</pre>"
-        for key in found.objective.law.source.split(",")
-        if key.strip()
+        f"<pre>{escape(work)}</pre>"
+        for work in cited_works(found.objective.law.source).values()
     )
     names = ", ".join(term.name for term in found.objective.terms)
     return (

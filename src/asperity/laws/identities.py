@@ -72,7 +72,7 @@ class BrokenIdentityError(AssertionError):
     def __init__(self, law: Law, broken: dict[str, str]) -> None:
         self.broken = broken
         found = "\n\n".join(f"{name}: {message.strip()}" for name, message in broken.items())
-        super().__init__(f"{type(law).name} breaks {len(broken)} identities\n\n{found}")
+        super().__init__(f"{type(law).name} breaks {', '.join(broken)}\n\n{found}")
 
 
 def check_law(

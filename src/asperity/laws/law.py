@@ -34,7 +34,8 @@ class Law(Displayed, eqx.Module):
     name : str
         The name by which the command line and tables call the law.
     source : str
-        Citation key(s) of the publication that states the law.
+        The publication that states the law: keys of `asperity.materials.available_citations` with
+        commas between them, or its reference as a text.
     state_names : tuple of str
         One name per state variable, in the order of the `state` tuple. States are dimensionless
         and logarithmic where the physical quantity is positive (ln of an age, not the age), so

@@ -9,13 +9,21 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from asperity.materials.bibliography import available_citations, citation
+from asperity.materials.bibliography import available_citations, citation, cited_works
 
 if TYPE_CHECKING:
     from asperity.materials.number import Number
     from asperity.materials.record import Material
 
-__all__ = ["Material", "Number", "available", "available_citations", "citation", "load"]
+__all__ = [
+    "Material",
+    "Number",
+    "available",
+    "available_citations",
+    "citation",
+    "cited_works",
+    "load",
+]
 
 
 def available() -> tuple[str, ...]:

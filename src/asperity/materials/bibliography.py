@@ -29,6 +29,27 @@ def citation(key: str) -> str:
         ) from None
 
 
+def cited_works(source: str) -> dict[str, str]:
+    """Works that a law names as its source, by citation key.
+
+    Parameters
+    ----------
+    source : str
+        Keys with commas between them, or the reference as a text.
+
+    Returns
+    -------
+    dict of str to str
+        BibTeX entries. What has none, as the source of a law from outside the package, stands for
+        itself.
+    """
+    entries = _entries()
+    keys = [key.strip() for key in source.split(",") if key.strip()]
+    if any(" " in key for key in keys):
+        keys = [source.strip()]
+    return {key: entries.get(key, key) for key in keys}
+
+
 def available_citations() -> tuple[str, ...]:
     """Keys that `citation` knows."""
     return tuple(sorted(_entries()))

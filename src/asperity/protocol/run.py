@@ -237,7 +237,6 @@ def _new_events(
 def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
     """Attributes of the file besides those of the solver."""
     numbers = protocol.numbers
-    source = protocol.slider.law.source
     return {
         "title": protocol.title or "run of a protocol",
         "protocol": "; ".join(protocol.lines),
@@ -245,9 +244,7 @@ def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
         f"velocity {protocol.programme.level.velocity!r} m/s",
         "material": protocol.material,
         "origin_of_parameters": "; ".join(f"{n}: {v.origin}" for n, v in numbers.items()),
-        "citation": "\n".join(
-            materials.citation(key.strip()) for key in source.split(",") if key.strip()
-        ),
+        "citation": "\n".join(materials.cited_works(protocol.slider.law.source).values()),
         "method": " and ".join(done.methods),
         "steps": done.steps,
         "unresolved_ringing": done.unresolved_ringing,

@@ -18,7 +18,7 @@ from typing import Any
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.laws import get_law
-from asperity.materials import citation
+from asperity.materials import cited_works
 from asperity.orbit.processes import available_cores
 from asperity.outputs import differences, free_disk, require_disk, size_text
 from asperity.parameters.arguments import file_path, whole_number
@@ -184,12 +184,9 @@ def _opened(
 
 
 def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
-    sources = {
-        key.strip()
-        for law in grid.record["laws"]
-        for key in get_law(law).source.split(",")
-        if key.strip()
-    }
+    works: dict[str, str] = {}
+    for law in grid.record["laws"]:
+        works |= cited_works(get_law(law).source)
     return {
         "title": plan.title or f"Sweep of {grid.points:,} points",
         "source": f"asperity {__version__}",
@@ -197,7 +194,7 @@ def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
         "plan_text": text,
         "relative_tolerance": 1e-8,
         "convention": "F/W0 = mean_friction + sum mu_n cos(n w t + phase_n), w(t) = W/W0",
-        "references": [citation(key) for key in sorted(sources)],
+        "references": [works[key] for key in sorted(works)],
         "runs": [],
     }
 
