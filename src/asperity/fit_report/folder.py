@@ -227,8 +227,7 @@ def provenance(found: Fit) -> str:
     ]
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     sources = "".join(
-        f"<pre>{escape(work)}</pre>"
-        for work in cited_works(found.objective.law.source).values()
+        f"<pre>{escape(work)}</pre>" for work in cited_works(found.objective.law.source).values()
     )
     names = ", ".join(term.name for term in found.objective.terms)
     return (

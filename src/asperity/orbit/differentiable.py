@@ -22,6 +22,7 @@ from asperity._jax import jit_large, spare_mappings
 from asperity.errors import InputError, closest
 from asperity.laws import Law, get_law
 from asperity.loads import Modulation
+from asperity.loads.consistency import checked_modulation
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
 from asperity.orbit.gradient.mesh_values import mesh_orbits, mesh_values
 from asperity.orbit.gradient.parametrised import (
@@ -39,7 +40,7 @@ from asperity.orbit.gradient.program import (
 from asperity.orbit.gradient.search import MeshOrbits, search_mesh_orbits
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
-from asperity.parameters.arguments import instance, switch, whole_number
+from asperity.parameters.arguments import switch, whole_number
 from asperity.slider import QuasiStatic
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.radiating import Radiating
@@ -254,8 +255,7 @@ def response_function(
     search = search if search == "direct" else switch(search, "search")
     harmonics = whole_number(harmonics, "harmonics", least=1)
     if modulation is not None:
-        advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
-        modulation = instance(modulation, Modulation, "modulation", advice)
+        modulation = checked_modulation(modulation)
     if not law_type.rate_dependent:
         raise InputError(
             f"law must depend on the velocity, got {law_type.name}; its force follows the load"

@@ -9,6 +9,7 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.loads import Harmonic, Modulation
+from asperity.loads.consistency import checked_modulation
 from asperity.parameters import DRIVE, MACHINE, obeying
 from asperity.parameters.arguments import instance, switch
 from asperity.slider.formulation import equation_of_motion
@@ -43,7 +44,7 @@ def checked_problem(
     inertia = switch(inertia, "inertia")
     V = DRIVE["V"].check(velocity)
     f = DRIVE["frequency"].check(frequency)
-    load = checked_modulation(epsilon, modulation)
+    load = chosen_modulation(epsilon, modulation)
     eta = None
     if radiation_damping is not None:
         # Zero is no damping in a table; as an argument it would be a mistake.
@@ -62,13 +63,14 @@ def checked_slider(slider: Any) -> Slider:
     return instance(slider, Slider, "slider", "build one as asperity.Slider(law, spring=, load=)")
 
 
-def checked_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation:
+def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation:
     """The modulation asked for, as an amplitude or as a programme.
 
     Raises
     ------
     InputError
-        Unless exactly one of the two is given, or where the amplitude breaks its rule.
+        Unless exactly one of the two is given, or where the amplitude breaks its rule or the
+        modulation one of `checked_modulation`.
     """
     if (epsilon is None) == (modulation is None):
         given = "neither" if epsilon is None else "both"
@@ -78,8 +80,7 @@ def checked_modulation(epsilon: Any, modulation: Modulation | None) -> Modulatio
         )
     if modulation is None:
         return Harmonic(DRIVE["epsilon"].check(epsilon))
-    advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
-    return instance(modulation, Modulation, "modulation", advice)
+    return checked_modulation(modulation)
 
 
 def flatten(problem: Problem) -> tuple[Problem, tuple[int, ...]]:

@@ -98,6 +98,8 @@ UNEQUAL = (
     "def read(path):\n"
     "    return RawRecording([RawColumn('t', np.arange(3.0)), RawColumn('F', np.arange(4.0))])\n"
 )
+LISTS = UNEQUAL.replace("np.arange(4.0)", "[0, 1, 2]")
+TEXT_STEP = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], step='1 ms'")
 
 
 @pytest.mark.parametrize(
@@ -106,6 +108,8 @@ UNEQUAL = (
         (RAISES, "could not read .RuntimeError: no."),
         (NOTHING, "must be a reader that returns a RawRecording"),
         (UNEQUAL, "must be a reader of columns of one length"),
+        (LISTS, "hold arrays of one dimension, got another thing in 'F'"),
+        (TEXT_STEP, "whose step is a positive number of seconds, got '1 ms'"),
         ("def read(path): ...\n", "must be a reader with is_format"),
         ("import nothing_of_this_name\n", "must be a reader that can be loaded"),
     ],

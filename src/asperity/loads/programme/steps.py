@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from asperity.errors import InputError
+from asperity.loads.consistency import checked_modulation
 from asperity.loads.modulation import Modulation
 from asperity.loads.programme.cycles import Cycles
 from asperity.loads.programme.interpolants import interpolated
 from asperity.loads.programme.levels import Levels
 from asperity.loads.programme.recorded import Recorded
 from asperity.loads.programme.segments import Segment
-from asperity.parameters.arguments import instance, number
+from asperity.parameters.arguments import number
 from asperity.units import to_si
 
 #: A number in SI, or a text with its unit.
@@ -209,8 +210,7 @@ class Cycle(Step):
         """One segment."""
         frequency = _positive(self.frequency, "frequency", f"{name}.frequency")
         duration = _duration(self.duration, name)
-        advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
-        modulation = instance(self.modulation, Modulation, f"{name}.modulation", advice)
+        modulation = checked_modulation(self.modulation, f"{name}.modulation")
         return [Cycles(duration, modulation, frequency, level.load, level.velocity)], level
 
 

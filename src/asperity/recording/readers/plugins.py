@@ -10,8 +10,11 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
+from numbers import Real
 from pathlib import Path
 from typing import Any, Protocol
+
+import numpy as np
 
 from asperity.errors import InputError
 from asperity.recording.readers.raw import RawRecording
@@ -97,6 +100,18 @@ def read_by_plugin(name: str, path: Path) -> RawRecording:
         raise InputError(
             f"read.format must be a reader that returns a RawRecording with columns, got "
             f"{type(recorded).__name__} of '{name}'; correct the reader"
+        )
+    for column in recorded.columns:
+        if not isinstance(column.values, np.ndarray) or column.values.ndim != 1:
+            raise InputError(
+                f"read.format must be a reader whose columns hold arrays of one dimension, got "
+                f"another thing in '{column.label}' of '{name}'; write numpy.asarray around it"
+            )
+    step = recorded.step
+    if step is not None and not (isinstance(step, Real) and 0 < step < np.inf):
+        raise InputError(
+            f"read.format must be a reader whose step is a positive number of seconds, got "
+            f"{step!r} of '{name}'; correct the reader"
         )
     sizes = {c.values.size for c in recorded.columns}
     if len(sizes) > 1:

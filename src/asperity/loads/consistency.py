@@ -1,0 +1,147 @@
+"""What the equations take for granted of a modulation, checked on samples of its period."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.loads.excitation import Excitation
+from asperity.loads.harmonic import Harmonic
+from asperity.loads.modulation import Modulation
+from asperity.loads.periodic import Periodic
+from asperity.parameters.arguments import instance
+
+#: Samples of the period; more are taken where fewer find a fault, which may be their own.
+_SAMPLES = (64, 1024, 16384)
+
+#: Values of one evaluation: points times samples.
+_VALUES = 2**18
+
+#: Largest error of a mean or of the amplitude, and share of the variation of W/W0 that its slope
+#: may miss: far above the error of a load with a kink, far below that of a wrong sign or factor.
+_MEAN, _SLOPE = 1e-3, 2e-2
+
+Array = NDArray[np.float64]
+
+
+def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
+    """A modulation whose members agree with each other.
+
+    Parameters
+    ----------
+    given : Modulation
+        Numbers or arrays of any shapes that broadcast. `Harmonic` and `Periodic` agree by their
+        construction.
+    name : str
+        What messages call it.
+
+    Raises
+    ------
+    InputError
+        If it is no `Modulation`; if over a period a value is not finite, W does not stay positive,
+        the mean of W/W0 or of the pull is not 1, `w_slope` is not the derivative of `w`,
+        `amplitude` is not that of the first harmonic, `scaled(0)` is not steady sliding, or the
+        load is not `even` and says so.
+    """
+    advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
+    modulation: Modulation = instance(given, Modulation, name, advice)
+    if type(modulation) in (Harmonic, Periodic):
+        return modulation
+    leaves, structure = jax.tree.flatten(modulation)
+    shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
+    flat = [np.ravel(np.broadcast_to(np.asarray(leaf, float), shape)) for leaf in leaves]
+    fault = _first_fault(structure, flat, int(np.prod(shape)), name)
+    if fault:
+        raise InputError(fault)
+    return modulation
+
+
+def _first_fault(
+    structure: Any, leaves: list[Array], points: int, name: str, samples: int = _SAMPLES[0]
+) -> str:
+    """A fault that more samples do not take away; empty where there is none."""
+    at_once = _VALUES // samples
+    for first in range(0, points, at_once):
+        part = [leaf[first : first + at_once] for leaf in leaves]
+        fault = _fault(structure.unflatten(part), samples, name)
+        if fault and samples < _SAMPLES[-1]:
+            finer = _SAMPLES[_SAMPLES.index(samples) + 1]
+            fault = _first_fault(structure, part, min(at_once, points - first), name, finer)
+        if fault:
+            return fault
+    return ""
+
+
+def _fault(modulation: Modulation, samples: int, name: str) -> str:
+    """What is wrong with the first point that has a fault; empty where there is none."""
+    theta = 2 * np.pi * np.arange(samples) / samples
+    at = modulation.at(theta[:, None])
+    amplitude = np.atleast_1d(np.asarray(modulation.amplitude, float))
+    values = {
+        field: np.asarray(value, float) * np.ones((samples, amplitude.size))
+        for field, value in zip(Excitation._fields, at, strict=True)
+    }
+    for field, found in values.items():
+        if not np.isfinite(found).all():
+            return f"{name}.at must be finite over the period, got {field} that is not; correct it"
+    w, pull = values["w"], values["pull"]
+    if (low := w.min()) <= 0:
+        return (
+            f"{name} must keep W/W0 positive over the period, so that contact is never lost, got "
+            f"{low:.4g}; lower its strength"
+        )
+    for field, found in (("w", w), ("pull", pull)):
+        mean = _furthest(found.mean(0), 1.0)
+        if abs(mean - 1) > _MEAN:
+            return (
+                f"{name}.at must give a {field} of mean 1 over the period, got {mean:.6g}; divide "
+                "it by its mean"
+            )
+    for field in ("w", "shear"):
+        missed = _missed_by_slope(values[field], values[f"{field}_slope"])
+        if missed > _SLOPE:
+            return (
+                f"{name}.at must give {field}_slope as the derivative of {field} with respect to "
+                f"theta, got one that misses {100 * missed:.2g} % of its variation; differentiate "
+                f"{field} once more"
+            )
+    first = 2 * np.abs((w * np.exp(-1j * theta)[:, None]).mean(0))
+    wrong = np.argmax(np.abs(amplitude - first))
+    if abs(amplitude[wrong] - first[wrong]) > _MEAN:
+        return (
+            f"{name}.amplitude must be that of the first harmonic of W/W0, {first[wrong]:.6g}, got "
+            f"{amplitude[wrong]:.6g}; correct one of the two"
+        )
+    still = np.asarray(modulation.scaled(0.0).at(theta[:, None]).w)
+    if not np.abs(still - 1).max() <= _MEAN:
+        return (
+            f"{name}.scaled(0) must be a constant load, W/W0 = 1, got one that changes; multiply "
+            "the strength by the share"
+        )
+    # Samples at theta and at 2 pi - theta.
+    odd = max(np.abs(v[1:] - v[:0:-1]).max() for v in (w, values["shear"], pull))
+    if modulation.even and odd > _MEAN:
+        return (
+            f"{name}.even must be False for a load that is not even in theta, got True; leave the "
+            "member out"
+        )
+    return ""
+
+
+def _furthest(values: Array, wanted: float) -> float:
+    return float(values[np.argmax(np.abs(values - wanted))])
+
+
+def _missed_by_slope(values: Array, slopes: Array) -> float:
+    """Largest share of the variation that the integral of the slope misses, by Simpson's rule."""
+    step = 2 * np.pi / len(values)
+    ahead = [np.roll(slopes, -k, axis=0) for k in range(3)]
+    integral = step / 3 * (ahead[0] + 4 * ahead[1] + ahead[2])
+    change = np.roll(values, -2, axis=0) - values
+    variation = np.abs(change).sum(0)
+    missed = np.abs(change - integral).sum(0)
+    return float(np.max(missed / np.maximum(variation, 1e-6), initial=0.0))

@@ -1,0 +1,144 @@
+"""A load of a user's own, whose members must agree with each other."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.errors import InputError
+from asperity.loads import Cycle, Excitation, Modulation, Programme, modulated
+from asperity.loads.consistency import checked_modulation
+
+
+class Skewed(Modulation):
+    """w = sqrt(1 - a^2) / (1 - a cos theta), of mean 1, with a shear force in proportion."""
+
+    a: float
+    gain: float = 0.3
+
+    def at(self, theta):
+        root = jnp.sqrt(1 - self.a**2)
+        w = root / (1 - self.a * jnp.cos(theta))
+        w_slope = -self.a / root * jnp.sin(theta) * w**2
+        return Excitation(w, w_slope, self.gain * (w - 1), self.gain * w_slope)
+
+    @property
+    def amplitude(self):
+        # Of the Fourier series, 1 + 2 sum over n of q^n cos n theta.
+        return 2 * self.a / (1 + jnp.sqrt(1 - self.a**2))
+
+    @property
+    def formula(self):
+        return "skewed"
+
+    def scaled(self, share):
+        return type(self)(self.a * share, self.gain)
+
+
+class Heavier(Skewed):
+    def at(self, theta):
+        at = super().at(theta)
+        return at._replace(w=at.w + 0.01)
+
+
+class Faster(Skewed):
+    def at(self, theta):
+        return super().at(theta)._replace(pull=1.01)
+
+
+class Lighter(Skewed):
+    def at(self, theta):
+        at = super().at(theta)
+        return at._replace(w=1 + 3 * (at.w - 1))
+
+
+class SlopeInTime(Skewed):
+    def at(self, theta):
+        at = super().at(theta)
+        return at._replace(w_slope=754 * at.w_slope)
+
+
+class NoShearSlope(Skewed):
+    def at(self, theta):
+        return super().at(theta)._replace(shear_slope=0.0)
+
+
+class OtherAmplitude(Skewed):
+    @property
+    def amplitude(self):
+        return self.a
+
+
+class NotEven(Skewed):
+    even = True
+
+    def at(self, theta):
+        return super().at(theta + 1.0)
+
+
+class NotScaled(Skewed):
+    def scaled(self, share):
+        return self
+
+
+@pytest.mark.parametrize(
+    ("load", "message"),
+    [
+        (Heavier, "a w of mean 1 over the period, got 1.01"),
+        (Faster, "a pull of mean 1 over the period, got 1.01"),
+        (Lighter, "keep W/W0 positive"),
+        (SlopeInTime, "w_slope as the derivative of w with respect to theta"),
+        (NoShearSlope, "shear_slope as the derivative of shear"),
+        (OtherAmplitude, "that of the first harmonic of W/W0, 0.535898, got 0.5"),
+        (NotEven, "even must be False"),
+        (NotScaled, r"scaled\(0\) must be a constant load"),
+    ],
+)
+def test_a_load_that_contradicts_itself(load, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        checked_modulation(load(0.5))
+
+
+def test_a_load_is_checked_wherever_it_comes_in() -> None:
+    slider = asp.Slider(asp.materials.load("bureau2000").law("rice-ruina"), spring=2e5, load=7.0)
+    with pytest.raises(InputError, match="mean 1"):
+        asp.periodic_response(slider, velocity=1e-6, frequency=120.0, modulation=Heavier(0.5))
+    with pytest.raises(InputError, match="mean 1"):
+        asp.response_function("rice-ruina", modulation=Heavier(0.5))
+    with pytest.raises(InputError, match=r"steps\[0\].modulation.at must give a w of mean 1"):
+        Programme(Cycle(1.0, Heavier(0.5), 120.0), load=7.0, velocity=1e-6)
+
+
+def test_one_bad_point_among_many_is_found() -> None:
+    a = np.full(300, 0.1)
+    assert checked_modulation(Skewed(a)) is not None
+    a[280] = 1.0
+    with pytest.raises(InputError, match="finite"):
+        checked_modulation(Skewed(a))
+
+
+@pytest.mark.parametrize("a", [0.0, 1e-6, 0.5, 0.999, 0.99999])
+def test_pulses_of_any_width_pass(a: float) -> None:
+    assert checked_modulation(Skewed(a)).a == a
+
+
+def test_a_kink_is_no_fault() -> None:
+    class Triangle(Skewed):
+        even = True
+
+        def at(self, theta):
+            x = jnp.abs(jnp.mod(theta + jnp.pi, 2 * jnp.pi) - jnp.pi) / jnp.pi
+            rising = jnp.mod(theta, 2 * jnp.pi) > jnp.pi
+            slope = jnp.where(rising, 2 * self.a, -2 * self.a) / jnp.pi
+            return Excitation(1 + self.a * (1 - 2 * x), slope)
+
+        @property
+        def amplitude(self):
+            return 8 * self.a / jnp.pi**2
+
+    assert checked_modulation(Triangle(0.4)).a == 0.4
+
+
+def test_the_package_s_own_loads_pass_as_they_are() -> None:
+    own = modulated(0.2, load={2: (0.1, 0.3)}, pull=0.1, tilt="5 deg")
+    assert checked_modulation(own) is own
