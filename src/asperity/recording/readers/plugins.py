@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
-from numbers import Real
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -102,13 +101,14 @@ def read_by_plugin(name: str, path: Path) -> RawRecording:
             f"{type(recorded).__name__} of '{name}'; correct the reader"
         )
     for column in recorded.columns:
-        if not isinstance(column.values, np.ndarray) or column.values.ndim != 1:
+        values: Any = column.values
+        if not isinstance(values, np.ndarray) or values.ndim != 1:
             raise InputError(
                 f"read.format must be a reader whose columns hold arrays of one dimension, got "
                 f"another thing in '{column.label}' of '{name}'; write numpy.asarray around it"
             )
-    step = recorded.step
-    if step is not None and not (isinstance(step, Real) and 0 < step < np.inf):
+    step: Any = recorded.step
+    if step is not None and not (isinstance(step, int | float) and 0 < step < np.inf):
         raise InputError(
             f"read.format must be a reader whose step is a positive number of seconds, got "
             f"{step!r} of '{name}'; correct the reader"

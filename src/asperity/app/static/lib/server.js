@@ -21,8 +21,8 @@ async function send(path, body, signal, part) {
     throw new Refused("The server does not answer; is asperity serve still running?");
   }
   if (!response.ok) {
-    const told = await response.json().catch(() => ({}));
-    throw new Refused(told.error || `The server answered with ${response.status}.`);
+    const body = await response.json().catch(() => ({}));
+    throw new Refused(body.error || `The server answered with ${response.status}.`);
   }
   return response;
 }

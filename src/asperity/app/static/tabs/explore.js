@@ -132,20 +132,20 @@ export function create(page) {
     searching = new AbortController();
     const { signal } = searching;
     try {
-      await run("explore/search", question(), (told) => {
+      await run("explore/search", question(), (part) => {
         if (signal.aborted) return;
-        if (told.point) answer.point = told.point;
-        else if (told.curve) {
-          const curve = answer.curves[told.curve];
-          told.rows.forEach((row, i) => {
+        if (part.point) answer.point = part.point;
+        else if (part.curve) {
+          const curve = answer.curves[part.curve];
+          part.rows.forEach((row, i) => {
             for (const n of ["mean_friction", "mu1", "mu2", "phase1", "phase2"]) {
-              curve[n][row] = told[n][i];
+              curve[n][row] = part[n][i];
             }
-            if (!told.converged[i] && !curve.lost) {
-              curve.lost = { at: answer.amplitudes[row], row, why: told.result[i] };
+            if (!part.converged[i] && !curve.lost) {
+              curve.lost = { at: answer.amplitudes[row], row, why: part.result[i] };
             }
           });
-          curve.left = curve.left.filter((row) => !told.rows.includes(row));
+          curve.left = curve.left.filter((row) => !part.rows.includes(row));
         } else return;
         draw();
       }, signal);

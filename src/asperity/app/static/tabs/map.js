@@ -114,12 +114,12 @@ export function create(page) {
     progress.removeAttribute("value");
     status.textContent = "Solving the first, coarse grid…";
     try {
-      await run("map", asked, (told) => {
+      await run("map", asked, (part) => {
         if (signal.aborted) return;
-        if (told.waiting) status.textContent = "Waiting for another map to be done…";
-        if (told.progress !== undefined) progress.value = told.progress;
-        if (!told.grid) return;
-        grid = told.grid;
+        if (part.waiting) status.textContent = "Waiting for another map to be done…";
+        if (part.progress !== undefined) progress.value = part.progress;
+        if (!part.grid) return;
+        grid = part.grid;
         shown = asked;
         draw();
         if (grid.count < asked.count) status.textContent = `${grid.count} × ${grid.count} points; a finer grid is being solved…`;

@@ -123,9 +123,9 @@ export class FitPanel {
     };
     this.#running(true);
     try {
-      const last = await run("data/fit", asked, (told) => {
-        if (told.waiting) this.status.textContent = "Waiting for another fit…";
-        if (told.minimisations !== undefined) this.status.textContent = `Fitting… ${told.minimisations} minimisations finished.`;
+      const last = await run("data/fit", asked, (part) => {
+        if (part.waiting) this.status.textContent = "Waiting for another fit…";
+        if (part.minimisations !== undefined) this.status.textContent = `Fitting… ${part.minimisations} minimisations finished.`;
       }, signal);
       if (last.result) this.#draw(last.result);
     } catch (error) {

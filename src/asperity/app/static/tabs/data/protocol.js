@@ -124,11 +124,11 @@ export class ProtocolPanel {
     this.bar.removeAttribute("value");
     this.status.textContent = "Preparing…";
     try {
-      const last = await run("data/run", { text: this.text.value }, (told) => {
-        if (told.waiting) this.status.textContent = "Waiting for another run…";
-        if (told.reached !== undefined) {
-          this.bar.value = told.reached / told.duration;
-          this.status.textContent = `${digits(told.reached, 3)} s of ${digits(told.duration, 3)} s`;
+      const last = await run("data/run", { text: this.text.value }, (part) => {
+        if (part.waiting) this.status.textContent = "Waiting for another run…";
+        if (part.reached !== undefined) {
+          this.bar.value = part.reached / part.duration;
+          this.status.textContent = `${digits(part.reached, 3)} s of ${digits(part.duration, 3)} s`;
         }
       }, this.work.signal);
       if (last.result) this.#draw(last.result);

@@ -81,11 +81,11 @@ export class RecordingCard {
     this.#says("Reading…");
     try {
       const { source, options } = this.state;
-      const last = await run("data/measure", { recording: this.state.key, source, options }, (told) => {
+      const last = await run("data/measure", { recording: this.state.key, source, options }, (part) => {
         if (signal.aborted) return;
-        if (told.waiting) this.#says("Waiting for another recording…");
-        if (told.stage === "measuring") this.#says("Measuring…");
-        if (told.recording) { this.recording = told.recording; this.#drawForms(); }
+        if (part.waiting) this.#says("Waiting for another recording…");
+        if (part.stage === "measuring") this.#says("Measuring…");
+        if (part.recording) { this.recording = part.recording; this.#drawForms(); }
       }, signal, `r${this.number}`);
       if (signal.aborted || !last.result) return;
       this.result = last.result;
