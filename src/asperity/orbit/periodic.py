@@ -63,8 +63,8 @@ def periodic_response(
         Called with the number of points finished so far and of all points.
     methods : tuple of str
         Which to use of "fourier", the fast method (shooting with inertia on elastic asperities),
-        "series", for slow modulation, and "collocation", the robust method with the methods that
-        follow branches to its initial guess. All by default.
+        "series", for slow or weak modulation, and "collocation", the robust method with the methods
+        that follow branches to its initial guess. All by default.
     workers : int, optional
         Processes to use; by default one per core for 200,000 points or more, else this one alone.
 

@@ -157,3 +157,56 @@ def test_what_maps_kept_at_once_leave_unresolved_is_resolved_interval_by_interva
     resolve_multipliers(problem, found, orbit, only)
     assert found.outcome[0] == Outcome.CONVERGED
     np.testing.assert_allclose(found.log_multipliers[:, 0], whole.log_multipliers, atol=1e-6)
+
+
+def tides(turns, epsilon):
+    """A fault that creeps at 1 nm/s on a spring 5 % above Kc; `turns` is V T/D0."""
+    a, b, v0 = 0.017, 0.025, 1e-9
+    law = RiceRuina(mu0=MU0, A=a, B=b, D0=D0, V0=V0)
+    slider = asp.Slider(law, spring=1.05 * (b - a) * W0 / D0, load=W0)
+    drive = {"velocity": v0, "epsilon": epsilon, "frequency": v0 / (np.asarray(turns) * D0)}
+    found = asp.periodic_response(slider, **drive, methods=("series",), waveform=SAMPLES)
+    return found, a, b, MU0 - (b - a) * np.log(v0 / V0)
+
+
+def test_a_weak_modulation_near_resonance_has_the_linear_gain():
+    """v = 1 + dv e^(i theta) in f' = kappa (1 - v), phi' = chi (e^(-phi) - v), to first order."""
+    turns = np.array([4.6, 8.0, 9.0])
+    found, a, b, mu = tides(turns, 1e-4)
+    assert found.converged.all()
+    chi = turns / (2 * np.pi)
+    kappa = chi * 1.05 * (b - a)
+    gain = kappa / np.abs(a - 1j * kappa - b * chi / (1j + chi))
+    assert gain[1] == pytest.approx(5.1, abs=0.05)
+    # The next order is that of the swing of the exponent squared.
+    swing = gain * mu * 1e-4 / kappa
+    assert (np.abs(found.mu1 / (1e-4 * mu) / gain - 1) < swing**2).all()
+
+
+def test_modulated_at_half_the_critical_period_the_fault_is_unstable():
+    """The monodromy matrix by another integrator, from the orbit's own first states."""
+    epsilon = 0.002
+    found, a, b, mu = tides([4.6, 8.0], epsilon)
+    for k, turns in enumerate((4.6, 8.0)):
+        chi = turns / (2 * np.pi)
+        kappa = chi * 1.05 * (b - a)
+
+        def rates(theta, y, chi=chi, kappa=kappa):
+            f, phi = y
+            v = np.exp((f / (1 + epsilon * np.cos(theta)) - mu - b * phi) / a)
+            return [kappa * (1 - v), chi * (np.exp(-phi) - v)]
+
+        def period(y, rates=rates):
+            return solve_ivp(rates, (0, 2 * np.pi), y, "DOP853", rtol=1e-12, atol=1e-14).y[:, -1]
+
+        y = np.array([mu, 0.0])
+        for _ in range(12):  # shooting
+            # Central differences: steps of a part of the swing.
+            steps = np.diag([1e-6, 1e-4])
+            columns = [(period(y + h) - period(y - h)) / (2 * h.max()) for h in steps]
+            monodromy = np.stack(columns, axis=1)
+            y = y - np.linalg.solve(monodromy - np.eye(2), period(y) - y)
+        assert period(y) == pytest.approx(y, abs=1e-10)
+        largest = np.abs(np.linalg.eigvals(monodromy)).max()
+        assert np.exp(found.log_multipliers[k, 0].real) == pytest.approx(largest, rel=1e-5)
+        assert found.stable[k] == (largest < 1) == (turns == 8.0)

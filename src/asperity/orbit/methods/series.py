@@ -1,10 +1,14 @@
-"""SeriesOrbits orbits of stiff equations: Fourier series, solved directly.
+"""Orbits of stiff equations, and under weak modulation: Fourier series, solved directly.
 
 Under slow modulation the orbit is nearly a sequence of steady states. Its harmonics fall
 exponentially, however fast perturbations of it grow or decay, so that a few dozen nodes, on which
 both are far from resolved, give it to round-off. Collocation on a mesh that begins to resolve them
 does worse: where sliding is unstable for part of the period, and a perturbation grows by e^40
 there, the solution on the mesh is as sensitive.
+
+Under weak modulation, of any period, the response is nearly linear and its harmonics fall as powers
+of the amplitude: near a resonance, where the fast method does not contract, a series takes a
+fraction of the time of a mesh.
 
 A series is accepted where one with more nodes, solved anew, agrees with it.
 """
@@ -24,7 +28,11 @@ from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.algebra.small_systems import jacobian_columns
 from asperity.orbit.batches import Indices, put, run_chunks, take
 from asperity.orbit.changes import exponent_change
-from asperity.orbit.compiled import STIFFNESS_CHUNK, stiffness_of_steady_sliding
+from asperity.orbit.compiled import (
+    STIFFNESS_CHUNK,
+    sharpness_of_slip,
+    stiffness_of_steady_sliding,
+)
 from asperity.orbit.methods.collocation.mesh import Orbit
 from asperity.orbit.methods.collocation.refinement import accept
 from asperity.orbit.methods.collocation.scheme import scheme_for
@@ -45,6 +53,9 @@ INTERVALS = 216
 
 #: Rate per radian of a disturbance of steady sliding from which modulation counts as slow.
 _SLOW = 1.0
+#: Range of the slip exponent's half swing in which modulation counts as weak. Below, the second
+#: harmonic loses digits to the round-off of the states, which a mesh keeps as deviations.
+_WEAK = (1e-3, 0.5)
 _CHUNK = 64
 #: Newton's steps from sequences of steady states, and from the series on fewer nodes.
 _FIRST_STEPS, _NEXT_STEPS = 14, 4
@@ -62,7 +73,7 @@ _HOPEFUL = 1e-8
 
 
 class FourierSeries(Method):
-    """Fourier series solved directly, for slow modulation."""
+    """Fourier series solved directly, for slow or weak modulation."""
 
     name = "series"
     choice = "series"
@@ -72,31 +83,38 @@ class FourierSeries(Method):
         return True
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
-        """As in `Method`; only points under slow modulation are tried."""
+        """As in `Method`; only points under slow or weak modulation are tried."""
         points = np.arange(problem.system.V.shape[-1])
         solution = Solution.unsolved(problem, len(points), options)
         system, load = problem
         # Mass and damping make the equations stiff too, but not their orbits smooth.
         sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
-        slow = np.concatenate(
+        smooth = np.concatenate(
             [
-                part[stiffness >= _SLOW]
-                for part, stiffness in run_chunks(
-                    stiffness_of_steady_sliding, sliding, points, STIFFNESS_CHUNK
+                part[(stiffness >= _SLOW) | weak]
+                for part, (stiffness, weak) in run_chunks(
+                    _smoothness, sliding, points, STIFFNESS_CHUNK
                 )
             ]
         )
-        if not len(slow):
+        if not len(smooth):
             return solution
-        part = take(problem, slow)
-        orbit, resolved = series_orbits(part, len(slow))
+        part = take(problem, smooth)
+        orbit, resolved = series_orbits(part, len(smooth))
         kept = np.flatnonzero(resolved)
         if len(kept):
             found = Solution.unsolved(problem, len(kept), options)
             accept(take(part, kept), found, take(orbit, kept), options)
             options.progress(int(found.converged.sum()))
-            solution.merge(slow[kept], found)
+            solution.merge(smooth[kept], found)
         return solution
+
+
+def _smoothness(sliding: Problem) -> tuple[Array, NDArray[np.bool_]]:
+    """Rate of a disturbance of steady sliding per radian, and which points are weakly modulated."""
+    sharpness = np.asarray(sharpness_of_slip(sliding))
+    weak = (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
+    return stiffness_of_steady_sliding(sliding), weak
 
 
 def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool_]]:
@@ -165,7 +183,7 @@ def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices
         rates, jacobian = (np.asarray(a) for a in _linearised(problem, Y))
         finite = np.isfinite(rates).all((0, 1)) & np.isfinite(jacobian).all((0, 1, 2))
         at = at[finite[at]]
-        gap = rates[..., at] - np.einsum("kl,nlb->nkb", derivative, Y[..., at])
+        gap = rates[..., at] - np.einsum("kl,nlb->nkb", derivative, Y[..., at], optimize=True)
         try:
             step = _solved(jacobian[..., at], derivative, gap)
         except np.linalg.LinAlgError:
@@ -232,7 +250,7 @@ def _on_even_mesh(harmonics: NDArray[np.complex128], scheme: CollocationScheme) 
     return Orbit(
         np.broadcast_to(mesh[:, None], (INTERVALS + 1, harmonics.shape[2])),
         harmonics[:, 0].real + weights.sum(1).real,
-        np.einsum("mk,nkb->nmb", nodes, weights).real,
-        np.einsum("smk,nkb->nsmb", slopes, weights).real,
+        np.einsum("mk,nkb->nmb", nodes, weights, optimize=True).real,
+        np.einsum("smk,nkb->nsmb", slopes, weights, optimize=True).real,
         scheme,
     )

@@ -139,7 +139,7 @@ def local_cluster(count: int) -> Iterator[Workers]:
     import dask
 
     with (
-        dask.config.set({"distributed.nanny.pre-spawn-environ": {**_limits(), **ENVIRONMENT}}),
+        dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ENVIRONMENT)}),
         distributed.LocalCluster(
             n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None
         ) as cluster,
@@ -185,11 +185,6 @@ def _using(client: Any, about: str) -> Iterator[Workers]:
     finally:
         with contextlib.suppress(RuntimeError):
             workers.close(kill=kill)
-
-
-def _limits() -> dict[str, str]:
-    """What Dask sets for its workers by default: one thread of every library."""
-    return dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 
 
 def _distributed(option: str) -> Any:

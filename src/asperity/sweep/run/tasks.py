@@ -21,8 +21,11 @@ if TYPE_CHECKING:
     from asperity.sweep.solve import Findings
     from asperity.sweep.store.store import SweepStore
 
-#: Environment of a worker: one thread of XLA.
-ENVIRONMENT = {"NPROC": "1"}
+#: Environment of a worker: one thread of XLA and of the linear algebra of NumPy, as Dask has it.
+ENVIRONMENT = {
+    "NPROC": "1",
+    **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
+}
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ _NAMES = (
 
 #: Points of a chunk: at least a call of the fast method, at most half a second.
 _FEWEST, _MOST = 960, 19_200
+#: Points that series may take in the first stage: some seconds.
+_FEW = 1200
 #: Chunks that a small plan is cut into, so that several workers have something to do.
 _SHARES = 8
 #: Times that a point takes longer where the mass counts.
@@ -33,7 +35,11 @@ _INERTIAL = 16
 
 
 class PeriodicSolve(SolveKind):
-    """`asperity.periodic_response` at every point: the fast method first, all methods then."""
+    """`asperity.periodic_response` at every point: the fast method first, all methods then.
+
+    Series belong to the first stage where it leaves few points: what follows has fixed costs, which
+    the points of a whole chunk share better than those of many batches.
+    """
 
     name = "periodic"
     outputs = tuple(OUTPUTS[name] for name in _NAMES)
@@ -41,8 +47,10 @@ class PeriodicSolve(SolveKind):
         *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
         *("log_multiplier", "mode_frequency", "stable"),
     )
-    #: Methods of the first stage.
+    #: Methods of the two stages, and of the first one for what the fast method leaves.
     quick: ClassVar[tuple[str, ...]] = ("fourier",)
+    smooth: ClassVar[tuple[str, ...]] = ("series",)
+    thorough: ClassVar[tuple[str, ...]] = ("series", "collocation")
 
     def chunk_points(self, grid: SweepGrid) -> int:
         """As in `SolveKind`."""
@@ -54,11 +62,17 @@ class PeriodicSolve(SolveKind):
 
     def first(self, points: Points, record: Mapping[str, Any]) -> Findings:
         """As in `SolveKind`."""
-        return _solve(points, record["outputs"], {"methods": self.quick}, leave=True)
+        found = _solve(points, record["outputs"], {"methods": self.quick}, leave=True)
+        left = found.left
+        most = _FEW // _INERTIAL if np.any(points.values.get("inertia", np.zeros(1)) > 0) else _FEW
+        if 0 < len(left) <= most:
+            options = {"methods": self.smooth}
+            found.put(left, _solve(points.take(left), record["outputs"], options, leave=True))
+        return found
 
     def second(self, points: Points, record: Mapping[str, Any]) -> Findings:
         """As in `SolveKind`."""
-        return _solve(points, record["outputs"], {}, leave=False)
+        return _solve(points, record["outputs"], {"methods": self.thorough}, leave=False)
 
 
 def _solve(points: Points, outputs: list[str], options: dict[str, Any], *, leave: bool) -> Findings:
