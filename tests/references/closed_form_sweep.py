@@ -1,5 +1,8 @@
-"""Sweeps without processes: a solve in closed form, and workers that are this process."""
+"""Sweeps with a solve in closed form, in this process or on any workers."""
 
+import os
+import signal
+import time
 from collections.abc import Callable
 from concurrent.futures import Future
 from pathlib import Path
@@ -8,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from asperity.parameters import OUTPUTS
-from asperity.sweep import SweepPlan
+from asperity.sweep import SweepPlan, run_sweep
 from asperity.sweep.run.executors import Workers
-from asperity.sweep.solve import Findings, SolveKind
+from asperity.sweep.solve import SOLVES, Findings, SolveKind
 from asperity.sweep.solve.outcome import SweepOutcome
 
 
@@ -64,6 +67,51 @@ class ThisProcess(Workers):
 
     def close(self, *, kill: bool) -> None:
         pass
+
+
+class InClosedForm(Workers):
+    """Other workers, on which every task uses the closed form.
+
+    The first task with the third chunk kills its process, which leaves the file `mark`.
+    """
+
+    def __init__(self, workers: Workers, mark: str) -> None:
+        self.workers, self.mark = workers, mark
+        self.count, self.about, self.lost = workers.count, workers.about, workers.lost
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        return self.workers.submit(_in_closed_form, self.mark, task, *args)
+
+    def restart(self) -> None:
+        self.workers.restart()
+
+    def close(self, *, kill: bool) -> None:
+        self.workers.close(kill=kill)
+
+
+def _in_closed_form(mark: str, task: Callable[..., Any], job: Any, units: Any, *args: Any) -> Any:
+    SOLVES["periodic"] = ClosedForm()
+    if any(unit.chunk == 2 for unit in units):
+        try:
+            os.close(os.open(mark, os.O_CREAT | os.O_EXCL))
+        except FileExistsError:
+            pass
+        else:
+            os.kill(os.getpid(), signal.SIGKILL)
+    return task(job, units, *args)
+
+
+class _Slow(ClosedForm):
+    def first(self, points: Any, record: Any) -> Findings:
+        time.sleep(0.2)
+        return super().first(points, record)
+
+
+def slow_driver(out: str) -> None:
+    """A driver that takes a fifth of a second for a chunk."""
+    os.environ["NPROC"] = "1"
+    SOLVES["periodic"] = _Slow()
+    run_sweep(plan_of(), out, workers=ThisProcess())
 
 
 def plan_of(epsilon: int = 20, stiffness: tuple[float, ...] = (1.0, 2.0, 3.0)) -> SweepPlan:

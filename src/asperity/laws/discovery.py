@@ -106,8 +106,10 @@ def _module(where: str, place: str) -> ModuleType:
 
 def _from_file(path: Path) -> ModuleType:
     file = path.resolve(strict=True)
-    # One module for one file, so that naming it twice gives the same class.
-    name = f"asperity_law_{hashlib.sha256(str(file).encode()).hexdigest()[:16]}"
+    # One module for one file, so that naming it twice gives the same class; a file that was edited
+    # since gives another one.
+    content = hashlib.sha256(str(file).encode() + b"\0" + file.read_bytes())
+    name = f"asperity_law_{content.hexdigest()[:16]}"
     if name in sys.modules:
         return sys.modules[name]
     spec = importlib.util.spec_from_file_location(name, file)

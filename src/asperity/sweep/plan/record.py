@@ -6,9 +6,12 @@ nothing but the record.
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -40,6 +43,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     """
     mistakes: list[str] = []
     axes: dict[str, Any] = {}
+    plan = _with_places(plan)
     laws = _laws_named(plan, mistakes)
     known = _known(laws)
     for name, table in plan.axes.items():
@@ -73,6 +77,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
         "solve": plan.solve,
         **({"settings": settings} if settings else {}),
         "laws": laws,
+        **({"law_files": files} if (files := _law_files(plan)) else {}),
         "numbers": numbers,
         "origins": origins,
         "axes": axes,
@@ -87,8 +92,49 @@ def _known(laws: Sequence[str]) -> dict[str, Parameter]:
     return {**parameters, **{name: ratio.parameter for name, ratio in RATIOS.items()}}
 
 
-def _laws_named(plan: SweepPlan, mistakes: list[str]) -> list[str]:
-    """Laws of the plan, without repetition, in their order."""
+def law_places(plan: SweepPlan) -> tuple[str, ...]:
+    """Places of the laws that the plan names by one; files by their whole path."""
+    named = dict.fromkeys(map(str, _named(_with_places(plan))))
+    return tuple(text for text in named if ":" in text)
+
+
+def _law_files(plan: SweepPlan) -> dict[str, str]:
+    """SHA-256 of the file of each law that is named by its place, by its name."""
+    found = {}
+    for place in law_places(plan):
+        module = sys.modules[get_law(known_law(place)).__module__]
+        content = Path(str(module.__file__)).read_bytes()
+        found[known_law(place)] = hashlib.sha256(content).hexdigest()
+    return found
+
+
+def _with_places(plan: SweepPlan) -> SweepPlan:
+    """The plan with whole paths: files of laws lie beside it, or where their path says."""
+
+    def place(law: Any) -> Any:
+        if isinstance(law, list | tuple):
+            return type(law)(place(one) for one in law)
+        file, _, name = str(law).rpartition(":")
+        return f"{(plan.folder / file).resolve()}:{name}" if file.endswith(".py") else law
+
+    axes = {}
+    for name, table in plan.axes.items():
+        fields: dict[str, Any] = {}
+        if name == "law" and table.values is not None:
+            fields["values"] = place(table.values)
+        if table.zip is not None and "law" in table.zip:
+            fields["zip"] = {**table.zip, "law": place(table.zip["law"])}
+        if table.cases is not None:
+            fields["cases"] = tuple(
+                {**case, "law": place(case["law"])} if "law" in case else case
+                for case in table.cases
+            )
+        axes[name] = table.model_copy(update=fields)
+    return plan.model_copy(update={"law": place(plan.law), "axes": axes})
+
+
+def _named(plan: SweepPlan) -> list[Any]:
+    """Laws as the plan writes them, in their order."""
     named: list[Any] = [plan.law] if plan.law else []
     for name, table in plan.axes.items():
         if name == "law" and table.values is not None:
@@ -98,6 +144,12 @@ def _laws_named(plan: SweepPlan, mistakes: list[str]) -> list[str]:
         for case in table.cases or ():
             value = case.get("law")
             named += value if isinstance(value, list | tuple) else [value] if value else []
+    return named
+
+
+def _laws_named(plan: SweepPlan, mistakes: list[str]) -> list[str]:
+    """Laws of the plan, without repetition, in their order."""
+    named = _named(plan)
     found = []
     for law in dict.fromkeys(named):
         try:

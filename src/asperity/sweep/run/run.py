@@ -11,7 +11,6 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +22,10 @@ from asperity.orbit.processes import available_cores
 from asperity.outputs import differences, free_disk, require_disk, size_text
 from asperity.parameters.arguments import file_path, whole_number
 from asperity.sweep.plan import SweepGrid, SweepPlan, load_plan
+from asperity.sweep.plan.record import law_places
 from asperity.sweep.run.driver import Driver, SweepProgress, is_full, units_of
 from asperity.sweep.run.executors import Workers, local_cluster, local_processes, scheduler
+from asperity.sweep.run.numerics import numerics, package_version
 from asperity.sweep.run.tasks import Job
 from asperity.sweep.store.extend import extend, is_extension
 from asperity.sweep.store.lock import StoreLock
@@ -122,7 +123,11 @@ def run_sweep(
         require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
                      "choose another disk or fewer outputs")  # fmt: skip
         with pool as found:
-            return _run(store, lock, found, retry_failed, progress, log)
+            job = Job(
+                str(store.path), store.grid.digest, lock.token, retry_failed, law_places(plan),
+                numerics(),
+            )  # fmt: skip
+            return _run(store, lock, found, job, progress, log)
 
 
 def _workers(
@@ -160,11 +165,12 @@ def _opened(
         remove_pieces(path)
         return create(path, grid, _attributes(plan, text, grid))
     store = SweepStore(path)
-    if store.attributes.get("asperity_version") != __version__ and not retry:
+    made = store.attributes.get("numerics", {})
+    if made != numerics() and not retry:
         raise InputError(
-            f"out must be of this version of asperity, {__version__}, got "
-            f"'{path.name}' of {store.attributes.get('asperity_version')}, whose numbers may "
-            "differ in their last digits; finish it with that version, or choose another store"
+            f"out must be continued by what began it, got '{path.name}' with "
+            f"{differences(made, numerics())}, so that last digits may differ; finish it with "
+            "those versions, or choose another store"
         )
     pending = store.attributes.get("extending")
     if pending:
@@ -191,6 +197,7 @@ def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
         "title": plan.title or f"Sweep of {grid.points:,} points",
         "source": f"asperity {__version__}",
         "asperity_version": __version__,
+        "numerics": numerics(),
         "plan_text": text,
         "relative_tolerance": 1e-8,
         "convention": "F/W0 = mean_friction + sum mu_n cos(n w t + phase_n), w(t) = W/W0",
@@ -216,15 +223,15 @@ def _run(
     store: SweepStore,
     lock: StoreLock,
     workers: Workers,
-    retry: bool,
+    job: Job,
     progress: Callable[[SweepProgress], None] | None,
     log: Callable[[str], None] | None,
 ) -> SweepSummary:
     grid = store.grid
     counts = SweepProgress(total=grid.points, chunk_total=grid.chunk_count)
-    job = Job(str(store.path), grid.digest, lock.token, retry)
     runs = [*store.attributes.get("runs", []), _started(workers)]
-    store.update_attributes(runs=runs)
+    # With --retry-failed these may be others than before; the runs have them all.
+    store.update_attributes(runs=runs, numerics=numerics())
     refreshed = time.monotonic()
 
     def tick(now: SweepProgress) -> None:
@@ -272,15 +279,8 @@ def _started(workers: Workers) -> dict[str, Any]:
         "workers": workers.about,
         "asperity": __version__,
         "python": platform.python_version(),
-        **{name: found for name in _PACKAGES if (found := _version(name))},
+        **{name: found for name in _PACKAGES if (found := package_version(name))},
     }
-
-
-def _version(package: str) -> str:
-    try:
-        return version(package)
-    except PackageNotFoundError:
-        return ""
 
 
 def _ended(counts: SweepProgress) -> Mapping[str, Any]:

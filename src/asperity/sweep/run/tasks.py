@@ -10,11 +10,15 @@ import os
 import platform
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from asperity.errors import InputError
+from asperity.outputs import differences
+from asperity.sweep.run.numerics import numerics
 
 if TYPE_CHECKING:
     from asperity.sweep.plan.grid import Points
@@ -42,12 +46,18 @@ class Job:
         Of the driver's lock; "" to write whoever has the lock.
     retry : bool
         Whether chunks with failed points are solved again.
+    laws : tuple of str
+        Places of laws that are neither of the package nor installed, ``path/to/file.py:Name``.
+    numerics : dict of str to str, optional
+        `asperity.sweep.run.numerics.numerics` of the driver.
     """
 
     store: str
     digest: str
     token: str
     retry: bool = False
+    laws: tuple[str, ...] = ()
+    numerics: Mapping[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -105,8 +115,8 @@ class SupersededError(RuntimeError):
     """Another driver has the store: what this worker was asked for is no longer wanted."""
 
 
-class ThreadsError(RuntimeError):
-    """JAX is loaded with several threads, so that results would differ in their last bits."""
+class WorkerError(InputError):
+    """A worker that would give other numbers than the driver, or none."""
 
 
 def work(job: Job, units: tuple[Unit, ...], budget: float) -> Report:
@@ -118,10 +128,14 @@ def work(job: Job, units: tuple[Unit, ...], budget: float) -> Report:
         If the store cannot be written.
     SupersededError
         If another driver has taken the store.
+    WorkerError
+        If this process has several threads, other versions than the driver, or lacks a law.
     """
     _single_thread()
+    _check_numerics(job)
     from asperity._jax import spare_mappings
 
+    _register(job)
     worker = _worker(job.store, job.digest)
     report = Report(worker=f"{platform.node()}:{os.getpid()}")
     begin = time.perf_counter()
@@ -155,10 +169,36 @@ def _single_thread() -> None:
     if "jax" not in sys.modules:
         os.environ.update(ENVIRONMENT)
     elif os.environ.get("NPROC") != "1":
-        raise ThreadsError(
+        raise WorkerError(
             "workers must have one thread of JAX, got a process that loaded it with more; start "
             "the workers with the environment variable NPROC=1"
         )
+
+
+def _check_numerics(job: Job) -> None:
+    own = numerics()
+    if job.numerics is not None and job.numerics != own:
+        raise WorkerError(
+            "workers must have the versions of the driver, got "
+            f"{differences(job.numerics, own)} ({platform.node()}); start them from the same "
+            "environment"
+        )
+
+
+def _register(job: Job) -> None:
+    """Make laws known that the package does not bring."""
+    from asperity.laws import get_law, known_law
+
+    for place in job.laws:
+        known_law(place)
+    for name in _worker(job.store, job.digest).grid.record["laws"]:
+        try:
+            get_law(name)
+        except InputError:
+            raise WorkerError(
+                f"law must be known to the workers, got '{name}', which only the program has "
+                "that started them; name it by its place, like law = 'my_law.py:MyLaw'"
+            ) from None
 
 
 @lru_cache(maxsize=1)
