@@ -9,10 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from asperity.sweep.plan import SweepGrid, SweepPlan, load_plan
-from asperity.sweep.solve import SOLVES
+from asperity.sweep.plan.grid import Points
+from asperity.sweep.solve import SOLVES, SolveKind
 
-#: Points of the sample, and seconds that its second stage may take.
+#: Points of the sample, and seconds that each of its stages may take.
 _SAMPLE, _SECONDS = 2000, 20.0
+#: Chunks on which the first stage is timed: as they are run, each with the laws that share it.
+_TIMED = 6
 
 
 @dataclass(frozen=True)
@@ -65,31 +68,26 @@ def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
         grid.points < 10**7
     ) else np.unique(np.random.default_rng(0).integers(0, grid.points, count))  # fmt: skip
     points = grid.numbered(np.sort(numbers))
-    # Once for the compiler, once for the clock.
-    for _ in range(2):
-        begin = time.process_time()
-        found = solve.first(points, grid.record)
-        first = time.process_time() - begin
-    left = found.left
-    share = len(left) / len(points)
-    second, solved = 0.0, 0
+    found = solve.first(points, grid.record)
     failed = int(np.count_nonzero(found.outcome > 0))
-    seen = len(points) - len(left)
-    batches = solve.batches(points, left)
+    seen, share = len(points) - len(found.left), len(found.left) / len(points)
+    first, batches = _first_stage(grid, solve)
+    # Batches of whole chunks: those of the sample, of each law a few points, would cost more each.
+    batches = batches or [points.take(rows) for rows in solve.batches(points, found.left)]
     if batches:
-        solve.second(points.take(batches[0]), grid.record)  # for the compiler
-    # The sample's batches are mixed; any of them stands for the rest.
+        solve.second(batches[0], grid.record)  # for the compiler
+    # Any of them stands for the rest.
     np.random.default_rng(0).shuffle(batches)
+    second, solved = 0.0, 0
     start = time.perf_counter()
     for batch in batches:
         begin = time.process_time()
-        part = solve.second(points.take(batch), grid.record)
+        part = solve.second(batch, grid.record)
         second, solved = second + time.process_time() - begin, solved + len(batch)
-        failed += part.failed
-        seen += len(batch)
+        failed, seen = failed + part.failed, seen + len(batch)
         if time.perf_counter() - start > _SECONDS:
             break
-    each = first / len(points) + (share * second / solved if solved else 0.0)
+    each = first + (share * second / solved if solved else 0.0)
     return SweepEstimate(
         shape=grid.shape,
         chunk_shape=grid.chunks,
@@ -101,3 +99,25 @@ def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
         failed=failed / max(seen, 1),
         seconds=each * grid.points,
     )
+
+
+def _first_stage(grid: SweepGrid, solve: SolveKind) -> tuple[float, list[Points]]:
+    """Processor time of the first stage for a point, from whole chunks, and batches they leave.
+
+    The sample would not do: it has points of all laws, each of which takes calls of its own.
+    """
+    count = min(_TIMED, grid.chunk_count)
+    spent, points = 0.0, 0
+    batches: list[Points] = []
+    start = time.perf_counter()
+    # Evenly over the plan, whose outer axes have the laws.
+    for k in range(count):
+        chunk = grid.at((2 * k + 1) * grid.chunk_count // (2 * count))
+        solve.first(chunk, grid.record)  # for the compiler
+        begin = time.process_time()
+        found = solve.first(chunk, grid.record)
+        spent, points = spent + time.process_time() - begin, points + len(chunk)
+        batches += [chunk.take(rows) for rows in solve.batches(chunk, found.left)]
+        if time.perf_counter() - start > _SECONDS:
+            break
+    return spent / points, batches
