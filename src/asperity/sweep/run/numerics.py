@@ -11,7 +11,6 @@ from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-import asperity
 from asperity._version import __version__
 
 #: Packages that the numbers come from.
@@ -41,7 +40,7 @@ def numerics() -> dict[str, str]:
 
 def _sources() -> str:
     """Digest of the package's modules, which may change between versions where it is developed."""
-    root = Path(asperity.__file__).parent
+    root = Path(__file__).parents[2]
     digest = hashlib.sha256()
     for file in sorted(root.rglob("*.py")):
         place = file.relative_to(root)
