@@ -6,7 +6,7 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
-from asperity.loads import Cycle, Excitation, Modulation, Programme, modulated
+from asperity.loads import CyclicLoading, Excitation, Modulation, Programme, modulated
 from asperity.loads.consistency import checked_modulation
 
 
@@ -106,7 +106,7 @@ def test_a_load_is_checked_wherever_it_comes_in() -> None:
     with pytest.raises(InputError, match="mean 1"):
         asp.response_function("rice-ruina", modulation=Heavier(0.5))
     with pytest.raises(InputError, match=r"steps\[0\].modulation.at must give a w of mean 1"):
-        Programme(Cycle(1.0, Heavier(0.5), 120.0), load=7.0, velocity=1e-6)
+        Programme(CyclicLoading(1.0, Heavier(0.5), 120.0), load=7.0, velocity=1e-6)
 
 
 def test_one_bad_point_among_many_is_found() -> None:

@@ -14,7 +14,7 @@ import pytest
 import asperity as asp
 from asperity.errors import InputError
 from asperity.loads import (
-    Cycle,
+    CyclicLoading,
     Hold,
     Modulate,
     Programme,
@@ -196,7 +196,10 @@ CASES: dict[str, tuple[Callable[..., Any], dict[str, Any], list[tuple[str, Any]]
             (RampLoad, {"to": 8.0, "duration": 1.0}),
             (RampVelocity, {"to": 1e-5, "duration": 1.0}),
             (Modulate, {"duration": 1.0, "epsilon": 0.1, "frequency": 10.0, "phase": 0.0}),
-            (Cycle, {"duration": 1.0, "modulation": modulated(epsilon=0.1), "frequency": 10.0}),
+            (
+                CyclicLoading,
+                {"duration": 1.0, "modulation": modulated(epsilon=0.1), "frequency": 10.0},
+            ),
         )
     },
     "StepLoad": (

@@ -5,13 +5,13 @@ import pytest
 
 from asperity.figures.style import style
 from asperity.figures.trajectory import draw_run
-from asperity.protocol import Outline
+from asperity.protocol import RunOutline
 
 
 def drawn(low, high, events=()):
     time = np.linspace(0, 10, 50)
     flat = np.full(50, 7.0)
-    run = Outline(
+    run = RunOutline(
         time,
         {"load": flat, "force": 0.4 * flat, "velocity": low},
         {"load": flat, "force": 0.5 * flat, "velocity": high},

@@ -9,7 +9,7 @@ import xarray
 import asperity as asp
 from asperity import materials
 from asperity.errors import InputError
-from asperity.loads import Cycle, Follow, Hold, Programme, Slide, StepLoad, modulated
+from asperity.loads import CyclicLoading, Follow, Hold, Programme, Slide, StepLoad, modulated
 from asperity.protocol import Protocol, ProtocolError, Repeat, load_protocol, run_protocol
 
 FILE = """
@@ -149,7 +149,7 @@ def test_a_file_that_is_not_there(tmp_path) -> None:
 def test_steps_of_every_kind_are_taken_as_they_are(write) -> None:
     protocol = load_protocol(write(FILE))
     time = np.linspace(0, 1, 11)
-    cycle = Cycle("0.5 s", modulated(0.2, load={2: (0.05, 0.0)}), "40 Hz")
+    cycle = CyclicLoading("0.5 s", modulated(0.2, load={2: (0.05, 0.0)}), "40 Hz")
     steps = (Follow(time, load=7 + time), cycle)
     changed = protocol.model_copy(update={"steps": steps})
     assert changed.programme.duration == 1.5

@@ -10,7 +10,7 @@ import pytest
 import asperity as asp
 from asperity.loads import Follow, Modulate, Programme
 from asperity.transients import transient
-from asperity.transients.equations import System
+from asperity.transients.equations import SegmentEquations
 from asperity.transients.inputs import checked_integration
 
 COMMON = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
@@ -32,7 +32,7 @@ class Sorting(asp.laws.RiceRuina):
 def goes_well(law: asp.laws.Law, programme: Programme, **options: Any) -> bool:
     slider = asp.Slider(law, spring=1e6, load=7.0, mass=1.6)
     motion = checked_integration(slider, programme, **options).motion
-    return one_kernel._goes_well(System(motion, programme.segments[0]))
+    return one_kernel._goes_well(SegmentEquations(motion, programme.segments[0]))
 
 
 @pytest.mark.parametrize("options", [{}, {"inertia": True}], ids=["quasi-static", "inertial"])

@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from asperity.errors import InputError
 from asperity.loads import (
-    Cycle,
+    CyclicLoading,
     Follow,
     Hold,
     Modulate,
@@ -84,7 +84,7 @@ PERIODIC = Periodic(load=((0.2, 0.0), (0.0, 0.1)), shear=((0.05, 0.0),), pull=((
         RampLoad("9 N", "0.4 s"),
         RampVelocity("5 um/s", "0.4 s"),
         Modulate("0.4 s", 0.2, "7 Hz", rise="0.4 s", phase=0.4, epsilon_v=0.3, shear_ratio=0.2),
-        Cycle("0.4 s", PERIODIC, "7 Hz"),
+        CyclicLoading("0.4 s", PERIODIC, "7 Hz"),
         Follow(
             np.linspace(0, 0.4, 9), 7 + np.sin(np.arange(9)), 1e-6 + 1e-7 * np.cos(np.arange(9))
         ),
@@ -112,7 +112,7 @@ def test_a_recording_is_one_interpolant(name, peer) -> None:
     W, V = 7 + rng.normal(size=300), 1e-6 * rng.uniform(0.5, 2, 300)
     p = Programme(Slide("0.5 s"), Follow(t, W, V, interpolant=name), Slide("0.1 s"), **START)
     x = np.linspace(t[0], t[-1], 1000)[:-1]
-    (segment,) = [s for s in p.segments if type(s).__name__ == "Recorded"]
+    (segment,) = [s for s in p.segments if type(s).__name__ == "RecordedSegment"]
     value, rate = segment.load(x - t[0])
     np.testing.assert_allclose(value, peer(t, W)(x), rtol=1e-11)
     np.testing.assert_allclose(rate, peer(t, W)(x, 1), rtol=1e-9, atol=1e-7)

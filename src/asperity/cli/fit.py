@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.fit_data import RUN_OPTIONS, FitData, priors_of, run_options
-from asperity.cli.measure.source import Source, source_options
+from asperity.cli.measure.source import RecordingSource, source_options
 from asperity.cli.options import json_option, law_named, material_named, settings_of
 from asperity.cli.posterior import PosteriorOptions, posterior_options, posterior_text
 from asperity.errors import InputError
@@ -58,7 +58,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         profile: bool,
         inertia: bool,
         radiation_damping: bool,
-        source: Source,
+        source: RecordingSource,
         window: str | None,
         steps: str | None,
         velocities: str | None,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.measure.source import Source
+from asperity.cli.measure.source import RecordingSource
 from asperity.cli.measure.times import span_of, times_of
 from asperity.cli.measure.words import naming_options
 from asperity.errors import InputError
@@ -60,13 +60,13 @@ class FitData:
 
     Attributes
     ----------
-    source : Source
+    source : RecordingSource
         Columns and units of recordings.
     window, steps, velocities : str or None
         As the options of these names.
     """
 
-    source: Source
+    source: RecordingSource
     window: str | None
     steps: str | None
     velocities: str | None

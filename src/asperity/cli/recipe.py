@@ -13,7 +13,7 @@ from asperity.cli.options import json_option, settings_of
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
-    from asperity.papers.bureau2000.recipe import Recipe
+    from asperity.papers.bureau2000.recipe import RecipeResult
 
 _EPILOG = """\b
 Example:
@@ -74,7 +74,7 @@ def recipe(
     return 0
 
 
-def recipe_text(found: Recipe) -> str:
+def recipe_text(found: RecipeResult) -> str:
     """Numbers beside the paper's, as a person reads them."""
     from asperity.cli.report import aligned
 

@@ -13,7 +13,7 @@ from asperity.cli.options import json_option, law_option
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
-    from asperity.protocol import Protocol, RunSummary, Setup
+    from asperity.protocol import Protocol, RecordingSetup, RunSummary
 
 _EPILOG = """\b
 Examples:
@@ -171,7 +171,7 @@ def _tell(protocol: Path, mistakes: tuple[str, ...]) -> int:
     return 2
 
 
-def _setup_for(asked: Protocol, record: Path) -> Setup:
+def _setup_for(asked: Protocol, record: Path) -> RecordingSetup:
     """The protocol's tribometer, before anything is computed."""
     from asperity.recording.writers import check_path
 

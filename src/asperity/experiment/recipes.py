@@ -11,9 +11,9 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.experiment.loading import DISPLACEMENT, DRIVE, FORCE, LOAD
 from asperity.experiment.motion import motion_rate, signals
-from asperity.loads import Hold, Programme, Slide, Step
-from asperity.loads.programme.segments import Segment
-from asperity.loads.programme.steps import Given, Level
+from asperity.loads import Hold, Programme, ProgrammeStep, Slide
+from asperity.loads.programme.segment import ProgrammeSegment
+from asperity.loads.programme.steps import Given, LaidOut, LoadAndVelocity
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
@@ -21,7 +21,7 @@ from asperity.units import to_si
 
 
 @dataclass(frozen=True)
-class SlideHoldSlide(Step):
+class SlideHoldSlide(ProgrammeStep):
     """Slide, then hold and slide again for each hold time.
 
     Attributes
@@ -35,20 +35,20 @@ class SlideHoldSlide(Step):
     holds: Sequence[Given]
     sliding: Given
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """The segments of all holds."""
         if not len(self.holds):
             raise InputError(
                 f"{name}.holds must hold a time, got none; give some, like 10 s, 100 s"
             )
-        steps: list[Step] = [Slide(self.sliding)]
+        steps: list[ProgrammeStep] = [Slide(self.sliding)]
         for hold in self.holds:
             steps += [Hold(hold), Slide(self.sliding)]
         return _laid_out(steps, level, name)
 
 
 @dataclass(frozen=True)
-class VelocitySteps(Step):
+class VelocitySteps(ProgrammeStep):
     """Slide at one velocity after the other, the same length of load-point displacement at each.
 
     Attributes
@@ -62,7 +62,7 @@ class VelocitySteps(Step):
     velocities: Sequence[Given]
     slip: Given
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """One segment for each velocity."""
         slip = to_si(self.slip, "length", f"{name}.slip")
         speeds = [to_si(v, "velocity", f"{name}.velocities") for v in self.velocities]
@@ -74,8 +74,8 @@ class VelocitySteps(Step):
         return _laid_out([Slide(slip / v, velocity=v) for v in speeds], level, name)
 
 
-def _laid_out(steps: Sequence[Step], level: Level, name: str) -> tuple[list[Segment], Level]:
-    segments: list[Segment] = []
+def _laid_out(steps: Sequence[ProgrammeStep], level: LoadAndVelocity, name: str) -> LaidOut:
+    segments: list[ProgrammeSegment] = []
     for step in steps:
         more, level = step.lay_out(level, name)
         segments += more
@@ -153,7 +153,7 @@ def velocity_steps(
 def _recording(
     slider: Slider,
     tribometer: Tribometer,
-    series: Step,
+    series: ProgrammeStep,
     velocity: float | str,
     name: str,
     seed: int,

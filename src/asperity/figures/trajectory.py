@@ -11,21 +11,21 @@ from matplotlib.figure import Figure
 from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, RICE_RUINA, new_figure
 
 if TYPE_CHECKING:
-    from asperity.protocol import Outline
+    from asperity.protocol import RunOutline
 
 #: Events that are marked; more of them than fit are counted instead.
 _MARKED = {"slip start": LINKER_DIETERICH, "steady": GREY}
 _MOST_MARKS = 60
 
 
-def draw_run(run: Outline) -> Figure:
+def draw_run(run: RunOutline) -> Figure:
     """Load, spring force, and velocity of the slider over time.
 
     Where a curve turns faster than the figure can show, the band between its extremes is filled.
 
     Parameters
     ----------
-    run : Outline
+    run : RunOutline
     """
     figure = new_figure(5.0, 6.2)
     load, force, velocity = figure.subplots(3, 1, sharex=True)
@@ -46,7 +46,7 @@ def draw_run(run: Outline) -> Figure:
     return figure
 
 
-def _draw_band(axis: Axes, run: Outline, name: str, color: str, scale: float) -> None:
+def _draw_band(axis: Axes, run: RunOutline, name: str, color: str, scale: float) -> None:
     low, high = scale * run.low[name], scale * run.high[name]
     axis.fill_between(run.time, low, high, color=color, alpha=0.45, linewidth=0)
     # The edges of the band, which are one line where it has no width.
@@ -60,7 +60,7 @@ def _draw_band(axis: Axes, run: Outline, name: str, color: str, scale: float) ->
         axis.set_ylim(float(np.min(low)) - 0.06 * span, float(np.max(high)) + 0.22 * span)
 
 
-def _scale_velocity(axis: Axes, run: Outline) -> None:
+def _scale_velocity(axis: Axes, run: RunOutline) -> None:
     """Pulses and holds are decades apart: logarithmic where the velocity stays positive."""
     low, high = 1e6 * run.low["velocity"], 1e6 * run.high["velocity"]
     if np.min(low) > 0 and np.max(high) > 30 * np.min(low):
@@ -74,7 +74,7 @@ def _scale_velocity(axis: Axes, run: Outline) -> None:
             axis.autoscale(axis="y")
 
 
-def _mark_events(axis: Axes, run: Outline) -> None:
+def _mark_events(axis: Axes, run: RunOutline) -> None:
     for kind, color in _MARKED.items():
         times = [t for t, k in run.events if k == kind]
         if not 0 < len(times) <= _MOST_MARKS:

@@ -7,19 +7,19 @@ from asperity.loads.modulation import Modulation
 from asperity.loads.periodic import Periodic
 from asperity.loads.programme.programme import Programme
 from asperity.loads.programme.steps import (
-    Cycle,
+    CyclicLoading,
     Follow,
     Hold,
     Modulate,
+    ProgrammeStep,
     RampLoad,
     RampVelocity,
     Slide,
-    Step,
     StepLoad,
 )
 
 __all__ = [
-    "Cycle",
+    "CyclicLoading",
     "Excitation",
     "Follow",
     "Harmonic",
@@ -28,10 +28,10 @@ __all__ = [
     "Modulation",
     "Periodic",
     "Programme",
+    "ProgrammeStep",
     "RampLoad",
     "RampVelocity",
     "Slide",
-    "Step",
     "StepLoad",
     "modulated",
     "sampled",

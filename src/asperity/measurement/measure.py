@@ -27,7 +27,7 @@ from asperity.measurement.verdicts import (
 from asperity.measurement.verdicts.shift import shifting_response
 from asperity.measurement.verdicts.verdict import Check, Verdict, worst
 from asperity.measurement.window import (
-    Stretch,
+    LoadInterval,
     clean_run,
     settled,
     stretches,
@@ -61,7 +61,7 @@ class Measurement(Displayed):
         mean_friction - static_friction, its standard uncertainty, and half of its 95 % interval.
     checks : tuple of Check
         Every question with number, limits and sentence.
-    stretches : tuple of Stretch
+    stretches : tuple of LoadInterval
         Modulated and unmodulated parts of the whole recording.
     samples : Samples
         What could be used of it.
@@ -79,7 +79,7 @@ class Measurement(Displayed):
     delta_mu_uncertainty: float
     delta_mu_interval_95: float
     checks: tuple[Check, ...]
-    stretches: tuple[Stretch, ...]
+    stretches: tuple[LoadInterval, ...]
     samples: Samples
     window: tuple[int, int]
     chosen_by: str
@@ -205,18 +205,18 @@ def measure_amplitudes(
 
 
 @dataclass(frozen=True, eq=False)
-class _Prepared:
+class _ModulatedRecording:
     """A recording with its modulation, before any of it is read."""
 
     samples: Samples
-    parts: list[Stretch]
+    parts: list[LoadInterval]
     frequency: float
     refine: bool
 
 
 def _prepared(
     trace: Trace, load: str, force: str, frequency: float | None, detrend: str, refine: bool
-) -> _Prepared:
+) -> _ModulatedRecording:
     if detrend not in DRIFTS:
         raise InputError(
             f"measure.detrend must be none, linear or quadratic, got '{detrend}'; choose one"
@@ -231,12 +231,12 @@ def _prepared(
             "if you know it, or measure without modulation"
         )
     start = frequency if frequency is not None and not refine else line.frequency
-    return _Prepared(samples, _parts(samples, line, start), start, refine)
+    return _ModulatedRecording(samples, _parts(samples, line, start), start, refine)
 
 
 def _measured(
-    recording: _Prepared,
-    part: Stretch | None,
+    recording: _ModulatedRecording,
+    part: LoadInterval | None,
     harmonics: int,
     window: tuple[float, float] | None,
     detrend: str,
@@ -328,7 +328,7 @@ def _asked(reading: LockInReading, time: Array, load: Array, force: Array) -> tu
 
 
 def _about_the_instrument(
-    reading: LockInReading, samples: Samples, parts: list[Stretch], cut: slice
+    reading: LockInReading, samples: Samples, parts: list[LoadInterval], cut: slice
 ) -> tuple[Check, ...]:
     time, load, force = samples.time[cut], samples.load[cut], samples.force[cut]
     return (
@@ -362,15 +362,15 @@ def modulation_line(time: Array, load: Array, near: float | None = None) -> Spec
     return max(lines, key=lambda line: line.amplitude)
 
 
-def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[Stretch]:
-    whole = Stretch(0, samples.time.size, line.amplitude)
+def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadInterval]:
+    whole = LoadInterval(0, samples.time.size, line.amplitude)
     if line.amplitude < _LINE * line.background:
         return [whole]
     found = stretches(samples.time, samples.load, frequency)
     return found if any(part.modulated for part in found) else [whole]
 
 
-def _chosen(samples: Samples, part: Stretch, frequency: float, degree: int) -> tuple[int, int]:
+def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int) -> tuple[int, int]:
     first, stop = clean_run(part.first, part.stop, samples.defects)
     inside = slice(first, stop)
     return first + settled(samples.time[inside], samples.force[inside], frequency, degree), stop
@@ -389,7 +389,7 @@ def _given(time: Array, window: tuple[float, float]) -> tuple[int, int]:
 
 
 def _around(
-    samples: Samples, parts: list[Stretch], chosen: Stretch, mean_load: float
+    samples: Samples, parts: list[LoadInterval], chosen: LoadInterval, mean_load: float
 ) -> tuple[tuple[MeanLevel, MeanLevel] | None, tuple[MeanLevel, MeanLevel] | None]:
     """Force and load without modulation, before and after the stretch that is read."""
     at, most = parts.index(chosen), chosen.stop - chosen.first

@@ -29,7 +29,7 @@ _SMOOTH, _FEWEST = 0.015, 16
 _WORTH = 0.5
 
 
-class Stretch(NamedTuple):
+class LoadInterval(NamedTuple):
     """A part of a recording.
 
     Attributes
@@ -50,7 +50,7 @@ class Stretch(NamedTuple):
         return self.amplitude > 0
 
 
-def stretches(time: Array, load: Array, frequency: float) -> list[Stretch]:
+def stretches(time: Array, load: Array, frequency: float) -> list[LoadInterval]:
     """Modulated and unmodulated parts of a load, in their order.
 
     Blocks at the edge of a part, which hold some of both, belong to none.
@@ -76,7 +76,7 @@ def stretches(time: Array, load: Array, frequency: float) -> list[Stretch]:
         if stop - first < 1:
             continue
         height = float(np.median(amplitude[first:stop])) if on[a] else 0.0
-        found.append(Stretch(int(edges[first]), int(edges[stop]), height))
+        found.append(LoadInterval(int(edges[first]), int(edges[stop]), height))
     return found
 
 

@@ -1,21 +1,21 @@
 """Protocols: experiments written as text, and run into a file."""
 
-from asperity.protocol.export import Outline, outline, write_csv
+from asperity.protocol.export import RunOutline, outline, write_csv
 from asperity.protocol.load import load_protocol
 from asperity.protocol.mistakes import ProtocolError
-from asperity.protocol.protocol import Protocol, Repeat, Solver, Start
-from asperity.protocol.recording import Setup, record_run
+from asperity.protocol.protocol import Protocol, ProtocolStart, Repeat, SolverSettings
+from asperity.protocol.recording import RecordingSetup, record_run
 from asperity.protocol.run import RunSummary, run_protocol
 
 __all__ = [
-    "Outline",
     "Protocol",
     "ProtocolError",
+    "ProtocolStart",
+    "RecordingSetup",
     "Repeat",
+    "RunOutline",
     "RunSummary",
-    "Setup",
-    "Solver",
-    "Start",
+    "SolverSettings",
     "load_protocol",
     "outline",
     "record_run",

@@ -28,7 +28,7 @@ _ROWS = 4 * CHUNKS["time"]
 
 
 @dataclass(frozen=True, eq=False)
-class Outline:
+class RunOutline:
     """A run as a figure can show it: extremes over stretches of time, and what happened.
 
     Attributes
@@ -77,7 +77,7 @@ def write_csv(run: str | Path, out: str | Path) -> Path:
     return Path(out)
 
 
-def outline(run: str | Path, stretches: int = 2000) -> Outline:
+def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
     """Extremes of load, force and velocity over stretches of equal length.
 
     Parameters
@@ -107,7 +107,7 @@ def outline(run: str | Path, stretches: int = 2000) -> Outline:
             np.maximum.at(high[name], index, block[name])
     filled = np.isfinite(low["load"])
     middle = first + width * (np.arange(count) + 0.5)
-    return Outline(
+    return RunOutline(
         middle[filled],
         {name: values[filled] for name, values in low.items()},
         {name: values[filled] for name, values in high.items()},

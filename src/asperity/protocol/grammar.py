@@ -16,7 +16,7 @@ from typing import Any
 
 from asperity.errors import InputError
 from asperity.experiment.recipes import SlideHoldSlide, VelocitySteps
-from asperity.loads import Hold, Modulate, RampLoad, RampVelocity, Slide, Step, StepLoad
+from asperity.loads import Hold, Modulate, ProgrammeStep, RampLoad, RampVelocity, Slide, StepLoad
 from asperity.protocol.recorded import follow
 from asperity.units import to_si
 
@@ -35,7 +35,7 @@ _KINDS = {
 
 
 @dataclass(frozen=True)
-class Form:
+class StepForm:
     """One way to write a step.
 
     Attributes
@@ -49,7 +49,7 @@ class Form:
 
     pattern: str
     example: str
-    build: Callable[[Mapping[str, Any], Path], Step]
+    build: Callable[[Mapping[str, Any], Path], ProgrammeStep]
 
     @cached_property
     def verb(self) -> str:
@@ -65,7 +65,7 @@ class Form:
         return re.compile(named, re.IGNORECASE)
 
 
-def _step_load(parts: Mapping[str, Any], folder: Path) -> Step:
+def _step_load(parts: Mapping[str, Any], folder: Path) -> ProgrammeStep:
     return StepLoad(parts["load"])
 
 
@@ -74,45 +74,45 @@ def _list(text: str) -> tuple[str, ...]:
     return tuple(part.strip() for part in text.split(","))
 
 
-def _modulate(parts: Mapping[str, Any], folder: Path) -> Step:
+def _modulate(parts: Mapping[str, Any], folder: Path) -> ProgrammeStep:
     return Modulate(**parts)
 
 
 #: Every form that a step can take.
 FORMS = (
-    Form("hold[for] {duration}", "hold 10 s", lambda parts, folder: Hold(**parts)),
-    Form(
+    StepForm("hold[for] {duration}", "hold 10 s", lambda parts, folder: Hold(**parts)),
+    StepForm(
         "slide[at {velocity}] for {duration}",
         "slide at 10 um/s for 60 s",
         lambda parts, folder: Slide(**parts),
     ),
-    Form(
+    StepForm(
         "modulate {epsilon} at {frequency} for {duration}[rising in {rise}][falling in {fall}]",
         "modulate 24 % at 120 Hz for 20 s",
         _modulate,
     ),
-    Form("step load to {load}", "step load to 9 N", _step_load),
-    Form(
+    StepForm("step load to {load}", "step load to 9 N", _step_load),
+    StepForm(
         "ramp load to {load} in {duration}",
         "ramp load to 9 N in 5 s",
         lambda parts, folder: RampLoad(parts["load"], parts["duration"]),
     ),
-    Form(
+    StepForm(
         "ramp velocity to {velocity} in {duration}",
         "ramp velocity to 100 um/s in 5 s",
         lambda parts, folder: RampVelocity(parts["velocity"], parts["duration"]),
     ),
-    Form(
+    StepForm(
         "slide-hold-slide for {holds} sliding {sliding}",
         "slide-hold-slide for 1 s, 10 s, 100 s sliding 20 s",
         lambda parts, folder: SlideHoldSlide(_list(parts["holds"]), parts["sliding"]),
     ),
-    Form(
+    StepForm(
         "velocity steps {velocities} over {slip}",
         "velocity steps 1 um/s, 10 um/s, 1 um/s over 100 um",
         lambda parts, folder: VelocitySteps(_list(parts["velocities"]), parts["slip"]),
     ),
-    Form(
+    StepForm(
         "follow {channels} from {file}",
         "follow load from recording.csv",
         lambda parts, folder: follow(parts["channels"], parts["file"], folder),
@@ -123,7 +123,7 @@ REPEAT = re.compile(r"repeat (?P<times>\S+)(?: times)?:(?P<steps>.*)", re.IGNORE
 REPEAT_EXAMPLE = "repeat 3 times: hold 10 s; slide for 60 s"
 
 
-def parse_step(text: str, name: str, folder: Path) -> Step:
+def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
     """One line of a protocol as a step.
 
     Parameters
@@ -150,7 +150,7 @@ def parse_step(text: str, name: str, folder: Path) -> Step:
     raise InputError(f"{name} must be a whole step, got '{line}'; write it like {examples}")
 
 
-def _meant(line: str, name: str) -> list[Form]:
+def _meant(line: str, name: str) -> list[StepForm]:
     """The forms that begin as the line does."""
     words = line.lower().split()
     for length in (1, 2):

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import InputError
-from asperity.loads import Step, StepLoad
-from asperity.loads.programme.steps import Level
+from asperity.loads import ProgrammeStep, StepLoad
+from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.protocol.grammar import REPEAT, REPEAT_EXAMPLE, parse_step
 
 #: Steps that a protocol may have with all repetitions: a misprint must not fill the memory.
@@ -17,20 +17,20 @@ MOST = 100_000
 
 
 @dataclass(frozen=True)
-class Planned:
+class PlannedStep:
     """A step, its place counted from 1 such as ``"step 3.2"``, and the line it was written as."""
 
     place: str
     text: str
-    step: Step
+    step: ProgrammeStep
 
 
-def plan(steps: Sequence[Any], folder: Path) -> tuple[list[Planned], list[str]]:
+def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[str]]:
     """All steps in their order, repetitions written out, and what is wrong with any of them.
 
     Parameters
     ----------
-    steps : sequence of str, Step, or object with ``repeat`` and ``steps``
+    steps : sequence of str, ProgrammeStep, or object with ``repeat`` and ``steps``
     folder : Path
         Where files that lines name lie.
     """
@@ -38,7 +38,7 @@ def plan(steps: Sequence[Any], folder: Path) -> tuple[list[Planned], list[str]]:
     return _planned(steps, "step ", folder, mistakes), mistakes
 
 
-def check_levels(planned: Sequence[Planned], level: Level) -> Iterator[str]:
+def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iterator[str]:
     """What is wrong with the values of the steps, each under the load and velocity it finds."""
     reported: set[str] = set()
     for one in planned:
@@ -55,8 +55,10 @@ def check_levels(planned: Sequence[Planned], level: Level) -> Iterator[str]:
                 yield f"{error} (in '{one.text}')"
 
 
-def _planned(steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[str]) -> list[Planned]:
-    found: list[Planned] = []
+def _planned(
+    steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[str]
+) -> list[PlannedStep]:
+    found: list[PlannedStep] = []
     for number, given in enumerate(steps, start=1):
         place = f"{prefix}{number}"
         try:
@@ -66,13 +68,13 @@ def _planned(steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[str
     return found
 
 
-def _one(given: Any, place: str, folder: Path, mistakes: list[str]) -> list[Planned]:
-    if isinstance(given, Step):
-        return [Planned(place, repr(given), given)]
+def _one(given: Any, place: str, folder: Path, mistakes: list[str]) -> list[PlannedStep]:
+    if isinstance(given, ProgrammeStep):
+        return [PlannedStep(place, repr(given), given)]
     if isinstance(given, str):
         line = " ".join(given.split())
         if line.lower().split(" ")[0] != "repeat":
-            return [Planned(place, line, parse_step(line, place, folder))]
+            return [PlannedStep(place, line, parse_step(line, place, folder))]
         times, inner = _repetition(line, place)
     else:
         times, inner = given.repeat, given.steps

@@ -19,13 +19,13 @@ from pydantic import (
 )
 
 from asperity.errors import InputError
-from asperity.loads import Programme, Step
-from asperity.loads.programme.steps import Level
+from asperity.loads import Programme, ProgrammeStep
+from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.operating_point import SourcedNumber
 from asperity.protocol.mistakes import ProtocolError, sentences
 from asperity.protocol.numbers import numbers_of, slider_of
-from asperity.protocol.plan import Planned, check_levels, plan
-from asperity.protocol.recording import Setup, setup_of
+from asperity.protocol.plan import PlannedStep, check_levels, plan
+from asperity.protocol.recording import RecordingSetup, setup_of
 from asperity.slider import Slider
 from asperity.transients import Trajectory, transient
 from asperity.transients.initial_state import require_contact
@@ -50,16 +50,16 @@ class Repeat(BaseModel):
     ----------
     repeat : int
         How often.
-    steps : tuple of str, Step or Repeat
+    steps : tuple of str, ProgrammeStep or Repeat
     """
 
     model_config = _STRICT
 
     repeat: PositiveInt
-    steps: tuple[str | Repeat | Step, ...]
+    steps: tuple[str | Repeat | ProgrammeStep, ...]
 
 
-class Start(BaseModel):
+class ProtocolStart(BaseModel):
     """What there is before the first step.
 
     Attributes
@@ -80,7 +80,7 @@ class Start(BaseModel):
     states: tuple[float, ...] | None = None
 
 
-class Solver(BaseModel):
+class SolverSettings(BaseModel):
     """How the motion is integrated and written.
 
     Attributes
@@ -113,14 +113,14 @@ class Protocol(BaseModel):
     ----------
     law : str
         A registered law.
-    steps : tuple of str, Step or Repeat
+    steps : tuple of str, ProgrammeStep or Repeat
         Lines such as ``"hold 10 s"``, steps of `asperity.loads`, or blocks of them.
-    start : Start
+    start : ProtocolStart
     material : str
         Where numbers come from that `parameters` does not have.
     parameters : mapping of str to float or str
         Numbers of the law, and K, W0, M and eta (radiation damping), by the names of tables.
-    solver : Solver
+    solver : SolverSettings
     tribometer : mapping, optional
         What a recording of the run is made with: fields of `Recorder`, ``seed``, and ``sensors``.
     title : str
@@ -136,23 +136,27 @@ class Protocol(BaseModel):
     model_config = _STRICT
 
     law: str
-    steps: tuple[str | Repeat | Step, ...]
-    start: Start
+    steps: tuple[str | Repeat | ProgrammeStep, ...]
+    start: ProtocolStart
     material: str = ""
     parameters: Mapping[str, Given] = {}
-    solver: Solver = Solver()
+    solver: SolverSettings = SolverSettings()
     tribometer: Mapping[str, Any] | None = None
     title: str = ""
     folder: Path = Path()
 
-    _planned: list[Planned] = PrivateAttr(default_factory=list)
+    _planned: list[PlannedStep] = PrivateAttr(default_factory=list)
     _numbers: dict[str, SourcedNumber] = PrivateAttr(default_factory=dict)
 
     def __init__(self, **fields: Any) -> None:
         try:
             super().__init__(**fields)
         except ValidationError as error:
-            models: dict[str, type[BaseModel]] = {"": Protocol, "start": Start, "solver": Solver}
+            models: dict[str, type[BaseModel]] = {
+                "": Protocol,
+                "start": ProtocolStart,
+                "solver": SolverSettings,
+            }
             raise ProtocolError(sentences(error, models)) from None
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
@@ -186,9 +190,9 @@ class Protocol(BaseModel):
             self.law, self.parameters, self.material, self.folder, self.solver.inertia
         )
 
-    def _level(self) -> Level:
+    def _level(self) -> LoadAndVelocity:
         load = self._numbers["W0"].value if self.start.load is None else self.start.load
-        return Level(
+        return LoadAndVelocity(
             to_si(load, "force", "start.load"),
             to_si(self.start.velocity, "velocity", "start.velocity"),
         )
@@ -216,7 +220,7 @@ class Protocol(BaseModel):
         return slider_of(self.law, {name: n.value for name, n in self._numbers.items()})
 
     @cached_property
-    def setup(self) -> Setup | None:
+    def setup(self) -> RecordingSetup | None:
         """What a recording of the run is made with, None without a tribometer."""
         if self.tribometer is None:
             return None

@@ -43,7 +43,7 @@ _CLAIMS = {"F": "shear force", "W": "normal load"}
 
 
 @dataclasses.dataclass(frozen=True)
-class Setup:
+class RecordingSetup:
     """What a protocol says of its recording.
 
     Attributes
@@ -66,7 +66,7 @@ class Setup:
 
 def setup_of(
     table: Mapping[str, Any], sampling: float | str | None, stiffness: float = np.nan
-) -> Setup:
+) -> RecordingSetup:
     """The tribometer that a table of a protocol describes.
 
     Parameters
@@ -98,15 +98,15 @@ def setup_of(
     for channel, fields in described.items():
         sensors[channel], exposed[channel] = _sensor(channel, fields)
     _check_sampling(sampling, recorder, sensors)
-    return Setup(Tribometer(sensors=sensors, recorder=recorder), exposed, seed, stiffness)
+    return RecordingSetup(Tribometer(sensors=sensors, recorder=recorder), exposed, seed, stiffness)
 
 
-def record_run(setup: Setup, run: str | Path) -> Trace:
+def record_run(setup: RecordingSetup, run: str | Path) -> Trace:
     """Record the motion of a run; all of it is in memory.
 
     Parameters
     ----------
-    setup : Setup
+    setup : RecordingSetup
     run : str or path
         NetCDF file of `run_protocol`.
     """

@@ -11,7 +11,7 @@ from asperity.errors import InputError, closest
 from asperity.parameters.toml_file import toml_content
 
 
-class Recipe(BaseModel):
+class ReadingRecipe(BaseModel):
     """How the recordings of a campaign are read: arguments of `asperity.recording.read`.
 
     Attributes
@@ -40,13 +40,13 @@ class Recipe(BaseModel):
     format: str | None = None
 
 
-def load_recipe(path: str | os.PathLike[str]) -> Recipe:
+def load_recipe(path: str | os.PathLike[str]) -> ReadingRecipe:
     """Read a reduction file.
 
     Parameters
     ----------
     path : str or path
-        TOML with the fields of `Recipe`.
+        TOML with the fields of `ReadingRecipe`.
 
     Raises
     ------
@@ -55,7 +55,7 @@ def load_recipe(path: str | os.PathLike[str]) -> Recipe:
     """
     file, content = toml_content(path, "recipe")
     try:
-        return Recipe.model_validate(content)
+        return ReadingRecipe.model_validate(content)
     except ValidationError as error:
         raise InputError(_sentence(error.errors(include_url=False)[0], file.name)) from None
 
@@ -63,7 +63,7 @@ def load_recipe(path: str | os.PathLike[str]) -> Recipe:
 def _sentence(mistake: Any, name: str) -> str:
     place = ".".join(map(str, mistake["loc"][:2]))
     if mistake["type"] == "extra_forbidden":
-        advice = closest(str(mistake["loc"][-1]), Recipe.model_fields)
+        advice = closest(str(mistake["loc"][-1]), ReadingRecipe.model_fields)
         return f"recipe.{place} must be a known field, got it in '{name}'; {advice}"
     rule = " ".join(mistake["msg"].split()).removeprefix("Input should be ")
     return f"recipe.{place} must be {rule}, got {mistake['input']!r} in '{name}'; correct the value"

@@ -19,15 +19,17 @@ from jax import Array
 
 from asperity.loads import Excitation
 from asperity.slider import Motion, QuasiStatic, ReversingInertial
-from asperity.transients.equations import System
+from asperity.transients.equations import SegmentEquations
 
 
-def states_across_break(before: System, t: float, after: System, Y: np.ndarray) -> np.ndarray:
+def states_across_break(
+    before: SegmentEquations, t: float, after: SegmentEquations, Y: np.ndarray
+) -> np.ndarray:
     """States at the beginning of a segment.
 
     Parameters
     ----------
-    before, after : System
+    before, after : SegmentEquations
         The segment that ends, at its time `t` (s), and the one that begins.
     Y : array, shape (size + 1,)
         States at the end of the former.
@@ -36,7 +38,9 @@ def states_across_break(before: System, t: float, after: System, Y: np.ndarray) 
 
 
 @jax.jit
-def _between_segments(before: System, t: Array, after: System, Y: Array) -> Array:
+def _between_segments(
+    before: SegmentEquations, t: Array, after: SegmentEquations, Y: Array
+) -> Array:
     return states_after_jump(before.motion, before.at(t), after.at(jnp.zeros(())), Y)
 
 

@@ -12,7 +12,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.loads import Excitation
-from asperity.loads.programme.segments import Segment
+from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.slider import Motion, QuasiStatic
 from asperity.transients.dense_output import PARTS, StepChunk
 
@@ -23,21 +23,21 @@ _DIGITS = 1e-13
 BATCH_SIZES = (64, 1024, 4096)
 
 
-class System(eqx.Module):
+class SegmentEquations(eqx.Module):
     """Rates in time of Y = (*states of the motion, x K / W0), x the displacement of the slider.
 
     Parameters
     ----------
     motion : Motion
         With omega = 1 rad/s, so that its radians are seconds.
-    segment : Segment
+    segment : ProgrammeSegment
     ringing : array
         Error of v/V that is tolerated for each unit of error of F_i/W, where the slider's ringing
         on its asperities is left out (`asperity.transients.pace`); 0 where it is resolved.
     """
 
     motion: Motion
-    segment: Segment
+    segment: ProgrammeSegment
     ringing: ArrayLike = 0.0
 
     def at(self, t: Array) -> Excitation:
@@ -108,7 +108,7 @@ class MotionSamples(NamedTuple):
     unsteadiness: np.ndarray
 
 
-def _read(system: System, t: Array, Y: Array) -> Array:
+def _read(system: SegmentEquations, t: Array, Y: Array) -> Array:
     motion, at, states = system.motion, system.at(t), Y[:-1]
     law = motion.slider.law
     velocity = motion.slider_velocity(states, at)
@@ -132,7 +132,7 @@ def _read(system: System, t: Array, Y: Array) -> Array:
 _read_points = jax.jit(_read)
 
 
-def motion_samples(system: System, t: np.ndarray, Y: np.ndarray) -> MotionSamples:
+def motion_samples(system: SegmentEquations, t: np.ndarray, Y: np.ndarray) -> MotionSamples:
     """Evaluate the states `Y`, shape (size + 1, n), at the times `t` of the segment, shape (n,)."""
     parts = []
     most = next((room for room in BATCH_SIZES if len(t) <= room), BATCH_SIZES[-1])
@@ -143,14 +143,14 @@ def motion_samples(system: System, t: np.ndarray, Y: np.ndarray) -> MotionSample
     return MotionSamples(*np.concatenate(parts, axis=1))
 
 
-def step_samples(system: System, chunk: StepChunk) -> MotionSamples:
+def step_samples(system: SegmentEquations, chunk: StepChunk) -> MotionSamples:
     """Evaluate the steps of a chunk at `DenseOutput.refined`."""
     inner, end = jax.device_get(_read_steps(system, chunk))
     return MotionSamples(*np.concatenate([inner[:, : PARTS * int(chunk.taken)], end], axis=1))
 
 
 @jax.jit
-def _read_steps(system: System, chunk: StepChunk) -> tuple[Array, Array]:
+def _read_steps(system: SegmentEquations, chunk: StepChunk) -> tuple[Array, Array]:
     shares = jnp.arange(PARTS) / PARTS
     t = chunk.begin[:, None] + chunk.length[:, None] * shares
     powers = jnp.moveaxis(chunk.coefficients, 0, -1)[..., None]

@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.slider import Motion, QuasiStatic, StiffInertial
 from asperity.transients.dense_output import DenseOutput
-from asperity.transients.equations import MotionSamples, System, motion_samples
+from asperity.transients.equations import MotionSamples, SegmentEquations, motion_samples
 from asperity.transients.termination import Termination
 
 _ROOT_STEPS = 60
@@ -83,7 +83,7 @@ class EventDetector:
         self._steady = thresholds.steady
         self._before: dict[str, float] = {}
 
-    def enter(self, system: System, start: float) -> None:
+    def enter(self, system: SegmentEquations, start: float) -> None:
         """Begin a segment; slip that began before it continues."""
         self._system, self._start = system, start
         self._steady_reached = not system.segment.constant

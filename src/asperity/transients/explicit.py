@@ -17,7 +17,7 @@ from jax import Array
 
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.transients.dense_output import StepChunk
-from asperity.transients.equations import System
+from asperity.transients.equations import SegmentEquations
 from asperity.transients.single_kernel import one_kernel
 from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, run_steps
 
@@ -34,14 +34,14 @@ _UNSTABLE = 100.0
 
 
 def advance(
-    system: System, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
+    system: SegmentEquations, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
 ) -> StepChunk:
     """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `run_steps`.
 
     Parameters
     ----------
     rtol, atol : array
-        Tolerances of `System.scale`.
+        Tolerances of `SegmentEquations.scale`.
     """
     run = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
     return run.chunk(_dense(system, run.begin, run.length, *run.records))
@@ -49,7 +49,7 @@ def advance(
 
 @one_kernel
 def _run(
-    system: System,
+    system: SegmentEquations,
     t: Array,
     Y: Array,
     h: Array,
@@ -66,7 +66,7 @@ def _run(
 
 
 def _attempt(
-    system: System, t: Array, Y: Array, h: Array, slope: Array, rtol: Array, atol: Array
+    system: SegmentEquations, t: Array, Y: Array, h: Array, slope: Array, rtol: Array, atol: Array
 ) -> TrialStep:
     table, size = dormand_prince_8(), Y.shape[0]
     # Excitation of all stages at once: it does not depend on the states. The last two coincide.
@@ -98,7 +98,9 @@ def _combined(weights: np.ndarray, stages: Array) -> Array:
 
 
 @jax.jit
-def _dense(system: System, begin: Array, length: Array, states: Array, stages: Array) -> Array:
+def _dense(
+    system: SegmentEquations, begin: Array, length: Array, states: Array, stages: Array
+) -> Array:
     """Polynomials of all steps at once, shape (STEPS, 8, size)."""
     table = dormand_prince_8()
     # Steps last: operations on all of them run along memory.

@@ -25,7 +25,7 @@ from asperity.algebra.runge_kutta import radau_iia
 from asperity.algebra.small_systems import jacobian_columns, product, solve_columns
 from asperity.loads import Excitation
 from asperity.transients.dense_output import StepChunk
-from asperity.transients.equations import System
+from asperity.transients.equations import SegmentEquations
 from asperity.transients.single_kernel import one_kernel
 from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, run_steps
 
@@ -85,7 +85,7 @@ class _LastStep(NamedTuple):
 
 
 def advance(
-    system: System, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
+    system: SegmentEquations, t: Array, Y: Array, h: Array, end: Array, rtol: Array, atol: Array
 ) -> StepChunk:
     """Integrate from `t` towards `end`, at most `STEPS` accepted steps; as `explicit.advance`."""
     run = _run(system, t, Y, h, end, system.segment.longest_step, rtol, atol)
@@ -94,7 +94,7 @@ def advance(
 
 @one_kernel
 def _run(
-    system: System,
+    system: SegmentEquations,
     t: Array,
     Y: Array,
     h: Array,
@@ -132,7 +132,7 @@ def _extrapolated(last: _LastStep, Y: Array, h: Array) -> Array:
 
 
 def _step(
-    system: System, t: Array, Y: Array, h: Array, guess: Array, scale: Array
+    system: SegmentEquations, t: Array, Y: Array, h: Array, guess: Array, scale: Array
 ) -> tuple[Array, Array, Array, Array]:
     """Stages Z, shape (size, stages), error, Newton iterations, and largest eigenvalue."""
     table = _tableau()
@@ -193,7 +193,7 @@ def _left(size: Array, rate: Array) -> Array:
     return size * jnp.minimum(rate / jnp.maximum(1 - rate, 1e-3), 1.0)
 
 
-def _stacked(system: System, at: Excitation, states: Array) -> Array:
+def _stacked(system: SegmentEquations, at: Excitation, states: Array) -> Array:
     """Rates of the motion's states and of the displacement, shape (size + 1,)."""
     rates, x_rate = system.motion_rates(at, states)
     return jnp.concatenate([rates, jnp.reshape(x_rate, (1,))])

@@ -15,7 +15,7 @@ from asperity.laws import Law, State
 from asperity.loads import Excitation, Programme
 from asperity.slider import Motion
 from asperity.transients.discontinuities import states_after_jump
-from asperity.transients.equations import System
+from asperity.transients.equations import SegmentEquations
 from asperity.transients.integration import NO_LOAD, Checkpoint
 
 #: Newton steps for the states of the law under another load, and the longest of them.
@@ -96,13 +96,13 @@ def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
             f"programme.velocity must be positive for a start in steady sliding, got "
             f"{level.velocity:g} m/s; give it, or the states at rest as initial"
         )
-    first = System(motion, programme.segments[0])
+    first = SegmentEquations(motion, programme.segments[0])
     w = level.load / motion.slider.W0
     return np.asarray(_steady(first, jnp.asarray(level.velocity), jnp.asarray(w)))
 
 
 @jax.jit
-def _steady(first: System, v: Array, w: Array) -> Array:
+def _steady(first: SegmentEquations, v: Array, w: Array) -> Array:
     """States from `v` (m/s) under the load `w`, over W0, at the beginning of a segment."""
     motion, law = first.motion, first.motion.slider.law
     state = _steady_state(law, v, w)

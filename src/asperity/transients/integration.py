@@ -12,12 +12,12 @@ import jax.numpy as jnp
 import numpy as np
 
 from asperity.loads import Programme
-from asperity.loads.programme.segments import Segment
+from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.slider import Motion
 from asperity.transients import implicit
 from asperity.transients.dense_output import UNDERFLOW, DenseOutput, StepChunk
 from asperity.transients.discontinuities import states_across_break
-from asperity.transients.equations import MotionSamples, System, step_samples
+from asperity.transients.equations import MotionSamples, SegmentEquations, step_samples
 from asperity.transients.events import Event, EventDetector, EventThresholds
 from asperity.transients.method_choice import NAMES, MethodChoice
 from asperity.transients.pace import Pace, ringing_velocity
@@ -77,7 +77,7 @@ class SegmentPart:
 
     Attributes
     ----------
-    system : System
+    system : SegmentEquations
     start : float
         Time of the programme at which the segment begins (s).
     dense_output : DenseOutput
@@ -92,7 +92,7 @@ class SegmentPart:
         From where the integration continues.
     """
 
-    system: System
+    system: SegmentEquations
     start: float
     dense_output: DenseOutput
     end: float
@@ -159,12 +159,12 @@ class Integration:
         here = self.checkpoint
         states = here.states
         if index < len(self.programme.segments):
-            before = System(self.motion, self.programme.segments[here.segment])
-            after = System(self.motion, self.programme.segments[index])
+            before = SegmentEquations(self.motion, self.programme.segments[here.segment])
+            after = SegmentEquations(self.motion, self.programme.segments[index])
             states = states_across_break(before, here.t, after, states)
         self.checkpoint = Checkpoint(index, 0.0, states)
 
-    def _segment(self, segment: Segment) -> Iterator[SegmentPart]:
+    def _segment(self, segment: ProgrammeSegment) -> Iterator[SegmentPart]:
         here = self.checkpoint
         ringless = here.ringless
         system = self._system(segment, ringless)
@@ -213,7 +213,9 @@ class Integration:
             if termination is not None:
                 return
 
-    def _standstill(self, system: System, start: float, termination: Termination) -> SegmentPart:
+    def _standstill(
+        self, system: SegmentEquations, start: float, termination: Termination
+    ) -> SegmentPart:
         """A segment part without steps: a termination before the first one."""
         size = self.motion.size + 1
         nothing = DenseOutput(np.empty(0), np.empty(0), np.empty((2, size, 0)))
@@ -221,13 +223,13 @@ class Integration:
         events = [Event(termination.time, termination.kind)]
         return SegmentPart(system, start, nothing, here.t, events, termination, False, here)
 
-    def _system(self, segment: Segment, ringless: bool) -> System:
-        return System(self.motion, segment, self._ringing if ringless else 0.0)
+    def _system(self, segment: ProgrammeSegment, ringless: bool) -> SegmentEquations:
+        return SegmentEquations(self.motion, segment, self._ringing if ringless else 0.0)
 
     def _advance(
         self,
         method: ModuleType,
-        system: System,
+        system: SegmentEquations,
         t: float,
         Y: np.ndarray,
         length: float,
@@ -251,7 +253,7 @@ class Integration:
             self.unresolved = max(self.unresolved, velocity)
 
 
-def _contact(segment: Segment, W0: float) -> tuple[float, float | None]:
+def _contact(segment: ProgrammeSegment, W0: float) -> tuple[float, float | None]:
     """Where integration of a segment has to end, and where the load vanishes, if it does."""
     duration = float(segment.duration)
     floor = NO_LOAD * W0

@@ -21,7 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.experimental.xla_metadata import set_xla_metadata
 
-from asperity.transients.equations import System
+from asperity.transients.equations import SegmentEquations
 
 _ATTRIBUTES = {"xla_cpu_small_call": "true", "inlineable": "false"}
 _NO_ATTRIBUTES = dict.fromkeys(_ATTRIBUTES)
@@ -45,12 +45,12 @@ def one_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     Parameters
     ----------
     function : callable
-        Of a `System` and other arguments.
+        Of a `SegmentEquations` and other arguments.
     """
     apart, joined = jax.jit(function), jax.jit(_joined(function))
 
     @wraps(function)
-    def call(system: System, *arguments: Any) -> Any:
+    def call(system: SegmentEquations, *arguments: Any) -> Any:
         run = joined if jax.default_backend() == "cpu" and _goes_well(system) else apart
         return run(system, *arguments)
 
@@ -70,7 +70,7 @@ def _joined(function: Callable[..., Any]) -> Callable[..., Any]:
     return call
 
 
-def _goes_well(system: System) -> bool:
+def _goes_well(system: SegmentEquations) -> bool:
     leaves, structure = jax.tree.flatten(system)
     return all(np.ndim(leaf) == 0 for leaf in leaves) and _elementwise(structure)
 

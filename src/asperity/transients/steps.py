@@ -10,7 +10,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from asperity.transients.dense_output import GOING_ON, STEPS, UNDERFLOW, StepChunk
-from asperity.transients.equations import System
+from asperity.transients.equations import SegmentEquations
 
 #: Factor by which a rejected step is shortened at least.
 _SAFETY = 0.9
@@ -78,7 +78,7 @@ class AcceptedSteps(NamedTuple):
 
 
 def run_steps(
-    system: System,
+    system: SegmentEquations,
     t: Array,
     Y: Array,
     h: Array,
@@ -92,7 +92,7 @@ def run_steps(
 
     Parameters
     ----------
-    system : System
+    system : SegmentEquations
     t, end : array
         Times of the segment (s).
     Y : array, shape (size + 1,)

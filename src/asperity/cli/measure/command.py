@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.measure.reading import FileRows, ReadingOptions
-from asperity.cli.measure.source import Source, source_options
+from asperity.cli.measure.source import RecordingSource, source_options
 from asperity.cli.measure.times import span_of, spans_of, times_of
 from asperity.cli.measure.words import in_options, naming_options
 from asperity.cli.options import json_option
@@ -94,7 +94,7 @@ in place of numbers; 2: bad input.
 @click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
 def measure(
     recordings: tuple[Path, ...],
-    source: Source,
+    source: RecordingSource,
     frequency: str,
     exact_frequency: bool,
     harmonics: int,
@@ -165,7 +165,9 @@ def measure(
     return _verdict(found.checks)
 
 
-def _amplitudes(recording: Path, source: Source, options: ReadingOptions, as_json: bool) -> int:
+def _amplitudes(
+    recording: Path, source: RecordingSource, options: ReadingOptions, as_json: bool
+) -> int:
     from asperity.cli.measure.text import amplitudes_text
     from asperity.cli.report import to_json
     from asperity.measurement.campaign import modulated_rows
@@ -182,7 +184,7 @@ def _amplitudes(recording: Path, source: Source, options: ReadingOptions, as_jso
 
 def _campaign(
     recordings: tuple[Path, ...],
-    source: Source,
+    source: RecordingSource,
     options: ReadingOptions,
     out: Path,
     resume: bool,

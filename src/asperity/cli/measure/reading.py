@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from asperity.cli.measure.source import Source
+from asperity.cli.measure.source import RecordingSource
 from asperity.cli.measure.words import in_options, naming_options
 from asperity.errors import InputError
 
@@ -91,11 +91,11 @@ class FileRows:
 
     Attributes
     ----------
-    source : Source
+    source : RecordingSource
     options : ReadingOptions
     """
 
-    source: Source
+    source: RecordingSource
     options: ReadingOptions
 
     def __call__(self, path: Path) -> list[dict[str, Any]]:

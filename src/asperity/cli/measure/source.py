@@ -19,7 +19,7 @@ Command = Callable[..., Any]
 
 
 @dataclass(frozen=True)
-class Source:
+class RecordingSource:
     """The choices with which files are read; one for all files of a campaign.
 
     Attributes
@@ -143,7 +143,9 @@ def source_options(command: Command) -> Command:
         chosen = {role: _name_or_number(name) for role, name in roles.items() if name is not None}
         named = dict(name_value_pairs(units, "--unit"))
         made = expressions_of(channels)
-        source = Source(chosen, named, rate, group, area, made, recipe, format, delimiter, decimal)
+        source = RecordingSource(
+            chosen, named, rate, group, area, made, recipe, format, delimiter, decimal
+        )
         return command(source=source, **others)
 
     found: Command = gathered

@@ -13,7 +13,7 @@ from asperity.errors import InputError
 from asperity.experiment.amplitudes.readings import AmplitudePoint, AmplitudeSeries
 from asperity.experiment.exciter import Exciter
 from asperity.experiment.motion import signals
-from asperity.loads import Programme, Slide, Step
+from asperity.loads import Programme, ProgrammeStep, Slide
 from asperity.measurement.measure import measure
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
@@ -116,8 +116,8 @@ def amplitude_motion(
         to_si(value, "time", f"amplitude_series.{name}")
         for name, value in (("sliding", sliding), ("modulated", modulated), ("rise", rise))
     )
-    applied: list[Step] = [Slide(off)]
-    borne: list[Step] = [Slide(off)]
+    applied: list[ProgrammeStep] = [Slide(off)]
+    borne: list[ProgrammeStep] = [Slide(off)]
     for epsilon in epsilons:
         outer, inner = exciter.steps(epsilon, on, slow)
         applied += [outer, Slide(off)]

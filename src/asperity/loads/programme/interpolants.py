@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError, closest
-from asperity.loads.programme.recorded import Curve
+from asperity.loads.programme.recorded import PiecewiseCubic
 from asperity.units import to_si
 
 _FIELDS = {"force": "load", "velocity": "velocity"}
@@ -15,8 +15,8 @@ _FIELDS = {"force": "load", "velocity": "velocity"}
 
 def interpolated(
     time: np.ndarray, given: Any, level: float, kind: str, interpolant: str, name: str
-) -> tuple[Curve, np.ndarray]:
-    """Curve through the samples, over the time since the first one, with samples that bound it.
+) -> tuple[PiecewiseCubic, np.ndarray]:
+    """Cubics through the samples over the time since the first, with values that bound them.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def interpolated(
     _check_time(time, name)
     span = np.array([0.0, time[-1] - time[0]])
     if given is None:
-        return Curve.of(span, np.array([[0.0], [0.0], [0.0], [level]])), np.array([level])
+        return PiecewiseCubic.of(span, np.array([[0.0], [0.0], [0.0], [level]])), np.array([level])
     field = f"{name}.{_FIELDS[kind]}"
     values = np.asarray(to_si(given, kind, field), float)
     if values.shape != time.shape:
@@ -50,7 +50,7 @@ def interpolated(
     pieces = _pieces(interpolant, name)(time - time[0], values)
     # Splines overshoot: bounds from between the samples too.
     between = pieces(np.concatenate([pieces.x, 0.5 * (pieces.x[1:] + pieces.x[:-1])]))
-    return Curve.of(pieces.x, pieces.c), np.append(between, values[-1])
+    return PiecewiseCubic.of(pieces.x, pieces.c), np.append(between, values[-1])
 
 
 def _pieces(interpolant: str, name: str) -> Any:

@@ -12,8 +12,8 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError
-from asperity.loads.programme.segments import Segment
-from asperity.loads.programme.steps import Level, Step
+from asperity.loads.programme.segment import ProgrammeSegment
+from asperity.loads.programme.steps import LoadAndVelocity, ProgrammeStep
 from asperity.parameters.arguments import number
 
 #: Relative distance to a break point within which a time counts as the break point itself: sums of
@@ -30,31 +30,35 @@ class Programme:
 
     Attributes
     ----------
-    steps : tuple of Step
-    level : Level
+    steps : tuple of ProgrammeStep
+    level : LoadAndVelocity
         Load (N) and pulling velocity (m/s) before the first step.
-    segments : tuple of Segment
+    segments : tuple of ProgrammeSegment
         What the steps amount to.
     starts : ndarray, shape (segments + 1,)
         Break points (s): beginning of every segment, and the end.
-    last : Level
+    last : LoadAndVelocity
         Load and velocity after the last step.
     """
 
-    steps: tuple[Step, ...]
-    level: Level
-    segments: tuple[Segment, ...]
+    steps: tuple[ProgrammeStep, ...]
+    level: LoadAndVelocity
+    segments: tuple[ProgrammeSegment, ...]
     starts: np.ndarray
-    last: Level
+    last: LoadAndVelocity
 
     def __init__(
-        self, *steps: Step, load: float | str, velocity: float | str, name: str = "programme"
+        self,
+        *steps: ProgrammeStep,
+        load: float | str,
+        velocity: float | str,
+        name: str = "programme",
     ) -> None:
         """Lay the steps out one after the other.
 
         Parameters
         ----------
-        *steps : Step
+        *steps : ProgrammeStep
             `Hold`, `Slide`, `StepLoad`, ... from `asperity.loads`.
         load : float or str
             Normal load (N) before the first step, positive.
@@ -69,14 +73,14 @@ class Programme:
         InputError
             If a value breaks its rule or the steps take no time.
         """
-        level = Level(
+        level = LoadAndVelocity(
             number(load, f"{name}.load", "force", "positive"),
             number(velocity, f"{name}.velocity", "velocity"),
         )
-        segments: list[Segment] = []
+        segments: list[ProgrammeSegment] = []
         reached = level
         for i, step in enumerate(steps):
-            if not isinstance(step, Step):
+            if not isinstance(step, ProgrammeStep):
                 raise InputError(
                     f"{name}.steps[{i}] must be a step, got a {type(step).__name__}; "
                     "take one of asperity.loads, such as Slide('10 s')"
@@ -126,7 +130,7 @@ class Programme:
     def _evaluate(
         self,
         t: ArrayLike,
-        read: Callable[[Segment, Any], Any],
+        read: Callable[[ProgrammeSegment, Any], Any],
         before: np.ndarray | None = None,
     ) -> np.ndarray:
         times = np.asarray(t, float)
@@ -144,15 +148,15 @@ class Programme:
 
 
 @jax.jit
-def _load(segment: Segment, t: Array) -> Array:
+def _load(segment: ProgrammeSegment, t: Array) -> Array:
     return segment.load(t)[0]
 
 
 @jax.jit
-def _pull(segment: Segment, t: Array) -> Array:
+def _pull(segment: ProgrammeSegment, t: Array) -> Array:
     return segment.pull(t)
 
 
 @jax.jit
-def _position(segment: Segment, t: Array) -> Array:
+def _position(segment: ProgrammeSegment, t: Array) -> Array:
     return segment.position(t)

@@ -10,10 +10,10 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.loads.programme.segments import Scalar, Segment
+from asperity.loads.programme.segment import ProgrammeSegment, Scalar
 
 
-class Curve(eqx.Module):
+class PiecewiseCubic(eqx.Module):
     """Cubic pieces between knots, padded to a power of two.
 
     Parameters
@@ -31,7 +31,7 @@ class Curve(eqx.Module):
     integral: Array
 
     @classmethod
-    def of(cls, knots: np.ndarray, coefficients: np.ndarray) -> Curve:
+    def of(cls, knots: np.ndarray, coefficients: np.ndarray) -> PiecewiseCubic:
         """From `knots` with the last end, shape (pieces + 1,), and coefficients."""
         pieces = coefficients.shape[1]
         room = 2 ** max(4, math.ceil(math.log2(pieces)))
@@ -65,14 +65,14 @@ class Curve(eqx.Module):
         return before + (((a / 4 * x + b / 3) * x + c / 2) * x + d) * x
 
 
-class Recorded(Segment):
+class RecordedSegment(ProgrammeSegment):
     """Load and pulling velocity as they were recorded.
 
     Parameters
     ----------
     duration : array
         Seconds.
-    load_curve, pull_curve : Curve
+    load_curve, pull_curve : PiecewiseCubic
         W (N) and V (m/s) over the time of the segment.
     spacing : array
         Time between samples (s).
@@ -83,8 +83,8 @@ class Recorded(Segment):
     """
 
     duration: Scalar = eqx.field(converter=jnp.asarray)
-    load_curve: Curve
-    pull_curve: Curve
+    load_curve: PiecewiseCubic
+    pull_curve: PiecewiseCubic
     spacing: Scalar = eqx.field(converter=jnp.asarray)
     smooth: Scalar = eqx.field(converter=jnp.asarray)
     lowest: Scalar = eqx.field(converter=jnp.asarray)

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from asperity.errors import InputError
 from asperity.loads.consistency import checked_modulation
 from asperity.loads.modulation import Modulation
-from asperity.loads.programme.cycles import Cycles
+from asperity.loads.programme.harmonic import HarmonicSegment
 from asperity.loads.programme.interpolants import interpolated
-from asperity.loads.programme.levels import Levels
-from asperity.loads.programme.recorded import Recorded
-from asperity.loads.programme.segments import Segment
+from asperity.loads.programme.periodic import PeriodicSegment
+from asperity.loads.programme.recorded import RecordedSegment
+from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.parameters.arguments import number
 from asperity.units import to_si
 
@@ -24,18 +24,22 @@ from asperity.units import to_si
 Given: TypeAlias = float | str
 
 
-class Level(NamedTuple):
+class LoadAndVelocity(NamedTuple):
     """Load (N) and pulling velocity (m/s) that a step finds and leaves."""
 
     load: float
     velocity: float
 
 
-class Step(ABC):
+#: Segments of a step, and the load and velocity that it leaves.
+LaidOut: TypeAlias = tuple[list[ProgrammeSegment], LoadAndVelocity]
+
+
+class ProgrammeStep(ABC):
     """One thing that an experimenter does."""
 
     @abstractmethod
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """Segments of the step, and the level it leaves.
 
         Raises
@@ -46,72 +50,72 @@ class Step(ABC):
 
 
 @dataclass(frozen=True)
-class Hold(Step):
+class Hold(ProgrammeStep):
     """Stop the drive for `duration`; afterwards it goes on as before."""
 
     duration: Given
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """One segment at rest."""
-        return [Levels(_duration(self.duration, name), level.load, 0.0)], level
+        return [HarmonicSegment(_duration(self.duration, name), level.load, 0.0)], level
 
 
 @dataclass(frozen=True)
-class Slide(Step):
+class Slide(ProgrammeStep):
     """Pull for `duration`, at `velocity` from now on, or as before."""
 
     duration: Given
     velocity: Given | None = None
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """One segment."""
         level = level._replace(velocity=_velocity(self.velocity, level, name))
-        return [Levels(_duration(self.duration, name), level.load, level.velocity)], level
+        return [HarmonicSegment(_duration(self.duration, name), level.load, level.velocity)], level
 
 
 @dataclass(frozen=True)
-class StepLoad(Step):
+class StepLoad(ProgrammeStep):
     """Change the load to `to` at once."""
 
     to: Given
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """No segment: a break point. Friction is defined under a positive load only."""
         return [], level._replace(load=_positive(self.to, "force", f"{name}.to"))
 
 
 @dataclass(frozen=True)
-class RampLoad(Step):
+class RampLoad(ProgrammeStep):
     """Change the load to `to` at a constant rate within `duration`."""
 
     to: Given
     duration: Given
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """One segment."""
         to, duration = number(self.to, f"{name}.to", "force"), _duration(self.duration, name)
         rate = (to - level.load) / duration
-        segment = Levels(duration, level.load, level.velocity, load_rate=rate)
+        segment = HarmonicSegment(duration, level.load, level.velocity, load_rate=rate)
         return [segment], level._replace(load=to)
 
 
 @dataclass(frozen=True)
-class RampVelocity(Step):
+class RampVelocity(ProgrammeStep):
     """Change the pulling velocity to `to` at a constant rate within `duration`."""
 
     to: Given
     duration: Given
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """One segment."""
         to, duration = number(self.to, f"{name}.to", "velocity"), _duration(self.duration, name)
         rate = (to - level.velocity) / duration
-        segment = Levels(duration, level.load, level.velocity, pull_rate=rate)
+        segment = HarmonicSegment(duration, level.load, level.velocity, pull_rate=rate)
         return [segment], level._replace(velocity=to)
 
 
 @dataclass(frozen=True)
-class Modulate(Step):
+class Modulate(ProgrammeStep):
     """Modulate the load, W = W1 (1 + eps cos(2 pi f t + phase)), for `duration`.
 
     Parameters
@@ -144,7 +148,7 @@ class Modulate(Step):
     epsilon_v: Given = 0.0
     shear_ratio: float = 0.0
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """Up to three segments: rise, modulation, fall."""
         whole = _duration(self.duration, name)
         rise = _at_least_zero(self.rise, "time", f"{name}.rise")
@@ -164,7 +168,7 @@ class Modulate(Step):
             "epsilon_v": number(self.epsilon_v, f"{name}.epsilon_v", "dimensionless"),
             "shear_ratio": number(self.shear_ratio, f"{name}.shear_ratio", "dimensionless"),
         }
-        segments: list[Segment] = []
+        segments: list[ProgrammeSegment] = []
         begin = 0.0
         for duration, first, last, change in (
             (rise, 0.0, epsilon, rise),
@@ -175,7 +179,7 @@ class Modulate(Step):
                 turns = (frequency * begin) % 1.0
                 phase = number(self.phase, f"{name}.phase", "dimensionless") + 2 * np.pi * turns
                 segments.append(
-                    Levels(
+                    HarmonicSegment(
                         duration,
                         epsilon1=first,
                         epsilon2=last,
@@ -189,7 +193,7 @@ class Modulate(Step):
 
 
 @dataclass(frozen=True)
-class Cycle(Step):
+class CyclicLoading(ProgrammeStep):
     """A periodic modulation of any form, over the load and velocity of the moment.
 
     Parameters
@@ -206,16 +210,16 @@ class Cycle(Step):
     modulation: Modulation
     frequency: Given
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """One segment."""
         frequency = _positive(self.frequency, "frequency", f"{name}.frequency")
         duration = _duration(self.duration, name)
         modulation = checked_modulation(self.modulation, f"{name}.modulation")
-        return [Cycles(duration, modulation, frequency, level.load, level.velocity)], level
+        return [PeriodicSegment(duration, modulation, frequency, level.load, level.velocity)], level
 
 
 @dataclass(frozen=True, eq=False)
-class Follow(Step):
+class Follow(ProgrammeStep):
     """Follow a recording from its first sample to its last.
 
     Parameters
@@ -237,14 +241,14 @@ class Follow(Step):
     velocity: ArrayLike | None = None
     interpolant: str = "pchip"
 
-    def lay_out(self, level: Level, name: str) -> tuple[list[Segment], Level]:
+    def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
         """One segment."""
         time = np.asarray(to_si(self.time, "time", f"{name}.time"), float)
         load, W = interpolated(time, self.load, level.load, "force", self.interpolant, name)
         pull, V = interpolated(
             time, self.velocity, level.velocity, "velocity", self.interpolant, name
         )
-        segment = Recorded(
+        segment = RecordedSegment(
             time[-1] - time[0],
             load,
             pull,
@@ -253,10 +257,10 @@ class Follow(Step):
             lowest=W.min(),
             fastest=np.abs(V).max(),
         )
-        return [segment], Level(float(W[-1]), float(V[-1]))
+        return [segment], LoadAndVelocity(float(W[-1]), float(V[-1]))
 
 
-def _velocity(given: Given | None, level: Level, name: str) -> float:
+def _velocity(given: Given | None, level: LoadAndVelocity, name: str) -> float:
     return level.velocity if given is None else number(given, f"{name}.velocity", "velocity")
 
 

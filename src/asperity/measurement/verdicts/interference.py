@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.samples import Samples
 from asperity.measurement.verdicts.verdict import Check, judged
-from asperity.measurement.window import Stretch
+from asperity.measurement.window import LoadInterval
 
 Array = NDArray[np.float64]
 
@@ -29,7 +29,7 @@ _SWITCHED = 0.5
 _PIECES, _PERIODS = 8, 4
 
 
-def mains(reading: LockInReading, samples: Samples, parts: list[Stretch]) -> Check:
+def mains(reading: LockInReading, samples: Samples, parts: list[LoadInterval]) -> Check:
     """Whether what is taken for the modulation can be the mains in the load's signal.
 
     A line that is switched off in the pauses of the recording is none of the mains.
@@ -62,7 +62,7 @@ def mains(reading: LockInReading, samples: Samples, parts: list[Stretch]) -> Che
 
 
 def lines_in_the_pauses(
-    reading: LockInReading, samples: Samples, parts: list[Stretch]
+    reading: LockInReading, samples: Samples, parts: list[LoadInterval]
 ) -> tuple[Check, ...]:
     """Lines of load and force at f and 2f where the load is not modulated, against the reading.
 
@@ -70,7 +70,7 @@ def lines_in_the_pauses(
     ----------
     reading : LockInReading
     samples : Samples
-    parts : list of Stretch
+    parts : list of LoadInterval
         Modulated and unmodulated parts of the recording.
     """
     found: tuple[float, str, bool] | None = None

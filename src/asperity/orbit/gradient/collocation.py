@@ -33,7 +33,7 @@ def unknowns_of(orbit: Orbit) -> Array:
     return jnp.concatenate([orbit.nodes[:, None], orbit.slopes], axis=1)
 
 
-class _Prepared(NamedTuple):
+class _CondensedEquations(NamedTuple):
     widths: Array
     weights: Array  # (STAGES,): of the slopes in the rise over an interval
     response: Array  # (n, STAGES, n, intervals, points): slopes for a change at the left node
@@ -50,7 +50,7 @@ class CollocationEquations:
         found = jax.lax.stop_gradient(parameters[1])
         return found.moved(nodes=unknowns[:, 0], slopes=unknowns[:, 1:])
 
-    def prepare(self, parameters: tuple[Problem, Orbit], unknowns: Array) -> _Prepared:
+    def prepare(self, parameters: tuple[Problem, Orbit], unknowns: Array) -> _CondensedEquations:
         """Condensed equations."""
         problem, orbit = parameters[0], self.orbit(parameters, unknowns)
         local = localise(*problem, orbit)
@@ -58,7 +58,7 @@ class CollocationEquations:
         unit = jnp.eye(n * STAGES).reshape(n * STAGES, n, STAGES, 1, 1)
         columns = [column + jnp.zeros_like(local.rates) for column in unit]
         response, *inverse = condense(local, orbit, *columns)
-        return _Prepared(
+        return _CondensedEquations(
             orbit.widths,
             jnp.asarray(orbit.scheme.b),
             response,
@@ -66,7 +66,9 @@ class CollocationEquations:
             factorise_cyclic(transfer_maps(response, orbit)),
         )
 
-    def residual(self, parameters: tuple[Problem, Orbit], unknowns: Array, at: _Prepared) -> Array:
+    def residual(
+        self, parameters: tuple[Problem, Orbit], unknowns: Array, at: _CondensedEquations
+    ) -> Array:
         """Gaps at the ends of the intervals, and slopes less rates."""
         (system, load), orbit = parameters[0], self.orbit(parameters, unknowns)
         states = orbit.centre[:, None, None] + orbit.stage_deviations
@@ -75,7 +77,7 @@ class CollocationEquations:
         gap = jnp.roll(orbit.nodes, -1, axis=1) - orbit.nodes - rise
         return jnp.concatenate([gap[:, None], orbit.slopes - rates], axis=1)
 
-    def solve(self, product: Callable[[Any], Any], right: Array, at: _Prepared) -> Array:
+    def solve(self, product: Callable[[Any], Any], right: Array, at: _CondensedEquations) -> Array:
         """Nodes from the condensed equations, slopes from the nodes."""
         constant = jnp.einsum(
             "nkcmb,cmb->nkmb", at.inverse, right[:, 1:].reshape(-1, *at.widths.shape)
@@ -85,7 +87,9 @@ class CollocationEquations:
         slopes = jnp.einsum("nkcmb,cmb->nkmb", at.response, nodes) + constant
         return jnp.concatenate([nodes[:, None], slopes], axis=1)
 
-    def solve_transposed(self, product: Callable[[Any], Any], right: Array, at: _Prepared) -> Array:
+    def solve_transposed(
+        self, product: Callable[[Any], Any], right: Array, at: _CondensedEquations
+    ) -> Array:
         """The transpose of `solve`, which is linear in the right-hand side."""
         (transposed,) = jax.linear_transpose(lambda b: self.solve(product, b, at), right)(right)
         return transposed

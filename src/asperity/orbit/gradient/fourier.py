@@ -42,7 +42,7 @@ class FourierUnknowns(NamedTuple):
     rest: States
 
 
-class _Prepared(NamedTuple):
+class _InvertedJacobian(NamedTuple):
     inverse: Matrix
     jacobian: Matrix
     steps: Array
@@ -71,16 +71,18 @@ class FourierEquations:
         _, push = jax.linearize(rates_on(problem.system, self.cycle(problem)), *states)
         return jacobian(push, states)
 
-    def prepare(self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns) -> _Prepared:
+    def prepare(
+        self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns
+    ) -> _InvertedJacobian:
         """Jacobian, and the inverse of its mean."""
         problem, steps = parameters
         J = self.jacobian(problem, unknowns)
         share = self.cycle(problem).share
         inverse = inverse_points([[share @ entry for entry in row] for row in J])
-        return _Prepared(inverse, J, steps)
+        return _InvertedJacobian(inverse, J, steps)
 
     def residual(
-        self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns, at: _Prepared
+        self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns, at: _InvertedJacobian
     ) -> FourierUnknowns:
         """The unknowns less what a step of the iteration makes of them."""
         problem, _ = parameters
@@ -94,7 +96,7 @@ class FourierEquations:
         return _less(unknowns, FourierUnknowns(mean, rest))
 
     def solve(
-        self, product: Callable[[Any], Any], right: FourierUnknowns, at: _Prepared
+        self, product: Callable[[Any], Any], right: FourierUnknowns, at: _InvertedJacobian
     ) -> FourierUnknowns:
         """By the contraction that found the orbit."""
         J, share, integral = self._transposed(at)
@@ -112,7 +114,7 @@ class FourierEquations:
         )
 
     def solve_transposed(
-        self, product: Callable[[Any], Any], right: FourierUnknowns, at: _Prepared
+        self, product: Callable[[Any], Any], right: FourierUnknowns, at: _InvertedJacobian
     ) -> FourierUnknowns:
         """By the transpose of that contraction."""
         J, share, integral = self._transposed(at)
@@ -131,7 +133,7 @@ class FourierEquations:
             contracted(contract, _turned(right), at.steps + _MORE_STEPS, points_last=False)
         )
 
-    def _transposed(self, at: _Prepared) -> tuple[Matrix, Any, Any]:
+    def _transposed(self, at: _InvertedJacobian) -> tuple[Matrix, Any, Any]:
         """Jacobian (points, nodes), weights of a mean, and the integral as a right factor.
 
         With the nodes last, products with the integral need no transposition, however many

@@ -26,7 +26,7 @@ _EXPONENT = 200.0
 
 
 @dataclass(frozen=True)
-class OperatingPoint:
+class IntegratedPoint:
     """Numbers of one operating point, SI; lambda_ = 0 are rigid asperities, M = 0 no inertia."""
 
     mu: float
@@ -137,12 +137,12 @@ class IntegratedOrbit:
         return complex(self.coefficients[1, 1])
 
 
-def periodic_orbit(p: OperatingPoint, epsilon: float, drop: float = 0.0) -> IntegratedOrbit:
+def periodic_orbit(p: IntegratedPoint, epsilon: float, drop: float = 0.0) -> IntegratedOrbit:
     """Periodic orbit at the amplitude `epsilon`, stable or not.
 
     Parameters
     ----------
-    p : OperatingPoint
+    p : IntegratedPoint
     epsilon : float
     drop : float
         Guess of the change of the mean of F/W0, where Newton's method starts.
@@ -172,7 +172,7 @@ def _exp(exponent: Float) -> Float:
     return np.exp(np.clip(exponent, -_EXPONENT, _EXPONENT))
 
 
-def _advance(p: OperatingPoint, states: Float, epsilon: float) -> Float:
+def _advance(p: IntegratedPoint, states: Float, epsilon: float) -> Float:
     """Copies of the states at _SAMPLES + 1 instants of one period, (size, copies, instants)."""
     from scipy.integrate import solve_ivp
 

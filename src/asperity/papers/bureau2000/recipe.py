@@ -169,7 +169,7 @@ class RecipeNumber:
 
 
 @dataclass(frozen=True, eq=False)
-class Recipe:
+class RecipeResult:
     """All numbers of the paper's procedure.
 
     Attributes
@@ -228,7 +228,7 @@ def paper_procedure(
     *,
     fixed: Mapping[str, Any] | None = None,
     progress: Callable[[int, int, str], None] | None = None,
-) -> Recipe:
+) -> RecipeResult:
     """A, B, D0, eps_ratio, lambda and a bound on alpha as Bureau et al. (2000) find them.
 
     Parameters
@@ -246,7 +246,7 @@ def paper_procedure(
 
     Returns
     -------
-    Recipe
+    RecipeResult
 
     Raises
     ------
@@ -260,7 +260,7 @@ def paper_procedure(
     warnings: list[str] = []
     report(0, 4, "steady sliding and bifurcation")
     base = _steady_and_threshold(steady, thresholds, float(material["V0"].si), warnings)
-    steps = _Steps(base, constants, warnings)
+    steps = _SingleFits(base, constants, warnings)
     found: list[RecipeNumber] = [*base.numbers]
     report(1, 4, "eps_ratio from the drop")
     ratio = steps.fitted(3, drop, "rice-ruina", "eps_ratio", {}, "the drop, by Rice-Ruina")
@@ -280,7 +280,9 @@ def paper_procedure(
     )
     found.append(replace(_limited(free.number), name="alpha, eps_ratio free"))
     report(4, 4, "alpha from the drop")
-    return Recipe({n.name: n for n in found}, tuple(warnings), (readings.name, thresholds.name))
+    return RecipeResult(
+        {n.name: n for n in found}, tuple(warnings), (readings.name, thresholds.name)
+    )
 
 
 def _limited(number: RecipeNumber) -> RecipeNumber:
@@ -324,7 +326,7 @@ def _rows(readings: LockInTable) -> tuple[LockInTable, LockInTable, LockInTable]
 
 
 @dataclass(frozen=True, eq=False)
-class _Base:
+class _SteadyStateNumbers:
     """mu0, A, B and D0, with the covariance of mu0, ln(B - A), ln A and ln D0."""
 
     numbers: tuple[RecipeNumber, ...]
@@ -339,7 +341,7 @@ class _Base:
 
 def _steady_and_threshold(
     steady: LockInTable, thresholds: Thresholds, V0: float, warnings: list[str]
-) -> _Base:
+) -> _SteadyStateNumbers:
     """Steps 1 and 2 as one weighted least squares: what is measured twice is averaged."""
     log_v = np.log(steady.points["V"] / V0)
     mean, error = steady.values["mean_friction"], steady.errors["mean_friction"]
@@ -386,7 +388,7 @@ def _steady_and_threshold(
             f"steady sliding and bifurcations do not agree within their uncertainties: "
             f"chi-squared {solved.fun @ solved.fun:.3g} for {dof} degrees of freedom"
         )
-    base = _Base((), solved.x, covariance)
+    base = _SteadyStateNumbers((), solved.x, covariance)
     values = base.values(solved.x)
     step = math.exp(solved.x[1])
     gradient = {
@@ -412,7 +414,7 @@ def _steady_and_threshold(
 
 
 @dataclass(frozen=True, eq=False)
-class _Step:
+class _FittedNumber:
     """A fitted number, and how it moves with what was fixed.
 
     Attributes
@@ -427,10 +429,10 @@ class _Step:
 
 
 @dataclass(frozen=True, eq=False)
-class _Steps:
+class _SingleFits:
     """Fits of one parameter with the numbers of earlier steps fixed."""
 
-    base: _Base
+    base: _SteadyStateNumbers
     constants: Mapping[str, Any]
     warnings: list[str]
 
@@ -440,12 +442,12 @@ class _Steps:
         table: LockInTable,
         law: str,
         name: str,
-        earlier: Mapping[str, tuple[float, _Step]],
+        earlier: Mapping[str, tuple[float, _FittedNumber]],
         how: str,
         beside: Sequence[str] = (),
         *,
         same: bool = False,
-    ) -> _Step:
+    ) -> _FittedNumber:
         """The fit of a parameter, with others beside it if they are named.
 
         With `same` the earlier steps use the same readings: their noise is that of this step and
@@ -475,7 +477,7 @@ class _Steps:
             more.append(0.0 if same else slope / (0.01 * value) * source.number.se_own)
         shifts = np.array([*shifts, *more])
         se = float(np.sqrt(estimate.se**2 + np.sum(shifts**2)))
-        return _Step(_beside(name, estimate.value, se, estimate.se, step, how), shifts)
+        return _FittedNumber(_beside(name, estimate.value, se, estimate.se, step, how), shifts)
 
     def _moved(self) -> list[tuple[dict[str, float], ...]]:
         """mu0, A, B and D0 one standard deviation up and down each principal axis."""

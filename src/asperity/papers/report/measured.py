@@ -14,7 +14,7 @@ from asperity.figures.files import save_table
 from asperity.papers.report.points import (
     POINT_COLUMNS,
     RULE,
-    Comparison,
+    CurveComparison,
     MeasuredPoint,
     Observable,
     check_names,
@@ -74,7 +74,7 @@ class MeasuredPoints:
             "standard uncertainties.",
         )  # fmt: skip
 
-    def write(self, folder: Path) -> list[Comparison]:
+    def write(self, folder: Path) -> list[CurveComparison]:
         """Write data/points.csv and agreement.json, and return what they say."""
         if not self.compared:
             return []

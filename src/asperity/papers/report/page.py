@@ -18,7 +18,7 @@ from asperity.papers.report import ledger
 from asperity.papers.report.brief import brief
 from asperity.papers.report.markup import cell, embedded_png, rich
 from asperity.papers.report.parameters import table as parameter_table
-from asperity.papers.report.points import RULE, Comparison
+from asperity.papers.report.points import RULE, CurveComparison
 
 if TYPE_CHECKING:
     from asperity.papers.ledger.contents import About
@@ -54,7 +54,7 @@ def build_page(
     groups: Sequence[PlateGroup],
     claims: Sequence[Claim],
     headlines: Sequence[Headline],
-    agreement: Sequence[Comparison] = (),
+    agreement: Sequence[CurveComparison] = (),
 ) -> str:
     """The page as text.
 
@@ -65,7 +65,7 @@ def build_page(
         The sections of figures, in their order on the page.
     claims : sequence of Claim
     headlines : sequence of Headline
-    agreement : sequence of Comparison
+    agreement : sequence of CurveComparison
         Of measured points with the curves, where points were given.
     """
     about = paper.contents.paper
@@ -112,7 +112,7 @@ def _header(about: About, claims: Sequence[Claim]) -> str:
     )
 
 
-def _agreement(agreement: Sequence[Comparison]) -> str:
+def _agreement(agreement: Sequence[CurveComparison]) -> str:
     rows = "\n".join(
         '<tr role="row">'
         + cell(
@@ -137,7 +137,7 @@ def _agreement(agreement: Sequence[Comparison]) -> str:
     )
 
 
-def _agreement_chip(one: Comparison) -> str:
+def _agreement_chip(one: CurveComparison) -> str:
     kind, sign = {
         "agrees": ("reproduced", "✓"), "disagrees": ("differs", "≠"), "undecided": ("misprint", "?")
     }[one.verdict]  # fmt: skip

@@ -91,7 +91,7 @@ class MeasuredPoint:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class CurveComparison:
     """Points of one figure and observable, or of one law, against the curves.
 
     Attributes
@@ -326,7 +326,7 @@ def _row(
     }
 
 
-def comparisons(rows: pd.DataFrame) -> list[Comparison]:
+def comparisons(rows: pd.DataFrame) -> list[CurveComparison]:
     """Judge the points of each figure, observable and law, then all points of each law.
 
     Parameters
@@ -342,7 +342,7 @@ def comparisons(rows: pd.DataFrame) -> list[Comparison]:
     return [*single, *together]
 
 
-def _judge(rows: pd.DataFrame, figure: str, observable: str, law: str) -> Comparison:
+def _judge(rows: pd.DataFrame, figure: str, observable: str, law: str) -> CurveComparison:
     from scipy.stats import chi2, ncx2
 
     n = len(rows)
@@ -354,7 +354,7 @@ def _judge(rows: pd.DataFrame, figure: str, observable: str, law: str) -> Compar
     verdict: Agreement = "disagrees"
     if value <= quantile:
         verdict = "agrees" if power >= 1 - LEVEL else "undecided"
-    return Comparison(figure, observable, law, n, value, p, power, verdict)
+    return CurveComparison(figure, observable, law, n, value, p, power, verdict)
 
 
 def draw_points(figure: Figure, rows: pd.DataFrame, observables: Sequence[Observable]) -> None:

@@ -15,7 +15,7 @@ from asperity.papers.paper import Paper
 from asperity.papers.report import ledger
 from asperity.papers.report.measured import MeasuredPoints
 from asperity.papers.report.page import Plate, PlateGroup, build_page
-from asperity.papers.report.points import Comparison
+from asperity.papers.report.points import CurveComparison
 from asperity.papers.report.sections import PaperFigure, Section
 from asperity.papers.report.summary import ReproductionSummary
 
@@ -23,7 +23,7 @@ from asperity.papers.report.summary import ReproductionSummary
 Progress = Callable[[int, int, str], None]
 
 
-class _Steps:
+class _StepCounter:
     """Counts the steps of the work and reports them."""
 
     def __init__(self, progress: Progress | None, total: int) -> None:
@@ -75,7 +75,7 @@ def reproduce(
     points = MeasuredPoints() if data is None else MeasuredPoints.read(Path(data))
     with written_folder(out) as folder, paper.sections() as sections:
         points.check({k: v for section in sections for k, v in section.observables.items()})
-        steps = _Steps(progress, sum(2 * len(section.figures) for section in sections) + 2)
+        steps = _StepCounter(progress, sum(2 * len(section.figures) for section in sections) + 2)
         for name in ("figures", "data"):
             (folder / name).mkdir()
         shown = [_show(section, folder, steps, points) for section in sections[:1]]
@@ -97,7 +97,7 @@ def reproduce(
 
 
 def _show(
-    section: Section, folder: Path, steps: _Steps, points: MeasuredPoints
+    section: Section, folder: Path, steps: _StepCounter, points: MeasuredPoints
 ) -> tuple[PlateGroup, list[PaperFigure]]:
     """Compute and draw the figures of a section, and write their tables."""
     figures = []
@@ -133,7 +133,7 @@ def _summary(
     out: Path,
     figures: Sequence[PaperFigure],
     claims: Sequence[Claim],
-    agreement: Sequence[Comparison],
+    agreement: Sequence[CurveComparison],
     seconds: float,
 ) -> ReproductionSummary:
     tests = Counter[str](claim.verdict for claim in claims if claim.is_test)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from asperity._version import __version__
-from asperity.papers.report.points import Comparison
+from asperity.papers.report.points import CurveComparison
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class ReproductionSummary:
         Number of claims that the models could have contradicted, by verdict.
     exceptions : tuple of (str, str, str)
         Verdict, place and statement of each claim that is not reproduced.
-    agreement : tuple of Comparison
+    agreement : tuple of CurveComparison
         Of measured points with the curves, where points were given.
     seconds : float
     """
@@ -45,7 +45,7 @@ class ReproductionSummary:
     claims: int
     tests: Mapping[str, int]
     exceptions: tuple[tuple[str, str, str], ...]
-    agreement: tuple[Comparison, ...]
+    agreement: tuple[CurveComparison, ...]
     seconds: float
 
     @property

@@ -24,7 +24,7 @@ from asperity.recording.roles import role_of
 
 if TYPE_CHECKING:
     from asperity.recording.readers.raw import RawRecording
-    from asperity.recording.recipe import Recipe
+    from asperity.recording.recipe import ReadingRecipe
     from asperity.recording.trace import Trace
 
 
@@ -38,7 +38,7 @@ def read(
     units: Mapping[str, str] | None = None,
     *,
     channels: Mapping[str, str] | None = None,
-    recipe: Recipe | str | os.PathLike[str] | None = None,
+    recipe: ReadingRecipe | str | os.PathLike[str] | None = None,
     rate: float | str | None = None,
     group: str | None = None,
     delimiter: str | None = None,
@@ -64,7 +64,7 @@ def read(
     channels : mapping of str to str, optional
         Channels that are made of others, such as ``{"load": "Conf.Press - Pore.Press"}``; see
         `asperity.recording.derive`.
-    recipe : Recipe, str or path, optional
+    recipe : ReadingRecipe, str or path, optional
         A reduction file with any of these arguments; what is given here goes before it, and
         mappings are joined.
     rate : float or str, optional
@@ -88,11 +88,11 @@ def read(
     InputError
         If the file cannot be read, or can be read in more than one way.
     """
-    from asperity.recording.recipe import Recipe, load_recipe
+    from asperity.recording.recipe import ReadingRecipe, load_recipe
 
-    if recipe is not None and not isinstance(recipe, Recipe):
+    if recipe is not None and not isinstance(recipe, ReadingRecipe):
         recipe = load_recipe(recipe)
-    rules = Recipe() if recipe is None else recipe
+    rules = ReadingRecipe() if recipe is None else recipe
     layout = {"group": group, "delimiter": delimiter, "decimal": decimal, "format": format}
     layout = {k: getattr(rules, k) if v is None else v for k, v in layout.items()}
     rate = rules.rate if rate is None else rate

@@ -19,7 +19,7 @@ from asperity.materials import Material
 from asperity.orbit import PeriodicResponse, periodic_response
 from asperity.papers.bureau2000.integration import (
     IntegratedOrbit,
-    OperatingPoint,
+    IntegratedPoint,
     periodic_orbit,
 )
 from asperity.slider import Slider
@@ -148,12 +148,12 @@ class Model:
         """What the closed forms take, at the paper's numbers; rigid asperities, no inertia."""
         return SmallModulation(**self._point(V, **overrides))
 
-    def operating_point(self, V: float, **overrides: float) -> OperatingPoint:
+    def operating_point(self, V: float, **overrides: float) -> IntegratedPoint:
         """What the reference integration takes, at the paper's numbers; rigid, no inertia."""
         numbers = {k: v for k, v in self._point(V, **overrides).items() if k != "omega"}
-        return OperatingPoint(**numbers, frequency=self.numbers.frequency)
+        return IntegratedPoint(**numbers, frequency=self.numbers.frequency)
 
-    def orbit(self, point: OperatingPoint, epsilon: float, drop: float = 0.0) -> IntegratedOrbit:
+    def orbit(self, point: IntegratedPoint, epsilon: float, drop: float = 0.0) -> IntegratedOrbit:
         """A periodic orbit of the reference integration, integrated once."""
         return self._once((point, epsilon, drop), lambda: periodic_orbit(point, epsilon, drop))
 

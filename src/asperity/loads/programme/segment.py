@@ -30,7 +30,7 @@ def number(default: float) -> Any:
     return eqx.field(converter=jnp.asarray, default=default)
 
 
-class Segment(eqx.Module):
+class ProgrammeSegment(eqx.Module):
     """Load, shear force and pulling velocity over a length of time.
 
     Attributes

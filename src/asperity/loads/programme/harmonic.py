@@ -8,10 +8,10 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity.loads.excitation import Excitation
-from asperity.loads.programme.segments import Scalar, Segment, number
+from asperity.loads.programme.segment import ProgrammeSegment, Scalar, number
 
 
-class Levels(Segment):
+class HarmonicSegment(ProgrammeSegment):
     """Load and velocity that rise or fall linearly, with a harmonic modulation on top.
 
         W = (W1 + dW t) (1 + eps(t) cos psi),     psi = 2 pi f t + phase,

@@ -10,10 +10,10 @@ from jax.typing import ArrayLike
 
 from asperity.loads.excitation import Excitation
 from asperity.loads.modulation import Modulation
-from asperity.loads.programme.segments import Scalar, Segment
+from asperity.loads.programme.segment import ProgrammeSegment, Scalar
 
 
-class Cycles(Segment):
+class PeriodicSegment(ProgrammeSegment):
     """A periodic modulation of any form about constant levels.
 
     Parameters
