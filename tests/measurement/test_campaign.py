@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from asperity.cli.measure.reading import FileRows, ReadingOptions
-from asperity.cli.measure.source import Source
+from asperity.cli.measure.source import RecordingSource
 from asperity.errors import InputError
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure_amplitudes
@@ -53,7 +53,7 @@ def options(**changes) -> ReadingOptions:
     return ReadingOptions(**(chosen | changes))
 
 
-ROWS = FileRows(Source({}, {}), options())
+ROWS = FileRows(RecordingSource({}, {}), options())
 
 
 def table_of(path: Path) -> list[dict[str, str]]:
@@ -62,7 +62,7 @@ def table_of(path: Path) -> list[dict[str, str]]:
 
 
 def test_every_amplitude_of_a_recording_has_its_delta_mu(amplitudes) -> None:
-    found = measure_amplitudes(Source({}, {}).read(amplitudes), harmonics=2)
+    found = measure_amplitudes(RecordingSource({}, {}).read(amplitudes), harmonics=2)
     assert len(found) == 3
     for measurement, epsilon, start in zip(found, AMPLITUDES, STARTS, strict=True):
         reading = measurement.reading
@@ -117,7 +117,7 @@ def test_an_interrupted_campaign_goes_on(amplitudes, tmp_path) -> None:
     assert not out.exists()
     with pytest.raises(InputError, match="go on with --resume"):
         run_campaign(files, ROWS, out, inputs=ROWS.inputs())
-    other = FileRows(Source({}, {}), options(harmonics=3))
+    other = FileRows(RecordingSource({}, {}), options(harmonics=3))
     with pytest.raises(InputError, match=r"options\.harmonics"):
         run_campaign(files, other, out, inputs=other.inputs(), resume=True)
 
@@ -139,7 +139,7 @@ def test_a_changed_reduction_file_is_noticed(amplitudes, tmp_path) -> None:
     files = [tmp_path / f"{name}.csv" for name in "ab"]
     for file in files:
         file.write_bytes(amplitudes.read_bytes())
-    rows_of = FileRows(Source({}, {}, recipe=recipe), options())
+    rows_of = FileRows(RecordingSource({}, {}, recipe=recipe), options())
     out = tmp_path / "campaign.csv"
 
     def stop(done: int, total: int, label: str) -> None:
@@ -160,7 +160,7 @@ def test_steps_and_holds_are_rows(pulled, tmp_path) -> None:
     header = "Time(s)\tDispl(microns)\tFriction"
     values = np.stack([time, 1e6 * slip, friction], axis=1)
     np.savetxt(file, values, "%.6f", "\t", header=header, comments="")
-    rows_of = FileRows(Source({}, {}), options(modulated=False))
+    rows_of = FileRows(RecordingSource({}, {}), options(modulated=False))
     out = tmp_path / "campaign.csv"
     run_campaign([file], rows_of, out, inputs=rows_of.inputs())
     step, hold = table_of(out)
