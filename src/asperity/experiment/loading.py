@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.experiment.motion import motion_rate, signals
+from asperity.experiment.motion import DISPLACEMENT, FORCE, LOAD, recorded_motion
 from asperity.loads import Programme, Slide
 from asperity.recording.trace import Trace
 from asperity.slider import Slider
@@ -23,8 +23,6 @@ from asperity.tribometer.tribometer import Tribometer
 from asperity.units import to_si
 
 Array = NDArray[np.float64]
-
-FORCE, LOAD, DISPLACEMENT, DRIVE = "shear force", "normal force", "displacement", "drive position"
 
 #: Share of each branch that is left out at either end: what turns there is filtered.
 _TRIM = 0.1
@@ -106,22 +104,8 @@ def loading_recording(
     back, there = (1 - low) * stroke, (high - low) * stroke
     rounds = [Slide(there, velocity=speed), Slide(there, velocity=-speed)] * cycles
     programme = Programme(Slide(back, velocity=-speed), *rounds, load=W0, velocity=speed)
-    columns, last = signals(
-        slider, programme, motion_rate(tribometer), ("force", "load", "displacement"), **options
-    )
-    if last.stopped is not None:
-        raise InputError(
-            f"loading_recording.slider must stay below the threshold, got a motion that ended: "
-            f"{last.stopped}"
-        )
-    offered = {
-        FORCE: columns["force"],
-        LOAD: columns["load"],
-        DISPLACEMENT: columns["displacement"],
-        DRIVE: programme.position(columns["time"]),
-    }
-    taken = {name: offered[name] for name in tribometer.sensors if name in offered}
-    return tribometer.record(columns["time"], taken, seed=seed, provenance=last.provenance)
+    rule = "loading_recording.slider must stay below the threshold"
+    return recorded_motion(slider, tribometer, programme, rule, seed=seed, options=options)
 
 
 def elastic_length(

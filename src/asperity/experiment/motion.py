@@ -1,18 +1,24 @@
-"""Signals of a simulated motion, sampled finely enough for the tribometer."""
+"""Signals of a simulated motion, sampled finely enough for the tribometer, and their recording."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.errors import InputError
 from asperity.loads import Programme
+from asperity.recording.trace import Trace
 from asperity.slider import Slider
 from asperity.transients import Trajectory, integrate_blocks
 from asperity.tribometer.tribometer import Tribometer
 
 Array = NDArray[np.float64]
+
+#: Channels that a tribometer may have of a simulated slider; the drive is the load point.
+FORCE, LOAD, DISPLACEMENT, DRIVE = "shear force", "normal force", "displacement", "drive position"
 
 #: Samples of the motion for one of the recorder's, at least: with half as many amplitudes would be
 #: 4e-5 too small.
@@ -51,3 +57,43 @@ def signals(
         for name, parts in kept.items():
             parts.append(getattr(block, name))
     return {name: np.concatenate(parts) for name, parts in kept.items()}, block
+
+
+def recorded_motion(
+    slider: Slider,
+    tribometer: Tribometer,
+    programme: Programme,
+    rule: str,
+    *,
+    seed: int,
+    options: Mapping[str, Any],
+) -> Trace:
+    """Integrate a programme to its end, and record the channels that the tribometer has.
+
+    Parameters
+    ----------
+    slider, tribometer, programme
+    rule : str
+        Beginning of the message where the motion ends early: field and rule.
+    seed : int
+        Of the tribometer's noise.
+    options : mapping
+        Of `asperity.transients.transient`.
+
+    Raises
+    ------
+    InputError
+        If the motion ends before the programme does.
+    """
+    wanted = ("force", "load", "displacement")
+    columns, last = signals(slider, programme, motion_rate(tribometer), wanted, **options)
+    if last.stopped is not None:
+        raise InputError(f"{rule}, got a motion that ended: {last.stopped}")
+    offered = {
+        FORCE: columns["force"],
+        LOAD: columns["load"],
+        DISPLACEMENT: columns["displacement"],
+        DRIVE: programme.position(columns["time"]),
+    }
+    taken = {name: offered[name] for name in tribometer.sensors if name in offered}
+    return tribometer.record(columns["time"], taken, seed=seed, provenance=last.provenance)

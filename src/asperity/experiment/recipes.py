@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.experiment.loading import DISPLACEMENT, DRIVE, FORCE, LOAD
-from asperity.experiment.motion import motion_rate, signals
+from asperity.experiment.motion import recorded_motion
 from asperity.loads import Hold, Programme, ProgrammeStep, Slide
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.loads.programme.steps import Given, LaidOut, LoadAndVelocity
@@ -161,18 +160,5 @@ def _recording(
 ) -> Trace:
     speed = to_si(velocity, "velocity", f"{name}.velocity")
     programme = Programme(series, load=np.asarray(slider.W0).item(), velocity=speed)
-    wanted = ("force", "load", "displacement")
-    columns, last = signals(slider, programme, motion_rate(tribometer), wanted, **options)
-    if last.stopped is not None:
-        raise InputError(
-            f"{name}.slider must slide to the end of the series, got a motion that ended: "
-            f"{last.stopped}"
-        )
-    offered = {
-        FORCE: columns["force"],
-        LOAD: columns["load"],
-        DISPLACEMENT: columns["displacement"],
-        DRIVE: programme.position(columns["time"]),
-    }
-    taken = {channel: offered[channel] for channel in tribometer.sensors if channel in offered}
-    return tribometer.record(columns["time"], taken, seed=seed, provenance=last.provenance)
+    rule = f"{name}.slider must slide to the end of the series"
+    return recorded_motion(slider, tribometer, programme, rule, seed=seed, options=options)

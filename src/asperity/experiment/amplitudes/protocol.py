@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from asperity.errors import InputError
 from asperity.experiment.amplitudes.readings import AmplitudePoint, AmplitudeSeries
 from asperity.experiment.exciter import Exciter
-from asperity.experiment.motion import signals
+from asperity.experiment.motion import FORCE, LOAD, signals
 from asperity.loads import Programme, ProgrammeStep, Slide
 from asperity.measurement.measure import measure
 from asperity.slider import Slider
@@ -20,9 +20,6 @@ from asperity.tribometer.tribometer import Tribometer
 from asperity.units import to_si
 
 Array = NDArray[np.float64]
-
-#: Channels of the recording.
-FORCE, LOAD = "shear force", "normal force"
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,14 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from asperity.experiment.amplitudes.protocol import FORCE, LOAD, amplitude_motion
+from asperity.experiment.amplitudes.protocol import amplitude_motion
 from asperity.experiment.amplitudes.readings import AmplitudePoint, AmplitudeSeries
 from asperity.experiment.exciter import Exciter
 from asperity.experiment.motion import motion_rate
 from asperity.slider import Slider
 from asperity.tribometer.tribometer import Tribometer
 
-__all__ = ["FORCE", "LOAD", "AmplitudePoint", "AmplitudeSeries", "amplitude_series"]
+__all__ = ["AmplitudePoint", "AmplitudeSeries", "amplitude_series"]
 
 
 def amplitude_series(

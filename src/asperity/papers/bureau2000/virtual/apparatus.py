@@ -13,7 +13,7 @@ import numpy as np
 
 from asperity.air import AirLayer, patch_radius
 from asperity.experiment import Exciter
-from asperity.experiment.amplitudes.series import FORCE, LOAD
+from asperity.experiment.motion import FORCE, LOAD
 from asperity.papers.bureau2000.numbers.machine import EXT, fitted_share, paper
 from asperity.papers.bureau2000.numbers.machine import slider as paper_slider
 from asperity.slider import Slider

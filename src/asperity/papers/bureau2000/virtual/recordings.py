@@ -15,7 +15,7 @@ from asperity.experiment import (
     amplitude_motion,
     channel_gain,
 )
-from asperity.experiment.amplitudes.series import FORCE, LOAD
+from asperity.experiment.motion import FORCE, LOAD
 from asperity.measurement.verdicts.verdict import worst
 from asperity.papers.bureau2000.numbers.machine import Float, paper, velocities
 from asperity.papers.bureau2000.virtual.apparatus import exciter, slider, tribometer
