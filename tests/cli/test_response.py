@@ -117,7 +117,7 @@ def test_json_is_strict() -> None:
 
 def test_other_modulations_by_set(asperity) -> None:
     point = ("response", "--law", "rice-ruina", *POINT[2:], "--material", "bureau2000", "--json")
-    shown = asperity(*point, "--set", "epsilon2=3 %", "--set", "pull=0.2", "--set", "tilt=0.05")
+    shown = asperity(*point, "--set", "epsilon2=3 %", "--set", "pull=0.2", "--set", "tilt=50 mrad")
     assert (shown.exit_code, shown.stderr) == (0, "")
     record = strict(shown.stdout)
     pmma = asp.materials.load("bureau2000")

@@ -16,7 +16,7 @@ def test_double_direct_shear_has_half_the_stress_at_the_same_force() -> None:
 
 @pytest.mark.parametrize("degrees", [20.0, 30.0, 45.0, 60.0])
 def test_triaxial_stresses_are_those_of_the_stress_tensor(degrees) -> None:
-    cell = Triaxial(diameter="20 mm", angle=np.deg2rad(degrees))
+    cell = Triaxial(diameter="20 mm", angle=f"{degrees} deg")
     axial, confining, pore = 20e3, 30e6, 5e6
     # Traction of diag(s1, s3) on the plane whose normal is (sin, cos) of the angle to the axis.
     s1 = confining + axial / (np.pi * 0.01**2)

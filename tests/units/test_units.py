@@ -16,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from asperity.errors import InputError
-from asperity.units import KINDS, format_si, from_si, to_si
+from asperity.units import KINDS, format_si, from_si, to_radians, to_si
 
 RUNGS = [(kind, unit, power) for kind, k in KINDS.items() for unit, power in k.ladder]
 finite = st.floats(min_value=1e-200, max_value=1e200)
@@ -297,3 +297,22 @@ def test_what_no_decimal_can_hold_is_refused_in_a_short_sentence(value) -> None:
 def test_a_power_that_the_figures_undo_is_a_number() -> None:
     assert to_si("0." + "0" * 400 + "1e401 m/s", "velocity", "velocity") == 1.0
     assert to_si("1" + "0" * 400 + "e-400 m/s", "velocity", "velocity") == 1.0
+
+
+@pytest.mark.parametrize(
+    ("angle", "radians"),
+    [("180 deg", math.pi), ("-90°", -math.pi / 2), ("0.5 rad", 0.5), ("20 mrad", 0.02), ("1", 1)],
+)
+def test_angles(angle: str, radians: float) -> None:
+    assert to_radians(angle, "tilt") == pytest.approx(radians, rel=1e-15)
+
+
+def test_numbers_are_radians_as_they_are() -> None:
+    phases = np.array([0.1, 2.0])
+    assert to_radians(phases, "phase") is phases
+
+
+@pytest.mark.parametrize("angle", ["5 turns", "deg", "nan deg", "1 um", ""])
+def test_what_is_no_angle(angle: str) -> None:
+    with pytest.raises(InputError, match="tilt must be an angle in rad or deg"):
+        to_radians(angle, "tilt")

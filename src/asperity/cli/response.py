@@ -33,9 +33,10 @@ leaves open is taken from --law, --set, -V, -e, -f and --material; other columns
 are kept. A row that cannot be solved says why in the column 'result'.
 
 \b
-Other modulations, as columns or by --set, angles in rad: epsilon2,
-epsilon2_phase, epsilon3, epsilon3_phase (harmonics of the load), pull,
-pull_phase (of the pulling velocity over its mean), tilt (of the exciter).
+Other modulations, as columns or by --set: epsilon2, epsilon2_phase, epsilon3,
+epsilon3_phase (harmonics of the load), pull, pull_phase (of the pulling
+velocity over its mean), tilt (of the exciter). Angles are in rad;
+--set "tilt=5 deg" is understood too.
 """
 
 #: Outputs that the text shows.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.loads.periodic import Periodic, Series
-from asperity.units import to_si
+from asperity.units import to_radians, to_si
 
 #: Phases of the period at which the load is held to be positive.
 _PHASES = 2 * np.pi * np.arange(720) / 720
@@ -25,7 +25,7 @@ def modulated(
     *,
     load: Mapping[int, tuple[Any, Any]] | None = None,
     pull: ArrayLike | str = 0.0,
-    pull_phase: ArrayLike = 0.0,
+    pull_phase: ArrayLike | str = 0.0,
     tilt: ArrayLike | str = 0.0,
 ) -> Periodic:
     """Modulation of load, shear force and pulling velocity from amplitudes and phases.
@@ -38,10 +38,10 @@ def modulated(
     epsilon : array or str
         Relative amplitude of the load at the modulation frequency, its phase being zero.
     load : mapping of int to pair, optional
-        Further harmonics of the load: n -> (e_n, p_n), phases in rad.
+        Further harmonics of the load: n -> (e_n, p_n), phases in rad or texts like ``"30 deg"``.
     pull : array or str
         Amplitude of the pulling velocity over its mean (dimensionless).
-    pull_phase : array
+    pull_phase : array or str
         Its phase against the load (rad).
     tilt : array or str
         Angle between the direction in which the modulated force acts and the interface's normal
@@ -59,7 +59,7 @@ def modulated(
         If the load would vanish within the period, or a value breaks its rule.
     """
     series = _load_series(epsilon, load)
-    speed = _pair(to_si(pull, "dimensionless", "pull"), pull_phase)
+    speed = _pair(to_si(pull, "dimensionless", "pull"), to_radians(pull_phase, "pull_phase"))
     gain = np.tan(_checked_tilt(tilt))
     shear = tuple((gain * a, gain * b) for a, b in series) if np.any(gain) else ()
     _require_contact(series)
@@ -126,7 +126,8 @@ def _load_series(epsilon: ArrayLike | str, load: Mapping[int, tuple[Any, Any]] |
             raise InputError(
                 f"load must have harmonics from 2 on, got {n}; give the first one as epsilon"
             )
-        terms[int(n)] = (to_si(amplitude, "dimensionless", f"load[{n}]"), phase)
+        size = to_si(amplitude, "dimensionless", f"load[{n}]")
+        terms[int(n)] = (size, to_radians(phase, f"load[{n}]"))
     return tuple(_pair(*terms.get(n, (0.0, 0.0))) for n in range(1, max(terms) + 1))
 
 
@@ -137,7 +138,7 @@ def _pair(amplitude: ArrayLike, phase: ArrayLike) -> tuple[ArrayLike, ArrayLike]
 
 
 def _checked_tilt(value: Any) -> NDArray[np.float64]:
-    angle = np.asarray(_radians(value), float)
+    angle = np.asarray(to_radians(value, "tilt"), float)
     bad = angle[~(np.abs(angle) < np.pi / 2)]
     if bad.size:
         raise InputError(
@@ -145,20 +146,6 @@ def _checked_tilt(value: Any) -> NDArray[np.float64]:
             "give the angle from the normal, such as '5 deg'"
         )
     return angle
-
-
-def _radians(value: Any) -> Any:
-    """An angle in rad; a text is in degrees if it says so."""
-    if not isinstance(value, str):
-        return value
-    number, _, unit = value.strip().partition(" ")
-    scales = {"": 1.0, "rad": 1.0, "deg": np.pi / 180, "degrees": np.pi / 180}
-    try:
-        return float(number) * scales[unit.strip()]
-    except (KeyError, ValueError):
-        raise InputError(
-            f"tilt must be an angle in rad or deg, got '{value}'; write it like '5 deg'"
-        ) from None
 
 
 def _series_of(name: str, values: ArrayLike | None, harmonics: int | None) -> Series:

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from asperity.parameters.rules import RULES, obeying
-from asperity.units import KINDS
+from asperity.units import KINDS, to_radians
 
 #: What a parameter belongs to: the friction law, the machine, the equation of motion, the drive,
 #: or the normal load.
@@ -56,6 +56,8 @@ class Parameter:
         Usual names in the literature on faults, in Markdown.
     words : mapping of str to float
         Texts that stand for values.
+    angle : bool
+        Whether it is an angle: a number in rad, or a text such as "5 deg".
     """
 
     name: str
@@ -74,6 +76,7 @@ class Parameter:
     meant: tuple[str, ...] = ()
     geophysics: str = ""
     words: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    angle: bool = False
 
     def __post_init__(self) -> None:
         # A mistake here is one of the programmer, found when the module is imported.
@@ -117,6 +120,8 @@ class Parameter:
         """
         if isinstance(value, str):
             value = self.words.get(value.strip().lower(), value)
+            if self.angle:
+                value = to_radians(value, label or self.label or self.name)
         elif self.rule == "switch" and np.asarray(value).dtype == bool:
             value = np.asarray(value, dtype=float)
         return obeying(value, label or self.label or self.name, self.kind, self.rule)

@@ -47,7 +47,7 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "below a right angle": Rule(
             "be less than a right angle, pi/2, on either side",
             lambda x: np.abs(x) < np.pi / 2,
-            "give the angle from the normal in rad, such as 0.03",
+            "give the angle from the normal in rad, such as 0.03, or as a text like '2 deg'",
         ),
         "switch": Rule(
             "be 1 or 0",

@@ -196,7 +196,10 @@ DRIVE = _by_name(
 
 
 def _modulation(name: str, symbol: str, meaning: str, rule: str = "finite") -> Parameter:
-    return Parameter(name, "dimensionless", rule, meaning, symbol, "drive", default=0.0, label=name)
+    angle = name == "tilt" or name.endswith("_phase")
+    return Parameter(
+        name, "dimensionless", rule, meaning, symbol, "drive", default=0.0, label=name, angle=angle
+    )
 
 
 #: What else may be modulated, 0 where it is not: the arguments of `asperity.loads.modulated`.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.errors import InputError
 from asperity.tribometer.sensors import Given
-from asperity.units import KINDS, to_si
+from asperity.units import KINDS, to_radians, to_si
 
 Array = NDArray[np.float64]
 
@@ -20,7 +20,9 @@ def _to_si(geometry: Any, kinds: dict[str, str]) -> None:
     for field in fields(geometry):
         name = f"{type(geometry).__name__}.{field.name}"
         kind = kinds[field.name]
-        value = to_si(getattr(geometry, field.name), kind, name)
+        given = getattr(geometry, field.name)
+        value = to_radians(given, name) if field.name == "angle" else given
+        value = to_si(value, kind, name)
         if not value > 0:
             raise InputError(
                 f"{name} must be positive, got {value:g} {KINDS[kind].si}; correct the value"
@@ -76,19 +78,19 @@ class Triaxial:
     ----------
     diameter : float or str
         Of the cylinder (m).
-    angle : float
-        Between the cut and the axis of the cylinder (rad), such as ``np.deg2rad(30)``.
+    angle : float or str
+        Between the cut and the axis of the cylinder (rad), such as ``"30 deg"``.
     """
 
     diameter: Given
-    angle: float
+    angle: Given
 
     def __post_init__(self) -> None:
         _to_si(self, {"diameter": "length", "angle": "dimensionless"})
         if not self.angle < np.pi / 2:
             raise InputError(
                 f"Triaxial.angle must be below pi/2, got {self.angle:g} rad; give the angle "
-                "between the cut and the axis, like np.deg2rad(30)"
+                "between the cut and the axis, like '30 deg'"
             )
 
     @property

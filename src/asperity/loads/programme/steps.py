@@ -18,7 +18,7 @@ from asperity.loads.programme.periodic import PeriodicSegment
 from asperity.loads.programme.recorded import RecordedSegment
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.parameters.arguments import number
-from asperity.units import to_si
+from asperity.units import to_radians, to_si
 
 #: A number in SI, or a text with its unit.
 Given: TypeAlias = float | str
@@ -128,7 +128,7 @@ class Modulate(ProgrammeStep):
         Hz.
     rise, fall : float or str
         Time (s) over which the amplitude comes and goes smoothly; 0 is sudden.
-    phase : float
+    phase : float or str
         Phase at the beginning (rad); at 0 a sudden beginning is a step of the load by eps.
     velocity : float or str, optional
         Pulling velocity (m/s) from now on; as before by default.
@@ -143,7 +143,7 @@ class Modulate(ProgrammeStep):
     frequency: Given
     rise: Given = 0.0
     fall: Given = 0.0
-    phase: float = 0.0
+    phase: Given = 0.0
     velocity: Given | None = None
     epsilon_v: Given = 0.0
     shear_ratio: float = 0.0
@@ -177,7 +177,8 @@ class Modulate(ProgrammeStep):
         ):
             if duration > 0:
                 turns = (frequency * begin) % 1.0
-                phase = number(self.phase, f"{name}.phase", "dimensionless") + 2 * np.pi * turns
+                radians = to_radians(self.phase, f"{name}.phase")
+                phase = number(radians, f"{name}.phase", "dimensionless") + 2 * np.pi * turns
                 segments.append(
                     HarmonicSegment(
                         duration,
