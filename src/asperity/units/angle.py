@@ -6,6 +6,7 @@ import math
 from typing import Any
 
 from asperity.errors import InputError
+from asperity.units.convert import shortened
 
 #: Radians in each unit; a text without one is in radians.
 _RADIANS = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "degrees": math.pi / 180}
@@ -36,6 +37,7 @@ def to_radians(value: Any, name: str) -> Any:
         angle = math.nan
     if not math.isfinite(angle):
         raise InputError(
-            f"{name} must be an angle in rad or deg, got '{value}'; write it like '5 deg'"
+            f"{name} must be an angle in rad or deg, got '{shortened(value)}'; write it "
+            "like '5 deg'"
         )
     return angle

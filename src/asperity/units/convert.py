@@ -177,14 +177,14 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
     if match is None:
         raise InputError(
             f"{name} must be a finite number{' with a unit' if spec.si else ''}, "
-            f"got '{_cut(text)}'; write it like '{spec.example}'"
+            f"got '{shortened(text)}'; write it like '{spec.example}'"
         )
     digits, unit = Decimal(match[1]), normalised(match[3])
     if spec.si and not unit:
         raise InputError(
-            f"{name} must carry a unit, got '{_cut(text)}'; write it like '{spec.example}'"
+            f"{name} must carry a unit, got '{shortened(text)}'; write it like '{spec.example}'"
         )
-    factor = unit_factor(unit, kind, name, _cut(text))
+    factor = unit_factor(unit, kind, name, shortened(text))
     power = _power_of_ten(match[2] or "0")
     # Decimals have a largest power themselves; of what lies beyond, zero alone is a number.
     if digits and abs(power + digits.adjusted()) > _LARGEST_POWER:
@@ -203,11 +203,11 @@ def _power_of_ten(text: str) -> int:
 
 def _beyond_doubles(name: str, text: str, spec: Kind) -> InputError:
     return InputError(
-        f"{name} must lie within the range of double precision, got '{_cut(text)}'; "
+        f"{name} must lie within the range of double precision, got '{shortened(text)}'; "
         f"write it like '{spec.example}'"
     )
 
 
-def _cut(text: str) -> str:
+def shortened(text: str) -> str:
     """What a message repeats of a user's text."""
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
