@@ -24,7 +24,7 @@ from asperity.orbit.methods.collocation.newton import (
 from asperity.orbit.methods.fourier.observables import (
     fourier_observables,
 )
-from asperity.orbit.methods.fourier.orbit import fourier_orbit
+from asperity.orbit.methods.fourier.orbit import FourierOrbit, fourier_orbit
 from asperity.orbit.observables import Observables, waveform
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
@@ -51,6 +51,9 @@ FAST_BLOCK = 240
 
 #: Points in a call of `stiffness_of_steady_sliding` and `sharpness_of_slip`.
 STIFFNESS_CHUNK = 4096
+
+#: Samples of waveforms in a call.
+_SAMPLES = 2**17
 
 #: A Newton change below this counts as converged: the one before it was about its square root.
 ACCEPTED = 1e-6
@@ -87,18 +90,18 @@ def deepest_unloading(problem: Problem) -> Array:
     return 1 - jnp.min(w, axis=0) * jnp.ones(_points(problem))
 
 
-@partial(jax.jit, static_argnames=("nodes", "grading", "harmonics", "phases"))
+@partial(jax.jit, static_argnames=("nodes", "grading", "harmonics"))
 def fast_solve(
-    problem: Problem, *, nodes: int, grading: float, harmonics: int, phases: int
-) -> tuple[Observables, Array, Array]:
-    """Fourier collocation: the observables, its error estimate and the number of steps.
+    problem: Problem, *, nodes: int, grading: float, harmonics: int
+) -> tuple[Observables, Array, FourierOrbit]:
+    """Fourier collocation: the observables, their estimated error and the orbits.
 
     Works on blocks of points that fit into a core's cache, each until its slowest point is done.
     """
     points = _points(problem)
 
-    def solve(block: Problem) -> tuple[Observables, Array, Array]:
-        return _fast_block(block, nodes, grading, harmonics, phases)
+    def solve(block: Problem) -> tuple[Observables, Array, FourierOrbit]:
+        return _fast_block(block, nodes, grading, harmonics)
 
     blocks = jax.tree.map(lambda a: a.reshape(-1, FAST_BLOCK), problem)
     results = jax.lax.map(solve, blocks)
@@ -106,23 +109,41 @@ def fast_solve(
 
 
 def _fast_block(
-    problem: Problem, nodes: int, grading: float, harmonics: int, phases: int
-) -> tuple[Observables, Array, Array]:
+    problem: Problem, nodes: int, grading: float, harmonics: int
+) -> tuple[Observables, Array, FourierOrbit]:
     system, load = problem
     points = _points(problem)
     orbit = fourier_orbit(
         system, load, points, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
     )
-    observables, error = fourier_observables(
-        system, load, orbit, harmonics=harmonics, phases=phases, max_steps=40
-    )
-    return observables, error, jnp.full(points, orbit.steps)
+    observables, error = fourier_observables(system, load, orbit, harmonics=harmonics, max_steps=40)
+    each = {name: jnp.full(points, getattr(orbit, name)) for name in ("steps", "grading")}
+    return observables, error, orbit._replace(**each)
 
 
-def _observables(problem: Problem, orbit: Orbit, harmonics: int, phases: int) -> Observables:
+def samples_chunk(phases: int) -> int:
+    """Points in a call that samples waveforms at so many phases."""
+    return min(max(_SAMPLES // phases, 1), FAST_BLOCK)
+
+
+@partial(jax.jit, static_argnames=("grading", "phases"))
+def sample_fourier_orbit(
+    problem_and_orbit: tuple[Problem, FourierOrbit], *, grading: float, phases: int
+) -> Array:
+    """The waveform of orbits of the fast method, shape (2, phases, points)."""
+    problem, orbit = problem_and_orbit
+    return waveform(problem, orbit._replace(grading=grading), phases)
+
+
+@partial(jax.jit, static_argnames=("phases",))
+def sample_orbit(problem_and_orbit: tuple[Problem, Orbit], *, phases: int) -> Array:
+    """The waveform of orbits on a mesh, shape (2, phases, points)."""
+    return waveform(*problem_and_orbit, phases)
+
+
+def _observables(problem: Problem, orbit: Orbit, harmonics: int) -> Observables:
     fine = orbit.mesh.shape[0] > _COARSE
-    observables = collocation_observables(*problem, orbit, harmonics=harmonics, growth=fine)
-    return observables._replace(waveform=waveform(problem, orbit, phases))
+    return collocation_observables(*problem, orbit, harmonics=harmonics, growth=fine)
 
 
 @partial(jit_large, static_argnames=("intervals",))
@@ -154,9 +175,9 @@ def remeshed(problem_and_orbit: tuple[Problem, Orbit], *, intervals: int) -> Orb
     return refined(*problem, orbit, intervals)
 
 
-@partial(jit_large, static_argnames=("intervals", "harmonics", "phases"))
+@partial(jit_large, static_argnames=("intervals", "harmonics"))
 def refine_orbit(
-    problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, harmonics: int, phases: int
+    problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, harmonics: int
 ) -> tuple[Orbit, Observables, Array]:
     """The orbit on an equidistributed mesh of `intervals`, its observables and last Newton change.
 
@@ -187,27 +208,25 @@ def refine_orbit(
     start = (first, jnp.full(_points(problem), jnp.inf), 0)
     orbit, error, _ = jax.lax.while_loop(unfinished, body, start)
     orbit = _where(error < ACCEPTED, orbit, first)
-    return orbit, _observables(problem, orbit, harmonics, phases), error
+    return orbit, _observables(problem, orbit, harmonics), error
 
 
 def _where(condition: Array, yes: Orbit, no: Orbit) -> Orbit:
     return jax.tree.map(lambda a, b: jnp.where(condition, a, b), yes, no)
 
 
-@partial(jit_large, static_argnames=("harmonics", "phases"))
-def read_orbit(
-    problem_and_orbit: tuple[Problem, Orbit], *, harmonics: int, phases: int = 0
-) -> Observables:
+@partial(jit_large, static_argnames=("harmonics",))
+def read_orbit(problem_and_orbit: tuple[Problem, Orbit], *, harmonics: int) -> Observables:
     """The observables of an orbit as it is."""
     problem, orbit = problem_and_orbit
-    return _observables(problem, orbit, harmonics, phases)
+    return _observables(problem, orbit, harmonics)
 
 
 @partial(jit_large, static_argnames=("parts",))
 def split_observables(problem_and_orbit: tuple[Problem, Orbit], *, parts: int) -> Observables:
     """Multipliers by transfer maps over parts of the intervals, for stiff but smooth orbits."""
     problem, orbit = problem_and_orbit
-    return _observables(problem, split(orbit, parts), 1, 0)
+    return _observables(problem, split(orbit, parts), 1)
 
 
 @partial(jit_large, static_argnames=("parts",))

@@ -36,8 +36,6 @@ class Observables(NamedTuple):
         computed.
     start : array, shape (size, points)
         States at theta = 0.
-    waveform : array, shape (2, phases, points)
-        F/W0 and ln(v_pl/V) at even phases.
     """
 
     mean_friction: Array
@@ -48,7 +46,6 @@ class Observables(NamedTuple):
     exponent: Array
     growth: Array
     start: Array
-    waveform: Array
 
     @property
     def log_multipliers(self) -> NDArray[np.complex128]:
@@ -84,8 +81,6 @@ class PeriodicOrbit(Protocol):
 
 def waveform(problem: Problem, orbit: PeriodicOrbit, phases: int) -> Array:
     """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points)."""
-    if phases == 0:
-        return jnp.zeros((2, 0, orbit.start.shape[-1]))
     theta = even_phases(phases)
     return waveform_of(problem, orbit.states(theta), jnp.asarray(theta))
 

@@ -90,12 +90,14 @@ class Solution(NamedTuple):
     def store(
         self, rows: Indices, observables: Observables, logs: NDArray[np.complex128] | None = None
     ) -> None:
-        """Write converged points, with logarithms of the multipliers if these are known better."""
+        """Write converged points, with logarithms of the multipliers if these are known better.
+
+        Not their waveforms, which are sampled once an orbit is settled.
+        """
         self.mean_friction[rows] = observables.mean_friction
         self.harmonics[:, rows] = observables.harmonics
         self.log_multipliers[:, rows] = observables.log_multipliers if logs is None else logs
         self.start[:, rows] = observables.start
-        self.waveform[..., rows] = observables.waveform
         self.outcome[rows] = Outcome.CONVERGED
 
     def discard(self, rows: Indices) -> None:

@@ -137,7 +137,7 @@ def _found(problem: Problem, points: int, harmonics: int, direct: bool) -> MeshO
     if len(bare):
         start = starting_orbits(take(problem, bare), len(bare), INTERVALS)
         put(orbit, bare[start.found], take(start.orbit, np.flatnonzero(start.found)))
-    solve = partial(refine_orbit, intervals=INTERVALS, harmonics=counted, phases=0)
+    solve = partial(refine_orbit, intervals=INTERVALS, harmonics=counted)
     rows = solved[orbit.mesh[-1, solved] > 0]
     chunk = chunk_size(INTERVALS, problem.system.size)
     for part, (fine, reading, error) in run_chunks(solve, (problem, orbit), rows, chunk):

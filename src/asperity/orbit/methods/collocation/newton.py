@@ -174,7 +174,7 @@ def refined(system: Motion, load: Modulation, orbit: Orbit, intervals: int) -> O
 def collocation_observables(
     system: Motion, load: Modulation, orbit: Orbit, *, harmonics: int, growth: bool = True
 ) -> Observables:
-    """Observables of a converged orbit without waveform; `growth` may be left out as inf."""
+    """Observables of a converged orbit; `growth` may be left out as inf."""
     local = localise(system, load, orbit)
     weights = jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths / (2 * jnp.pi)
     constant, rest = system.force_split(
@@ -204,5 +204,4 @@ def collocation_observables(
         exponent,
         2 * jnp.pi * (weights * abscissa).sum((0, 1)),
         orbit.start,
-        jnp.zeros((2, 0, *mean.shape)),
     )

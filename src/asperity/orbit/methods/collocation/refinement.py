@@ -9,7 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.orbit.batches import Indices, put, run_chunks, take
-from asperity.orbit.compiled import ACCEPTED, read_orbit, refine_orbit, remeshed
+from asperity.orbit.compiled import (
+    ACCEPTED,
+    read_orbit,
+    refine_orbit,
+    remeshed,
+    sample_orbit,
+    samples_chunk,
+)
 from asperity.orbit.methods.collocation.mesh import Orbit
 from asperity.orbit.multipliers import (
     AGREEMENT,
@@ -73,7 +80,6 @@ def refine(
             refine_orbit,
             intervals=intervals,
             harmonics=options.harmonics,
-            phases=options.phases,
         )
         resolved = np.zeros(points, dtype=bool)
         for part, (fine, observables, error) in run_chunks(
@@ -82,18 +88,23 @@ def refine(
             put(finer, part, fine)
             solution.iterations[part] = intervals
             resolved[part] = _compare(solution, part, previous, observables, error, agreement)
-        keep_orbits(problem, solution, finer, index[resolved[index]])
+        _keep(problem, solution, finer, index[resolved[index]])
         orbit, index = finer, index[~resolved[index]]
         if not len(index):
             return
     stiff = index[solution.outcome[index] == Outcome.MULTIPLIERS_NOT_RESOLVED]
     resolve_multipliers(problem, solution, orbit, stiff)
-    keep_orbits(problem, solution, orbit, stiff[solution.converged[stiff]])
+    _keep(problem, solution, orbit, stiff[solution.converged[stiff]])
     solution.discard(index[~solution.converged[index]])
 
 
-def keep_orbits(problem: Problem, solution: Solution, orbit: Orbit, rows: Indices) -> None:
-    """Write orbits of the points `rows` to `solution`, which may have room for them."""
+def _keep(problem: Problem, solution: Solution, orbit: Orbit, rows: Indices) -> None:
+    """Write waveforms and orbits of the points `rows` to `solution`, which may have room."""
+    phases = solution.waveform.shape[1]
+    if phases:
+        sample = partial(sample_orbit, phases=phases)
+        for part, samples in run_chunks(sample, (problem, orbit), rows, samples_chunk(phases)):
+            solution.waveform[..., part] = samples
     intervals = len(solution.orbit.mesh) - 1
     if intervals:
         remesh = partial(remeshed, intervals=intervals)
@@ -115,7 +126,7 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     options : SearchOptions
     """
     intervals = orbit.mesh.shape[0] - 1
-    evaluate = partial(read_orbit, harmonics=options.harmonics, phases=options.phases)
+    evaluate = partial(read_orbit, harmonics=options.harmonics)
     chunk = chunk_size(intervals, problem.system.size)
     points = np.arange(orbit.centre.shape[1])
     stiff = []
@@ -128,7 +139,7 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     index = np.concatenate(stiff)
     solution.outcome[index] = Outcome.MULTIPLIERS_NOT_RESOLVED
     resolve_multipliers(problem, solution, orbit, index)
-    keep_orbits(problem, solution, orbit, np.flatnonzero(solution.converged))
+    _keep(problem, solution, orbit, np.flatnonzero(solution.converged))
     solution.discard(np.flatnonzero(~solution.converged))
 
 

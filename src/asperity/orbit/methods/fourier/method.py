@@ -11,6 +11,8 @@ from asperity.orbit.compiled import (
     FAST_BLOCK,
     STIFFNESS_CHUNK,
     fast_solve,
+    sample_fourier_orbit,
+    samples_chunk,
     sharpness_of_slip,
     stiffness_of_steady_sliding,
 )
@@ -61,13 +63,18 @@ class Fourier(Method):
                 nodes=nodes,
                 grading=grading,
                 harmonics=options.harmonics,
-                phases=options.phases,
             )
             chosen = left[sharpness[left] <= sharpest]
-            for part, (observables, error, steps) in run_chunks(solve, problem, chosen, _CHUNK):
+            for part, (observables, error, orbit) in run_chunks(solve, problem, chosen, _CHUNK):
                 good = np.flatnonzero(error < _ERROR)
                 solution.store(part[good], take(observables, good))
-                solution.iterations[part] += steps
+                solution.iterations[part] += orbit.steps
+                if options.phases:
+                    sample = partial(sample_fourier_orbit, grading=grading, phases=options.phases)
+                    inputs = (take(problem, part), orbit)
+                    chunk = samples_chunk(options.phases)
+                    for some, samples in run_chunks(sample, inputs, good, chunk):
+                        solution.waveform[..., part[some]] = samples
                 options.progress(len(good))
             left = left[~solution.converged[left]]
         return solution

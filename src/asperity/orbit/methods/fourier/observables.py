@@ -1,4 +1,4 @@
-"""Observables of a Fourier orbit: mean, harmonics, waveform and monodromy matrix.
+"""Observables of a Fourier orbit: mean, harmonics and monodromy matrix.
 
 The fundamental matrix is Q(tau) exp(L tau) with Q periodic of mean 1, which obeys
 dQ/dtau = J Q - Q L and is found by the iteration that finds the orbit; the multipliers are
@@ -24,9 +24,8 @@ from asperity.orbit.methods.fourier.orbit import (
     rates_on,
     together,
 )
-from asperity.orbit.observables import Observables, waveform
+from asperity.orbit.observables import Observables
 from asperity.slider import QuasiStatic
-from asperity.slider.problem import Problem
 
 #: On the estimated error of L.
 _FLOQUET_TOLERANCE = 1e-12
@@ -38,7 +37,6 @@ def fourier_observables(
     orbit: FourierOrbit,
     *,
     harmonics: int,
-    phases: int,
     max_steps: int,
 ) -> tuple[Observables, Array]:
     """Observables of a converged orbit, and their estimated error, (points,).
@@ -50,8 +48,8 @@ def fourier_observables(
     system, load
         As given to `fourier_orbit`.
     orbit : FourierOrbit
-    harmonics, phases : int
-        Numbers of harmonics and of waveform samples.
+    harmonics : int
+        Their number.
     max_steps : int
         Bound on the steps of the Floquet iteration.
     """
@@ -74,7 +72,6 @@ def fourier_observables(
         2 * jnp.pi * exponent,
         jnp.full_like(mean, jnp.inf),
         orbit.start,
-        waveform(Problem(system, load), orbit, phases),
     )
     return observables, jnp.maximum(error, floquet_error)
 

@@ -204,15 +204,14 @@ class _Refinement:
             np.full_like(reached.monodromy, np.nan),
             zero,
             start,
-            self._waveform(rows, count),
         )
         self.solution.store(rows, observables, logs)
+        self._sample(rows, count)
         self.solution.iterations[rows] = count
         self.options.progress(len(rows))
 
-    def _waveform(self, rows: Indices, count: int) -> Float:
+    def _sample(self, rows: Indices, count: int) -> None:
         phases = self.options.phases
-        waveform = np.zeros((2, phases, self.first.shape[1]))
         if phases:
             solve = partial(
                 shot_waveform,
@@ -222,8 +221,7 @@ class _Refinement:
                 phases=phases,
             )
             for some, samples in run_chunks(solve, (self.problem, self.first), rows, _chunk(rows)):
-                waveform[..., some] = samples
-        return waveform[..., rows]
+                self.solution.waveform[..., some] = samples
 
 
 def _chunk(rows: Indices) -> int:
