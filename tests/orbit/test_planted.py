@@ -17,7 +17,7 @@ BASE = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
 LAMBDA, ALPHA = 7e-7, 0.2
 K, W0, V, FREQUENCY = 2e5, 7.0, 1e-6, 120.0
 EPSILON = np.array([0.02, 0.1])
-#: As in `test_periodic`, which shares the programs of the correct laws.
+#: As in `test_periodic`.
 SAMPLES = 4096
 SEGMENTS = 32
 VARIANTS = {
