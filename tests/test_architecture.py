@@ -50,7 +50,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material
     "papers": _RESULTS | _STUDIES | {"figures", "inference"},
-    "app": _RESULTS | _STUDIES | {"inference", "figures", "operating_point", "papers"},
+    "app": _RESULTS
+    | _STUDIES
+    | {"inference", "figures", "operating_point", "papers", "fit_report"},
     "cli": _RESULTS
     | _STUDIES
     | {"inference", "figures", "operating_point", "papers", "app", "fit_report"},

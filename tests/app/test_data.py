@@ -1,13 +1,16 @@
 """Data: files that are sent, what is measured of them, fits, and the virtual tribometer."""
 
+import base64
 import gzip
+import io
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.app.api import recordings
+from asperity.app.api import data, recordings
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError
 
@@ -218,6 +221,22 @@ def test_a_table_is_fitted(ask, measured):
     assert "--free mu0" in result["command"]
 
 
+def test_the_report_of_a_fit_names_its_files_as_their_sender_does(monkeypatch):
+    def written(folder, found):
+        folder.mkdir()
+        for name in ("fit.json", "report.html"):
+            (folder / name).write_text(f"{found} fitted to sent-table-0.csv")
+
+    monkeypatch.setattr("asperity.fit_report.write_report", written)
+    packed = data._report("a law", {"sent-table-0.csv": '<my "readings">.csv'})
+    with zipfile.ZipFile(io.BytesIO(base64.b64decode(packed))) as folder:
+        texts = {name: folder.read(name).decode() for name in folder.namelist()}
+    assert texts == {
+        "report/fit.json": r"""a law fitted to <my \"readings\">.csv""",
+        "report/report.html": "a law fitted to &lt;my &quot;readings&quot;&gt;.csv",
+    }
+
+
 @pytest.mark.parametrize(
     ("changed", "word"),
     [
@@ -245,17 +264,75 @@ def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modul
     (tmp_path / "bad.csv").write_bytes(b"PK\x03\x04" + b"\0" * 500)
     page = visit("#data")
     page.locator(".drop").wait_for()
-    page.set_input_files("#data-files", [tmp_path / "good.csv", tmp_path / "bad.csv"])
+    page.set_input_files("#data-files", [tmp_path / "bad.csv", tmp_path / "good.csv"])
     good, bad = (
         page.locator(".recording[aria-label='good.csv']"),
         page.locator(".recording[aria-label='bad.csv']"),
     )
-    good.locator(".sentence", has_text="Modulated at 20 Hz by 20 %").wait_for()
     bad.locator(".message", has_text="must").wait_for()
+    good.locator(".sentence", has_text="Modulated at 20 Hz by 20 %").wait_for()
     assert good.locator("figure").count() == 4
-    page.wait_for_url(lambda url: "good.csv" in url)
+    page.get_by_role("button", name="Remove bad.csv").click()
+    page.wait_for_url(lambda url: "good.csv" in url and "bad.csv" not in url)
     again = visit(page.url.split("/")[-1])
+    # While the link is opened, a channel is given another role by hand on the first page.
+    page.locator("summary", has_text="Channels").first.click()
+    page.get_by_label("Role of Fn").select_option("F")
     again.locator(".sentence", has_text="Modulated at 20 Hz").wait_for()
-    again.locator("summary", has_text="Channels").first.click()
-    again.get_by_label("Role of Fn").select_option("F")
-    again.locator(".recording[aria-label='good.csv'] .message", has_text="must").wait_for()
+    good.locator(".message", has_text="must").wait_for()
+
+
+@pytest.fixture
+def steps(tmp_path):
+    """Friction that goes up and down with ln V at two steps of the velocity, and its argument."""
+    rng = np.random.default_rng(5)
+    t = np.arange(1200) / 10.0
+    fast = (t >= 40) & (t < 80)
+    slip = np.cumsum(np.where(fast, 10.0, 1.0)) / 10.0
+    friction = 0.6 - 0.01 * fast + 3e-4 * rng.normal(size=t.size)
+    rows = np.column_stack([t, slip, 10 * friction, np.full(t.size, 10.0)])
+    path = tmp_path / "0123.csv"
+    header = "time (s),displacement (um),Ft (N),Fn (N)"
+    np.savetxt(path, rows, delimiter=",", header=header, comments="", fmt="%.7g")
+    asked = {
+        "laws": ["rice-ruina"], "free": ["A", "B", "D0"], "material": "bureau2000",
+        "runs": [{"recording": "0" * 32, "window": [10.0, 70.0]}],
+    }  # fmt: skip
+    return {"asked": asked, "files": [{"path": str(path), "name": "steps.csv"}]}
+
+
+def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps):
+    asked = data.Fitted.model_validate(steps["asked"])
+    run = data._run(asked.runs[0], steps["files"][0])
+    direct = asp.inference.recorded_run(steps["files"][0]["path"], window=(10.0, 70.0))
+    assert run.name == "steps"
+    assert run.velocities == direct.velocities
+    assert np.array_equal(run.friction, direct.friction)
+    assert run.velocities == pytest.approx([1e-6, 1e-5], rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("asked", "run", "word"),
+    [
+        ({"gauge": "-1 Hz"}, {}, "gauge"),
+        ({"gauge": "1 kg"}, {}, "gauge"),
+        ({"free": ["alpha"], "laws": ["linker-dieterich"]}, {}, "alpha"),
+        ({}, {"velocities": ["1 um/s"]}, "velocities"),
+        ({}, {"velocities": ["fast", "slow"]}, "velocities"),
+        ({}, {"window": [70.0, 10.0]}, "window"),
+        ({}, {"source": {"columns": {"F": "no such"}}}, "no such"),
+    ],
+)
+def test_a_recording_that_cannot_be_fitted_gets_a_sentence(steps, asked, run, word):
+    steps["asked"] |= asked
+    steps["asked"]["runs"][0] |= run
+    with pytest.raises(InputError, match=" must ") as refused:
+        data.fit(steps, lambda **message: None)
+    assert word in str(refused.value)
+    assert "0123" not in str(refused.value)
+
+
+def test_a_fit_needs_a_recording_that_was_sent(ask, steps):
+    answer = ask("data/fit", steps["asked"])
+    assert answer.status == 400
+    assert "recording must be" in answer.json["error"]

@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from asperity.app.api import map as map_tab
+from asperity.sweep import map as maps
 from asperity.sweep.map import Axis
 
 ASKED = {
@@ -28,6 +30,22 @@ def test_the_grid_is_that_of_the_package(ask):
     assert np.array_equal(np.array(grid["stable"], dtype=bool), found["stable"].values)
     assert grid["x"] == pytest.approx(Axis("epsilon", 0.01, 0.4, 2).values)
     assert {k for line in grid["boundaries"] for k in line["kind"]} == {"Neimark-Sacker"}
+
+
+def test_the_first_grid_does_not_wait_for_the_boundary(monkeypatch):
+    asked_for = []
+
+    def solved(law, fixed, *, x, y, boundary, progress):
+        asked_for.append((x.count, boundary))
+        return maps.response_map(law, fixed, x=x, y=y, boundary=False, progress=progress)
+
+    coarse = [dict(ASKED, count=8), dict(ASKED, count=16)]
+    monkeypatch.setattr(map_tab, "response_map", solved)
+    grids = []
+    for asked in coarse:
+        map_tab.grow(asked, lambda **message: grids.append(message.get("grid")))
+    assert asked_for == [(8, True), (8, False), (16, True)]
+    assert [g["boundaries"] for g in grids if g] == [[], None, []]
 
 
 @pytest.mark.parametrize(

@@ -58,6 +58,23 @@ def test_the_keyboard_reaches_every_control(visit):
     assert missed == []
 
 
+def test_the_keyboard_reads_the_values_of_a_chart(visit, explored):
+    page = opened(visit, "explore")
+    page.locator(".sentence", has_text="able;").wait_for()
+    numbers = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0}
+    force = explored({"law": "rice-ruina", "numbers": numbers})["point"]["force"]
+    chart = page.locator(".panel.period .plot")
+    spoken = page.locator(".panel.period [aria-live]")
+    chart.focus()
+    chart.press("ArrowRight")
+    assert spoken.inner_text() == f"F/W₀: {float(f'{force[0]:.4g}'):g} at 0"
+    chart.press("ArrowDown")
+    assert spoken.inner_text().startswith("slip velocity / V: ")
+    assert page.locator(".panel.period .readout").is_visible()
+    chart.press("Escape")
+    assert spoken.inner_text() == ""
+
+
 def test_tabs_are_links_and_come_back_as_they_were(visit):
     page = opened(visit, "explore")
     page.get_by_label("Law", exact=True).select_option("linker-dieterich")

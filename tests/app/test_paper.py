@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import asperity as asp
+from asperity.app.api import paper
 
 
 @pytest.fixture
@@ -23,8 +24,8 @@ def figure(ask):
 def test_curves_are_those_of_the_package(figure):
     answer = figure(figure="figure-08", numbers={"K": "0.3 N/um"})
     curve = answer["moved"][1]
-    paper = asp.materials.load("bureau2000")
-    slider = asp.Slider(paper.law("rice-ruina"), spring="0.3 N/um", load=paper.W0)
+    pmma = asp.materials.load("bureau2000")
+    slider = asp.Slider(pmma.law("rice-ruina"), spring="0.3 N/um", load=pmma.W0)
     epsilon = curve["values"]["epsilon_eff"][10]
     point = asp.periodic_response(slider, velocity="10 um/s", epsilon=epsilon, frequency="120 Hz")
     assert curve["name"] == "10 µm/s"
@@ -37,7 +38,7 @@ def test_curves_are_those_of_the_package(figure):
 @pytest.mark.parametrize(
     ("asked", "word"),
     [
-        ({"figure": "figure-10"}, "figure"),
+        ({"figure": "figure-12"}, "figure"),
         ({"figure": "../figure"}, "figure"),
         ({"figure": "figure-02", "numbers": {"h0": 1e-6}}, "numbers"),
         ({"figure": "figure-02", "numbers": {"A": -1}}, "A"),
@@ -50,6 +51,38 @@ def test_a_wrong_figure_gets_a_sentence(ask, asked, word):
     assert answer.status == 400
     assert answer.json["error"].startswith(word)
     assert " must be " in answer.json["error"]
+
+
+def test_the_element_of_figure_10_moves_as_its_equation_says(figure):
+    """x' = (lambda F/W)' + plastic rate, with the stretch and both rates from the page."""
+    answer = figure(figure="figure-10", numbers={"lambda": "1.2 um"})
+    assert answer["element"]["asperities"] == pytest.approx(7 / 1.2e-6)
+    slow = answer["moved"][0]
+    assert slow["name"] == "1 µm/s"
+    stretch, velocity, plastic = (
+        np.array(slow["values"][n]) for n in ("stretch", "slider_velocity", "plastic_velocity")
+    )
+    # The derivative of a periodic function by its Fourier series; over V, in periods of 1/120 s.
+    orders = np.fft.rfftfreq(stretch.size, 1 / stretch.size)
+    rate = np.fft.irfft(2j * np.pi * orders * np.fft.rfft(1e-9 * stretch)) * 120.0 / 1e-6
+    assert velocity == pytest.approx(rate + plastic, abs=2e-3 * np.abs(velocity).max())
+
+
+def test_curves_with_the_mass_follow_the_numbers():
+    sent = []
+    asked = {"figure": "figure-11", "numbers": {"M": "2 kg"}}
+    paper.inertia(asked, lambda **message: sent.append(message))
+    curve = next(m["curve"] for m in sent if "curve" in m)
+    assert [m["progress"] for m in sent][-1] == 1
+    assert curve["name"] == "1 µm/s, with its mass"
+    pmma = asp.materials.load("bureau2000")
+    slider = asp.Slider(pmma.law("elasto-plastic"), spring=pmma.K, load=pmma.W0, mass=2.0)
+    # Another number of points than the page's: another start of the search.
+    epsilon = curve["values"]["epsilon_eff"][20:]
+    point = asp.periodic_response(
+        slider, velocity="1 um/s", epsilon=epsilon, frequency="120 Hz", inertia=True
+    )
+    assert curve["values"]["mu2"][20:] == pytest.approx(point.mu2, rel=1e-6)
 
 
 def test_the_ledger_can_be_searched(visit):

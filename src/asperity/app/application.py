@@ -58,7 +58,7 @@ def build(port: int, *, in_notebook: bool = False, prepare: bool = True) -> Guar
     tasks: dict[str, Callable[[], Any]] = {}
     routes: list[Route | Mount] = []
     limits: dict[str, int] = {}
-    reused: set[str] = set()
+    warm: dict[str, str | None] = {}
     for module in modules:
         tasks |= getattr(module, "preparations", dict)()
         for endpoint in module.ENDPOINTS:
@@ -67,9 +67,10 @@ def build(port: int, *, in_notebook: bool = False, prepare: bool = True) -> Guar
                 handler = _upload(endpoint, uploads)
                 limits[path] = endpoint.largest
             elif isinstance(endpoint, Job):
-                jobs = lanes.setdefault(endpoint.lane, Jobs())
-                if not endpoint.limits:  # a job with limits has a process for itself
-                    reused.add(endpoint.lane)
+                # A job with limits has a process for itself, which need not know any orbits.
+                own = endpoint.job.partition(":")[0] if endpoint.limits else "asperity.orbit"
+                jobs = lanes.setdefault(endpoint.lane, Jobs(preload=own))
+                warm[endpoint.lane] = warm.get(endpoint.lane) or endpoint.warm
                 handler = _job(endpoint, jobs, uploads)
                 limits[path] = endpoint.largest or BODY_LIMIT
             else:
@@ -101,8 +102,8 @@ def build(port: int, *, in_notebook: bool = False, prepare: bool = True) -> Guar
     async def lifespan(app: Starlette) -> AsyncIterator[None]:
         if prepare:
             preparation.start(list(tasks)[:3])
-            for name in reused:
-                await lanes[name].prepare()
+            for name, first in warm.items():
+                await lanes[name].prepare(first)
         yield
         preparation.close()
         lane.close()

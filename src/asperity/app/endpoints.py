@@ -70,6 +70,9 @@ class Job:
         question's fields.
     largest : int, optional
         Bytes of the body, where they may be more than of other requests.
+    warm : str, optional
+        ``module:function`` that a worker runs when the server starts, so that the first question
+        need not wait for programs to be compiled.
     """
 
     path: str
@@ -81,6 +84,7 @@ class Job:
     seconds: float = 600.0
     argument: Callable[[Any, Uploads], Any] | None = None
     largest: int | None = None
+    warm: str | None = None
 
 
 @dataclass(frozen=True)

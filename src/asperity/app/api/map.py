@@ -16,7 +16,8 @@ from asperity.operating_point import SourcedNumber, refuse_foreign
 from asperity.parameters.arguments import one_of
 from asperity.sweep.map import SHOWN, Axis, response_map
 
-#: Points along each axis: at once, then finer while one looks, up to what is asked.
+#: Points along each axis: at once and without a boundary, then finer while one looks, up to what is
+#: asked.
 _COARSE = 8
 #: Largest number of points along an axis.
 _FINEST = 128
@@ -89,7 +90,8 @@ def grow(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, 
     """Solve ever finer grids.
 
     Each message has ``grid``: axes, `MapAsked.show` on the grid, where it is stable, why a point
-    failed, and the boundary with its bifurcations; or ``progress``, a share of all work.
+    failed, and the boundary with its bifurcations; or ``progress``, a share of all work. The first
+    of several grids has None for the boundary: searching for it takes longer than its points.
     """
     asked = MapAsked.model_validate(argument)
     counts = [asked.count]
@@ -103,9 +105,26 @@ def grow(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, 
         def progress(done: int, points: int, before: int = before) -> None:
             report(progress=(before + done) / total)
 
-        found = response_map(asked.law, fixed, x=x, y=y, progress=progress)
+        first = count < asked.count and count == counts[0]
+        found = response_map(asked.law, fixed, x=x, y=y, boundary=not first, progress=progress)
         before += count * count
-        report(grid=_record(found, asked, x, y), progress=before / total)
+        grid = _record(found, asked, x, y) | ({"boundaries": None} if first else {})
+        report(grid=grid, progress=before / total)
+    return {}
+
+
+def warm(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
+    """Compile what the map that the tab begins with needs, before it is asked for."""
+    sides = {"x": {"name": "epsilon", "low": 0.01, "high": 0.4},
+             "y": {"name": "K", "low": 1e5, "high": 4e5}}  # fmt: skip
+    numbers = {"V": 1e-6, "frequency": 120.0}
+    asked = MapAsked.model_validate({"law": "rice-ruina", "numbers": numbers, **sides})
+    x, y = asked.axes(_COARSE)
+
+    def on_progress(done: int, points: int) -> None:
+        report()
+
+    response_map(asked.law, asked.fixed(), x=x, y=y, boundary=False, progress=on_progress)
     return {}
 
 
@@ -147,5 +166,8 @@ def _short(value: float) -> float | None:
 
 ENDPOINTS = (
     Answer("map/text", MapAsked, text),
-    Job("map", MapAsked, "asperity.app.api.map:grow", lane="map", check=check, seconds=900),
-)
+    Job(
+        "map", MapAsked, "asperity.app.api.map:grow", lane="map", check=check, seconds=900,
+        warm="asperity.app.api.map:warm",
+    ),
+)  # fmt: skip

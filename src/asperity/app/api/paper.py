@@ -17,7 +17,13 @@ from asperity.app.endpoints import Answer, Job, Question
 from asperity.app.preparation import Preparation
 from asperity.errors import InputError, closest
 from asperity.materials import Material
-from asperity.orbit import Outcome, ResponseFunction, response_function
+from asperity.orbit import (
+    Outcome,
+    ResponseFunction,
+    over_a_period,
+    periodic_response,
+    response_function,
+)
 from asperity.papers import find_paper
 from asperity.papers.bureau2000.numbers import (
     CURVES,
@@ -29,14 +35,17 @@ from asperity.papers.bureau2000.numbers import (
     stated,
 )
 from asperity.papers.bureau2000.numbers.bands import variations
-from asperity.papers.bureau2000.numbers.machine import slider
+from asperity.papers.bureau2000.numbers.machine import EXT, slider, velocities, velocity_text
+from asperity.papers.bureau2000.numbers.resonance import contact_resonance
 from asperity.papers.ledger.ledger import altered
 from asperity.parameters import law_parameters, obeying
 from asperity.units import from_si
 
 _PAPER = "bureau2000"
-#: Intervals of a curve that follows a slider.
-_STEPS = 25
+#: Intervals of a curve that follows a slider, and instants of a period.
+_STEPS, _INSTANTS = 25, 128
+#: The figure without curves: the element of the elasto-plastic law, here with its motion.
+_ELEMENT = "figure-10"
 
 _ELASTIC = ("A", "B", "D0", "lambda", "mu0", "K", "W0", "frequency", "transmission")
 _RIGID = ("A", "B", "D0", "mu0", "K", "W0", "frequency")
@@ -53,8 +62,11 @@ _NUMBERS: Mapping[str, tuple[str, ...]] = {
     "figure-07": _RIGID,
     "figure-08": _RIGID,
     "figure-09": ("alpha", "alpha_low", *_RIGID),
+    "figure-10": ("lambda", "K", "W0", "M", "A", "B", "D0", "mu0", "frequency"),
     "figure-11": _ELASTIC[:-1],
 }
+#: Numbers beside them on which the curves with the slider's mass rest.
+_MASS = ("figure-02", "figure-04", "figure-11")
 _TITLES = {
     "figure-02": "The mean friction falls when the load is modulated",
     "figure-03": "Modulation shifts the friction–velocity curve down",
@@ -64,6 +76,7 @@ _TITLES = {
     "figure-07": "How much of the modulation the contacts bear",
     "figure-08": "Rice–Ruina: the harmonics",
     "figure-09": "Linker–Dieterich ageing, two coefficients",
+    "figure-10": "The interface: a spring in series with a frictional joint",
     "figure-11": "Elastic asperities: hardly any dependence on V, no saturation",
 }
 _LABELS = {
@@ -74,6 +87,10 @@ _LABELS = {
     "epsilon_applied": "modulation amplitude ε",
     "epsilon_eff": "effective amplitude ε_eff",
     "V": "pulling velocity V",
+    "phase": "time over the period, 0 at the largest load",
+    "stretch": "λF/W (nm)",
+    "slider_velocity": "ẋ / V",
+    "plastic_velocity": "plastic rate / V",
 }
 #: A share is moved between these; other numbers by this factor to both sides.
 _SHARE, _FACTOR = (0.05, 1.0), 4.0
@@ -87,7 +104,7 @@ class MovedFigure(Question):
     Attributes
     ----------
     figure : str
-        A key of `CURVES`.
+        A key of `CURVES`, or the element's.
     numbers : mapping of str to number or str
         SI, or texts with units, by the names of the paper's numbers; the others are as printed.
     """
@@ -108,7 +125,7 @@ def use(preparation: Preparation) -> None:
 
 def preparations() -> dict[str, Callable[[], Any]]:
     """Programs of each figure."""
-    return {_place(name): partial(_printed_curves, name) for name in CURVES}
+    return {_place(name): partial(_printed_curves, name) for name in _NUMBERS}
 
 
 def _place(figure: str) -> str:
@@ -126,9 +143,10 @@ def overview(asked: Nothing) -> dict[str, Any]:
                 "name": name,
                 "place": _place(name),
                 "title": _TITLES[name],
-                "numbers": [_slider(n, about.parameters) for n in _NUMBERS[name]],
+                "numbers": [_slider(n, about.parameters) for n in _numbers_of(name)],
+                "inertia": name in CURVES and bool(_inertial(name)),
             }
-            for name in CURVES
+            for name in _NUMBERS
         ],
         "claims": [
             {
@@ -139,6 +157,11 @@ def overview(asked: Nothing) -> dict[str, Any]:
             for c in contents.claim
         ],
     }  # fmt: skip
+
+
+def _numbers_of(figure: str) -> tuple[str, ...]:
+    own = _NUMBERS[figure]
+    return (*own, "M") if figure in _MASS else own
 
 
 def _section(place: str) -> str:
@@ -165,16 +188,22 @@ def _slider(name: str, meanings: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def figure(asked: MovedFigure) -> dict[str, Any]:
-    """Curves of a figure as printed and with the moved numbers, and what the text states."""
-    if asked.figure not in CURVES:
+def check(asked: MovedFigure) -> None:
+    """Refuse what cannot be drawn, before a process is asked."""
+    if asked.figure not in _NUMBERS:
         raise InputError(
             f"figure must be one of the paper's with curves, got '{asked.figure}'; "
-            f"{closest(asked.figure, CURVES)}"
+            f"{closest(asked.figure, _NUMBERS)}"
         )
+    _moved_numbers(asked)
+
+
+def figure(asked: MovedFigure) -> dict[str, Any]:
+    """Curves of a figure as printed and with the moved numbers, and what the text states."""
+    check(asked)
     numbers = _moved_numbers(asked)
     answer: dict[str, Any] = {
-        "numbers": {n: numbers[n].si for n in _NUMBERS[asked.figure]},
+        "numbers": {n: numbers[n].si for n in _numbers_of(asked.figure)},
         "python": _python(asked, numbers),
         "command": f"asperity reproduce {_PAPER} --out report",
     }
@@ -184,11 +213,25 @@ def figure(asked: MovedFigure) -> dict[str, Any]:
     with replaced_numbers(numbers, _STEPS):
         after = _curves(asked.figure) if asked.numbers else before
         marks = _stated(asked.figure)
+        if asked.figure == _ELEMENT:
+            answer["element"] = _element()
     return {**answer, **_layout(asked.figure), "printed": before, "moved": after, "stated": marks}
 
 
+def _element() -> dict[str, float]:
+    """Stiffnesses and frequencies of the element at the numbers in force, in SI."""
+    own = paper()
+    asperities = own.W0 / own["lambda"].si
+    return {
+        "asperities": asperities,
+        "spring": own.K,
+        "ratio": own.K / asperities,
+        "resonance": contact_resonance(),
+    }
+
+
 def _moved_numbers(asked: MovedFigure) -> Material:
-    known = _NUMBERS[asked.figure]
+    known = _numbers_of(asked.figure)
     changes = {}
     for name, value in asked.numbers.items():
         if name not in known:
@@ -217,9 +260,10 @@ def _followed(curve: FigureCurve) -> bool:
 
 def _curves(name: str) -> list[dict[str, Any]]:
     """Lines of a figure at the numbers in force."""
+    if name == _ELEMENT:
+        return [_element_period(V) for V in velocities()]
     curves = [curve for curve in CURVES[name]() if _followed(curve)]
-    layout = _layout(name)
-    columns = (layout["x"]["column"], *(row["column"] for row in layout["rows"]))
+    columns = _columns(name)
     found = [_fast_curve(curve) for curve in curves]
     for curve, values in zip(curves, found, strict=True):
         _fill_in(curve, values)
@@ -227,6 +271,75 @@ def _curves(name: str) -> list[dict[str, Any]]:
         {"name": curve.name.replace("um", "µm"), "values": {c: values[c] for c in columns}}
         for curve, values in zip(curves, found, strict=True)
     ]
+
+
+def _columns(name: str) -> tuple[str, ...]:
+    layout = _layout(name)
+    return (layout["x"]["column"], *(row["column"] for row in layout["rows"]))
+
+
+def _element_period(V: float) -> dict[str, Any]:
+    """What the element does over a period: stretch of the asperities, and rates over V."""
+    response = periodic_response(
+        slider(EXT), velocity=V, epsilon=stated().epsilon_eff, frequency=paper().frequency,
+        waveform=_INSTANTS,
+    )  # fmt: skip
+    period = over_a_period(response)
+    stretch = 1e9 * paper()["lambda"].si * period.force / period.load
+    values = {
+        "phase": period.phase, "stretch": stretch, "slider_velocity": period.velocity,
+        "plastic_velocity": period.plastic_velocity,
+    }  # fmt: skip
+    return {"name": velocity_text(V).replace("um", "µm"), "values": values}
+
+
+def _inertial(name: str) -> list[FigureCurve]:
+    return [curve for curve in CURVES[name]() if curve.inertia]
+
+
+def inertia(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
+    """Curves with the mass of the slider, a message each: ``curve``, and ``printed`` beside it.
+
+    These have no method that always takes milliseconds.
+    """
+    asked = MovedFigure.model_validate(argument)
+    numbers = _moved_numbers(asked)
+    names = [curve.name for curve in _inertial(asked.figure)] if asked.figure in CURVES else []
+    for done, name in enumerate(names):
+
+        def on_progress(points: int, total: int, done: int = done) -> None:
+            report(progress=(done + points / total) / len(names))
+
+        before = _printed_inertial_curve(asked.figure, name, on_progress)
+        after = before
+        if asked.numbers:
+            with replaced_numbers(numbers, _STEPS):
+                after = _inertial_curve(asked.figure, name, on_progress)
+        report(curve=after, printed=before, progress=(done + 1) / len(names))
+    return {}
+
+
+_inertial_as_printed: dict[tuple[str, str], dict[str, Any]] = {}
+
+
+def _printed_inertial_curve(
+    figure: str, name: str, progress: Callable[[int, int], None]
+) -> dict[str, Any]:
+    key = figure, name
+    if key not in _inertial_as_printed:
+        with replaced_numbers(printed(), _STEPS):
+            _inertial_as_printed[key] = _inertial_curve(figure, name, progress)
+    return _inertial_as_printed[key]
+
+
+def _inertial_curve(figure: str, name: str, progress: Callable[[int, int], None]) -> dict[str, Any]:
+    curve = next(c for c in _inertial(figure) if c.name == name)
+    _check_share(curve)
+    rows = solve_curves([curve], progress=progress)
+    return {
+        "name": name.replace("um", "µm").replace("inertia", "with its mass"),
+        "values": {c: rows[c].to_numpy(float) for c in _columns(figure)},
+    }
 
 
 def _fast_curve(curve: FigureCurve) -> dict[str, Any]:
@@ -305,6 +418,12 @@ def _layout(name: str) -> dict[str, Any]:
     """Axes of a figure: an abscissa and a row for each observable."""
     from asperity.papers.bureau2000.figures.observables import OBSERVABLES
 
+    if name == _ELEMENT:
+        rows = ("stretch", "slider_velocity", "plastic_velocity")
+        return {
+            "x": {"column": "phase", "label": _LABELS["phase"], "log": False},
+            "rows": [{"column": c, "label": _LABELS[c], "log": False} for c in rows],
+        }
     observables = OBSERVABLES[name]
     x = observables[0].x
     return {
@@ -319,7 +438,7 @@ def _layout(name: str) -> dict[str, Any]:
 def _stated(name: str) -> dict[str, list[dict[str, Any]]]:
     """What the text states at one amplitude, by observable; an interval has two ends."""
     seen = stated()
-    if name == "figure-03":
+    if name in ("figure-03", _ELEMENT):
         return {}
     borne = name in ("figure-08", "figure-09", "figure-11")
     at = seen.epsilon_eff if borne else seen.epsilon
@@ -337,6 +456,16 @@ def _stated(name: str) -> dict[str, list[dict[str, Any]]]:
 
 def _python(asked: MovedFigure, numbers: Material) -> str:
     changes = {name: numbers[name].value for name in asked.numbers}
+    if asked.figure == _ELEMENT:
+        return (
+            "from asperity.papers.bureau2000.numbers import printed, replaced_numbers\n"
+            "from asperity.papers.bureau2000.numbers.period import one_period\n"
+            "from asperity.papers.ledger.ledger import altered\n\n"
+            f"numbers = altered(printed(), {changes!r})\n"
+            "with replaced_numbers(numbers):\n"
+            f'    table = one_period("{EXT}", V=1e-6, epsilon={stated().epsilon_eff})\n'
+            "print(table)\n"
+        )
     names = "CURVES, printed, replaced_numbers, solve_curves"
     return (
         f"from asperity.papers.bureau2000.numbers import {names}\n"
@@ -373,5 +502,9 @@ def _claims(report: Callable[..., None]) -> list[dict[str, Any]]:
 ENDPOINTS = (
     Answer("paper", Nothing, overview),
     Answer("paper/figure", MovedFigure, figure),
+    Job(
+        "paper/inertia", MovedFigure, "asperity.app.api.paper:inertia", lane="search",
+        check=check, seconds=120,
+    ),
     Job("paper/ledger", Nothing, "asperity.app.api.paper:ledger", lane="paper", seconds=300),
-)
+)  # fmt: skip

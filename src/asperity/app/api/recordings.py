@@ -98,7 +98,7 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
         if table is not None:
             return {"table": table}
         report(stage="reading")
-        trace = _read(path, argument["source"])
+        trace = read_source(path, argument["source"])
         report(recording=_described(trace, name, argument["source"]))
         return _measured(trace, argument, report)
 
@@ -113,7 +113,8 @@ def named(path: Path, name: str) -> Iterator[None]:
         raise InputError(printable(text, 900)) from None
 
 
-def _read(path: Path, source: Mapping[str, Any]) -> Any:
+def read_source(path: Path, source: Mapping[str, Any]) -> Any:
+    """The recording in a file, read as the fields of `Source` say."""
     from asperity.recording.conversions import stress_to_force
     from asperity.recording.readers import read
 
@@ -310,16 +311,7 @@ def _recipes(
 
 
 def _command(name: str, source: Mapping[str, Any], options: Options, *, modulated: bool) -> str:
-    parts = ["asperity measure", shlex.quote(name)]
-    own = {"W": "--load", "F": "--force", "time": "--time"}
-    for role, column in source["columns"].items():
-        given = [own[role], str(column)] if role in own else ["--column", f"{role}={column}"]
-        parts += [given[0], shlex.quote(given[1])]
-    parts += [f"--unit {shlex.quote(f'{n}={u}')}" for n, u in source["units"].items()]
-    parts += [f"--channel {shlex.quote(f'{n} = {e}')}" for n, e in source["channels"].items()]
-    for option in ("rate", "group", "delimiter", "decimal", "area"):
-        if source.get(option):
-            parts.append(f"--{option} {shlex.quote(source[option])}")
+    parts = ["asperity measure", shlex.quote(name), *source_options(source)]
     if not modulated:
         parts.append("--no-modulation")
     elif options.frequency:
@@ -338,3 +330,18 @@ def _command(name: str, source: Mapping[str, Any], options: Options, *, modulate
     if options.holds and not modulated:
         parts.append("--holds " + ",".join(f"{a:g}:{b:g}" for a, b in options.holds))
     return " ".join(parts)
+
+
+def source_options(source: Mapping[str, Any]) -> list[str]:
+    """How a file is read, as options of a command."""
+    own = {"W": "--load", "F": "--force", "time": "--time"}
+    parts: list[str] = []
+    for role, column in source["columns"].items():
+        given = [own[role], str(column)] if role in own else ["--column", f"{role}={column}"]
+        parts += [given[0], shlex.quote(given[1])]
+    parts += [f"--unit {shlex.quote(f'{n}={u}')}" for n, u in source["units"].items()]
+    parts += [f"--channel {shlex.quote(f'{n} = {e}')}" for n, e in source["channels"].items()]
+    for option in ("rate", "group", "delimiter", "decimal", "area"):
+        if source.get(option):
+            parts.append(f"--{option} {shlex.quote(source[option])}")
+    return parts

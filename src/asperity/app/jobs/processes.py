@@ -30,10 +30,13 @@ class Jobs:
         Jobs that run at the same time; others wait.
     most : int
         Jobs that may wait.
+    preload : str
+        Module that a worker imports before its first job comes.
     """
 
-    def __init__(self, workers: int = 1, most: int = 20) -> None:
+    def __init__(self, workers: int = 1, most: int = 20, preload: str = "asperity.orbit") -> None:
         self._most = most
+        self._preload = preload
         self._free = asyncio.Semaphore(workers)
         self._waiting = 0
         self._idle: list[_Worker] = []
@@ -114,7 +117,7 @@ class Jobs:
         finished = False
         superseded = asyncio.ensure_future(newer.wait())
         try:
-            worker = self._idle.pop() if self._idle and not limits else await _Worker.start()
+            worker = self._idle_one() or await _Worker.start(self._preload)
             self._alive.add(worker)
             await worker.send({"job": job, "argument": argument, "limits": dict(limits or {})})
             end = asyncio.get_running_loop().time() + seconds
@@ -142,8 +145,18 @@ class Jobs:
             self._tasks.add(task)
             task.add_done_callback(self._tasks.discard)
 
+    def _idle_one(self) -> _Worker | None:
+        while self._idle:
+            worker = self._idle.pop()
+            if worker.running:
+                return worker
+        return None
+
     async def _look_after(self, worker: _Worker | None, *, reusable: bool, finished: bool) -> None:
-        """Keep a worker for the next job if its own is done, or stops when asked."""
+        """Keep a worker for the next job if its own is done, or stops when asked.
+
+        Another one takes the place of a worker that had limits, and waits with its imports done.
+        """
         try:
             if worker is not None:
                 if reusable and worker.running and (finished or await worker.stop_job()):
@@ -152,23 +165,35 @@ class Jobs:
                     worker.kill()
                     self._alive.discard(worker)
                     await worker.ended()
+                    if not reusable and not self._closed:
+                        await self.prepare()
         finally:
             self._free.release()
 
-    async def prepare(self) -> None:
-        """Start a worker for the first job."""
-        worker = await _Worker.start()
+    async def prepare(self, warm: str | None = None) -> None:
+        """Start a worker for the first job, and let it run `warm` without waiting for its end."""
+        worker = await _Worker.start(self._preload)
         self._alive.add(worker)
         self._idle.append(worker)
+        if warm is not None:
+            task = asyncio.get_running_loop().create_task(self._warm(warm))
+            self._tasks.add(task)
+            task.add_done_callback(self._tasks.discard)
+
+    async def _warm(self, job: str) -> None:
+        async for _ in self.run("the server itself", job, {}):
+            pass
 
     async def close(self) -> None:
         """End all workers, and wait until they have ended."""
         self._closed = True
-        workers = [*self._alive]
-        for worker in workers:
+        for worker in self._alive:
             worker.kill()
-        await asyncio.gather(*self._tasks, return_exceptions=True)
-        await asyncio.gather(*(worker.ended() for worker in workers))
+        while self._tasks:  # one that ends may leave its worker to another one
+            await asyncio.gather(*self._tasks, return_exceptions=True)
+        for worker in self._alive:  # and one that began meanwhile
+            worker.kill()
+        await asyncio.gather(*(worker.ended() for worker in self._alive))
 
 
 class _Worker:
@@ -181,13 +206,14 @@ class _Worker:
         self._reader = asyncio.get_running_loop().create_task(self._read_lines())
 
     @classmethod
-    async def start(cls) -> _Worker:
-        """Start a process."""
+    async def start(cls, preload: str) -> _Worker:
+        """Start a process that imports a module before its first job."""
         return cls(
             await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-m",
                 "asperity.app.jobs.worker",
+                preload,
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 limit=_LONGEST,

@@ -1,9 +1,9 @@
 """The process that runs a job: one line of JSON in a request, lines of JSON as it goes on.
 
-Started as ``python -m asperity.app.jobs.worker``. A request is ``{"job": "module:function",
-"argument": ..., "limits": ...}``; the function is called with the argument and with a function
-that sends a message, and its result is the last message. ``{"cancel": true}`` on the input makes
-the next report of progress raise `Cancelled`.
+Started as ``python -m asperity.app.jobs.worker MODULE``, which it imports. A request is ``{"job":
+"module:function", "argument": ..., "limits": ...}``; the function is called with the argument and
+with a function that sends a message, and its result is the last message. ``{"cancel": true}`` on
+the input makes the next report of progress raise `Cancelled`.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ import threading
 from collections.abc import Callable
 from typing import IO, Any
 
+from asperity.app.jobs.limits import set_limits
 from asperity.app.plain import to_json
 from asperity.errors import InputError
 
@@ -55,7 +56,8 @@ def main() -> None:
         os._exit(0)  # the server is gone
 
     threading.Thread(target=listen, daemon=True).start()
-    importlib.import_module("asperity.orbit")  # what most jobs need, before the first one comes
+    for module in sys.argv[1:]:  # what jobs need, before the first one comes
+        importlib.import_module(module)
     while True:
         arrived.acquire()
         request = requests.pop(0)
@@ -74,7 +76,7 @@ def _answer(request: dict[str, Any], channel: IO[str], cancelled: threading.Even
             send(**message)
 
     try:
-        _set_limits(request.get("limits") or {})
+        set_limits(request.get("limits") or {})
         send(result=_function(request["job"])(request["argument"], report), done=True)
     except InputError as error:
         send(error=str(error), done=True)
@@ -96,17 +98,6 @@ def _function(job: str) -> Callable[[Any, Report], Any]:
         raise InputError(f"job must be one of the page's, got '{job}'; name one")
     found: Callable[[Any, Report], Any] = getattr(importlib.import_module(module), name)
     return found
-
-
-def _set_limits(limits: dict[str, int]) -> None:
-    """Address space (bytes) and processor time (s) beyond which the system ends the process."""
-    try:
-        import resource
-    except ImportError:  # Windows has no such limits
-        return
-    for name, kind in (("memory", resource.RLIMIT_AS), ("seconds", resource.RLIMIT_CPU)):
-        if name in limits:
-            resource.setrlimit(kind, (limits[name], limits[name]))
 
 
 if __name__ == "__main__":

@@ -39,6 +39,12 @@ class MapBoundary:
     reason: NDArray[np.object_]
     unresolved: int
 
+    @classmethod
+    def empty(cls) -> MapBoundary:
+        """No points: nothing was searched for."""
+        no = PointResponses.empty(0)
+        return cls(np.empty((0, 2)), np.empty(0, dtype=int), no, np.empty(0, dtype=object), 0)
+
 
 def trace_boundary(plane: MapPlane, grid: PointResponses) -> MapBoundary:
     """Trace the boundary through a solved grid.

@@ -16,9 +16,9 @@ from asperity.operating_point import (
 )
 from asperity.outputs import output_file, written_file
 from asperity.parameters import MODULATION, point_parameters
-from asperity.parameters.arguments import function, instance
+from asperity.parameters.arguments import function, instance, switch
 from asperity.sweep.map.axis import Axis
-from asperity.sweep.map.boundary import trace_boundary
+from asperity.sweep.map.boundary import MapBoundary, trace_boundary
 from asperity.sweep.map.dataset import as_dataset
 from asperity.sweep.map.grid import BLOCK, interrupted, kept_beside, solve_grid, solve_grid_kept
 from asperity.sweep.map.plane import MapPlane
@@ -34,6 +34,7 @@ def response_map(
     *,
     x: Axis,
     y: Axis,
+    boundary: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> xarray.Dataset:
     """Response and stability on a grid over two numbers, and the stability boundary between.
@@ -49,6 +50,9 @@ def response_map(
         belong to other laws only are left out.
     x, y : Axis
         The numbers that vary; any two.
+    boundary : bool
+        Whether to search for the stability boundary, which takes longer than a coarse grid itself.
+        Without it there are no points on ``boundary_point``.
     progress : callable, optional
         Called with the number of points done so far and of all points.
 
@@ -77,7 +81,8 @@ def response_map(
     """
     plane, origins = _plane(law, numbers, x, y)
     grid = solve_grid(plane, function(progress, "progress") or _silent)
-    return as_dataset(plane, grid, trace_boundary(plane, grid), origins)
+    traced = trace_boundary(plane, grid) if switch(boundary, "boundary") else MapBoundary.empty()
+    return as_dataset(plane, grid, traced, origins)
 
 
 def write_map(

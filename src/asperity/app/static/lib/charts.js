@@ -25,15 +25,20 @@ export function series(index) {
  * A figure with a title, a note and buttons that save it.
  *
  * `columns()` returns what the CSV holds: arrays by name. `options` are elements beside the title.
+ * `ownLabel` says what the keyboard does on the chart where that is not reading values.
  */
 export class Figure {
-  constructor({ name, title, height = 240, columns, options }) {
-    Object.assign(this, { name, title, height, columns });
+  constructor({ name, title, height = 240, columns, options, ownLabel = "" }) {
+    Object.assign(this, { name, title, height, columns, ownLabel });
     this.readout = el("div", { class: "readout", "aria-hidden": "true" });
+    this.spoken = el("div", { class: "visually-hidden", "aria-live": "polite" });
     this.plot = el("div", {
-      class: "plot", pointermove: (e) => this.#hover(e), pointerleave: () => this.#hover(null),
+      class: "plot", tabindex: "0", role: "group",
+      pointermove: (e) => this.#hover(e), pointerleave: () => this.#hover(null),
+      keydown: (e) => this.#read(e), blur: () => this.#forget(),
     });
     this.plot.style.minHeight = `${height}px`; // nothing moves when the picture comes
+    if (ownLabel) this.plot.setAttribute("aria-label", ownLabel);
     this.note = el("div", { class: "note" });
     const label = fresh("figure");
     const button = (text, what, act) => el("button", {
@@ -48,7 +53,7 @@ export class Figure {
           button("SVG", "as SVG", () => this.#saveSvg()),
           button("PNG", "as PNG", () => this.#savePng()),
           button("CSV", "the numbers as CSV", () => this.#saveCsv()))),
-      el("div", { class: "stage" }, this.plot, this.readout),
+      el("div", { class: "stage" }, this.plot, this.readout, this.spoken),
       this.note,
     );
     figures.add(this);
@@ -67,11 +72,14 @@ export class Figure {
   draw(chart, description = "") {
     this.chart = chart;
     this.description = description;
+    this.plot.style.minHeight = `${this.height}px`;
+    if (!this.ownLabel) this.plot.setAttribute("aria-label", `${this.heading.textContent}: arrow keys read its values`);
     const width = this.plot.clientWidth;
     if (!width) return;
     const drawn = drawChart(chart, width, this.height, description);
     this.plot.innerHTML = drawn.svg;
     this.frames = drawn.frames;
+    if (this.cursor) this.#showCursor();
   }
 
   /** Position of an event on the first row, in units of the axes; null outside. */
@@ -86,12 +94,15 @@ export class Figure {
 
   #hover(event) {
     const text = event && this.frames ? this.#under(event) : "";
+    const box = this.plot.getBoundingClientRect();
+    this.#tell(text, event && event.clientX - box.left, event && event.clientY - box.top);
+  }
+
+  #tell(text, x, y) {
     this.readout.hidden = !text;
     if (!text) return;
     this.readout.textContent = text;
     const box = this.plot.getBoundingClientRect();
-    const x = event.clientX - box.left;
-    const y = event.clientY - box.top;
     const wide = this.readout.offsetWidth;
     this.readout.style.left = `${Math.max(0, Math.min(x + 12, box.width - wide))}px`;
     this.readout.style.top = `${Math.max(0, y - this.readout.offsetHeight - 10)}px`;
@@ -119,11 +130,69 @@ export class Figure {
         }
       }
     }
-    if (!best) return "";
-    const { item, i, y } = best;
+    return best ? this.#said(row, best.item, best.i) : "";
+  }
+
+  #said(row, item, i) {
+    const y = item.y[i];
     if (item.title) return typeof item.title === "function" ? item.title(i) : item.title;
     const name = item.name ? `${item.name}: ` : "";
     return `${name}${(row.y.format || digits)(y)} at ${(this.chart.x.format || digits)(item.x[i])}`;
+  }
+
+  // --- With the keyboard: arrows to the sides follow a curve, up and down change to another one ----
+
+  /** Every curve, row of points and row of bars that has a value, with the number of its row. */
+  #tracks() {
+    return this.chart.rows.flatMap((row, k) => ["lines", "bars", "points"].flatMap((kind) =>
+      (row[kind] || []).filter((item) => item.y.some(isKnown)).map((item) => ({ k, row, item }))));
+  }
+
+  #read(event) {
+    const steps = { ArrowLeft: [0, -1], ArrowRight: [0, 1], ArrowUp: [-1, 0], ArrowDown: [1, 0] }[event.key];
+    if (event.key === "Escape") this.#forget();
+    if (!steps || !this.frames || this.ownLabel) return;
+    event.preventDefault();
+    const tracks = this.#tracks();
+    if (!tracks.length) return;
+    const inside = (n, count) => Math.max(0, Math.min(count - 1, n));
+    if (!this.cursor) this.cursor = { track: 0, i: tracks[0].item.y.findIndex(isKnown) };
+    else {
+      const old = tracks[inside(this.cursor.track, tracks.length)];
+      const at = old.item.x[inside(this.cursor.i, old.item.x.length)];
+      const track = inside(this.cursor.track + steps[0], tracks.length);
+      const { item } = tracks[track];
+      const known = item.y.map((_, i) => i).filter((i) => isKnown(item.y[i]));
+      let i = known.reduce((best, n) => (Math.abs(item.x[n] - at) < Math.abs(item.x[best] - at) ? n : best), known[0]);
+      if (steps[1]) i = known[inside(known.indexOf(i) + steps[1] * Math.ceil(known.length / 64), known.length)];
+      this.cursor = { track, i };
+    }
+    this.#showCursor();
+  }
+
+  #showCursor() {
+    const tracks = this.#tracks();
+    const found = tracks[Math.min(this.cursor.track, tracks.length - 1)];
+    const i = found && Math.min(this.cursor.i, found.item.x.length - 1);
+    if (!found || !isKnown(found.item.y[i])) return this.#forget();
+    const frame = this.frames[found.k];
+    const [x, y] = [frame.x.to(found.item.x[i]), clampPixel(frame.y.to(found.item.y[i]))];
+    this.plot.querySelector(".cursor")?.remove();
+    const circle = document.createElementNS("http://www.w3.org/2000/svg", "circle");
+    for (const [n, v] of Object.entries({ class: "cursor", cx: round(x), cy: round(y), r: 8 })) circle.setAttribute(n, v);
+    this.plot.querySelector("svg").append(circle);
+    const text = this.#said(found.row, found.item, i);
+    const label = found.row.y.label && !found.item.title ? `${found.row.y.label}: ` : "";
+    this.#tell(text, x, y);
+    this.spoken.textContent = label + text;
+    return undefined;
+  }
+
+  #forget() {
+    this.cursor = null;
+    this.plot.querySelector(".cursor")?.remove();
+    this.readout.hidden = true;
+    this.spoken.textContent = "";
   }
 
   #saveSvg() {
@@ -152,14 +221,17 @@ export class Figure {
     const copy = shown.cloneNode(true);
     copy.setAttribute("xmlns", "http://www.w3.org/2000/svg");
     const from = shown.querySelectorAll("*");
+    const gone = [];
     copy.querySelectorAll("*").forEach((node, i) => {
       const style = getComputedStyle(from[i]);
       for (const property of ["fill", "stroke", "stroke-width", "stroke-dasharray", "font-size", "font-family", "opacity"]) {
         const value = style.getPropertyValue(property);
         if (value) node.setAttribute(property, value);
       }
+      if (node.classList.contains("cursor")) gone.push(node);
       node.removeAttribute("class");
     });
+    for (const node of gone) node.remove();
     const ground = document.createElementNS("http://www.w3.org/2000/svg", "rect");
     ground.setAttribute("width", "100%");
     ground.setAttribute("height", "100%");
@@ -173,6 +245,8 @@ export class Figure {
     if (columns) saveFile(`${this.name}.csv`, csv(columns), "text/csv");
   }
 }
+
+const isKnown = (value) => value !== null && value !== undefined && Number.isFinite(value);
 
 /** Draw everything again, after the width has changed. */
 export function redrawAll() {
@@ -204,7 +278,9 @@ function drawChart(chart, width, height, description) {
     parts.push(drawRow(row, frame, chart.x, k === rows.length - 1));
   });
   const foot = frames[frames.length - 1];
-  parts.push(text((foot.left + foot.right) / 2, height - 6, chart.x.label, "axis-label", "middle"));
+  // A label that is longer than its axis has the whole width.
+  const long = 6.4 * chart.x.label.length > foot.right - foot.left;
+  parts.push(text(long ? width / 2 : (foot.left + foot.right) / 2, height - 6, chart.x.label, "axis-label", "middle"));
   return {
     frames,
     svg: `<svg width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" role="img" aria-label="${escape(description)}">${parts.join("")}</svg>`,

@@ -29,7 +29,7 @@ export function create(page) {
     el("p", { class: "note" }, "CSV and other text, HDF5, MATLAB, TDMS, LOOK; up to 512 MB each. They stay on this machine and are deleted when the server ends."),
     choose, el("label", { for: "data-files", class: "button" }, "Choose files"));
 
-  const fit = new FitPanel(page, { rows: () => cards.flatMap((c) => c.rows()), tables: () => cards.flatMap((c) => c.table() || []), changed: link });
+  const fit = new FitPanel(page, { rows: () => cards.flatMap((c) => c.rows()), tables: () => cards.flatMap((c) => c.table() || []), runs: () => cards.flatMap((c) => c.run() || []), changed: link });
   const protocol = new ProtocolPanel(page, { read: (upload) => open(upload), changed: link });
   const element = el("section", { class: "tab data", "aria-label": title },
     el("div", { class: "paper-head" }, el("h2", {}, "Data"),
@@ -85,7 +85,7 @@ export function create(page) {
           known = await ask("data", {});
         } catch (error) {
           if (!(error instanceof Refused)) throw error;
-          message.textContent = error.message;
+          message.textContent = capital(error.message);
           return;
         }
         protocol.begin(known.protocols);
@@ -108,3 +108,7 @@ export function create(page) {
   };
 }
 
+
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

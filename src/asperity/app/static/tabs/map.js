@@ -132,7 +132,7 @@ export function create(page) {
       stop();
       status.textContent = "";
       if (!(error instanceof Refused)) throw error;
-      message.textContent = error.message;
+      message.textContent = capital(error.message);
     }
   }
 
@@ -162,7 +162,7 @@ export function create(page) {
       rows: [{
         y,
         image: { url: known.length ? picture(grid.values, colours, limits) : "", x: corners(grid.x, x.log), y: corners(grid.y, y.log) },
-        lines: grid.boundaries.map((line) => ({ x: line.x, y: line.y, cls: "boundary", thick: true })),
+        lines: (grid.boundaries || []).flatMap((line) => ["boundary-halo", "boundary"].map((cls) => ({ x: line.x, y: line.y, cls, thick: true }))),
         points: marker ? [{ x: [marker[0]], y: [marker[1]], cls: "ink", size: 6 }] : [],
         readout: (px, py) => readAt(px, py),
       }],
@@ -170,8 +170,9 @@ export function create(page) {
     fill(figure.note,
       el("div", { class: "scale" }, el("span", {}, digits(limits[0], 3)), scaleBar(colours), el("span", {}, digits(limits[1], 3)),
         el("span", { class: "what" }, `${output.meaning}${output.unit === "1" ? "" : ` (${output.unit})`}`)),
-      grid.boundaries.map((line) => el("p", {}, el("span", { class: "swatch boundary" }), describeLine(line))),
-      grid.boundaries.length || !known.length ? null : el("p", {}, grid.stable.flat().some(Boolean) ? "No stability boundary here: stable wherever an orbit was found." : "No stability boundary here: unstable everywhere."),
+      grid.boundaries === null && el("p", {}, "The stability boundary comes with the next, finer grid."),
+      (grid.boundaries || []).map((line) => el("p", {}, el("span", { class: "swatch boundary" }), describeLine(line))),
+      grid.boundaries === null || grid.boundaries.length || !known.length ? null : el("p", {}, grid.stable.flat().some(Boolean) ? "No stability boundary here: stable wherever an orbit was found." : "No stability boundary here: unstable everywhere."),
       grid.failed ? el("p", { class: "lost" }, `${grid.failed} of ${grid.count ** 2} points have no orbit: ${grid.reasons[0]}`) : null,
       grid.not_located ? el("p", {}, `In ${grid.not_located} places stability changes without a crossing that could be located.`) : null);
   }
@@ -190,7 +191,7 @@ export function create(page) {
   }
 
   function description() {
-    return `Map of ${catalogue.outputs[shown.show].meaning} for ${shown.law}. ${grid.boundaries.map(describeLine).join(". ")}`;
+    return `Map of ${catalogue.outputs[shown.show].meaning} for ${shown.law}. ${(grid.boundaries || []).map(describeLine).join(". ")}`;
   }
 
   function scaleBar(colours) {
@@ -310,7 +311,7 @@ export function create(page) {
     try {
       copyText((await ask("map/text", question()))[kind], button);
     } catch (error) {
-      message.textContent = error.message;
+      message.textContent = capital(error.message);
     }
   }
 
@@ -323,6 +324,7 @@ export function create(page) {
       if (!figure) {
         figure = new Figure({
           name: "stability-map", title: "Response and stability", height: 560,
+          ownLabel: "Map: arrow keys move a point, Enter takes it to Explore",
           columns: () => grid && {
             [shown.x.name]: grid.y.flatMap(() => grid.x),
             [shown.y.name]: grid.y.flatMap((v) => grid.x.map(() => v)),
@@ -330,9 +332,6 @@ export function create(page) {
             stable: grid.stable.flat(),
           },
         });
-        figure.plot.tabIndex = 0;
-        figure.plot.setAttribute("role", "group");
-        figure.plot.setAttribute("aria-label", "Map: arrow keys move a point, Enter takes it to Explore");
         figure.plot.addEventListener("keydown", pressed);
         figure.plot.addEventListener("click", (event) => {
           const at = figure.at(event);
@@ -358,4 +357,8 @@ export function create(page) {
 /** A number of the address, or its text where it has a unit. */
 function number(text) {
   return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
+}
+
+function capital(text) {
+  return text.charAt(0).toUpperCase() + text.slice(1);
 }

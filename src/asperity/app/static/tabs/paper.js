@@ -6,11 +6,14 @@ import { el, fill, fresh } from "../lib/dom.js";
 import { copyText, csv, saveFile } from "../lib/save.js";
 import { ask, Latest, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
+import { elementDrawing } from "./paper/element.js";
 
 export const name = "paper";
 export const title = "Paper";
 
 const VERDICTS = ["reproduced", "misprint", "differs"];
+/** Time (ms) without a change after which curves with the slider's mass are asked for. */
+const REST = 200;
 const KINDS = ["test", "fit", "arithmetic", "identity"];
 
 export function create(page) {
@@ -19,6 +22,9 @@ export function create(page) {
   let answer = null;
   let verdicts = null;
   let computing = null;
+  let inertia = [];
+  let weighing = null;
+  let resting = 0;
 
   const latest = new Latest("paper/figure", answered, refused);
   const message = el("p", { class: "message", role: "alert" });
@@ -26,6 +32,9 @@ export function create(page) {
   const sentence = el("p", { class: "sentence", role: "status" });
   const ends = el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": "At the end of each curve" });
   const figure = new Figure({ name: "paper-figure", title: "Figure", height: 460, columns: figureColumns });
+  const drawing = el("div", { class: "element" });
+  const massStatus = el("p", { class: "status", role: "status" });
+  const massBar = el("progress", { max: 1, "aria-label": "Progress of the curves with the slider's mass", hidden: true });
   const copies = el("div", { class: "actions" }, ...[
     ["Copy link", () => location.href], ["Copy as Python", () => answer?.python], ["Copy as command", () => answer?.command],
   ].map(([label, text]) => el("button", {
@@ -33,7 +42,7 @@ export function create(page) {
   }, label)));
   const figures = el("div", { class: "paper-figures" }, controls,
     el("div", { class: "results" },
-      el("div", { class: "summary" }, sentence, message, copies), figure.element,
+      el("div", { class: "summary" }, sentence, message, el("div", { class: "work" }, massStatus, massBar), copies), drawing, figure.element,
       el("section", { class: "law", "aria-label": "Numbers" }, el("h3", {}, "At the end of each curve"), ends)));
   const ledgerView = el("div", { class: "ledger" });
   const switches = el("div", { class: "switch", role: "group", "aria-label": "What is shown" });
@@ -72,6 +81,7 @@ export function create(page) {
 
   function changed() {
     link();
+    stopMass();
     sentence.textContent = asSentence();
     latest.ask({ figure: view.figure, numbers: view.numbers }, null);
   }
@@ -97,6 +107,43 @@ export function create(page) {
     page.say("");
     answer = found;
     draw();
+    if (current().inertia && view.show === "figures") resting = setTimeout(weigh, REST);
+  }
+
+  // --- Curves with the slider's mass, which may take seconds ------------------------------------
+
+  function stopMass() {
+    clearTimeout(resting);
+    weighing?.abort();
+    weighing = null;
+    inertia = [];
+    massBar.hidden = true;
+    massStatus.textContent = "";
+  }
+
+  async function weigh() {
+    stopMass();
+    weighing = new AbortController();
+    const { signal } = weighing;
+    massBar.hidden = false;
+    massBar.removeAttribute("value");
+    massStatus.textContent = "Solving the curves with the slider's mass…";
+    try {
+      await run("paper/inertia", { figure: view.figure, numbers: view.numbers }, (part) => {
+        if (signal.aborted) return;
+        if (part.progress !== undefined) massBar.value = part.progress;
+        if (!part.curve) return;
+        inertia.push(part);
+        draw();
+      }, signal);
+      if (signal.aborted) return;
+      massStatus.textContent = "";
+    } catch (error) {
+      if (error.name === "AbortError") return;
+      massStatus.textContent = "";
+      refused(error);
+    }
+    massBar.hidden = true;
   }
 
   function refused(error) {
@@ -109,6 +156,7 @@ export function create(page) {
     if (!answer?.printed || view.show !== "figures") return;
     const { x, rows, printed, moved, stated } = answer;
     const isMoved = Object.keys(view.numbers).length > 0;
+    fill(drawing, answer.element && elementDrawing(answer.element));
     const [scale, unit] = x.column === "V" ? [1e6, " (µm/s)"] : [1, ""];
     const xs = (curve) => curve.values[x.column].map((v) => scale * v);
     figure.heading.textContent = `${current().place}: ${current().title}`;
@@ -117,33 +165,37 @@ export function create(page) {
       y: { label: row.label, log: row.log },
       lines: [
         ...(isMoved ? printed.map((curve) => ({ x: xs(curve), y: curve.values[row.column], cls: "printed dashed", name: `${curve.name}, as printed` })) : []),
+        ...(isMoved ? inertia.map(({ printed: c }) => ({ x: xs(c), y: c.values[row.column], cls: "mass dashed", name: `${c.name}, as printed` })) : []),
+        ...inertia.map(({ curve }) => ({ x: xs(curve), y: curve.values[row.column], cls: "mass", name: curve.name })),
         ...moved.map((curve, k) => ({ x: xs(curve), y: curve.values[row.column], cls: series(k), name: curve.name, thick: true })),
         ...(stated[row.column] || []).filter((s) => s.ends.length > 1).map((s) => ({ x: s.ends.map(() => s.x), y: s.ends, cls: "stated", thick: true, name: s.text })),
       ],
       points: (stated[row.column] || []).map((s) => ({ x: s.ends.map(() => s.x), y: s.ends, cls: "stated", title: s.text })),
     }));
     const largest = Math.max(...moved.flatMap(xs));
-    const range = x.log ? undefined : [0, 1.02 * largest];
+    const range = x.log ? undefined : x.column === "phase" ? [0, 1] : [0, 1.02 * largest];
     figure.draw({ x: { label: x.label + unit, log: x.log, range }, rows: drawn },
       `${asSentence()} Curves: ${moved.map((c) => c.name).join(", ")}.`);
     const hasStated = rows.some((row) => stated[row.column]);
     fill(figure.note,
       moved.map((curve, k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), curve.name)),
-      isMoved && el("p", { class: "key" }, el("span", { class: "swatch printed" }), "as printed"),
-      hasStated && el("p", { class: "key" }, el("span", { class: "swatch stated" }), "stated in the text"));
+      inertia.length > 0 && el("p", { class: "key" }, el("span", { class: "swatch mass" }), inertia.map(({ curve }) => curve.name).join("; ")),
+      isMoved && el("p", { class: "key" }, el("span", { class: "swatch printed" }), "dashed: as printed"),
+      hasStated && el("p", { class: "key" }, el("span", { class: "swatch dot stated" }), "stated in the text"));
     drawEnds();
   }
 
   function drawEnds() {
     const { rows, printed, moved, stated } = answer;
     const last = (curve, column) => curve.values[column].at(-1);
+    const all = [...moved.map((curve, k) => [curve, printed[k]]), ...inertia.map((m) => [m.curve, m.printed])];
     const said = rows.flatMap((row) => (stated[row.column] || []).map((s) =>
       el("li", {}, `${row.label} at ${digits(s.x, 3)}: ${s.ends.map((v) => digits(v, 3)).join(" to ")} (${s.text})`)));
     fill(ends, el("table", {},
       el("thead", {}, el("tr", {}, ["Curve", "Quantity", "As printed", "Moved"].map((t) => el("th", { scope: "col" }, t)))),
-      el("tbody", {}, moved.flatMap((curve, k) => rows.map((row) => el("tr", {},
+      el("tbody", {}, all.flatMap(([curve, before]) => rows.map((row) => el("tr", {},
         el("th", { scope: "row" }, curve.name), el("td", {}, row.label),
-        el("td", {}, digits(last(printed[k], row.column), 4)), el("td", {}, digits(last(curve, row.column), 4))))))),
+        el("td", {}, digits(last(before, row.column), 4)), el("td", {}, digits(last(curve, row.column), 4))))))),
     said.length > 0 && el("ul", { class: "said" }, said));
   }
 
@@ -156,6 +208,7 @@ export function create(page) {
         if (column !== answer.x.column) columns[`${curve.name} ${column} as printed`] = answer.printed[k].values[column];
       }
     });
+    for (const { curve } of inertia) for (const [column, values] of Object.entries(curve.values)) columns[`${curve.name} ${column}`] = values;
     return columns;
   }
 
@@ -164,6 +217,7 @@ export function create(page) {
     fill(controls,
       choice("Figure", paper.figures.map((f) => [f.name, `${f.place} – ${f.title}`]), view.figure, (value) => {
         view.figure = value;
+        answer = null;
         const kept = current().numbers.map((n) => n.name);
         view.numbers = Object.fromEntries(Object.entries(view.numbers).filter(([n]) => kept.includes(n)));
         buildControls();
@@ -265,7 +319,7 @@ export function create(page) {
   function buildSwitches() {
     fill(switches, [["figures", "Figures"], ["ledger", "Ledger"]].map(([key, text]) => el("button", {
       type: "button", "aria-pressed": String(view.show === key),
-      click: () => { view.show = key; present(); link(); },
+      click: () => { view.show = key; stopMass(); present(); link(); },
     }, text)));
   }
 
@@ -295,6 +349,7 @@ export function create(page) {
       fromParameters(parameters);
       present();
     },
+    hide: stopMass,
   };
 }
 

@@ -9,12 +9,15 @@ import { digits } from "../../lib/units.js";
 
 const SETTINGS = {
   laws: ["elasto-plastic"], material: "bureau2000", free: ["eps_ratio", "lambda"], fixed: "",
-  prior: false, profile: false, inertia: false,
+  prior: false, profile: false, inertia: false, report: false,
+  trend: "linear", drift: false, initial: "steady", gauge: "", velocities: "",
 };
+const FLAGS = ["prior", "profile", "inertia", "report", "drift"];
+const TEXTS = ["material", "fixed", "trend", "initial", "gauge", "velocities"];
 
 export class FitPanel {
-  constructor(page, { rows, tables, changed }) {
-    Object.assign(this, { page, rows, tables, changed });
+  constructor(page, { rows, tables, runs, changed }) {
+    Object.assign(this, { page, rows, tables, runs, changed });
     this.settings = { ...SETTINGS };
     this.form = el("form", { class: "fit-form", submit: (e) => { e.preventDefault(); this.start(); } });
     this.data = el("p", { class: "note" });
@@ -42,8 +45,8 @@ export class FitPanel {
       const { laws } = this.page.catalogue;
       if (Array.isArray(given.laws)) this.settings.laws = given.laws.filter((n) => laws[n]?.rate_dependent);
       if (Array.isArray(given.free)) this.settings.free = given.free.filter((n) => typeof n === "string");
-      for (const n of ["material", "fixed"]) if (typeof given[n] === "string") this.settings[n] = given[n];
-      for (const n of ["prior", "profile", "inertia"]) this.settings[n] = given[n] === true;
+      for (const n of TEXTS) if (typeof given[n] === "string") this.settings[n] = given[n];
+      for (const n of FLAGS) this.settings[n] = given[n] === true;
     } catch {
       // A link that was cut: the settings to begin with.
     }
@@ -53,8 +56,10 @@ export class FitPanel {
   refresh() {
     const rows = this.rows().length;
     const tables = this.tables().length;
-    this.element.hidden = !(rows || tables);
-    const parts = [rows && `${rows} measured ${rows === 1 ? "amplitude" : "amplitudes"}`, tables && `${tables} ${tables === 1 ? "table" : "tables"}`].filter(Boolean);
+    const runs = this.runs().length;
+    this.element.hidden = !(rows || tables || runs);
+    this.runOptions.hidden = !runs;
+    const parts = [rows && `${rows} measured ${rows === 1 ? "amplitude" : "amplitudes"}`, tables && `${tables} ${tables === 1 ? "table" : "tables"}`, runs && `${runs} whole ${runs === 1 ? "recording" : "recordings"}`].filter(Boolean);
     this.data.textContent = `Data: ${parts.join(" and ")}.`;
   }
 
@@ -73,6 +78,20 @@ export class FitPanel {
     const fixed = el("textarea", { id, rows: 3, spellcheck: "false", placeholder: "V = 10 um/s", input: () => set("fixed")(fixed.value) });
     fixed.value = settings.fixed;
     this.freeHolder = el("div", { class: "ticks" });
+    const text = (label, key, placeholder) => {
+      const own = fresh("field");
+      const field = el("input", { type: "text", id: own, placeholder, spellcheck: "false", autocomplete: "off", change: () => set(key)(field.value.trim()) });
+      field.value = settings[key];
+      return el("div", { class: "choice" }, el("label", { for: own }, label), field);
+    };
+    this.runOptions = el("fieldset", {}, el("legend", {}, "Whole recordings"),
+      el("p", { class: "note" }, "Compared with the motion through the whole of it; K is free for each of them, and the noise is estimated."),
+      el("div", { class: "filters" },
+        choice("Trend of the friction over slip", ["none", "linear", "quadratic"].map((n) => [n, n]), settings.trend, set("trend")).element,
+        choice("State at the beginning", [["steady", "of steady sliding"], ["free", "free"]], settings.initial, set("initial")).element,
+        text("Low-pass of the force gauge", "gauge", "none, or 50 Hz"),
+        text("Velocities between the steps", "velocities", "measured, or 1 um/s, 10 um/s"),
+        tick("A drift over time besides", settings.drift, set("drift")).element));
     fill(this.form,
       el("fieldset", {}, el("legend", {}, "Laws: one is fitted, several are compared"),
         el("div", { class: "ticks" }, names.map((n) => tick(n, settings.laws.includes(n), toggle("laws", n, names), laws[n].title).element))),
@@ -83,7 +102,10 @@ export class FitPanel {
         el("div", { class: "ticks" },
           tick("Published uncertainties as priors", settings.prior, set("prior")).element,
           tick("Intervals by profile likelihood", settings.profile, set("profile")).element,
-          tick("The mass counts", settings.inertia, set("inertia")).element)));
+          tick("The mass counts", settings.inertia, set("inertia")).element,
+          tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it").element)),
+      this.runOptions);
+    this.runOptions.hidden = !this.runs().length;
     this.#free();
     this.fitButton.textContent = settings.laws.length > 1 ? "Compare" : "Fit";
   }
@@ -118,14 +140,26 @@ export class FitPanel {
     const asked = {
       laws: settings.laws, free: settings.free.filter((n) => this.names.includes(n)),
       rows: this.rows(), tables: this.tables(), fixed,
+      runs: this.runs().map((r) => r.asked),
+      trend: settings.trend, drift: settings.drift, initial: settings.initial, gauge: settings.gauge || null,
+      report: settings.report,
       material: settings.material || null, prior: settings.prior ? settings.material || null : null,
       profile: settings.profile, inertia: settings.inertia,
     };
+    const velocities = settings.velocities.split(",").map((v) => v.trim()).filter(Boolean);
+    if (velocities.length && asked.runs.length) {
+      if (asked.runs.length > 1) {
+        this.message.textContent = `Velocities between the steps must go with one recording, got ${asked.runs.length}; fit them one by one.`;
+        return;
+      }
+      asked.runs[0].velocities = velocities;
+    }
     this.#running(true);
     try {
       const last = await run("data/fit", asked, (part) => {
         if (part.waiting) this.status.textContent = "Waiting for another fit…";
         if (part.minimisations !== undefined) this.status.textContent = `Fitting… ${part.minimisations} minimisations finished.`;
+        if (part.stage === "report") this.status.textContent = "Writing the report folder…";
       }, signal);
       if (last.result) this.#draw(last.result);
     } catch (error) {
@@ -145,17 +179,18 @@ export class FitPanel {
     if (on) this.status.textContent = "Fitting…";
   }
 
-  #draw({ fit, comparison, residuals, command }) {
+  #draw({ fit, comparison, residuals, runs, report, command }) {
     const python = () => this.#python();
     const record = fit || comparison;
     const buttons = el("div", { class: "actions" },
       el("button", { type: "button", click: (e) => copyText(python(), e.currentTarget) }, "Copy as Python"),
       el("button", { type: "button", click: (e) => copyText(command, e.currentTarget) }, "Copy as command"),
       el("button", { type: "button", click: () => saveFile(fit ? "fit.json" : "comparison.json", JSON.stringify(record, null, 2), "application/json") }, "JSON"),
+      report && el("button", { type: "button", click: () => saveFile("report.zip", fromBase64(report)) }, "Report folder (ZIP)"),
       el("button", { type: "button", click: () => this.#saveCsv(fit ? { [fit.law]: fit } : comparison.laws) }, "CSV"));
     if (fit) {
       this.status.textContent = fitSentence(fit);
-      fill(this.results, buttons, ...fitTables(fit), this.#residuals(residuals));
+      fill(this.results, buttons, ...fitTables(fit), this.#runs(runs), this.#residuals(residuals));
     } else {
       this.status.textContent = capital(comparison.verdict);
       const laws = Object.entries(comparison.laws);
@@ -164,16 +199,31 @@ export class FitPanel {
         table(["Law", "χ²", "degrees of freedom", "p", "AICc − lowest", "weight", ""],
           laws.map(([n, l]) => [n, digits(l.chi2), String(l.dof), digits(l.p_value, 2), l.aicc === null ? "–" : digits(l.aicc - lowest), digits(l.weight, 3), l.converged ? (l.excluded ? `excluded: ${l.why}` : "") : l.message]), "Comparison"),
         ...laws.filter(([, l]) => l.converged).map(([n, l]) => el("details", { open: n === comparison.best }, el("summary", {}, n), el("p", {}, fitSentence(l)), ...fitTables(l))),
-        residuals && this.#residuals(residuals));
+        this.#runs(runs), this.#residuals(residuals));
     }
-    this.figure?.();
+    for (const draw of this.figures) draw();
   }
 
-  #residuals({ value, observable }) {
+  #runs(runs) {
+    this.figures = [];
+    return (runs || []).map(({ name, recorded, fitted, difference }, k) => {
+      const figure = new Figure({ name: `run-${k + 1}`, title: `${name}: recorded and fitted`, height: 330, columns: () => ({ time: recorded.x, friction: recorded.y }) });
+      fill(figure.note, el("p", { class: "key" }, el("span", { class: "swatch s6" }), "recorded"), el("p", { class: "key" }, el("span", { class: "swatch s2" }), "fitted"));
+      this.figures.push(() => figure.draw({ x: { label: "time (s)" }, rows: [
+        { y: { label: "friction" }, lines: [{ ...recorded, cls: "s6", name: "recorded" }, { ...fitted, cls: "s2", name: "fitted", thick: true }] },
+        { y: { label: "difference" }, lines: [{ ...difference, cls: "s6", name: "recorded − fitted" }] },
+      ] }, `Friction of ${name} as recorded and as fitted.`));
+      return figure.element;
+    });
+  }
+
+  #residuals(residuals) {
+    if (!residuals?.value.length) return null;
+    const { value, observable } = residuals;
     const names = [...new Set(observable)];
     const figure = new Figure({ name: "residuals", title: "Residuals in standard deviations", height: 230, columns: () => ({ observable, residual: value }) });
     fill(figure.note, names.map((n, k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), n)));
-    this.figure = () => {
+    this.figures.push(() => {
       const at = value.map((_, i) => i + 1);
       const of = (n) => at.filter((_, i) => observable[i] === n);
       const far = 1.1 * Math.max(3, ...value.map(Math.abs));
@@ -182,13 +232,21 @@ export class FitPanel {
         lines: [{ x: [0, value.length + 1], y: [0, 0], cls: "ink", name: "zero" }],
         points: names.map((n, k) => ({ x: of(n), y: value.filter((_, i) => observable[i] === n), cls: series(k), title: (i) => `${n}: ${digits(value.filter((_, j) => observable[j] === n)[i], 3)}` })),
       }] }, `Residuals of ${names.join(", ")}.`);
-    };
+    });
     return figure.element;
   }
 
   #saveCsv(fits) {
     const rows = Object.entries(fits).flatMap(([law, f]) => Object.entries(f.parameters).map(([n, p]) => ({ law, parameter: n, value: p.value, se: p.se, low_95: p.interval_95[0], high_95: p.interval_95[1], unit: p.unit })));
     saveFile("parameters.csv", csv(Object.fromEntries(Object.keys(rows[0]).map((n) => [n, rows.map((r) => r[n])]))), "text/csv");
+  }
+
+  #runOptions() {
+    const { trend, drift, initial, gauge } = this.settings;
+    if (!this.runs().length || (trend === "linear" && !drift && initial === "steady" && !gauge)) return "";
+    const linear = ["offset", ...{ none: [], linear: ["trend"], quadratic: ["trend", "bend"] }[trend], ...(drift ? ["drift"] : [])];
+    const corner = gauge ? `, gauge=(1, asp.units.to_si(${JSON.stringify(gauge)}, "frequency", "gauge"))` : "";
+    return `    runs=inference.RunOptions(linear=${JSON.stringify(linear).replace("[", "(").replace("]", ",)")}, initial="${initial}"${corner}),\n`;
   }
 
   #python() {
@@ -199,13 +257,20 @@ export class FitPanel {
     const chosen = `{${fixed.map(([n, v]) => `"${n}": "${v}"`).join(", ")}}`;
     const files = [...this.tables().map((t) => t.name), ...(this.rows().length ? ["campaign.csv"] : [])];
     return `import asperity as asp\nfrom asperity import inference\n\nfixed = ${chosen}\ngiven = {name: fixed[name] for name in ("V", "epsilon", "frequency") if name in fixed}\ntables = [inference.read_table(path, given) for path in ${list(files)}]\n`
+      + this.runs().map(({ name, python, asked }) => `${python}\ntables.append(inference.recorded_run(trace, name=${JSON.stringify(name.replace(/\.[^.]*$/, ""))}${asked.window ? `, window=(${asked.window.join(", ")})` : ""}${asked.steps ? `, steps=[${asked.steps.join(", ")}]` : ""}))\n`).join("")
       + `found = inference.${one ? "fit" : "compare"}(\n    tables,\n    ${one ? `"${laws[0]}"` : list(laws)},\n    ${list(free.filter((n) => this.names.includes(n)))},\n    fixed=fixed,\n`
-      + `${material ? `    material=asp.materials.load("${material}"),\n` : ""}${profile ? "    profile=True,\n" : ""}${inertia ? "    inertia=True,\n" : ""})\n`;
+      + `${material ? `    material=asp.materials.load("${material}"),\n` : ""}${profile ? "    profile=True,\n" : ""}${inertia ? "    inertia=True,\n" : ""}${this.#runOptions()})\n`;
   }
+}
+
+function fromBase64(text) {
+  return new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], { type: "application/zip" });
 }
 
 function fitSentence(fit) {
   if (!fit.converged) return capital(fit.message);
+  // The level of the noise of recordings is estimated: chi-squared does not judge the law then.
+  if (fit.noise.model?.includes("AR(")) return `${capital(fit.law)}: ${fit.noise.model}, ${digits(fit.noise.effective_samples, 4)} effective samples. The noise is estimated, so that χ² does not judge the law; AICc compares laws.`;
   const p = fit.p_value;
   const judged = p === null ? "" : p < 0.01 ? ": the law or the uncertainties are wrong" : ": the law describes the data";
   return `${capital(fit.law)}: χ² = ${digits(fit.chi2)} for ${fit.dof} degrees of freedom, p = ${digits(p, 2)}${judged}.`;

@@ -23,6 +23,7 @@ export class RecordingCard {
     this.result = null;
     this.recording = null;
     this.chosen = new Map();
+    this.fitted = true;
     this.status = el("p", { class: "sentence", role: "status" });
     this.bar = el("progress", { max: 1, "aria-label": `Progress of ${this.state.name}` });
     this.message = el("p", { class: "message", role: "alert" });
@@ -42,6 +43,16 @@ export class RecordingCard {
   rows() {
     const rows = this.result?.measured?.rows || [];
     return rows.filter((row, i) => row.kind === "amplitude" && !row.reason && this.chosen.get(i) !== false);
+  }
+
+  /** The recording as a whole, where it is no modulated one and is to be fitted. */
+  run() {
+    const { key, name, source, options } = this.state;
+    if (this.result?.measured?.record.mode !== "sliding" || !this.fitted) return null;
+    return {
+      name, python: this.recording?.python || "",
+      asked: { recording: key, source, window: options.window || null, steps: options.steps || null },
+    };
   }
 
   table() {
@@ -213,7 +224,10 @@ export class RecordingCard {
         copy("Copy as Python", () => this.result.python), copy("Copy as command", () => this.result.command),
         el("button", { type: "button", click: () => saveFile(`${this.state.name}.json`, JSON.stringify(record, null, 2), "application/json") }, "JSON"),
         el("button", { type: "button", click: () => saveRows(`${this.state.name}-rows.csv`, measured.rows) }, "CSV")),
-      figures.readings, this.#rowTable(measured.rows),
+      figures.readings,
+      record.mode === "sliding" && tick("Fit the recording as a whole", this.fitted, (on) => { this.fitted = on; this.changed(); },
+        "It goes into the fit below, with the window and the velocity steps above").element,
+      this.#rowTable(measured.rows),
       el("div", { class: "panels" }, figures.list.map((f) => f.element)),
       this.#checks(record.checks), this.#findings());
     for (const [figure, chart, description] of figures.charts) figure.draw(chart, description);
@@ -285,11 +299,12 @@ export class RecordingCard {
     if (record.steps.length) {
       list.push(rate);
       const at = record.steps.map((s) => Math.abs(s.velocity_after));
-      charts.push([rate, { x: { label: "velocity after the step (m/s)", log: true }, rows: [{ y: { label: "A − B" }, ...errorBars(at, record.steps.map((s) => s.rate_dependence), record.steps.map((s) => s.rate_uncertainty)) }] }, "A − B of each velocity step."]);
+      charts.push([rate, { x: { label: "velocity after the step", log: true, range: [Math.min(...at) / 1.6, Math.max(...at) * 1.6], format: (v) => quantity(v, "velocity", 3) }, rows: [{ y: { label: "A − B" }, ...errorBars(at, record.steps.map((s) => s.rate_dependence), record.steps.map((s) => s.rate_uncertainty)) }] }, "A − B of each velocity step."]);
     }
     if (record.holds.length) {
       list.push(healing);
-      charts.push([healing, { x: { label: "hold time (s)", log: true }, rows: [{ y: { label: "healing" }, ...errorBars(record.holds.map((h) => h.hold_time), record.holds.map((h) => h.healing), record.holds.map((h) => h.healing_uncertainty)) }] }, "Healing against the time of each hold."]);
+      const held = record.holds.map((h) => h.hold_time);
+      charts.push([healing, { x: { label: "hold time (s)", log: true, range: [Math.min(...held) / 1.6, Math.max(...held) * 1.6] }, rows: [{ y: { label: "healing" }, ...errorBars(record.holds.map((h) => h.hold_time), record.holds.map((h) => h.healing), record.holds.map((h) => h.healing_uncertainty)) }] }, "Healing against the time of each hold."]);
     }
     return { readings, list, charts };
   }

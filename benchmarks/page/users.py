@@ -1,6 +1,6 @@
 """Many users of the page at once: time from a question of Explore to its answer.
 
-``python -m benchmarks.page_users`` starts a server and as many clients as ``--users``, each of
+``python -m benchmarks.page.users`` starts a server and as many clients as ``--users``, each of
 which asks again as soon as it is answered, as a slider that never rests would, while one more
 client has asked for the largest map.
 """
@@ -10,24 +10,13 @@ from __future__ import annotations
 import argparse
 import contextlib
 import http.client
-import json
 import statistics
-import subprocess
-import sys
 import threading
 import time
-from urllib.parse import urlsplit
+
+from benchmarks.page.serving import ask, load, quantile, serving
 
 POINT = {"law": "rice-ruina", "laws": ["elasto-plastic"]}
-
-
-def ask(port: int, path: str, question: dict, client: str) -> bytes:
-    connection = http.client.HTTPConnection("127.0.0.1", port, timeout=600)
-    headers = {"Content-Type": "application/json", "X-Client": client}
-    connection.request("POST", f"/api/{path}", json.dumps(question), headers)
-    answer = connection.getresponse().read()
-    connection.close()
-    return answer
 
 
 def question(k: int) -> dict:
@@ -48,11 +37,8 @@ def main() -> None:
     parser.add_argument("--questions", type=int, default=10)
     parser.add_argument("--no-map", action="store_true")
     options = parser.parse_args()
-    command = [sys.executable, "-m", "asperity", "serve", "--port", "0"]
-    server = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    address = next(word for word in server.stderr.readline().split() if word.startswith("http"))
-    port = urlsplit(address).port
-    try:
+    with serving() as server:
+        port = server.port
         while b"preparing" in ask(port, "explore", question(0), "first"):
             time.sleep(0.5)
         if not options.no_map:
@@ -78,15 +64,11 @@ def main() -> None:
                 thread.start()
             for thread in threads:
                 thread.join()
-            times.sort()
-            p95 = times[int(0.95 * len(times))]
             print(
                 f"{users} users, {len(times)} answers: median "
-                f"{1e3 * statistics.median(times):.0f} ms, p95 {1e3 * p95:.0f} ms"
+                f"{1e3 * statistics.median(times):.0f} ms, p95 {1e3 * quantile(times, 0.95):.0f} ms"
+                f"; {load()}"
             )
-    finally:
-        server.terminate()
-        server.wait()
 
 
 if __name__ == "__main__":

@@ -1,0 +1,1 @@
+"""The browser page: many users at once, time from slider to picture, and an hour of sliding."""

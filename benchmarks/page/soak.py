@@ -1,0 +1,84 @@
+"""The page left open while its sliders move: memory of the page and of the server.
+
+``python -m benchmarks.page.soak --minutes 60`` moves three sliders of Explore in turn, some times a
+second, and says at intervals what the page's scripts hold after a garbage collection, how many
+elements and listeners the page has, and the resident memory of the server and of its workers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import Any
+
+from benchmarks.page.latency import opened, slider
+from benchmarks.page.serving import chromium, load, serving
+
+SLIDERS = ("relative amplitude", "pulling velocity", "stiffness of the pulling")
+
+
+def resident(process: int) -> float:
+    """Resident memory (MB) of a process and all that it started."""
+    total = 0.0
+    for line in Path(f"/proc/{process}/status").read_text().splitlines():
+        if line.startswith("VmRSS"):
+            total += int(line.split()[1]) / 1024
+    for task in Path(f"/proc/{process}/task").iterdir():
+        for child in (task / "children").read_text().split():
+            total += resident(int(child))
+    return total
+
+
+def own(process: int) -> float:
+    """Resident memory (MB) of the process alone."""
+    lines = Path(f"/proc/{process}/status").read_text().splitlines()
+    return next(int(x.split()[1]) / 1024 for x in lines if x.startswith("VmRSS"))
+
+
+def counted(session: Any) -> dict[str, float]:
+    """What the page holds after a garbage collection."""
+    session.send("HeapProfiler.collectGarbage")
+    found = session.send("Performance.getMetrics")["metrics"]
+    return {metric["name"]: metric["value"] for metric in found}
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--every", type=float, default=3.0, help="minutes between two reports")
+    parser.add_argument("--rate", type=float, default=2.0, help="movements a second")
+    options = parser.parse_args()
+    with serving() as server, chromium() as browser:
+        page = opened(browser, server.port)
+        session = page.context.new_cdp_session(page)
+        session.send("Performance.enable")
+        handles = [slider(page, meaning) for meaning in SLIDERS]
+        start = told = time.monotonic()
+        moved = 0
+        print(
+            "minutes  movements  heap MB  elements  listeners  server MB  with workers MB",
+            flush=True,
+        )
+        while True:
+            now = time.monotonic()
+            over = now - start > 60 * options.minutes
+            if moved == 60 or now - told > 60 * options.every or over:
+                told = now
+                held = counted(session)
+                print(
+                    f"{(now - start) / 60:7.1f}  {moved:9}  {held['JSHeapUsedSize'] / 1e6:7.1f}  "
+                    f"{held['Nodes']:8.0f}  {held['JSEventListeners']:9.0f}  "
+                    f"{own(server.process):9.0f}  {resident(server.process):15.0f}  {load()}",
+                    flush=True,
+                )
+            if over:
+                break
+            handle = handles[moved // 40 % len(handles)]
+            handle.press("ArrowRight" if moved // 20 % 2 == 0 else "ArrowLeft")
+            moved += 1
+            page.wait_for_timeout(1e3 / options.rate)
+
+
+if __name__ == "__main__":
+    main()

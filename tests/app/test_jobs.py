@@ -1,0 +1,82 @@
+"""Processes of the page's jobs: ended when they take too much, or when nobody waits for them."""
+
+import asyncio
+from pathlib import Path
+
+import pytest
+
+from asperity.app.jobs.limits import limited
+from asperity.app.jobs.processes import Jobs
+
+JOB = "asperity.app.api.recordings:"
+
+
+@pytest.fixture
+def with_jobs(monkeypatch):
+    """Call a coroutine function with `Jobs` whose workers know `unruly_jobs`."""
+    monkeypatch.setenv("PYTHONPATH", str(Path(__file__).parent), prepend=":")
+
+    def run(work):
+        async def whole():
+            jobs = Jobs(preload="unruly_jobs")
+            try:
+                return await work(jobs)
+            finally:
+                await jobs.close()
+
+        return asyncio.run(whole())
+
+    return run
+
+
+async def messages(jobs, job, client="a", **options):
+    return [m async for m in jobs.run(client, JOB + job, {"x": 1}, **options)]
+
+
+def test_a_job_that_takes_too_much_is_ended(with_jobs):
+    async def work(jobs):
+        return [
+            (await messages(jobs, job, limits=limits))[-1]
+            for job, limits in (
+                ("spin", {"seconds": 1}),
+                ("hoard", {"memory": 256 * 1024**2, "seconds": 20}),
+                ("answer", None),
+            )
+        ]
+
+    spun, hoarded, answered = with_jobs(work)
+    assert spun == {"error": spun["error"], "done": True}
+    assert "time or memory" in spun["error"]
+    assert "memory" in hoarded["error"]
+    assert answered == {"result": {"x": 1}, "done": True}
+
+
+def test_a_part_of_the_work_has_limits_of_its_own():
+    resource = pytest.importorskip("resource", reason="this system has no such limits")
+    kinds = resource.RLIMIT_AS, resource.RLIMIT_CPU
+    before = [resource.getrlimit(kind) for kind in kinds]
+    spent = resource.getrusage(resource.RUSAGE_SELF).ru_utime
+    with limited({"memory": 2**40, "seconds": 10_000}):
+        memory, seconds = (resource.getrlimit(kind)[0] for kind in kinds)
+    assert memory == pytest.approx(2**40, rel=0.1)
+    assert 10_000 <= seconds - spent < 20_000
+    assert [resource.getrlimit(kind) for kind in kinds] == before
+
+
+def test_a_job_that_nobody_waits_for_is_ended_whether_it_listens_or_not(with_jobs):
+    async def work(jobs):
+        running = jobs.run("a", JOB + "spin", {})
+        assert await anext(running) == {"begun": True}
+        await running.aclose()
+        left = await messages(jobs, "answer")
+        # A newer job of the same client ends the earlier one; another client's waits for its turn.
+        running = jobs.run("b", JOB + "spin", {})
+        await anext(running)
+        newer = asyncio.ensure_future(messages(jobs, "answer", client="b"))
+        superseded = await anext(running)
+        return left, superseded, await newer
+
+    left, superseded, newer = with_jobs(work)
+    assert left[-1]["result"] == {"x": 1}
+    assert superseded["cancelled"]
+    assert newer[-1]["result"] == {"x": 1}

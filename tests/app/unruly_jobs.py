@@ -1,0 +1,27 @@
+"""Jobs that do not listen, for the processes that have to end them; see `test_jobs`."""
+
+from asperity.app.api import recordings
+
+
+def spin(argument, report):
+    """Compute forever without a report."""
+    report(begun=True)
+    while True:
+        pass
+
+
+def hoard(argument, report):
+    """Take memory until there is none left."""
+    kept = []
+    while True:
+        kept.append(bytearray(64 * 1024**2))
+
+
+def answer(argument, report):
+    """Answer at once."""
+    return argument
+
+
+# Workers run what is in the rooms of the page only.
+for job in (spin, hoard, answer):
+    setattr(recordings, job.__name__, job)
