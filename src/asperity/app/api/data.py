@@ -223,9 +223,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
         whole: Any = best
         record: dict[str, Any] = {"fit": fit_record(best)}
     else:
-        whole = compared = inference.compare(
-            [*tables, *runs], asked.laws, asked.free, **options
-        )
+        whole = compared = inference.compare([*tables, *runs], asked.laws, asked.free, **options)
         judged = compared.laws.get(compared.best)
         best = None if judged is None else judged.fit
         record = {"comparison": comparison_record(compared)}
