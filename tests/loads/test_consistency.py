@@ -6,7 +6,7 @@ import pytest
 
 import asperity as asp
 from asperity.errors import InputError
-from asperity.loads import CyclicLoading, Excitation, Modulation, Programme, modulated
+from asperity.loads import CyclicLoading, Excitation, Harmonic, Modulation, Programme, modulated
 from asperity.loads.consistency import checked_modulation
 
 
@@ -107,6 +107,16 @@ def test_a_load_is_checked_wherever_it_comes_in() -> None:
         asp.response_function("rice-ruina", modulation=Heavier(0.5))
     with pytest.raises(InputError, match=r"steps\[0\].modulation.at must give a w of mean 1"):
         Programme(CyclicLoading(1.0, Heavier(0.5), 120.0), load=7.0, velocity=1e-6)
+
+
+def test_a_text_is_no_number() -> None:
+    with pytest.raises(InputError, match="numbers for its fields, got '24 %'"):
+        checked_modulation(Harmonic("24 %"))
+
+
+def test_arrays_that_do_not_broadcast() -> None:
+    with pytest.raises(InputError, match=r"arrays that broadcast, got shapes \(2,\), \(3,\)"):
+        checked_modulation(Skewed(np.full(2, 0.1), np.full(3, 0.1)))
 
 
 def test_one_bad_point_among_many_is_found() -> None:

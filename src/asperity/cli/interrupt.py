@@ -1,4 +1,4 @@
-"""Ctrl-C: at once while nothing is being written, with an orderly retreat while something is."""
+"""Ctrl-C: ends the process at once, or, while files are being written, by an exception."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Handler = Callable[[int, Any], Any]
 
 
 @contextmanager
-def leaving_at_once() -> Iterator[None]:
+def ending_at_once() -> Iterator[None]:
     """Leave the process on Ctrl-C without unwinding.
 
     Python's own way, an exception between any two steps, crashes compiled modules that are just
@@ -27,7 +27,7 @@ def leaving_at_once() -> Iterator[None]:
 
 
 @contextmanager
-def retreating() -> Iterator[Callable[[], None]]:
+def interruptible() -> Iterator[Callable[[], None]]:
     """Raise `KeyboardInterrupt` on Ctrl-C, for work that has files to put in order.
 
     Yields
@@ -58,7 +58,7 @@ def _leave(signum: int, frame: Any) -> None:
 
 @contextmanager
 def _handling(handler: Handler) -> Iterator[None]:
-    # Batch systems and nohup switch Ctrl-C off, and only the main thread may decide about it.
+    # Batch systems and nohup ignore Ctrl-C; only the main thread may set handlers.
     ours = signal.getsignal(signal.SIGINT) in (signal.default_int_handler, _leave)
     if not ours or threading.current_thread() is not threading.main_thread():
         yield

@@ -127,7 +127,7 @@ def _solve(
 
 
 def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
-    """Before anything is solved: a mistake must not cost the work."""
+    """Check files and quantity before anything is solved."""
     from asperity.outputs import output_files
     from asperity.sweep.map import SHOWN
 

@@ -1,4 +1,4 @@
-"""Options that several commands share, and what they say in one sentence when misused."""
+"""Options that several commands share, with their error messages."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from asperity.cli.interrupt import retreating
+from asperity.cli.interrupt import interruptible
 
 #: Seconds between updates: a log file is not to be flooded.
 _ON_TERMINAL, _IN_LOG = 0.2, 15.0
@@ -24,7 +24,7 @@ def bar(unit: str) -> Iterator[Callable[[int, int, str], None]]:
     shown = tqdm(
         unit=unit, file=sys.stderr, delay=1.0, mininterval=interval, leave=False, dynamic_ncols=True
     )
-    with shown, retreating() as check:
+    with shown, interruptible() as check:
 
         def update(done: int, total: int, label: str = "") -> None:
             check()

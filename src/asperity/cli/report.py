@@ -90,7 +90,7 @@ def _provenance(response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]
 
 
 def _plain(value: Any) -> Any:
-    """A tree of what JSON knows, None for numbers that are not finite."""
+    """A tree of JSON values, None for numbers that are not finite."""
     if isinstance(value, Mapping):
         return {key: _plain(v) for key, v in value.items()}
     if isinstance(value, list | tuple):

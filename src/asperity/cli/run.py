@@ -40,7 +40,7 @@ A protocol:
   sampling = "2 kHz"
 
 \b
-Exit code 0: done; 1: the motion ended before the programme, and why is said;
+Exit code 0: done; 1: the motion ended before the programme, with the reason;
 2: bad input; 130: interrupted.
 """
 
@@ -98,7 +98,7 @@ def run(
                 "change one of them or leave the option out"
             )
     except ProtocolError as error:
-        return _tell(protocol, error.mistakes)
+        return _print_mistakes(protocol, error.mistakes)
     setup = None if record is None else _setup_for(asked, record)
     _check_room(asked, out, text, record)
     with bar("ms") as update:
@@ -126,11 +126,11 @@ def run(
 
 @contextmanager
 def _after_the_motion(files: list[Path]) -> Iterator[None]:
-    """Say on Ctrl-C that the motion is whole; the files beside it are complete or absent."""
-    from asperity.cli.interrupt import retreating
+    """On Ctrl-C, say that the motion is finished and which other files are."""
+    from asperity.cli.interrupt import interruptible
 
     try:
-        with retreating():
+        with interruptible():
             yield
     except KeyboardInterrupt:
         written = ", ".join(f"'{file}'" for file in files)
@@ -145,7 +145,7 @@ _TEXT_BYTES = 18
 
 
 def _check_room(asked: Protocol, out: Path, text: Path | None, record: Path | None) -> None:
-    """Say how much a run writes, and refuse what disk or memory cannot hold."""
+    """Print the size of the run; refuse one that disk or memory cannot hold."""
     from asperity.outputs import require_disk, require_memory, size_text
 
     if asked.rows is None:
@@ -164,8 +164,8 @@ def _check_room(asked: Protocol, out: Path, text: Path | None, record: Path | No
     click.echo(f"asperity: writing {rows}, about {size_text(size)}, to {out}", err=True)
 
 
-def _tell(protocol: Path, mistakes: tuple[str, ...]) -> int:
-    """All mistakes at once, a line each."""
+def _print_mistakes(protocol: Path, mistakes: tuple[str, ...]) -> int:
+    """A line for each mistake."""
     for mistake in mistakes:
         click.echo(f"asperity: {protocol}: {' '.join(mistake.split())}", err=True)
     return 2

@@ -9,7 +9,7 @@ from typing import Any, NoReturn
 
 import click
 
-from asperity.cli.interrupt import INTERRUPTED, MESSAGE, leaving_at_once
+from asperity.cli.interrupt import INTERRUPTED, MESSAGE, ending_at_once
 from asperity.errors import InputError, closest
 
 _BAD_INPUT = 2
@@ -57,18 +57,18 @@ class Shell(click.Group):
         Click's own standalone mode is not used: its messages take several lines.
         """
         try:
-            with leaving_at_once():
+            with ending_at_once():
                 code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
         except InputError as error:
-            code = _say(str(error), _BAD_INPUT)
+            code = _print_error(str(error), _BAD_INPUT)
         except click.Abort as abort:
-            code = _say(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
+            code = _print_error(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
         except click.ClickException as error:
-            code = _say(error.format_message(), _BAD_INPUT)
+            code = _print_error(error.format_message(), _BAD_INPUT)
         sys.exit(code)
 
 
-def _say(message: str, code: int) -> int:
+def _print_error(message: str, code: int) -> int:
     """One line, whatever the user's text in the message holds."""
     click.echo("asperity: " + " ".join(message.split()), err=True)
     return code

@@ -1,4 +1,4 @@
-"""What a channel of a tribometer makes of an amplitude, to correct readings for it."""
+"""Transfer function of a tribometer's channel, to correct readings for it."""
 
 from __future__ import annotations
 

@@ -163,7 +163,7 @@ def elastic_length(
 
 
 def _turning_points(force: Array) -> list[int]:
-    """First sample, every extreme from which the force goes back for good, and last sample."""
+    """First sample, every turning point of the force, and last sample."""
     reach = _TURN * float(np.ptp(force))
     turns, best, rising = [0], 0, None
     for i, value in enumerate(force):

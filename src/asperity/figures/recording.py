@@ -1,4 +1,4 @@
-"""Figures of a recording: what was read, what was found, and what was left."""
+"""Figures of a recording: the signals, the fit, and its residual."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _LABELLED: dict[str, Any] = {"va": "top", "ha": "left", "fontsize": 10}
 
 
 def draw_modulated(found: Measurement) -> Figure:
-    """Recording with its window, mean cycle with the fit, and what is left of it.
+    """Recording with its window, mean cycle with the fit, and spectrum of the residual.
 
     Parameters
     ----------
@@ -143,7 +143,7 @@ def _draw_cycle(axis: Axes, found: Measurement) -> None:
 
 
 def _draw_residual(axis: Axes, found: Measurement) -> None:
-    """Amplitudes of what the fit leaves, with what it has found beside them."""
+    """Spectrum of the residual of the fit, with the fitted harmonics."""
     reading = found.reading
     frequency, amplitude = residual_spectrum(found)
     order = np.arange(1, reading.harmonics.size + 1)

@@ -1,4 +1,4 @@
-"""Figure of a run: load, force and velocity over time, with what happened."""
+"""Figure of a run: load, force and velocity over time, with its events."""
 
 from __future__ import annotations
 

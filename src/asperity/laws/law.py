@@ -1,6 +1,6 @@
 """What a friction law is: parameters, a friction coefficient, and the rates of its states.
 
-A law knows nothing of springs, masses or load programmes. Its methods are pure, element-wise
+A law does not contain springs, masses or load programmes. Its methods are pure, element-wise
 functions of arrays: every argument may be a number or a JAX array of any shape, and
 shapes broadcast. `v` is always the velocity that enters the RATE term (m/s), `state` a tuple with
 one array per state variable, `w` the normal load over its mean, W/W0.

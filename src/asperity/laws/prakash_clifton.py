@@ -1,4 +1,4 @@
-"""Rice-Ruina friction that remembers the normal load: it follows a change of W by and by.
+"""Rice-Ruina friction that remembers the normal load: it follows a change of W gradually.
 
 After Prakash (1998), in the form of Cochard and Rice (2000): the interface force is that of a load
 W_e, which relaxes to the applied one over a slip of length L, or a time L/V_star at rest::

@@ -1,4 +1,4 @@
-"""What the equations take for granted of a modulation, checked on samples of its period."""
+"""Checks of a modulation on samples of its period: what the equations assume of it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from asperity.loads.excitation import Excitation
 from asperity.loads.harmonic import Harmonic
 from asperity.loads.modulation import Modulation
 from asperity.loads.periodic import Periodic
-from asperity.parameters.arguments import instance
+from asperity.parameters.arguments import instance, shown
 
 #: Samples of the period; more are taken where fewer find a fault, which may be their own.
 _SAMPLES = (64, 1024, 16384)
@@ -42,17 +42,28 @@ def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
     Raises
     ------
     InputError
-        If it is no `Modulation`; if over a period a value is not finite, W does not stay positive,
-        the mean of W/W0 or of the pull is not 1, `w_slope` is not the derivative of `w`,
-        `amplitude` is not that of the first harmonic, `scaled(0)` is not steady sliding, or the
-        load is not `even` and says so.
+        If it is no `Modulation`, or its fields are no numbers or arrays that broadcast; if over a
+        period a value is not finite, W does not stay positive, the mean of W/W0 or of the pull
+        is not 1, `w_slope` is not the derivative of `w`, `amplitude` is not that of the first
+        harmonic, `scaled(0)` is not steady sliding, or the load is not `even` and says so.
     """
     advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
     modulation: Modulation = instance(given, Modulation, name, advice)
+    leaves, structure = jax.tree.flatten(modulation)
+    for leaf in leaves:
+        if isinstance(leaf, str):
+            raise InputError(
+                f"{name} must have numbers for its fields, got {shown(leaf)}; give them in SI"
+            )
     if type(modulation) in (Harmonic, Periodic):
         return modulation
-    leaves, structure = jax.tree.flatten(modulation)
-    shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
+    try:
+        shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
+    except ValueError:
+        raise InputError(
+            f"{name} must have arrays that broadcast, got shapes "
+            f"{', '.join(str(np.shape(leaf)) for leaf in leaves)}; give arrays of one shape"
+        ) from None
     flat = [np.ravel(np.broadcast_to(np.asarray(leaf, float), shape)) for leaf in leaves]
     fault = _first_fault(structure, flat, int(np.prod(shape)), name)
     if fault:

@@ -28,7 +28,7 @@ class Periodic(Modulation):
     ----------
     load, shear, pull : tuple of pairs
         (a_k, b_k) for k = 1, 2, ...; empty where nothing is modulated. The load must stay
-        positive, which whoever builds the programme sees to.
+        positive; `modulated` and `sampled` check it.
     """
 
     load: Series = ()

@@ -1,4 +1,4 @@
-"""What a run has written, as text and in outline, a block at a time."""
+"""The file of a run as text, and its extremes over intervals of time; read in blocks."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _ROWS = 4 * CHUNKS["time"]
 
 @dataclass(frozen=True, eq=False)
 class RunOutline:
-    """A run as a figure can show it: extremes over stretches of time, and what happened.
+    """Extremes of a run over intervals of time, and its events, for a figure.
 
     Attributes
     ----------

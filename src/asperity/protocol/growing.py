@@ -18,14 +18,14 @@ CHUNKS: Mapping[str, int] = {"time": 32_768, "event": 1024}
 
 
 def append(path: Path, block: xarray.Dataset, done: Mapping[str, int]) -> None:
-    """Add a block behind what is done; what lies beyond that is a block never finished.
+    """Add a block after the finished ones; an unfinished block behind them is overwritten.
 
     The file is closed again, so that it is whole and readable between blocks.
 
     Parameters
     ----------
     path : Path
-        Made if there is nothing done.
+        Created where nothing is done yet.
     block : xarray.Dataset
         Variables over ``time`` or ``event``, and others, which are written once.
     done : mapping of str to int

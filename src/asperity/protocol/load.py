@@ -13,7 +13,7 @@ from asperity.protocol.mistakes import ProtocolError
 from asperity.protocol.protocol import Protocol
 from asperity.units import KINDS
 
-#: Kinds of what stands in the tables of a file: there, a quantity carries its unit.
+#: Kinds of the quantities in the tables of a file, where each carries its unit.
 _KINDS = {
     "start": {"velocity": "velocity", "load": "force"},
     "solver": {"sampling": "frequency"},
@@ -32,7 +32,7 @@ def load_protocol(path: str | os.PathLike[str]) -> Protocol:
     InputError
         If the file cannot be read or is not TOML.
     ProtocolError
-        An `InputError` that tells all mistakes, with file, step and a valid example.
+        An `InputError` that lists all mistakes, with file, step and a valid example.
     """
     file, content = toml_content(path, "protocol")
     mistakes = list(_without_unit(content))
@@ -52,7 +52,7 @@ def _law(content: Mapping[str, Any]) -> str | None:
 
 
 def _without_unit(content: Mapping[str, Any]) -> list[str]:
-    """Bare numbers where a unit is needed: a file says what it means."""
+    """Numbers without the unit that a file must give."""
     kinds = {
         **_KINDS,
         "parameters": {n: q.kind for n, q in known_parameters(_law(content)).items()},

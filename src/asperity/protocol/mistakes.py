@@ -1,4 +1,4 @@
-"""Everything that is wrong with a protocol, in one message."""
+"""All mistakes in a protocol, in one message."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def sentences(error: ValidationError, models: Mapping[str, type[BaseModel]]) -> 
     steps: set[int] = set()
     for mistake in error.errors(include_url=False):
         if mistake["loc"][:1] == ("steps",) and len(mistake["loc"]) > 1:
-            # Every kind of step that a wrong one could have been complains for itself.
+            # pydantic reports a wrong step once for each kind of step.
             if int(mistake["loc"][1]) in steps:
                 continue
             steps.add(int(mistake["loc"][1]))

@@ -26,7 +26,7 @@ class PlannedStep:
 
 
 def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[str]]:
-    """All steps in their order, repetitions written out, and what is wrong with any of them.
+    """All steps in their order, repetitions written out, and the mistakes in them.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[st
 
 
 def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iterator[str]:
-    """What is wrong with the values of the steps, each under the load and velocity it finds."""
+    """Mistakes in the values of the steps, each at the load and velocity before it."""
     reported: set[str] = set()
     for one in planned:
         try:

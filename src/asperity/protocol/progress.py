@@ -1,4 +1,4 @@
-"""How far a run has come, saved with its finished blocks so that it can go on from there."""
+"""State of an unfinished run, saved with its finished blocks, from which it is resumed."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ class Repeat(BaseModel):
 
 
 class ProtocolStart(BaseModel):
-    """What there is before the first step.
+    """Load, velocity and states before the first step.
 
     Attributes
     ----------

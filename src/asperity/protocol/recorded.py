@@ -1,4 +1,4 @@
-"""Steps that follow a load or a velocity measured elsewhere."""
+"""Steps that follow a recorded load or velocity."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from asperity.recording import read
 #: What a recording can prescribe: the role of its channel, and the kind that it must be of.
 _CHANNELS = {"load": ("W", "force"), "velocity": ("velocity", "velocity")}
 
-#: Findings of a recording that must not be bridged in silence.
+#: Findings that make a recording unusable here: interpolation would hide them.
 _UNUSABLE = frozenset({"gap", "truncated", "malformed row", "repeated time", "backward time"})
 
 

@@ -1,4 +1,4 @@
-"""Whether steady sliding, from which a run begins, is stable: a question that a run may not ask."""
+"""Whether the steady sliding that a run begins with is stable."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 #: Laws whose steady sliding loses stability at a stiffness known in closed form.
 _RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip")
 _ELASTIC = {"elasto-plastic": "slider", "elasto-plastic-age": "plastic"}
-#: Growth per slipped metre (1/m) that is none: far below that of any interface.
+#: Growth per slipped metre (1/m) that counts as zero: far below that of any interface.
 _ROUND_OFF = 1e-3
 
 

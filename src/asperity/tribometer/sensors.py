@@ -1,4 +1,4 @@
-"""Sensors of the virtual tribometer: what stands between a quantity and the recorder."""
+"""Sensors of the virtual tribometer: from a quantity to the signal at the recorder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 #: Given as a number in SI or a text with its unit, and a float in SI from the construction on.
 Given: TypeAlias = Any
 
-#: What the fields of a sensor are that do not measure what the sensor does.
+#: Kinds of the fields of a sensor that are not in the unit of its quantity.
 _KINDS = {
     "bandwidth": "frequency",
     "high_pass": "frequency",
@@ -54,7 +54,7 @@ class Sensor:
         Dead time (s): a phase of -2 pi f delay on top of that of the bandwidth.
     """
 
-    #: What noise, resolution and offset are, and what the reading is, as keys of `KINDS`.
+    #: Kind of noise, resolution and offset, and kind of the reading, as keys of `KINDS`.
     kind: ClassVar[str]
     reads: ClassVar[str]
 

@@ -1,7 +1,7 @@
 """The virtual tribometer: from the motion of a slider to what a laboratory would have recorded.
 
-It is handed signals and knows no laws and no solvers: force, load and displacement go through
-their sensors, an anti-alias filter and the recorder's clock and converter into a `Trace`.
+Force, load and displacement go through their sensors, an anti-alias filter and the recorder's clock
+and converter into a `Trace`. No law and no solver is used here.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class Recorder:
     rate : float or str
         Samples per second (Hz).
     jitter : float or str
-        Standard deviation of the instants of sampling (s); the time stamps do not know of it.
+        Standard deviation of the instants of sampling (s); the time stamps are those without it.
     clock_error : float
         Relative error of the clock: a positive one samples late, so that recorded frequencies
         come out higher by this much.

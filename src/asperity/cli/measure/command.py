@@ -1,4 +1,4 @@
-"""``asperity measure``: what a recording says about friction, and whether to believe it."""
+"""``asperity measure``: friction in a recording, with uncertainties and verdicts."""
 
 from __future__ import annotations
 
@@ -221,7 +221,7 @@ def _campaign(
 
 
 def _check_picture(path: Path, recording: Path) -> None:
-    """Before anything is read: a mistake must not cost the work."""
+    """Check the picture's path before anything is read."""
     from asperity.outputs import output_files
 
     if path.suffix.lower() != ".png":

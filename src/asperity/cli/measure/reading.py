@@ -1,4 +1,4 @@
-"""What is read out of a recording, and how: the options that every file of a campaign shares."""
+"""Options of a measurement, which every file of a campaign shares."""
 
 from __future__ import annotations
 

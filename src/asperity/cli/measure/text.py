@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from asperity.recording.finding import Finding
 
 
-#: What is slower than a tenth of a nanometre a day is rounding.
+#: A velocity (m/s) below this, a tenth of a nanometre a day, is rounding.
 _STILL = 1e-15
 
 
@@ -72,7 +72,7 @@ def modulated_text(found: Measurement, name: str) -> str:
             head,
             aligned(rows, "  "),
             *_quality(found.checks),
-            *_seen(found.samples.findings),
+            *_findings(found.samples.findings),
             *_unread(found.samples.unread),
         ]
     )
@@ -252,7 +252,7 @@ def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tupl
 
 
 def _quality(checks: Iterable[Check]) -> list[str]:
-    """A row a name: of several checks of one name the first of the gravest, and how many more."""
+    """A row for each name of a check: the worst of that name, and the number of the others."""
     by_name: dict[str, list[Check]] = {}
     for check in checks:
         by_name.setdefault(check.name, []).append(check)
@@ -267,13 +267,13 @@ def _quality(checks: Iterable[Check]) -> list[str]:
     return ["quality", aligned(rows, "  ")]
 
 
-def _seen(findings: Iterable[Finding]) -> list[str]:
-    """What was found anywhere in the recording, read or not."""
+def _findings(findings: Iterable[Finding]) -> list[str]:
+    """Findings of the whole recording, within the window or not."""
     rows = [(f.severity, f.name, f.sentence) for f in findings]
     return ["whole recording", aligned(rows, "  ")] if rows else []
 
 
 def _unread(count: int) -> list[str]:
-    """One line for what is said about columns that are not read."""
+    """One line for findings about columns that are not read."""
     findings = "finding is" if count == 1 else "findings are"
     return [f"{count} more {findings} about columns that were not read"] if count else []

@@ -10,7 +10,7 @@ from asperity.errors import InputError
 
 #: Options that choose the column of a role; other roles have --column.
 _OPTION_OF_ROLE = {"W": "--load", "F": "--force", "time": "--time"}
-#: What begins a sentence, and what stands there on the command line.
+#: Beginnings of the library's sentences, and the words of the command line for them.
 _SUBJECTS = {
     "measure.window": "--window",
     "measure.detrend": "--detrend",
@@ -71,7 +71,7 @@ def in_options(sentence: str) -> str:
     )
     sentence = re.sub(r"^units\['[^']*'\]", "--unit", sentence)
     sentence = re.sub(r"^Trace\.channel\b", "--column", sentence)
-    # What the program says of unread columns, too, is in the words of the library.
+    # Messages about unread columns name arguments of the library too.
     sentence = re.sub(r"columns=\{'(\w+)': (?:'([^']*)'|(\d+))\}", _column, sentence)
     sentence = re.sub(r"units=\{'([^']*)': '([^']*)'\}", r"""--unit "\1=\2\"""", sentence)
     return re.sub(r"units=\{'([^']*)': \.\.\.\}", r"""--unit "\1=UNIT\"""", sentence)

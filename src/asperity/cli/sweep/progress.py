@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.interrupt import retreating
+from asperity.cli.interrupt import interruptible
 
 if TYPE_CHECKING:
     from asperity.sweep.run.driver import SweepProgress
@@ -40,7 +40,7 @@ def shown() -> Iterator[tuple[Callable[[SweepProgress], None], Callable[[str], N
     """
     last: SweepProgress | None = None
     on_terminal = sys.stderr.isatty()
-    with retreating() as check:
+    with interruptible() as check:
         report, line, close = _bar() if on_terminal else _lines()
 
         def progress(now: SweepProgress) -> None:

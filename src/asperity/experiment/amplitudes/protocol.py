@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class AmplitudeMotion:
-    """The protocol as the slider has gone through it.
+    """Motion of a slider through the amplitude protocol.
 
     Attributes
     ----------
@@ -62,9 +62,9 @@ class AmplitudeMotion:
         ----------
         tribometer : Tribometer
             With the channels ``"shear force"`` and ``"normal force"``; the latter measures the
-            load as applied, and knows nothing of the part that an air layer bears.
+            load as applied, not the part of it that an air layer bears.
         seed : int
-            Of the tribometer's noise: each makes a recording of its own.
+            Of the tribometer's noise: another seed, another recording.
         harmonics : int
             To read.
         """

@@ -1,4 +1,4 @@
-"""What the protocol of amplitudes has measured: a reading for each amplitude, as a table."""
+"""Readings of the amplitude protocol: one for each amplitude, and all as a table."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class AmplitudePoint:
 
 @dataclass(frozen=True, eq=False)
 class AmplitudeSeries:
-    """What the protocol has recorded, and its readings.
+    """Recording of the amplitude protocol, and its readings.
 
     Attributes
     ----------

@@ -42,7 +42,7 @@ def amplitude_series(
         That slides steadily without modulation: K above its critical value, or with inertia.
     tribometer : Tribometer
         With the channels ``"shear force"`` and ``"normal force"``; the latter measures the load
-        as applied, and knows nothing of the part that an air layer bears.
+        as applied, not the part of it that an air layer bears.
     exciter : Exciter
     epsilons : sequence of float
         Commanded amplitudes, in the order of the experiment.

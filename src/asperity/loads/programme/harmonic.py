@@ -149,7 +149,7 @@ class HarmonicSegment(ProgrammeSegment):
 
     @property
     def _level(self) -> bool:
-        """Whether neither load nor velocity nor amplitude changes by and by."""
+        """Whether load, velocity and amplitude are constant."""
         fixed = float(self.epsilon1) == float(self.epsilon2) or float(self.rise) == 0
         return fixed and float(self.load_rate) == 0 and float(self.pull_rate) == 0
 

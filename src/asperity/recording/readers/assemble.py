@@ -1,4 +1,4 @@
-"""Columns as recorded to a checked `Trace`: names, units and roles are settled here, once."""
+"""Columns as recorded to a checked `Trace`: names, units and roles are determined here."""
 
 from __future__ import annotations
 
