@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi_squared
 
-from asperity.inference.intervals import Interval, bounded_interval
+from asperity.inference.intervals import bounded_interval
 from asperity.inference.objective import Objective, log_density
+from asperity.inference.profile import profile_interval
 from asperity.inference.residuals import Residuals
 from asperity.inference.result import Estimate, Fit, Optimum
 
@@ -21,6 +22,13 @@ Float = NDArray[np.float64]
 _SAME_CHI2, _SAME_COORDINATE = 1e-3, 1e-2
 #: Other minima this close in chi-squared are reported: 3 standard deviations.
 _RIVAL = 9.0
+#: Where chi-squared is compared with its parabola, in standard deviations, and the rises there
+#: between which intervals of the normal approximation are taken: a quarter too wide or too narrow.
+_TRIED_AT, _LOWEST_RISE, _HIGHEST_RISE = 2.0, 2.4, 6.8
+#: Coordinates, in factors of e, that are known better than this are not tried.
+_PRECISE = 0.1
+#: Decrease of chi-squared along a profile that is another minimum.
+_LOWER = 0.01
 #: Minima this near, in standard errors of everything but nuisances, give the same answer.
 _NEAR = 0.5
 #: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
@@ -92,14 +100,26 @@ def described_fit(
         if not unknown.nuisance
         and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > _UNDETERMINED)
     )
+    bent = [] if profile else _bent(objective, (u, chi2), covariance, missing)
     estimates = {}
     for i, unknown in enumerate(objective.unknowns):
         low, high = unknown.bounds
         at_bound = min(u[i] - low, high - u[i]) < _AT_BOUND * max(sd[i], 1e-12)
-        narrow, wide = (
-            _interval(objective, i, (u, chi2), unbounded[i], covariance, level, profile, missing[i])
-            for level in (math.erf(1 / math.sqrt(2)), 0.95)
-        )
+        ends = []
+        for level in (math.erf(1 / math.sqrt(2)), 0.95):
+            if profile:
+                found, lowest = profile_interval(objective, i, u, chi2, covariance, level)
+                if lowest[1] < chi2 - _LOWER:
+                    # The search has missed a minimum: begin again there.
+                    return described_fit(
+                        objective, [objective.minimise(lowest[0]), *minima], profile=profile
+                    )
+                ends.append(found)
+            elif missing[i]:
+                ends.append((low, high))
+            else:
+                ends.append(bounded_interval(unbounded[i], float(sd[i]), level, low, high))
+        narrow, wide = ((unknown.end(a), unknown.end(b)) for a, b in ends)
         value = float(unknown.to_value(u[i]))
         estimates[unknown.name] = Estimate(
             unknown.name,
@@ -136,7 +156,14 @@ def described_fit(
         warnings=(),
         objective=objective,
     )
-    return _with_warnings(found, _contradicted(objective, u, covariance))
+    said = _contradicted(objective, u, covariance)
+    if bent:
+        said.append(
+            f"chi-squared is no parabola in {' and '.join(bent)}: intervals of the normal "
+            "approximation do not hold, of these and of what goes with them; ask for those by "
+            "profile likelihood"
+        )
+    return _with_warnings(found, said)
 
 
 def _contradicted(objective: Objective, u: Float, covariance: Float) -> list[str]:
@@ -185,28 +212,49 @@ def inverse_information(information: Float) -> tuple[Float, NDArray[np.bool_]]:
     return covariance + np.diag(np.where(loose, 1e12, 0.0)), loose
 
 
-def _interval(
+def _bent(
     objective: Objective,
-    i: int,
     minimum: tuple[Float, float],
-    unbounded: float,
     covariance: Float,
-    level: float,
-    profile: bool,
-    loose: bool,
-) -> Interval:
-    """Confidence interval of a parameter in SI."""
-    unknown = objective.unknowns[i]
-    low, high = unknown.bounds
-    if profile:
-        from asperity.inference.profile import profile_interval
+    missing: NDArray[np.bool_],
+) -> list[str]:
+    """Parameters whose interval the normal approximation does not give.
 
-        ends = profile_interval(objective, i, *minimum, covariance, level)
-    elif loose:
-        ends = (low, high)
-    else:
-        ends = bounded_interval(unbounded, float(np.sqrt(covariance[i, i])), level, low, high)
-    return unknown.end(ends[0]), unknown.end(ends[1])
+    Along each, at two standard deviations and with the others following, chi-squared should have
+    risen by four.
+    """
+    u, chi2 = minimum
+    low, high = np.array([k.bounds for k in objective.unknowns]).T
+    sd = np.sqrt(np.diag(covariance))
+    found = []
+    for i, unknown in enumerate(objective.unknowns):
+        if unknown.nuisance or missing[i] or not _PRECISE < sd[i] <= _UNDETERMINED:
+            continue
+        for sign in (-1, 1):
+            point = u + sign * _TRIED_AT * covariance[:, i] / sd[i]
+            if (point <= low).any() or (point >= high).any():
+                continue  # an interval beside a bound
+            rise = objective.chi2(point) - chi2
+            if rise > _HIGHEST_RISE:
+                # The valley may bend, and be as wide as it should be nevertheless.
+                rise = _lowered(objective, point, i) - chi2
+            if not _LOWEST_RISE <= rise <= _HIGHEST_RISE:
+                found.append(unknown.name)
+                break
+    return found
+
+
+def _lowered(objective: Objective, u: Float, i: int) -> float:
+    """chi-squared after a step of Gauss and Newton from u that leaves coordinate i as it is."""
+    r, J = objective.residuals(u)
+    if not np.isfinite(r).all():
+        return math.inf
+    others = np.arange(u.size) != i
+    step = np.zeros_like(u)
+    step[others] = -np.linalg.lstsq(J[:, others], r, rcond=1e-10)[0]
+    low, high = np.array([k.bounds for k in objective.unknowns]).T
+    trial = np.clip(u + step, low + 1e-10, high - 1e-10)
+    return min(objective.chi2(trial), float(r @ r))
 
 
 def _rivals(
@@ -273,4 +321,7 @@ def _why_undetermined(found: Fit, name: str) -> str:
             f"{name} is not determined by these data beside {' and '.join(partners)}: they change "
             "the predictions together; fix one, give a prior, or measure what tells them apart"
         )
-    return f"{name} is not determined by these data; fix it or give a prior"
+    return (
+        f"{name} is not determined by these data; fix it or give a prior: the intervals of the "
+        "other parameters hold only for values of it near this one"
+    )

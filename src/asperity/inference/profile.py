@@ -23,8 +23,8 @@ _NO_ORBIT = 1e3
 
 def profile_interval(
     objective: Objective, i: int, u: Float, chi2: float, covariance: Float, level: float
-) -> Interval:
-    """Ends of the confidence interval of a coordinate.
+) -> tuple[Interval, tuple[Float, float]]:
+    """Ends of the confidence interval of a coordinate, and the lowest point on the way.
 
     Parameters
     ----------
@@ -40,12 +40,15 @@ def profile_interval(
 
     Returns
     -------
-    (float, float)
+    ends : (float, float)
         Infinite or the bound where the profile stays below the threshold.
+    lowest : (array, float)
+        Coordinates and chi-squared; below the minimum where that was not the lowest one.
     """
     low, high = objective.unknowns[i].bounds
     side = _Side(objective, i, u, chi2, covariance, level)
-    return side.end(-1, low), side.end(1, high)
+    ends = side.end(-1, low), side.end(1, high)
+    return ends, min(side.path.values(), key=lambda point: point[1])
 
 
 class _Side:

@@ -127,35 +127,49 @@ class Autoregression:
 
 
 def fitted(
-    stretches: Sequence[Float], *, order: int | None = None, parameters: int = 0
+    stretches: Sequence[Float],
+    *,
+    order: int | None = None,
+    parameters: int = 0,
+    uncertain: Sequence[Float] | None = None,
 ) -> Autoregression:
     """Autoregressive process of one or more stretches of noise, by Burg's method.
 
     Parameters
     ----------
     stretches : sequence of array
-        Noise without mean, evenly sampled, of one process.
+        Noise, evenly sampled, of one process.
     order : int, optional
         By default the order of the lowest AICc.
     parameters : int
         That were fitted to the same samples: the variance is larger than that of the residual.
+    uncertain : sequence of array, shape (columns, samples of the stretch), optional
+        What the fit may have taken off the noise: a root of the covariance of the fitted curve.
+
+    Notes
+    -----
+    A fit takes off what resembles its curves, slow noise above all. With `uncertain`, the moments
+    are those that the noise is expected to have given the residual, which is a step of the EM
+    algorithm for the restricted likelihood (Patterson and Thompson, Biometrika 58, 545, 1971;
+    Laird and Ware, Biometrics 38, 963, 1982).
     """
     n = sum(s.size for s in stretches)
     highest = order if order is not None else min(_HIGHEST, int(_SHARE * n))
     highest = min(highest, max(0, min(s.size for s in stretches) - 2))
-    variance = sum(float(s @ s) for s in stretches) / n
-    forward = [s.copy() for s in stretches]
-    backward = [s.copy() for s in stretches]
+    more = uncertain if uncertain is not None else [np.zeros((0, s.size)) for s in stretches]
+    forward = [np.vstack([s, u]) for s, u in zip(stretches, more, strict=True)]
+    backward = [f.copy() for f in forward]
+    variance = sum(float(np.sum(f * f)) for f in forward) / n
     reflection: list[float] = []
     criteria = [n * math.log(max(variance, 1e-300)) + 2]
     rest = variance
     for _ in range(highest):
-        ahead = [f[1:] for f in forward]
-        behind = [b[:-1] for b in backward]
-        power = sum(float(f @ f + b @ b) for f, b in zip(ahead, behind, strict=True))
+        ahead = [f[:, 1:] for f in forward]
+        behind = [b[:, :-1] for b in backward]
+        power = sum(_dot(f, f) + _dot(b, b) for f, b in zip(ahead, behind, strict=True))
         if power <= 0:
             break
-        k = 2 * sum(float(f @ b) for f, b in zip(ahead, behind, strict=True)) / power
+        k = 2 * sum(_dot(f, b) for f, b in zip(ahead, behind, strict=True)) / power
         k = min(max(k, -1 + 1e-9), 1 - 1e-9)
         forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
         backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
@@ -171,6 +185,11 @@ def fitted(
     white = np.concatenate([found.whiten(s) for s in stretches])
     left = max(n - parameters - best, 1)
     return Autoregression(chosen, variance * float(white @ white) / left)
+
+
+def _dot(a: Float, b: Float) -> float:
+    # Threads of BLAS would wait for each other longer than these short sums take.
+    return float(np.einsum("ij,ij->", a, b))
 
 
 @dataclass(frozen=True)

@@ -25,11 +25,15 @@ Float = NDArray[np.float64]
 _NOT_WHITE = 1e-3
 #: A peak of the innovations less probable than this is a line; so many are removed.
 _LINE, _LINES = 1e-4, 6
+#: Steps towards the noise at given parameters, and what of the fitted curve counts as seen.
+_NOISE_STEPS, _SEEN = 3, 1e-10
 #: A sample that is farther off than this by chance, over the whole run, is an outlier; the largest
 #: share of samples that are left out as such.
 _OUTLIER, _MOST_OUTLIERS = 1e-4, 0.01
 #: Times of velocity changes are known to this many sampling intervals.
 _CUT_INTERVALS = 2.0
+#: Samples on either side of a velocity change that are never left out.
+_AT_STEP = 5
 #: Outliers that a warning names.
 _NAMED = 5
 #: Samples that the quickest part of the gauge's response is resolved by.
@@ -186,17 +190,8 @@ class RunTerm:
         if raw is None:
             return False
         while True:
-            left = raw[0] + self._columns @ self._coefficients(raw[0])
-            count = self._columns.shape[1] + int(np.any(raw[1], axis=0).sum())
-            self.models = [
-                fitted(
-                    [left[a:b] - left[a:b].mean()],
-                    order=self._order,
-                    parameters=round(count * (b - a) / left.size),
-                )
-                for a, b in self.run.stretches
-            ]
-            self._prepare()
+            for _ in range(_NOISE_STEPS):
+                self._estimate_noise(*raw)
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             white = self._whitened(left[:, None])[:, 0]
             if not (self._add_outliers(white) or (self._order != 0 and self._add_line(white))):
@@ -204,6 +199,27 @@ class RunTerm:
         innovations = [white[a:b] for a, b in self.run.stretches]
         self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
         return True
+
+    def _estimate_noise(self, difference: Float, jacobian: Float) -> None:
+        """One step towards the noise that the residual shows beside what the fit takes off it."""
+        left = difference + self._columns @ self._coefficients(difference)
+        curves = np.column_stack([jacobian[:, np.any(jacobian, axis=0)], self._columns])
+        white = self._whitened(curves)
+        size = np.sqrt(np.einsum("ij,ij->j", white, white))
+        # A root of the covariance of the fitted curve: its columns are orthonormal when whitened.
+        values, vectors = np.linalg.eigh(white.T @ white / np.outer(size, size))
+        seen = values > _SEEN * values[-1]
+        root = (curves / size) @ (vectors[:, seen] / np.sqrt(values[seen]))
+        self.models = [
+            fitted(
+                [left[a:b]],
+                order=self._order,
+                parameters=round(curves.shape[1] * (b - a) / left.size),
+                uncertain=[root[a:b].T],
+            )
+            for a, b in self.run.stretches
+        ]
+        self._prepare()
 
     def _add_outliers(self, white: Float) -> bool:
         """Leave out the samples that are too far off alone, if there are any.
@@ -219,6 +235,11 @@ class RunTerm:
             apart = np.abs(model.departures_of_single_samples(white[a:b]))
             known = [k - a for k in self._outliers if a <= k < b]
             apart[known] = 0.0
+            # At a step a wrong motion is off by a few samples, and must not hide its misfit.
+            edges = self.run.drive.edges[list(self.run.cuts)]
+            after = np.searchsorted(self.run.time, edges) - a
+            for first in after:
+                apart[max(first - _AT_STEP, 0) : max(first + _AT_STEP, 0)] = 0.0
             reach = max(3, model.order)
             for k in np.argsort(-apart):
                 if apart[k] <= limit or len(found) >= room:
