@@ -108,13 +108,13 @@ def described_fit(
         ends = []
         for level in (math.erf(1 / math.sqrt(2)), 0.95):
             if profile:
-                found, lowest = profile_interval(objective, i, u, chi2, covariance, level)
+                interval, lowest = profile_interval(objective, i, u, chi2, covariance, level)
                 if lowest[1] < chi2 - _LOWER:
                     # The search has missed a minimum: begin again there.
                     return described_fit(
                         objective, [objective.minimise(lowest[0]), *minima], profile=profile
                     )
-                ends.append(found)
+                ends.append(interval)
             elif missing[i]:
                 ends.append((low, high))
             else:
