@@ -129,6 +129,27 @@ def test_what_is_no_recording_gets_a_sentence(what, tmp_path):
     assert "0123" not in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("content", "source", "begin"),
+    [
+        (b"a,b\n" + b"1,2\n" * 300, {}, "Time column must be a column"),
+        (b"time,b\n" + b"1,2\n" * 300, {"rate": "1 kg"}, "Sampling rate must"),
+        (b"time (s),Ft (N)\n0,1\n1,2\n2,3\n3,3\n", {}, "Normal load must be a channel"),
+        (b"PK\x03\x04" + b"\0" * 300, {}, "The recording must be"),
+    ],
+)
+def test_a_sentence_names_what_the_page_names(content, source, begin, tmp_path):
+    path = tmp_path / "0123.csv"
+    path.write_bytes(content)
+    asked = recordings.Source.model_validate(source).model_dump()
+    argument = {"path": str(path), "name": "mine.csv", "source": asked, "options": {}}
+    with pytest.raises(InputError) as refused:
+        recordings.measure(argument, lambda **message: None)
+    assert str(refused.value).startswith(begin)
+    assert "columns=" not in str(refused.value)
+    assert "columns[" not in str(refused.value)
+
+
 def test_the_sentence_of_a_file_reaches_the_page(measured):
     *_, last = measured(HOSTILE["hdf5 garbage"], "garbage.h5")
     assert last["done"]
@@ -319,7 +340,7 @@ def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps):
         ({"free": ["alpha"], "laws": ["linker-dieterich"]}, {}, "alpha"),
         ({}, {"velocities": ["1 um/s"]}, "velocities"),
         ({}, {"velocities": ["fast", "slow"]}, "velocities"),
-        ({}, {"window": [70.0, 10.0]}, "window"),
+        ({}, {"window": [70.0, 10.0]}, "Window"),
         ({}, {"source": {"columns": {"F": "no such"}}}, "no such"),
     ],
 )

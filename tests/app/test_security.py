@@ -103,6 +103,7 @@ def test_no_parameter_names_a_file(ask, tmp_path, material):
         b'{"law": "amontons", "laws": ["no-such-law"], "numbers": {"V": 1, "epsilon": 0.1}}',
         b'{"law": "amontons", "air": {"P0": 0}, "numbers": {"V": 1, "epsilon": 0.1}}',
         b'{"law": "amontons", "laws": 1}',
+        b'{"law": "amontons", "air": {"h0": 1e-308}, "numbers": {"V": 1, "epsilon": 0.1}}',
     ],
 )  # fmt: skip
 def test_what_is_no_question_gets_a_sentence(ask, body):

@@ -90,10 +90,11 @@ def law_class(name: str) -> type[Law]:
 def borne_share(point: OperatingPoint, values: Mapping[str, float], frequency: Any) -> Any:
     """The share of the load's modulation that the contacts bear, and its phase (rad)."""
     layer, contact = air_arguments(point.air_values(), values)
-    return (
-        effective_modulation(frequency, layer=layer, **contact),
-        modulation_phase(frequency, layer=layer, **contact),
-    )
+    with np.errstate(all="ignore"):  # numbers at the ends of the range have no share
+        return (
+            effective_modulation(frequency, layer=layer, **contact),
+            modulation_phase(frequency, layer=layer, **contact),
+        )
 
 
 def air_arguments(
@@ -117,6 +118,11 @@ def epsilon_on_contacts(point: OperatingPoint, values: Mapping[str, float]) -> f
         return values["epsilon"]
     share, _ = borne_share(point, values, values["frequency"])
     found = float(share) * values["epsilon"]
+    if not np.isfinite(found):
+        raise InputError(
+            "air must have numbers that leave a share of the modulation, got a share out of range; "
+            "bring pressure, gap, radius and viscosity nearer to the material's"
+        )
     if not found < 1:
         raise InputError(
             f"epsilon on the contacts must be below 1, got {found:g}; the air layer and the mass "

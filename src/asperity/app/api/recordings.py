@@ -17,6 +17,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
+from asperity.app.api.wording import in_page_words
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Question
 from asperity.errors import InputError, printable
@@ -105,11 +106,11 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
 
 @contextmanager
 def named(path: Path, name: str) -> Iterator[None]:
-    """Sentences with the name that people know in place of the server's."""
+    """Sentences with the name that people know in place of the server's, in the page's words."""
     try:
         yield
     except InputError as error:
-        text = str(error).replace(str(path), name).replace(path.name, name)
+        text = in_page_words(str(error)).replace(str(path), name).replace(path.name, name)
         raise InputError(printable(text, 900)) from None
 
 

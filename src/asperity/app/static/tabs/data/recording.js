@@ -166,6 +166,7 @@ export class RecordingCard {
           const f = v.split(/[,;]+/).map((h) => numbers(h.replace(":", " "))).filter((h) => h.length === 2);
           if (f.length) options.holds = f; else delete options.holds;
         }, "found, or 100:110"),
+        text("Time column", source.columns.time, optional(source.columns, "time"), "named in the file, or column 0"),
         text("Sampling rate", source.rate, optional(source, "rate"), "from the file, or 10 kHz"),
         text("Area", source.area, optional(source, "area"), "makes stresses forces, 25 cm^2"),
         text("Group", source.group, optional(source, "group"), "of HDF5, MATLAB, TDMS"),
