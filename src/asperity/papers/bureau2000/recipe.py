@@ -345,7 +345,36 @@ def _steady_and_threshold(
     """Steps 1 and 2 as one weighted least squares: what is measured twice is averaged."""
     log_v = np.log(steady.points["V"] / V0)
     mean, error = steady.values["mean_friction"], steady.errors["mean_friction"]
-    weight = 1 / error**2
+    omega, omega_err = 2 * math.pi * thresholds.frequency, 2 * math.pi * thresholds.frequency_err
+
+    def residuals(u: Float) -> Float:
+        mu0, weakening, a, d = u
+        line = mu0 - math.exp(weakening) * log_v
+        stiffness = math.exp(weakening - d)
+        critical = math.exp((weakening - a) / 2 - d) * thresholds.V
+        return np.concatenate(
+            [
+                (line - mean) / error,
+                (stiffness - thresholds.K_over_W0) / thresholds.K_over_W0_err,
+                (critical - omega) / omega_err,
+            ]
+        )
+
+    start = _start_of_least_squares(steady, log_v, thresholds)
+    solved = least_squares(residuals, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    dof = solved.fun.size - 4
+    if dof > 0 and chi_squared.sf(float(solved.fun @ solved.fun), dof) < _MISFIT:
+        warnings.append(
+            f"steady sliding and bifurcations do not agree within their uncertainties: "
+            f"chi-squared {solved.fun @ solved.fun:.3g} for {dof} degrees of freedom"
+        )
+    base = _SteadyStateNumbers((), solved.x, np.linalg.inv(solved.jac.T @ solved.jac))
+    return replace(base, numbers=_numbers_of(base))
+
+
+def _start_of_least_squares(steady: LockInTable, log_v: Float, thresholds: Thresholds) -> Float:
+    """Closed-form estimates of mu0, ln(B - A), ln A and ln D0."""
+    mean, weight = steady.values["mean_friction"], 1 / steady.errors["mean_friction"] ** 2
     centre = np.average(log_v, weights=weight)
     slope = np.average((log_v - centre) * mean, weights=weight) / np.average(
         (log_v - centre) ** 2, weights=weight
@@ -356,9 +385,9 @@ def _steady_and_threshold(
             f"{slope:.3g} with ln V; without weakening there is no bifurcation"
         )
     k = float(np.average(thresholds.K_over_W0, weights=thresholds.K_over_W0_err**-2))
-    omega, omega_err = 2 * math.pi * thresholds.frequency, 2 * math.pi * thresholds.frequency_err
+    omega = 2 * math.pi * thresholds.frequency
     contrast = float(np.median(omega / thresholds.V)) * -slope / k
-    start = np.array(
+    return np.array(
         [
             np.average(mean, weights=weight) - slope * centre,
             math.log(-slope),
@@ -367,50 +396,34 @@ def _steady_and_threshold(
         ]
     )
 
-    def residuals(u: Float) -> Float:
-        mu0, weakening, a, d = u
-        line = mu0 - math.exp(weakening) * log_v
-        stiffness = math.exp(weakening - d)
-        pulsation = math.exp((weakening - a) / 2 - d) * thresholds.V
-        return np.concatenate(
-            [
-                (line - mean) / error,
-                (stiffness - thresholds.K_over_W0) / thresholds.K_over_W0_err,
-                (pulsation - omega) / omega_err,
-            ]
-        )
 
-    solved = least_squares(residuals, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    covariance = np.linalg.inv(solved.jac.T @ solved.jac)
-    dof = solved.fun.size - 4
-    if dof > 0 and chi_squared.sf(float(solved.fun @ solved.fun), dof) < _MISFIT:
-        warnings.append(
-            f"steady sliding and bifurcations do not agree within their uncertainties: "
-            f"chi-squared {solved.fun @ solved.fun:.3g} for {dof} degrees of freedom"
-        )
-    base = _SteadyStateNumbers((), solved.x, covariance)
-    values = base.values(solved.x)
-    step = math.exp(solved.x[1])
+#: Step of each number of steady sliding and bifurcation, and how it is found.
+_HOW = {
+    "mu0": (1, "mean friction at V0"),
+    "B - A": (1, "slope of the mean friction with ln V"),
+    "A": (2, "critical frequency, K/W0 and B - A at the bifurcation"),
+    "B": (2, "A and the slope"),
+    "D0": (2, "K/W0 at the bifurcation and the slope"),
+}
+
+
+def _numbers_of(base: _SteadyStateNumbers) -> tuple[RecipeNumber, ...]:
+    """mu0, B - A, A, B and D0 with their standard errors, to first order."""
+    values = base.values(base.coordinates)
+    values["B - A"] = weakening = math.exp(base.coordinates[1])
     gradient = {
         "mu0": [1.0, 0, 0, 0],
         "A": [0, 0, values["A"], 0],
-        "B": [0, step, values["A"], 0],
+        "B": [0, weakening, values["A"], 0],
         "D0": [0, 0, 0, values["D0"]],
-        "B - A": [0, step, 0, 0],
-    }
-    shown = {"mu0": values["mu0"], "B - A": step, **{n: values[n] for n in ("A", "B", "D0")}}
-    how = {
-        "mu0": (1, "mean friction at V0"),
-        "B - A": (1, "slope of the mean friction with ln V"),
-        "A": (2, "critical frequency, K/W0 and B - A at the bifurcation"),
-        "B": (2, "A and the slope"),
-        "D0": (2, "K/W0 at the bifurcation and the slope"),
+        "B - A": [0, weakening, 0, 0],
     }
     numbers = []
-    for name, value in shown.items():
-        se = float(np.sqrt(np.array(gradient[name]) @ covariance @ np.array(gradient[name])))
-        numbers.append(_beside(name, value, se, se, *how[name]))
-    return replace(base, numbers=tuple(numbers))
+    for name, how in _HOW.items():
+        row = np.array(gradient[name])
+        se = float(np.sqrt(row @ base.covariance @ row))
+        numbers.append(_beside(name, values[name], se, se, *how))
+    return tuple(numbers)
 
 
 @dataclass(frozen=True, eq=False)
