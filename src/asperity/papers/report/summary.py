@@ -1,4 +1,4 @@
-"""What a reproduction came to, in a few lines."""
+"""Summary of a reproduction, in a few lines."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 
 from asperity._version import __version__
 from asperity.papers.report.points import CurveComparison
+from asperity.parameters.display import count_text
 
 
 @dataclass(frozen=True)
@@ -56,10 +57,11 @@ class ReproductionSummary:
     def lines(self) -> list[str]:
         """Lines of the table that the command prints."""
         tests = ", ".join(f"{count} {verdict}" for verdict, count in self.tests.items())
+        tested = count_text(sum(self.tests.values()), "test")
         rows = [
             ("figures", f"{self.figures} in figures/ (PNG, PDF), their numbers in data/ (CSV)"),
             ("solved", f"{self.points} points" + (f", {self.failed} failed" * bool(self.failed))),
-            ("claims", f"{self.claims}, of which {sum(self.tests.values())} tests: {tests}"),
+            ("claims", f"{self.claims}, of which {tested}: {tests}"),
             *(("points", one.text) for one in self.agreement if not one.figure),
             ("time", f"{self.seconds:.1f} s"),
         ]

@@ -36,7 +36,7 @@ POINT_COLUMNS = {
     "frequency": "Hz; of the load modulation",
     "epsilon_set": "1; commanded relative amplitude of the load",
     "epsilon": "1; the same as measured",
-    "epsilon_eff": "1; what the contacts bear, of which the readings know nothing",
+    "epsilon_eff": "1; amplitude that the contacts bear, which is not measured",
     "seeds": "of the runs: of their noise and of their drift",
     "window": "s; mean length of what the lock-in has read",
     "verdict": "gravest verdict of the readings",
