@@ -1,12 +1,13 @@
 """Coverage of intervals from recordings: how many of them hold the truth.
 
-``python -m benchmarks.coverage [--sets 200] [--case steps|holds] [--recordings FOLDER]``
+``python -m benchmarks.coverage [--sets 200] [--case steps|holds] [--residual FILE]``
 
 Recordings are computed by SciPy (Radau, relative tolerance 1e-9) from the printed equations, and
 get noise as real recordings have it: white, correlated over half a second and over eight, and a
 line. Each is fitted twice: by `asperity.inference.fit`, and by the same fit under white noise of
 the residual's size, which is what least squares and its covariance amount to. The share of 68 and
-95 % intervals that hold the truth is printed for both.
+95 % intervals that hold the truth is printed for both. With ``--residual`` the noise is that of a
+real recording, velstep1_TR2_exp013_sepiolite.txt.
 """
 
 from __future__ import annotations
@@ -14,8 +15,9 @@ from __future__ import annotations
 import argparse
 import json
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -31,6 +33,8 @@ STIFFNESS, LOAD = 4e3, 2e7
 #: Of the residual of a fit to 3 to 10 um/s on basalt (10 and 100 samples a second): an AR(1) and
 #: an AR(3), and what is slower.
 NOISE = 8e-4
+#: Of the recording whose residual is resampled (s).
+WINDOW = (10000, 10800)
 
 
 @dataclass(frozen=True)
@@ -86,7 +90,32 @@ def coloured(random: np.random.Generator, n: int, rate: float) -> np.ndarray:
     return NOISE * (0.7 * white + 0.5 * wander(quick) + 0.4 * wander(slow) + 0.2 * line)
 
 
-def runs_of(case: Case, sets: int, seed: int = 0) -> Iterator[RecordedRun]:
+def resampled(path: Path) -> Callable[[np.random.Generator, int, float], np.ndarray]:
+    """Noise with the spectrum of what a fit leaves of a real recording, sample for sample.
+
+    The phases of the whole residual are drawn anew, and a stretch of it is taken; it has the size
+    of the other noise.
+    """
+    run = recorded_run(path, window=WINDOW)
+    found = fit(run, "rice-ruina", ["A", "B", "D0"], starts=16)
+    left = run.friction - found.objective.terms[0].fitted_friction(found.values)
+    size = np.abs(np.fft.rfft(left - left.mean()))
+
+    def noise(random: np.random.Generator, n: int, rate: float) -> np.ndarray:
+        phases = np.exp(2j * np.pi * random.random(size.size))
+        whole = np.fft.irfft(size * phases, left.size)
+        first = random.integers(0, left.size - n + 1)
+        return NOISE * whole[first : first + n] / left.std()
+
+    return noise
+
+
+def runs_of(
+    case: Case,
+    sets: int,
+    seed: int = 0,
+    noise: Callable[[np.random.Generator, int, float], np.ndarray] | None = None,
+) -> Iterator[RecordedRun]:
     """Recordings of one truth with different noise."""
     time = np.arange(int(case.end * case.rate)) / case.rate
     clean = friction(case, time)
@@ -96,7 +125,7 @@ def runs_of(case: Case, sets: int, seed: int = 0) -> Iterator[RecordedRun]:
     )
     for k in range(sets):
         random = np.random.default_rng([seed, k])
-        noisy = clean + coloured(random, time.size, case.rate)
+        noisy = clean + (noise or coloured)(random, time.size, case.rate)
         displacement = path + 2e-8 * random.normal(size=time.size)
         trace = Trace(
             time,
@@ -112,14 +141,20 @@ def runs_of(case: Case, sets: int, seed: int = 0) -> Iterator[RecordedRun]:
 TRUE = {**{n: TRUTH[n] for n in ("A", "B", "D0")}, "K": STIFFNESS * LOAD}
 
 
-def covered(case: Case, sets: int, options: RunOptions, seed: int = 0) -> dict[str, Any]:
+def covered(
+    case: Case,
+    sets: int,
+    options: RunOptions,
+    seed: int = 0,
+    noise: Callable[[np.random.Generator, int, float], np.ndarray] | None = None,
+) -> dict[str, Any]:
     """Shares of intervals that hold the truth, by parameter, with means of their widths."""
     inside = {n: np.zeros(2) for n in TRUE}
     widths: dict[str, list[float]] = {n: [] for n in TRUE}
     off: dict[str, list[float]] = {n: [] for n in TRUE}
     failed, noise_rejected, done = 0, 0, 0
     begun = clock.perf_counter()
-    for run in runs_of(case, sets, seed):
+    for run in runs_of(case, sets, seed, noise):
         found = fit(
             run,
             "rice-ruina",
@@ -167,7 +202,9 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--white-only", action="store_true")
     parser.add_argument("--coloured-only", action="store_true")
+    parser.add_argument("--residual", type=Path, metavar="FILE", help="of the sepiolite step")
     arguments = parser.parse_args()
+    noise = resampled(arguments.residual) if arguments.residual else None
     for name in arguments.case or list(CASES):
         ways = {"autoregressive": RunOptions(), "white": RunOptions(order=0)}
         if arguments.white_only:
@@ -175,7 +212,7 @@ def main() -> None:
         if arguments.coloured_only:
             ways.pop("white")
         for way, options in ways.items():
-            result = covered(CASES[name], arguments.sets, options, arguments.seed)
+            result = covered(CASES[name], arguments.sets, options, arguments.seed, noise)
             print(json.dumps({"case": name, "noise": way, **result}), flush=True)
             for n, row in result["parameters"].items():
                 print(
