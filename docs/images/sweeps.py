@@ -76,7 +76,7 @@ def tides(store: str) -> Figure:
 def study(store: str) -> Figure:
     """Drop and stability of all laws over amplitude and stiffness, and mu1 over the slip ratio."""
     found = xarray.open_zarr(store, chunks=None)
-    law = found["law"].values.astype(str)
+    law = np.asarray(found["law"].values, dtype=object)
     alpha, lambda_ = found["alpha"].values, found["lambda"].values
     rows = [
         (int(np.flatnonzero(law == "rice-ruina")[0]), "Rice-Ruina"),

@@ -20,6 +20,20 @@ class Mine(RiceRuina):
     name = "{name}"
 """
 
+PLAN = """
+law = "my_law.py:Mine"
+material = "bureau2000"
+[parameters]
+V = "1 um/s"
+frequency = "120 Hz"
+[axes.K]
+values = ["1 N/m", "2 N/m", "3 N/m"]
+[axes.epsilon]
+from = 0.05
+to = 0.98
+count = 20
+"""
+
 
 @pytest.fixture(autouse=True)
 def _laws_as_before(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
@@ -38,7 +52,8 @@ class Elsewhere(ThisProcess):
 def test_a_law_from_a_file_reaches_the_workers(tmp_path: Path, closed_form: ClosedForm) -> None:
     file, out = tmp_path / "my_law.py", tmp_path / "s.zarr"
     file.write_text(LAW.format(name="mine"))
-    plan = plan_of().model_copy(update={"law": "my_law.py:Mine", "folder": tmp_path})
+    plan = tmp_path / "plan.toml"
+    plan.write_text(PLAN)
     assert run_sweep(plan, out, workers=Elsewhere()).solved == 60
     assert str(open_store(out)["law"].values) == "mine"
     # Another code is another law, in a process that has loaded the file before, too.

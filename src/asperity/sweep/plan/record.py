@@ -64,8 +64,9 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     settings: dict[str, Any] = {}
     outputs: tuple[str, ...] = ()
     try:
-        settings = solve.settings(plan)
-        outputs = solve.chosen_outputs(plan)
+        named = plan.model_copy(update={"law": laws[0]}) if plan.law and laws else plan
+        settings = solve.settings(named)
+        outputs = solve.chosen_outputs(named)
     except InputError as error:
         mistakes.append(str(error))
     if not mistakes:
@@ -440,7 +441,8 @@ def _twice(axes: Mapping[str, Any]) -> Iterator[str]:
 
 def without_unit(plan: SweepPlan) -> list[str]:
     """Bare numbers where a unit is needed: a file says what it means."""
-    known = {**known_parameters(plan.law or None), **{n: r.parameter for n, r in RATIOS.items()}}
+    # What is wrong with the laws is said with all else that the plan means.
+    known = _known(_laws_named(_with_places(plan), []))
     places: list[tuple[str, str, Any]] = [
         (f"parameters.{name}", name, value) for name, value in plan.parameters.items()
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, Executor, Future
@@ -11,6 +12,9 @@ from typing import Any
 
 from asperity.errors import InputError
 from asperity.sweep.run.tasks import ENVIRONMENT
+
+#: Seconds after which the workers of a scheduler are counted again.
+_RECOUNT = 5.0
 
 
 class Workers(ABC):
@@ -101,12 +105,19 @@ class DaskWorkers(Workers):
 
         self.client = client
         self.lost = (KilledWorker,)
-        self.count = max(1, sum(client.nthreads().values()))
+        self._recount()
         self.about = f"{about}, {self.count} threads"
         self._executor: Executor = client.get_executor(pure=False)
 
+    def _recount(self) -> None:
+        """Count the workers: jobs of a batch system begin and end while a sweep runs."""
+        self.count = max(1, sum(self.client.nthreads().values()))
+        self._counted = time.monotonic()
+
     def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
         """As in `Workers`."""
+        if time.monotonic() - self._counted > _RECOUNT:
+            self._recount()
         return self._executor.submit(task, *args)
 
     def close(self, *, kill: bool) -> None:
