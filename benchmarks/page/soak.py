@@ -54,7 +54,7 @@ def main() -> None:
         session = page.context.new_cdp_session(page)
         session.send("Performance.enable")
         handles = [slider(page, meaning) for meaning in SLIDERS]
-        start = told = time.monotonic()
+        start = reported = time.monotonic()
         moved = 0
         print(
             "minutes  movements  heap MB  elements  listeners  server MB  with workers MB",
@@ -63,8 +63,8 @@ def main() -> None:
         while True:
             now = time.monotonic()
             over = now - start > 60 * options.minutes
-            if moved == 60 or now - told > 60 * options.every or over:
-                told = now
+            if moved == 60 or now - reported > 60 * options.every or over:
+                reported = now
                 held = counted(session)
                 print(
                     f"{(now - start) / 60:7.1f}  {moved:9}  {held['JSHeapUsedSize'] / 1e6:7.1f}  "
