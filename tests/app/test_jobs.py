@@ -1,6 +1,7 @@
 """Processes of the page's jobs: ended when they take too much, or when nobody waits for them."""
 
 import asyncio
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -24,7 +25,9 @@ def with_jobs(monkeypatch):
             finally:
                 await jobs.close()
 
-        return asyncio.run(whole())
+        # A thread of its own: the browser of other tests has a loop in this one.
+        with ThreadPoolExecutor(1) as thread:
+            return thread.submit(lambda: asyncio.run(whole())).result()
 
     return run
 
