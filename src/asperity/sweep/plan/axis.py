@@ -165,10 +165,12 @@ class DrawnAxis(SweepAxis):
         scramble = np.random.default_rng(self.seed)
         if self.method == "halton":
             sequence: Any = qmc.Halton(dimensions, rng=scramble)
+            # Its points follow from their numbers; SciPy's fast_forward makes all those before.
+            sequence.num_generated = start
         else:
             sequence = qmc.Sobol(dimensions, bits=SOBOL_BITS, rng=scramble)
-        if start:
-            sequence.fast_forward(start)
+            if start:
+                sequence.fast_forward(start)
         with warnings.catch_warnings():
             # Any part of a Sobol sequence is taken, its balanced powers of two or not.
             warnings.simplefilter("ignore", UserWarning)
