@@ -183,3 +183,12 @@ def test_a_report_folder_that_cannot_be_written(asperity, tmp_path: Path) -> Non
     refused(asperity("reproduce", "--out", blocked), "must be a folder that can be written")
     refused(asperity("reproduce", "--out", blocked / "below"), "must be a folder that can be")
     assert list(tmp_path.iterdir()) == [blocked]
+
+
+@pytest.mark.parametrize("command", [("fit", "--law", "rice-ruina"), ("compare",)])
+def test_a_report_folder_is_tried_before_data_are_read(asperity, tmp_path, command) -> None:
+    blocked = tmp_path / "file"
+    blocked.write_text("", encoding="utf-8")
+    shown = asperity(*command, tmp_path / "none.csv", "--free", "A", "--report", blocked)
+    refused(shown, "--report must be a folder that can be written")
+    assert list(tmp_path.iterdir()) == [blocked]

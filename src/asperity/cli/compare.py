@@ -10,6 +10,7 @@ import click
 
 from asperity.cli.fit import checked_laws, fit_options
 from asperity.cli.fit_data import FitData
+from asperity.outputs import require_folder
 
 _EPILOG = """\b
 Example:
@@ -41,6 +42,8 @@ def compare(
     from asperity.cli.report import aligned, to_json
     from asperity.inference.record import comparison_record
 
+    if report is not None:
+        require_folder(report, "--report")
     read = reading.read(data, options["fixed"])
     found = inference.compare(read, checked_laws(laws), free, **options)
     without = found.not_compared

@@ -14,6 +14,7 @@ from asperity.cli.measure.source import RecordingSource, source_options
 from asperity.cli.options import json_option, law_named, material_named, settings_of
 from asperity.cli.posterior import PosteriorOptions, posterior_options, posterior_text
 from asperity.errors import InputError
+from asperity.outputs import require_folder
 
 if TYPE_CHECKING:
     from asperity.inference import Fit
@@ -135,6 +136,8 @@ def fit(
     from asperity.inference.record import fit_record
 
     sampling.check()
+    if report is not None:
+        require_folder(report, "--report")
     read = reading.read(data, options["fixed"])
     found = inference.fit(read, law_named(law), free, **options)
     posterior = sampling.sample(found)

@@ -39,7 +39,7 @@ def write_comparison(folder: Path, found: Comparison) -> None:
         raise InputError(
             f"comparison must have a converged fit for a report, got none; {found.verdict}"
         )
-    with written_folder(folder) as staging:
+    with written_folder(folder, "report") as staging:
         record = json.dumps(comparison_record(found), indent=2)
         (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
         (staging / "report.html").write_text(page(found, fits), encoding="utf-8")

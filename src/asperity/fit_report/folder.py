@@ -48,7 +48,7 @@ def write_report(folder: Path, found: Fit, posterior: Posterior | None = None) -
         raise InputError(
             f"fit must have converged for a report, got '{found.message}'; correct that first"
         )
-    with written_folder(folder) as staging:
+    with written_folder(folder, "report") as staging:
         more = {"posterior": posterior.record()} if posterior else {}
         record = json.dumps({**fit_record(found), **more}, indent=2)
         (staging / "fit.json").write_text(record + "\n", encoding="utf-8")

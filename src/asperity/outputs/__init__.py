@@ -13,7 +13,7 @@ from asperity.outputs.capacity import (
     size_text,
 )
 from asperity.outputs.file import written_file
-from asperity.outputs.folder import written_folder
+from asperity.outputs.folder import require_folder, written_folder
 from asperity.outputs.targets import output_file, output_files
 from asperity.outputs.unfinished import (
     Interrupted,
@@ -33,6 +33,7 @@ __all__ = [
     "output_file",
     "output_files",
     "require_disk",
+    "require_folder",
     "require_memory",
     "size_text",
     "undisturbed",

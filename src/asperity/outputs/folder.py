@@ -19,8 +19,22 @@ except ImportError:  # pragma: no cover  Windows: temporary folders of killed ru
 _PREFIX = ".asperity-unfinished-"
 
 
+def require_folder(folder: Path, name: str = "out") -> None:
+    """Refuse a folder that cannot be written, before anything is computed for it.
+
+    Raises
+    ------
+    InputError
+        Which calls the folder `name`.
+    """
+    staging, lock = _staging(folder, name)
+    shutil.rmtree(staging, ignore_errors=True)
+    if lock is not None:
+        os.close(lock)
+
+
 @contextmanager
-def written_folder(folder: Path) -> Iterator[Path]:
+def written_folder(folder: Path, name: str = "out") -> Iterator[Path]:
     """Hand out a temporary folder whose files are moved to `folder` at the end.
 
     An error, or an interruption, leaves `folder` as it was. Files of other names that lie there
@@ -31,19 +45,19 @@ def written_folder(folder: Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        At once, if the folder cannot be written.
+        At once, if the folder, which messages call `name`, cannot be written.
     """
-    staging, lock = _staging(folder)
+    staging, lock = _staging(folder, name)
     try:
         yield staging
-        _move_files(staging, folder)
+        _move_files(staging, folder, name)
     finally:
         shutil.rmtree(staging, ignore_errors=True)
         if lock is not None:
             os.close(lock)
 
 
-def _staging(folder: Path) -> tuple[Path, int | None]:
+def _staging(folder: Path, name: str) -> tuple[Path, int | None]:
     """A new temporary folder, and the descriptor that holds its lock where there are locks."""
     try:
         if folder.exists() and not folder.is_dir():
@@ -62,7 +76,7 @@ def _staging(folder: Path) -> tuple[Path, int | None]:
             if guard is not None:
                 os.close(guard)
     except OSError as error:
-        raise _unwritable(folder, error) from None
+        raise _unwritable(folder, name, error) from None
 
 
 def _remove_abandoned(place: Path) -> None:
@@ -95,18 +109,19 @@ def _locked(folder: Path, *, wait: bool = False) -> int | None:
     return descriptor
 
 
-def _move_files(staging: Path, folder: Path) -> None:
+def _move_files(staging: Path, folder: Path, name: str) -> None:
     try:
         for source in sorted(p for p in staging.rglob("*") if p.is_file()):
             target = folder / source.relative_to(staging)
             target.parent.mkdir(parents=True, exist_ok=True)
             os.replace(source, target)
     except OSError as error:
-        raise _unwritable(folder, error) from None
+        raise _unwritable(folder, name, error) from None
 
 
-def _unwritable(folder: Path, error: OSError) -> InputError:
+def _unwritable(folder: Path, name: str, error: OSError) -> InputError:
     why = (error.strerror or "no reason given").lower()
     return InputError(
-        f"out must be a folder that can be written, got '{folder}' ({why}); choose another folder"
+        f"{name} must be a folder that can be written, got '{folder}' ({why}); "
+        "choose another folder"
     )

@@ -22,7 +22,7 @@ from asperity.materials import Material
 from asperity.materials import load as load_material
 from asperity.parameters import MODULATION, Parameter, point_parameters
 from asperity.parameters.toml_file import toml_content
-from asperity.units import to_si
+from asperity.units import to_radians, to_si
 
 Float = NDArray[np.float64]
 
@@ -34,8 +34,6 @@ _LOGARITHMIC = ("V", "frequency")
 _MOST_CANDIDATES = 100_000
 #: Largest number of draws and readings.
 _MOST_DRAWS, _MOST_POINTS = 1000, 100_000
-_DEGREE = math.pi / 180
-_ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": _DEGREE}
 
 
 @dataclass(frozen=True)
@@ -641,17 +639,9 @@ def _whole(value: Any, label: str, low: int, high: int) -> int:
 
 
 def _angle(value: Any, label: str) -> float:
-    """An angle in rad from a text such as '1 deg', or from a number in rad."""
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        if value == 0:
-            return 0.0
-    elif isinstance(value, str):
-        number, _, unit = value.strip().partition(" ")
-        try:
-            if unit.strip() in _ANGLES and math.isfinite(float(number)):
-                return float(number) * _ANGLES[unit.strip()]
-        except ValueError:
-            pass
+    """An angle in rad from a text with its unit; of numbers only 0 needs none."""
+    if isinstance(value, str) or (value == 0 and not isinstance(value, bool)):
+        return float(to_radians(value, label))
     raise InputError(
         f"{label} must be an angle with its unit, got {value!r}; write it like '1 deg' or '20 mrad'"
     )

@@ -53,9 +53,12 @@ INTERVALS = 216
 
 #: Rate per radian of a disturbance of steady sliding from which modulation counts as slow.
 _SLOW = 1.0
-#: Range of the slip exponent's half swing in which modulation counts as weak. Below, the second
-#: harmonic loses digits to the round-off of the states, which a mesh keeps as deviations.
+#: Range of the slip exponent's half swing in which modulation counts as weak.
 _WEAK = (1e-3, 0.5)
+#: Smallest first and second harmonic of F/W0 under weak modulation. The states are kept whole, with
+#: a round-off of some 3e-16, of which smaller harmonics feel more than 1e-10; a mesh keeps them as
+#: deviations from their mean.
+_LEAST_HARMONIC = 3e-6
 _CHUNK = 64
 #: Newton's steps from sequences of steady states, and from the series on fewer nodes.
 _FIRST_STEPS, _NEXT_STEPS = 14, 4
@@ -89,14 +92,10 @@ class FourierSeries(Method):
         system, load = problem
         # Mass and damping make the equations stiff too, but not their orbits smooth.
         sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
-        smooth = np.concatenate(
-            [
-                part[(stiffness >= _SLOW) | weak]
-                for part, (stiffness, weak) in run_chunks(
-                    _smoothness, sliding, points, STIFFNESS_CHUNK
-                )
-            ]
-        )
+        slow, weak = np.zeros((2, len(points)), dtype=bool)
+        for part, smoothness in run_chunks(_smoothness, sliding, points, STIFFNESS_CHUNK):
+            slow[part], weak[part] = smoothness
+        smooth = np.flatnonzero(slow | weak)
         if not len(smooth):
             return solution
         part = take(problem, smooth)
@@ -105,16 +104,18 @@ class FourierSeries(Method):
         if len(kept):
             found = Solution.unsolved(problem, len(kept), options)
             accept(take(part, kept), found, take(orbit, kept), options)
-            options.progress(int(found.converged.sum()))
-            solution.merge(smooth[kept], found)
+            rows = smooth[kept]
+            exact = slow[rows] | (np.abs(found.harmonics[:2]) > _LEAST_HARMONIC).all(0)
+            options.progress(int(found.converged[exact].sum()))
+            solution.merge(rows[exact], take(found, np.flatnonzero(exact)))
         return solution
 
 
-def _smoothness(sliding: Problem) -> tuple[Array, NDArray[np.bool_]]:
-    """Rate of a disturbance of steady sliding per radian, and which points are weakly modulated."""
+def _smoothness(sliding: Problem) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Which points are modulated slowly, and which weakly."""
     sharpness = np.asarray(sharpness_of_slip(sliding))
     weak = (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
-    return stiffness_of_steady_sliding(sliding), weak
+    return np.asarray(stiffness_of_steady_sliding(sliding)) >= _SLOW, weak
 
 
 def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool_]]:
