@@ -643,5 +643,6 @@ def _angle(value: Any, label: str) -> float:
     if isinstance(value, str) or (value == 0 and not isinstance(value, bool)):
         return float(to_radians(value, label))
     raise InputError(
-        f"{label} must be an angle with its unit, got {value!r}; write it like '1 deg' or '20 mrad'"
+        f"{label} must be an angle in rad or deg, with its unit, got {value!r}; "
+        "write it like '1 deg' or '20 mrad'"
     )
