@@ -1,8 +1,8 @@
 """Coverage of intervals from recordings: how many of them hold the truth.
 
-``python -m benchmarks.coverage [--sets 200] [--case steps|holds] [--residual FILE]``
+``python -m benchmarks.coverage [--sets 200] [--case steps|holds|loads] [--residual FILE]``
 
-Recordings are computed by SciPy (Radau, relative tolerance 1e-9) from the printed equations, and
+Recordings are computed by SciPy (Radau, relative tolerance 1e-10) from the printed equations, and
 get noise as real recordings have it: white, correlated over half a second and over eight, and a
 line. Each is fitted twice: by `asperity.inference.fit`, and by the same fit under white noise of
 the residual's size, which is what least squares and its covariance amount to. The share of 68 and
@@ -17,6 +17,7 @@ import json
 import time as clock
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,50 +28,82 @@ from scipy.signal import lfilter
 from asperity.inference import RecordedRun, RunOptions, fit, recorded_run
 from asperity.recording import Channel, Trace
 
-TRUTH = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6}
+TRUTH = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6, "alpha": 0.2}
 #: Stiffness over the load (1/m), and the load (Pa).
 STIFFNESS, LOAD = 4e3, 2e7
 #: Of the residual of a fit to 3 to 10 um/s on basalt (10 and 100 samples a second): an AR(1) and
 #: an AR(3), and what is slower.
 NOISE = 8e-4
+#: Standard deviation of a load that changes, over the load.
+LOAD_NOISE = 2e-4
 #: Of the recording whose residual is resampled (s).
 WINDOW = (10000, 10800)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A programme of the drive: velocities (m/s) and times of their changes (s)."""
+    """A programme of the drive: velocities (m/s), times of their changes (s), and W/W0."""
 
     velocities: tuple[float, ...]
     changes: tuple[float, ...]
     end: float
     rate: float
+    loads: tuple[tuple[float, float], ...] = ((0.0, 1.0),)
+
+    @property
+    def law(self) -> str:
+        """Of the fit: with alpha where the load changes."""
+        return "linker-dieterich" if len(self.loads) > 1 else "rice-ruina"
+
+    @property
+    def true(self) -> dict[str, float]:
+        """Parameters that are counted, K among them."""
+        names = ("A", "B", "D0", *(("alpha",) if len(self.loads) > 1 else ()))
+        return {**{n: TRUTH[n] for n in names}, "K": STIFFNESS * LOAD}
+
+    def load(self, time: np.ndarray) -> np.ndarray:
+        """W/W0, linear between the given times."""
+        return np.interp(time, *np.array(self.loads).T)
 
 
 CASES = {
     "steps": Case((3e-6, 1e-5, 3e-6), (40.0, 80.0), 140.0, 10.0),
     "holds": Case((1e-5, 0.0, 1e-5, 0.0, 1e-5), (20.0, 30.0, 50.0, 80.0), 110.0, 10.0),
+    # Load steps of 10 % within half a second, and a velocity step for A and B.
+    "loads": Case(
+        (3e-6, 1e-5),
+        (90.0,),
+        140.0,
+        10.0,
+        ((30.0, 1.0), (30.5, 1.1), (60.0, 1.1), (60.5, 1.0)),
+    ),
 }
 
 
 def friction(case: Case, time: np.ndarray) -> np.ndarray:
     """Friction of the ageing law at the samples, by SciPy."""
     A, B, D0, V0, mu0 = (TRUTH[n] for n in ("A", "B", "D0", "V0", "mu0"))
+    share = TRUTH["alpha"] / B if len(case.loads) > 1 else 0.0
 
-    def rhs(_: float, y: np.ndarray, V: float) -> list[float]:
-        v = V0 * np.exp((y[0] - mu0 - B * y[1]) / A)
-        return [STIFFNESS * (V - v), (V0 * np.exp(-y[1]) - v) / D0]
+    def rhs(t: float, y: np.ndarray, V: float) -> list[float]:
+        # y[1] + share ln w is the logarithm of the age, by Linker and Dieterich.
+        w = case.load(t)
+        log_age = y[1] - share * np.log(w)
+        v = V0 * np.exp((y[0] / w - mu0 - B * log_age) / A)
+        return [STIFFNESS * (V - v), (V0 * np.exp(-log_age) - v) / D0]
 
     first = np.log(case.velocities[0] / V0)
     y = np.array([mu0 + (A - B) * first, -first])
     out = np.empty_like(time)
-    edges = [0.0, *case.changes, case.end]
-    for a, b, V in zip(edges[:-1], edges[1:], case.velocities, strict=True):
+    changes = sorted({*case.changes, *(t for t, _ in case.loads if t > 0)})
+    edges = [0.0, *changes, case.end]
+    for a, b in pairwise(edges):
+        V = case.velocities[np.searchsorted(case.changes, (a + b) / 2)]
         here = (time >= a) & ((time < b) | (b == case.end))
         solution = solve_ivp(
-            rhs, (a, b), y, method="Radau", rtol=1e-9, atol=1e-12, dense_output=True, args=(V,)
+            rhs, (a, b), y, method="Radau", rtol=1e-10, atol=1e-12, dense_output=True, args=(V,)
         )
-        out[here] = solution.sol(time[here])[0]
+        out[here] = solution.sol(time[here])[0] / case.load(time[here])
         y = solution.y[:, -1]
     return out
 
@@ -127,18 +160,21 @@ def runs_of(
         random = np.random.default_rng([seed, k])
         noisy = clean + (noise or coloured)(random, time.size, case.rate)
         displacement = path + 2e-8 * random.normal(size=time.size)
+        load = LOAD * case.load(time)
+        if len(case.loads) > 1:
+            load += LOAD_NOISE * LOAD * random.normal(size=time.size)
         trace = Trace(
             time,
             {
                 "friction": Channel(noisy, "dimensionless", "", "friction", ""),
                 "displacement": Channel(displacement, "length", "m", "displacement", "m"),
-                "normal_stress": Channel(np.full(time.size, LOAD), "pressure", "Pa", "ns", "Pa"),
+                "normal_stress": Channel(load, "pressure", "Pa", "ns", "Pa"),
             },
         )
         yield recorded_run(trace, name="run")
 
 
-TRUE = {**{n: TRUTH[n] for n in ("A", "B", "D0")}, "K": STIFFNESS * LOAD}
+TRUE = CASES["steps"].true
 
 
 def covered(
@@ -149,17 +185,18 @@ def covered(
     noise: Callable[[np.random.Generator, int, float], np.ndarray] | None = None,
 ) -> dict[str, Any]:
     """Shares of intervals that hold the truth, by parameter, with means of their widths."""
-    inside = {n: np.zeros(2) for n in TRUE}
-    widths: dict[str, list[float]] = {n: [] for n in TRUE}
-    off: dict[str, list[float]] = {n: [] for n in TRUE}
+    true = case.true
+    inside = {n: np.zeros(2) for n in true}
+    widths: dict[str, list[float]] = {n: [] for n in true}
+    off: dict[str, list[float]] = {n: [] for n in true}
     failed, noise_rejected, done = 0, 0, 0
     begun = clock.perf_counter()
     for run in runs_of(case, sets, seed, noise):
         found = fit(
             run,
-            "rice-ruina",
-            ["A", "B", "D0"],
-            start={n: TRUE[n] for n in TRUE},
+            case.law,
+            [n for n in true if n != "K"],
+            start=true,
             runs=options,
             starts=4,
         )
@@ -168,7 +205,7 @@ def covered(
             continue
         done += 1
         noise_rejected += any("noise" in w for w in found.warnings)
-        for n, truth in TRUE.items():
+        for n, truth in true.items():
             p = found.parameters[n]
             inside[n] += [
                 p.interval_68[0] <= truth <= p.interval_68[1],
@@ -189,7 +226,7 @@ def covered(
                 "scatter": float(np.std(off[n])),
                 "bias": float(np.mean(off[n])),
             }
-            for n in TRUE
+            for n in true
         },
     }
 

@@ -146,9 +146,32 @@ def test_what_cannot_be_sampled_is_refused(found):
         sample_posterior(found, chains=1)
 
 
-def test_the_density_of_a_recording_is_that_of_its_fit():
+@pytest.fixture(scope="module")
+def steps():
     (run,) = runs_of(CASES["steps"], 1)
-    found = fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1)
+    return run
+
+
+def fit_of_steps(run):
+    return fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1)
+
+
+def test_blocks_of_a_recording_are_the_same_after_another_fit(steps):
+    # An interrupted run is resumed by a new process, which fits the recording again.
+    density, data = whitened_posterior(fit_of_steps(steps)).compiled()
+    again, same = whitened_posterior(fit_of_steps(steps)).compiled()
+    assert again == density
+    for one, other in zip(jax.tree.leaves(data), jax.tree.leaves(same), strict=True):
+        np.testing.assert_array_equal(one, other)
+    gradient = jax.jit(jax.value_and_grad(density))
+    z = np.zeros(data.mode.size)
+    np.testing.assert_array_equal(
+        gradient(z, data)[1], jax.jit(jax.value_and_grad(again))(z, same)[1]
+    )
+
+
+def test_the_density_of_a_recording_is_that_of_its_fit(steps):
+    found = fit_of_steps(steps)
     whitened = whitened_posterior(found)
     density, data = whitened.compiled()
     both = jax.jit(jax.value_and_grad(density))

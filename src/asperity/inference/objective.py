@@ -237,12 +237,16 @@ class Objective:
             full[moving] = part
             return full
 
+        def triangle(part: Float) -> Float:
+            r, jacobian = self.residuals(whole(part))
+            return compressed(np.column_stack([jacobian[:, moving], r]))
+
         low, high = np.array([self.unknowns[i].bounds for i in moving]).T
         inside = np.clip(point[moving], low + 1e-10, high - 1e-10)
         result = least_squares(
-            lambda part: self.residuals(whole(part))[0],
+            lambda part: triangle(part)[:, -1],
             inside,
-            jac=lambda part: self.residuals(whole(part))[1][:, moving],
+            jac=lambda part: triangle(part)[:, :-1],
             bounds=(low, high),
             x_scale="jac",
             xtol=self.tolerance,
@@ -252,6 +256,35 @@ class Objective:
         )
         found = whole(result.x)
         return found, self.chi2(found)
+
+
+def compressed(columns: Float) -> Float:
+    """Few rows with the same inner products of columns, for what depends on those alone.
+
+    Parameters
+    ----------
+    columns : array, shape (m, n)
+
+    Returns
+    -------
+    array, shape (at most n, n)
+        Triangle R of columns = Q R; the columns themselves where they are not finite.
+
+    Notes
+    -----
+    By blocks of rows (Demmel et al., SIAM J. Sci. Comput. 34, A206, 2012): one factorisation of
+    thousands of rows makes threads of BLAS wait for each other.
+    """
+    if not np.isfinite(columns).all():
+        return columns
+    width = columns.shape[1]
+    block = 8 * width
+    while columns.shape[0] > block:
+        whole = columns.shape[0] // block * block
+        blocks = columns[:whole].reshape(-1, block, width)
+        factors = np.asarray(np.linalg.qr(blocks, mode="r"))
+        columns = np.vstack([factors.reshape(-1, width), columns[whole:]])
+    return np.asarray(np.linalg.qr(columns, mode="r"))
 
 
 def log_density(data: Residuals) -> float:

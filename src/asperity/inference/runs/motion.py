@@ -334,9 +334,9 @@ def _integrated(motion: Motion, drive: Drive, values: Mapping[str, Array], room:
             inner = y + step * (row @ k)
             return k.at[number].set(rates(t + node * step, inner)), inner
 
-        # A loop rather than seven copies: the program compiles several times faster.
+        # Unrolled: half the time for 1.7 s more of compiling.
         numbers = (jnp.arange(7), jnp.asarray(_NODES), jnp.asarray(_STAGES))
-        k, inner = jax.lax.scan(stage, jnp.zeros((7, m)), numbers)
+        k, inner = jax.lax.scan(stage, jnp.zeros((7, m)), numbers, unroll=7)
         new = inner[-1]  # the last stage is the solution of order 5
         error = step * (jnp.asarray(_ERROR) @ k)
         scale = _ABSOLUTE + _RELATIVE * jnp.maximum(jnp.abs(y), jnp.abs(new))
