@@ -46,7 +46,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "experiment": _RESULTS,
     "operating_point": _EQUATIONS | {"algebra", "materials", "orbit"},  # numbers by name
     "protocol": _RESULTS | {"experiment", "operating_point"},
-    "sweep": _RESULTS | {"operating_point", "protocol"},  # may sweep what a protocol does
+    "sweep": _RESULTS | {"operating_point", "protocol", "inference"},  # sweeps all of these
     "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material
     "papers": _RESULTS | _STUDIES | {"figures", "inference"},

@@ -26,12 +26,20 @@ _LARGE = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level"
 #: Programs after whose loading the memory mappings of the process are counted.
 _OFTEN = 8
 _loaded = 0
+_compiling = 0.0
 
 
 def _count(event: str, duration_secs: float, **_: str | int) -> None:
-    global _loaded  # JAX tells of its programs in no other way
+    global _loaded, _compiling  # JAX tells of its programs in no other way
+    if event.endswith(("backend_compile_duration", "jaxpr_to_mlir_module_duration")):
+        _compiling += duration_secs
     if event.endswith("backend_compile_duration"):
         _loaded += 1
+
+
+def seconds_compiling() -> float:
+    """Time that this process has spent on compiling and loading programs so far (s)."""
+    return _compiling
 
 
 def spare_mappings() -> None:

@@ -60,6 +60,34 @@ def test_a_driver_that_is_killed_costs_nothing(tmp_path: Path, whole: dict[str, 
 
 
 @pytest.mark.skipif(os.name != "posix", reason="no SIGKILL")
+def test_workers_of_a_killed_driver_end() -> None:
+    script = (
+        "import os, time; from asperity.sweep.run.executors import LocalProcesses;"
+        "print(LocalProcesses(1).submit(os.getpid).result(), flush=True); time.sleep(600)"
+    )
+    driver = subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, text=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )  # fmt: skip
+    assert driver.stdout is not None
+    worker = int(driver.stdout.readline())
+    driver.send_signal(signal.SIGKILL)
+    driver.communicate()
+    deadline = time.monotonic() + 60
+    while _runs(worker):
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+
+
+def _runs(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+@pytest.mark.skipif(os.name != "posix", reason="no SIGKILL")
 @pytest.mark.parametrize("start", [local_processes, local_cluster])
 def test_one_of_two_workers_is_killed(
     tmp_path: Path,

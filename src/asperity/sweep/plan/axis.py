@@ -13,6 +13,9 @@ from numpy.typing import NDArray
 
 Column = NDArray[Any]
 
+#: Columns of texts.
+TEXTS = ("law", "data")
+
 #: Rows that are drawn at a time with a seed of their own: any of them can be drawn without those
 #: before.
 _DRAWN_TOGETHER = 4096
@@ -48,7 +51,7 @@ class SweepAxis(ABC):
     def rows(self, start: int, stop: int) -> dict[str, Column]:
         """The columns from row `start` to before `stop`: SI, NaN where a row has no value.
 
-        The column ``law`` holds names, "" where a row has none.
+        Columns of texts hold names, "" where a row has none.
         """
 
     @property

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters, point_parameters
-from asperity.sweep.plan.axis import Column, DrawnAxis, ListedAxis, Spread, SweepAxis
+from asperity.sweep.plan.axis import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
 from asperity.sweep.plan.model import SweepPlan
 from asperity.sweep.plan.ratios import RATIOS
 from asperity.sweep.plan.record import plan_record
@@ -36,17 +36,21 @@ class Points:
     laws : str array, shape (points,)
     values : dict of str to array, shape (points,)
         SI numbers by name, NaN where a point has none.
+    data : str array, shape (points,), or None
+        Files of data, where they vary.
     """
 
     laws: NDArray[np.object_]
     values: dict[str, Float]
+    data: NDArray[np.object_] | None = None
 
     def __len__(self) -> int:
         return len(self.laws)
 
     def take(self, index: Any) -> Points:
         """The points `index`."""
-        return Points(self.laws[index], {n: v[index] for n, v in self.values.items()})
+        data = None if self.data is None else self.data[index]
+        return Points(self.laws[index], {n: v[index] for n, v in self.values.items()}, data)
 
     def of_law(self, law: str) -> dict[str, Float]:
         """Values of all parameters of one law, with defaults where a point has none."""
@@ -117,7 +121,10 @@ class SweepGrid:
     def known(self) -> dict[str, Parameter]:
         """Parameters of all laws of the sweep, and ratios."""
         laws = [get_law(name) for name in self.record["laws"]]
-        return {**all_parameters(laws), **{n: r.parameter for n, r in RATIOS.items()}}
+        from asperity.sweep.solve import SOLVES
+
+        own = SOLVES[self.record["solve"]].parameters()
+        return {**all_parameters(laws), **own, **{n: r.parameter for n, r in RATIOS.items()}}
 
     def place(self, chunk: int) -> tuple[int, ...]:
         """Position of a chunk among the chunks, by its number in C order."""
@@ -160,6 +167,7 @@ class SweepGrid:
         values = {n: np.full(count, float(v)) for n, v in self.record["numbers"].items()}
         first = self.record["laws"][0]
         laws = np.full(count, first, dtype=object)
+        data = None
         for i, columns in enumerate(rows):
             for name, column in columns.items():
                 if shape is not None:
@@ -167,6 +175,8 @@ class SweepGrid:
                     column = np.broadcast_to(along, shape).ravel()
                 if name == "law":
                     laws = np.where(column == "", laws, column)
+                elif name == "data":
+                    data = np.array(column, dtype=object)
                 else:
                     values[name] = np.array(column, dtype=float)
         for name, ratio in RATIOS.items():
@@ -174,7 +184,7 @@ class SweepGrid:
                 needed = {n: values.get(n, np.full(count, np.nan)) for n in (name, *ratio.needs)}
                 with np.errstate(all="ignore"):
                     values[ratio.target] = ratio.solve(needed)
-        return Points(laws, values)
+        return Points(laws, values, data)
 
     def _chunks(self) -> tuple[int, ...]:
         """Chunk lengths: laws apart, then as many points of the last axes as belong together."""
@@ -200,6 +210,6 @@ def _axis(name: str, record: Mapping[str, Any]) -> SweepAxis:
 
 
 def _values(name: str, values: Sequence[Any]) -> Column:
-    if name == "law":
+    if name in TEXTS:
         return np.array(values, dtype=object)
     return np.array([math.nan if value is None else value for value in values], dtype=float)

@@ -6,7 +6,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PositiveInt, ValidationError, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveInt,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from asperity.errors import InputError
 from asperity.sweep.plan.mistakes import PlanError, sentences
@@ -137,6 +145,52 @@ class TransientTable(BaseModel):
     most_steps: float = 2e6
 
 
+class PriorTable(BaseModel):
+    """A normal prior of a free parameter.
+
+    Attributes
+    ----------
+    mean, std : float or str
+    """
+
+    model_config = _STRICT
+
+    mean: float | str
+    std: float | str
+
+
+class FitTable(BaseModel):
+    """A fit at every point.
+
+    Attributes
+    ----------
+    free : tuple of str
+        Free parameters.
+    data : tuple of str
+        Tables of readings, all in one likelihood, where no axis has a column ``data``.
+    prior : str or mapping of str to PriorTable
+        A material with published uncertainties, or priors by name.
+    profile : bool
+        Intervals by profile likelihood.
+    starts, seed : int
+        Starts that are drawn besides the given one, and their seed.
+    """
+
+    model_config = _STRICT
+
+    free: tuple[str, ...]
+    data: tuple[str, ...] | None = None
+    prior: str | Mapping[str, PriorTable] | None = None
+    profile: bool = False
+    starts: PositiveInt = 64
+    seed: int = Field(default=0, ge=0)
+
+    @field_validator("data", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+
 class SweepPlan(BaseModel):
     """What a sweep computes.
 
@@ -150,14 +204,14 @@ class SweepPlan(BaseModel):
         Where numbers come from that neither an axis nor `parameters` has.
     parameters : mapping of str to float, str or bool
         Numbers that are the same at every point, by the names of tables, and ratios.
-    solve : {"periodic", "threshold", "transient"}
+    solve : {"periodic", "threshold", "transient", "fit"}
     outputs : tuple of str
         What is kept of each point; all that the solve has by default.
     seed : int
         Of drawn axes.
     chunk : int, optional
         Points solved and written together, about.
-    threshold, transient
+    threshold, transient, fit
         How these are solved.
     title : str
     folder : Path
@@ -175,12 +229,13 @@ class SweepPlan(BaseModel):
     law: str = ""
     material: str = ""
     parameters: Mapping[str, Given] = {}
-    solve: Literal["periodic", "threshold", "transient"] = "periodic"
+    solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
     outputs: tuple[str, ...] | None = None
     seed: int = 0
     chunk: PositiveInt | None = None
     threshold: ThresholdTable = ThresholdTable()
     transient: TransientTable | None = None
+    fit: FitTable | None = None
     title: str = ""
     folder: Path = Path()
 
@@ -190,11 +245,29 @@ class SweepPlan(BaseModel):
             "axes": AxisTable,
             "threshold": ThresholdTable,
             "transient": TransientTable,
+            "fit": FitTable,
         }
         try:
             super().__init__(**fields)
         except ValidationError as error:
             raise PlanError(sentences(error, models)) from None
+
+    @property
+    def columns(self) -> dict[str, tuple[Any, ...]]:
+        """What the axes vary, as the plan writes it: listed values by name, none of draws."""
+        found: dict[str, tuple[Any, ...]] = {}
+        for name, table in self.axes.items():
+            if table.values is not None or table.from_ is not None:
+                found[name] = (*found.get(name, ()), *(table.values or ()))
+            for column, values in (table.zip or {}).items():
+                found[column] = (*found.get(column, ()), *values)
+            for case in table.cases or ():
+                for column, value in case.items():
+                    values = tuple(value) if isinstance(value, list | tuple) else (value,)
+                    found[column] = (*found.get(column, ()), *values)
+            for column in table.over or {}:
+                found.setdefault(column, ())
+        return found
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A plan with some fields replaced, checked as any other."""

@@ -22,7 +22,7 @@ from asperity.laws import get_law, known_law
 from asperity.operating_point import known_parameters, sourced_numbers
 from asperity.parameters import Parameter, canonical_name, point_parameters, suggestion
 from asperity.parameters.arguments import shown
-from asperity.sweep.plan.axis import SOBOL_BITS
+from asperity.sweep.plan.axis import SOBOL_BITS, TEXTS
 from asperity.sweep.plan.mistakes import PlanError
 from asperity.sweep.plan.model import AxisTable, SweepPlan
 from asperity.sweep.plan.ratios import RATIOS
@@ -45,7 +45,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     axes: dict[str, Any] = {}
     plan = _with_places(plan)
     laws = _laws_named(plan, mistakes)
-    known = _known(laws)
+    known = _known(laws, plan.solve)
     for name, table in plan.axes.items():
         try:
             written, axis = _axis(name, table, known, plan.seed)
@@ -63,14 +63,16 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     solve = SOLVES[plan.solve]
     settings: dict[str, Any] = {}
     outputs: tuple[str, ...] = ()
+    supplied: tuple[str, ...] = ()
     try:
         named = plan.model_copy(update={"law": laws[0]}) if plan.law and laws else plan
         settings = solve.settings(named)
         outputs = solve.chosen_outputs(named)
+        supplied = solve.supplied(named)
     except InputError as error:
         mistakes.append(str(error))
     if not mistakes:
-        mistakes += _missing(laws, axes, numbers, solve.supplies)
+        mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _twice(axes)
     if mistakes:
         raise PlanError(mistakes)
@@ -87,9 +89,9 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     }
 
 
-def _known(laws: Sequence[str]) -> dict[str, Parameter]:
+def _known(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
     """Every name that an axis or a fixed number may have."""
-    parameters = known_parameters(laws[0] if laws else None)
+    parameters = {**known_parameters(laws[0] if laws else None), **SOLVES[solve].parameters()}
     return {**parameters, **{name: ratio.parameter for name, ratio in RATIOS.items()}}
 
 
@@ -217,7 +219,7 @@ def _listed(columns: Mapping[str, list[Any]]) -> dict[str, Any]:
 
 def _name(name: str, known: Mapping[str, Parameter]) -> str:
     """The one name of a column."""
-    if name == "law":
+    if name in TEXTS:
         return name
     found = canonical_name(name, known)
     if found is None:
@@ -233,6 +235,8 @@ def _column(name: str, values: Sequence[Any], known: Mapping[str, Parameter]) ->
     own = _name(name, known)
     if own == "law":
         return [_law_name(value) for value in values]
+    if own in TEXTS:
+        return [str(value) for value in values]
     return [None if value == "" else _value(known[own], value) for value in values]
 
 
@@ -251,7 +255,7 @@ def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -
     """Values at equal distances or ratios, both ends among them."""
     own = _name(name, known)
     extra = set(table) - {"from", "to", "count", "spacing"}
-    if own == "law" or extra or not {"from", "to", "count"} <= set(table):
+    if own in TEXTS or extra or not {"from", "to", "count"} <= set(table):
         raise InputError(
             f"{name} must have from, to and count, got {', '.join(sorted(table))}; write it like "
             "{ from = 0.01, to = 0.5, count = 20 }"
@@ -285,8 +289,8 @@ def _check_spacing(
 def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
     """How a number is drawn: ends or mean and standard deviation in SI, and the kind."""
     own = _name(name, known)
-    if own == "law":
-        raise InputError("over must name numbers, got 'law'; add an axis of laws")
+    if own in TEXTS:
+        raise InputError(f"over must name numbers, got '{own}'; add an axis of its values")
     if set(table) == {"mean", "std"}:
         mean, std = _value(known[own], table["mean"]), _width(known[own], table["std"])
         return {"low": mean, "high": std, "kind": "normal"}
@@ -323,7 +327,7 @@ def _cases(cases: Sequence[Mapping[str, Any]], known: Mapping[str, Parameter]) -
         for row in itertools.product(*lists.values()):
             own = dict(zip(lists, row, strict=True))
             for name in names:
-                columns[name].append(own.get(name, "" if name == "law" else None))
+                columns[name].append(own.get(name, "" if name in TEXTS else None))
     if not columns:
         raise InputError("cases must have at least one case, got none; write [{ law = '...' }]")
     return columns
@@ -364,7 +368,7 @@ def _numbers(
             raise InputError(
                 f"{target} must be given once, got {ratio} too, which determines it; leave one out"
             )
-    wanted: set[str] = set()
+    wanted: set[str] = set(SOLVES[plan.solve].parameters())
     for law in laws:
         wanted |= set(point_parameters(get_law(law)))
     for name in targets.values():
@@ -442,7 +446,7 @@ def _twice(axes: Mapping[str, Any]) -> Iterator[str]:
 def without_unit(plan: SweepPlan) -> list[str]:
     """Bare numbers where a unit is needed: a file says what it means."""
     # What is wrong with the laws is said with all else that the plan means.
-    known = _known(_laws_named(_with_places(plan), []))
+    known = _known(_laws_named(_with_places(plan), []), plan.solve)
     places: list[tuple[str, str, Any]] = [
         (f"parameters.{name}", name, value) for name, value in plan.parameters.items()
     ]

@@ -41,8 +41,10 @@ class SweepProgress:
         Points that have an answer, of earlier runs too, and all.
     failed : int
         Points without a converged answer among them.
+    stored : int
+        Points of chunks that were done when this run began.
     kept : int
-        Points that the store had.
+        Points with an answer that this run did not solve, of those counted so far.
     chunks, chunk_total : int
         Chunks in the store, and all.
     seconds : float
@@ -53,11 +55,14 @@ class SweepProgress:
         Times that a worker process died.
     left : float
         Seconds left, about; NaN where nothing tells.
+    spent, solved : dict of str to float
+        Processor seconds of both stages, without the compiler's, and their points.
     """
 
     points: int = 0
     total: int = 0
     failed: int = 0
+    stored: int = 0
     kept: int = 0
     chunks: int = 0
     chunk_total: int = 0
@@ -65,6 +70,8 @@ class SweepProgress:
     memory: float = 0.0
     lost: int = 0
     left: float = float("nan")
+    spent: dict[str, float] = field(default_factory=lambda: {"first": 0.0, "second": 0.0})
+    solved: dict[str, float] = field(default_factory=lambda: {"first": 0.0, "second": 0.0})
 
     @property
     def rate(self) -> float:
@@ -83,12 +90,12 @@ class _Pace:
     spent, points : dict of str to float
         Sums by stage.
     left : float
-        Points that first stages have left for second ones.
+        Points that these first stages have left for second ones.
     """
 
+    spent: dict[str, float]
+    points: dict[str, float]
     unit: dict[str, float] = field(default_factory=dict)
-    spent: dict[str, float] = field(default_factory=lambda: {"first": 0.0, "second": 0.0})
-    points: dict[str, float] = field(default_factory=lambda: {"first": 0.0, "second": 0.0})
     left: float = 0.0
 
     def note(self, unit: Unit, seconds: float) -> None:
@@ -107,11 +114,13 @@ class _Pace:
         return max(1, min(_MOST_UNITS, round(_TASK / max(seconds, 1e-3))))
 
     def seconds_left(self, first: float, second: float) -> float:
-        """Processor time for points of both stages that are left."""
+        """Processor time for points of both stages that are left; NaN before any was solved."""
         seen = self.points["first"] + self.left
-        if not seen:
+        if (first and not seen) or ((second or self.left) and not self.points["second"]):
             return float("nan")
         hard = self.spent["second"] / self.points["second"] if self.points["second"] else 0.0
+        if not first:
+            return second * hard
         each = self.spent["first"] / seen + self.left / seen * hard
         return first * each + second * hard
 
@@ -152,8 +161,8 @@ class Driver:
         self._open: dict[int, int] = {}
         self._deaths: dict[Unit, int] = {}
         self._running: dict[Future[Report], tuple[Unit, ...]] = {}
-        self._pace = _Pace()
-        self._exhausted = False
+        self._pace = _Pace(spent=progress.spent, points=progress.solved)
+        self._looked_at = 0
         self._begin = time.perf_counter()
 
     def run(self) -> None:
@@ -229,7 +238,6 @@ class Driver:
         while len(units) < wanted:
             unit = self._again.popleft() if self._again else next(self._chunks, None)
             if unit is None:
-                self._exhausted = True
                 break
             units.append(unit)
         return tuple(units)
@@ -239,16 +247,21 @@ class Driver:
         progress.memory = max(progress.memory, report.memory)
         for message in report.messages:
             self.log(message)
+        found = {unit.chunk for unit, seconds, _ in report.done
+                 if unit.stage == "first" and seconds < 0}  # fmt: skip
+        stored = found & {chunk for chunk, _, _ in report.finished}
         for unit in report.opened:
             self._second.append(unit)
             self._open[unit.chunk] = self._open.get(unit.chunk, 0) + 1
-            self._pace.left += unit.points
+            # What an earlier run left half done is mostly hard, and says nothing of the rest.
+            if unit.chunk not in found:
+                self._pace.left += unit.points
         for unit, seconds, failed in report.done:
             kept = seconds < 0
             if not kept:
                 self._pace.note(unit, seconds)
-            if unit.stage == "first" and kept:
-                continue  # counted with the chunks that are in the store
+            if unit.stage == "first" and unit.chunk in stored:
+                continue  # counted below
             if unit.stage in ("first", "second"):
                 progress.points += unit.points
                 progress.failed += failed
@@ -260,14 +273,14 @@ class Driver:
                 self._open[unit.chunk] -= 1
                 if not self._open[unit.chunk]:
                     self._finish.append(Unit("finish", unit.chunk))
-        seen = {unit.chunk for unit, seconds, _ in report.done if seconds < 0}
         for chunk, points, failed in report.finished:
             progress.chunks += 1
             self._open.pop(chunk, None)
-            if chunk in seen:
+            if chunk in stored:
                 progress.points += points
                 progress.kept += points
                 progress.failed += failed
+                self._looked_at += points
         for unit in reversed(report.rest):
             queue = {"first": self._again, "second": self._second, "finish": self._finish}
             queue[unit.stage].appendleft(unit)
@@ -294,7 +307,9 @@ class Driver:
         second = sum(u.points for u in self._second)
         second += sum(u.points for units in self._running.values() for u in units
                       if u.stage == "second")  # fmt: skip
-        first = max(0, progress.total - progress.points - second)
+        # Chunks that were done when this run began cost it nothing, looked at already or not.
+        stored = max(0, progress.stored - self._looked_at)
+        first = max(0, progress.total - progress.points - second - stored)
         work_left = self._pace.seconds_left(first, second)
         progress.left = work_left / self.workers.count
 

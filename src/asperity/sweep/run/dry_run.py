@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -63,26 +65,27 @@ def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
         plan = load_plan(plan)
     grid = SweepGrid.of(plan)
     solve = SOLVES[plan.solve]
+    record = {**grid.record, "folder": str(plan.folder.resolve())}
     count = min(_SAMPLE, grid.points, max(1, solve.chunk_points(grid)))
     numbers = np.random.default_rng(0).choice(grid.points, count, replace=False) if (
         grid.points < 10**7
     ) else np.unique(np.random.default_rng(0).integers(0, grid.points, count))  # fmt: skip
     points = grid.numbered(np.sort(numbers))
-    found = solve.first(points, grid.record)
+    found = solve.first(points, record)
     failed = int(np.count_nonzero(found.outcome > 0))
     seen, share = len(points) - len(found.left), len(found.left) / len(points)
-    first, batches = _first_stage(grid, solve)
+    first, batches = _first_stage(grid, solve, record)
     # Batches of whole chunks: those of the sample, of each law a few points, would cost more each.
     batches = batches or [points.take(rows) for rows in solve.batches(points, found.left)]
     if batches:
-        solve.second(batches[0], grid.record)  # for the compiler
+        solve.second(batches[0], record)  # for the compiler
     # Any of them stands for the rest.
     np.random.default_rng(0).shuffle(batches)
     second, solved = 0.0, 0
     start = time.perf_counter()
     for batch in batches:
         begin = time.process_time()
-        part = solve.second(batch, grid.record)
+        part = solve.second(batch, record)
         second, solved = second + time.process_time() - begin, solved + len(batch)
         failed, seen = failed + part.failed, seen + len(batch)
         if time.perf_counter() - start > _SECONDS:
@@ -101,7 +104,9 @@ def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
     )
 
 
-def _first_stage(grid: SweepGrid, solve: SolveKind) -> tuple[float, list[Points]]:
+def _first_stage(
+    grid: SweepGrid, solve: SolveKind, record: Mapping[str, Any]
+) -> tuple[float, list[Points]]:
     """Processor time of the first stage for a point, from whole chunks, and batches they leave.
 
     The sample would not do: it has points of all laws, each of which takes calls of its own.
@@ -113,9 +118,9 @@ def _first_stage(grid: SweepGrid, solve: SolveKind) -> tuple[float, list[Points]
     # Evenly over the plan, whose outer axes have the laws.
     for k in range(count):
         chunk = grid.at((2 * k + 1) * grid.chunk_count // (2 * count))
-        solve.first(chunk, grid.record)  # for the compiler
+        solve.first(chunk, record)  # for the compiler
         begin = time.process_time()
-        found = solve.first(chunk, grid.record)
+        found = solve.first(chunk, record)
         spent, points = spent + time.process_time() - begin, points + len(chunk)
         batches += [chunk.take(rows) for rows in solve.batches(chunk, found.left)]
         if time.perf_counter() - start > _SECONDS:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -15,6 +17,8 @@ from asperity.sweep.run.tasks import ENVIRONMENT
 
 #: Seconds after which the workers of a scheduler are counted again.
 _RECOUNT = 5.0
+#: Seconds between looks of a worker process at whether its driver still runs.
+_LOOK = 1.0
 
 
 class Workers(ABC):
@@ -63,7 +67,11 @@ class LocalProcesses(Workers):
 
         # Never forked: a fork of a process in which JAX runs hangs.
         return get_reusable_executor(
-            max_workers=self.count, env=dict(ENVIRONMENT), timeout=600, initializer=_keep_programs
+            max_workers=self.count,
+            env=dict(ENVIRONMENT),
+            timeout=600,
+            initializer=_begin,
+            initargs=(os.getpid(),),
         )
 
     def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
@@ -84,11 +92,21 @@ class LocalProcesses(Workers):
             self._executor.shutdown(wait=False, kill_workers=True)
 
 
-def _keep_programs() -> None:
-    """Keep a worker whose memory has grown by 300 MB: that is compiled programs, and no leak."""
+def _begin(driver: int) -> None:
+    """Set up a worker of the process `driver`."""
     from loky import process_executor
 
+    # A worker whose memory has grown by 300 MB has compiled programs, and no leak.
     process_executor._USE_PSUTIL = False
+    if os.name == "posix":
+        threading.Thread(target=_end_with, args=(driver,), daemon=True).start()
+
+
+def _end_with(driver: int) -> None:
+    """End this process when its driver is gone: one that was killed can tell it nothing."""
+    while os.getppid() == driver:
+        time.sleep(_LOOK)
+    os._exit(1)
 
 
 class DaskWorkers(Workers):

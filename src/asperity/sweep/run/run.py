@@ -125,7 +125,7 @@ def run_sweep(
         with pool as found:
             job = Job(
                 str(store.path), store.grid.digest, lock.token, retry_failed, law_places(plan),
-                numerics(),
+                str(plan.folder.resolve()), numerics(),
             )  # fmt: skip
             return _run(store, lock, found, job, progress, log)
 
@@ -229,6 +229,10 @@ def _run(
 ) -> SweepSummary:
     grid = store.grid
     counts = SweepProgress(total=grid.points, chunk_total=grid.chunk_count)
+    if not job.retry:
+        # Chunks of one size: counting files does not read them.
+        share = sum(1 for _ in _status_files(store)) / grid.chunk_count
+        counts.stored = round(share * grid.points)
     runs = [*store.attributes.get("runs", []), _started(workers)]
     # With --retry-failed these may be others than before; the runs have them all.
     store.update_attributes(runs=runs, numerics=numerics())
@@ -290,6 +294,10 @@ def _ended(counts: SweepProgress) -> Mapping[str, Any]:
         "points_solved": counts.points - counts.kept,
         "points_kept": counts.kept,
         "failed": counts.failed,
+        "stages": {
+            name: {"points": counts.solved[name], "seconds": round(counts.spent[name], 3)}
+            for name in counts.spent
+        },
         "worker_memory": round(counts.memory),
         "workers_lost": counts.lost,
     }

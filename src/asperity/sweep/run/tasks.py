@@ -48,6 +48,8 @@ class Job:
         Whether chunks with failed points are solved again.
     laws : tuple of str
         Places of laws that are neither of the package nor installed, ``path/to/file.py:Name``.
+    folder : str
+        Where files that the plan names lie.
     numerics : dict of str to str, optional
         `asperity.sweep.run.numerics.numerics` of the driver.
     """
@@ -57,6 +59,7 @@ class Job:
     token: str
     retry: bool = False
     laws: tuple[str, ...] = ()
+    folder: str = ""
     numerics: Mapping[str, str] | None = None
 
 
@@ -86,8 +89,8 @@ class Report:
     Attributes
     ----------
     done : list of tuple
-        Units with the seconds they took and their failed points; -1 s where nothing was to be
-        done because the store had it.
+        Units with the seconds they took and their failed points; -1 s where an earlier run had
+        solved them.
     opened : list of Unit
         Batches of chunks whose first stage left points.
     finished : list of tuple
@@ -136,7 +139,7 @@ def work(job: Job, units: tuple[Unit, ...], budget: float) -> Report:
     from asperity._jax import spare_mappings
 
     _register(job)
-    worker = _worker(job.store, job.digest)
+    worker = _worker(job.store, job.digest, job.folder)
     report = Report(worker=f"{platform.node()}:{os.getpid()}")
     begin = time.perf_counter()
     for i, unit in enumerate(units):
@@ -165,6 +168,13 @@ def _largest_memory() -> float:
     return unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 
 
+def _clock() -> float:
+    """Time for what a unit costs, which the compiler's, spent once, is not part of (s)."""
+    from asperity._jax import seconds_compiling
+
+    return time.perf_counter() - seconds_compiling()
+
+
 def _single_thread() -> None:
     if "jax" not in sys.modules:
         os.environ.update(ENVIRONMENT)
@@ -191,7 +201,7 @@ def _register(job: Job) -> None:
 
     for place in job.laws:
         known_law(place)
-    for name in _worker(job.store, job.digest).grid.record["laws"]:
+    for name in _worker(job.store, job.digest, job.folder).grid.record["laws"]:
         try:
             get_law(name)
         except InputError:
@@ -202,16 +212,16 @@ def _register(job: Job) -> None:
 
 
 @lru_cache(maxsize=1)
-def _worker(store: str, digest: str) -> _Worker:
+def _worker(store: str, digest: str, folder: str) -> _Worker:
     from asperity.sweep.store.store import SweepStore
 
-    return _Worker(SweepStore(Path(store)), digest)
+    return _Worker(SweepStore(Path(store)), digest, folder)
 
 
 class _Worker:
     """A store that is open for writing, and the solve of its plan."""
 
-    def __init__(self, store: SweepStore, digest: str) -> None:
+    def __init__(self, store: SweepStore, digest: str, folder: str) -> None:
         from asperity.sweep.solve import SOLVES
         from asperity.sweep.store.pieces import Pieces
 
@@ -220,6 +230,8 @@ class _Worker:
             raise SupersededError(f"{store.path} has another plan now")
         self.solve = SOLVES[store.record["solve"]]
         self.pieces = Pieces(store.path, digest)
+        # The record names no folder: a store may move, and its data with it.
+        self.record = {**store.record, "folder": folder}
 
     def do(self, job: Job, unit: Unit, report: Report) -> None:
         """Do one unit and report it."""
@@ -234,7 +246,7 @@ class _Worker:
     def _first(self, job: Job, unit: Unit, report: Report) -> None:
         from asperity.sweep.store.pieces import first_name
 
-        begin = time.perf_counter()
+        begin = _clock()
         failed = self.store.failed_in(unit.chunk)
         again = job.retry and failed > 0
         if failed >= 0 and not again and self.store.is_sound(unit.chunk):
@@ -246,6 +258,7 @@ class _Worker:
             self.pieces.drop(unit.chunk)
         points = self.grid.at(unit.chunk)
         findings = self.pieces.load(first_name(unit.chunk))
+        fresh = findings is None
         if findings is None:
             findings = self._guarded(self.solve.first, points, report)
         left = findings.left
@@ -261,23 +274,23 @@ class _Worker:
         known = len(findings) - len(left)
         lost = findings.failed - len(left)
         solved = Unit("first", unit.chunk, -1, known)
-        report.done.append((solved, time.perf_counter() - begin, lost))
+        report.done.append((solved, _clock() - begin if fresh else -1.0, lost))
 
     def _second(self, job: Job, unit: Unit, report: Report) -> None:
-        begin = time.perf_counter()
+        begin = _clock()
         points, _, batches = self._opened(unit.chunk, report)
         found, fresh = self._batch(unit.chunk, unit.batch, points, batches, report)
-        seconds = time.perf_counter() - begin if fresh else -1.0
+        seconds = _clock() - begin if fresh else -1.0
         report.done.append((unit, seconds, found.failed))
 
     def _finish(self, job: Job, unit: Unit, report: Report) -> None:
-        begin = time.perf_counter()
+        begin = _clock()
         points, findings, batches = self._opened(unit.chunk, report)
         for k, index in enumerate(batches):
             findings.put(index, self._batch(unit.chunk, k, points, batches, report)[0])
         self._write(job, unit.chunk, findings, report)
         self.pieces.drop(unit.chunk)
-        report.done.append((unit, time.perf_counter() - begin, 0))
+        report.done.append((unit, _clock() - begin, 0))
 
     def _give_up(self, job: Job, unit: Unit, report: Report) -> None:
         """Record that the process which solved these points died each time."""
@@ -329,13 +342,17 @@ class _Worker:
         from asperity.sweep.solve.outcome import SweepOutcome
 
         try:
-            return solve(points, self.store.record)
+            return solve(points, self.record)
         except (MemoryError, OSError):
             raise
         except Exception as error:
             found = Findings.empty(self.store.record["outputs"], len(points))
             if len(points) == 1:
-                found.fail(found.left, SweepOutcome.SOLVER_ERROR)
+                refused = isinstance(error, InputError)
+                found.fail(
+                    found.left,
+                    SweepOutcome.REFUSED if refused else SweepOutcome.SOLVER_ERROR,
+                )
                 values = ", ".join(f"{n} = {v[0]:.9g}" for n, v in points.values.items())
                 report.messages.append(f"{type(error).__name__}: {error} ({values})")
                 return found

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.parameters import Output
+from asperity.parameters import Output, Parameter
 from asperity.parameters.arguments import some_of
 from asperity.sweep.solve.outcome import SweepOutcome
 
@@ -104,6 +104,14 @@ class SolveKind(ABC):
     supplies: ClassVar[tuple[str, ...]] = ()
     batch: ClassVar[int] = 64
 
+    def parameters(self) -> dict[str, Parameter]:
+        """Numbers that a point of this kind may have besides those of its law, by name."""
+        return {}
+
+    def supplied(self, plan: SweepPlan) -> tuple[str, ...]:
+        """Parameters that a point of this plan need not have."""
+        return self.supplies
+
     def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
         """Outputs by name, of a plan with this record."""
         return {output.name: output for output in self.outputs}
@@ -123,11 +131,12 @@ class SolveKind(ABC):
 
     def settings(self, plan: SweepPlan) -> dict[str, Any]:
         """What a plan says of this kind of solve, as JSON values."""
-        if plan.transient is not None:
-            raise InputError(
-                f"transient must be left out where solve is '{self.name}', got a table; "
-                "write solve = 'transient' or remove it"
-            )
+        for other in ("transient", "fit"):
+            if other != self.name and getattr(plan, other) is not None:
+                raise InputError(
+                    f"{other} must be left out where solve is '{self.name}', got a table; "
+                    f"write solve = '{other}' or remove it"
+                )
         return {}
 
     @abstractmethod

@@ -21,6 +21,9 @@ class SweepOutcome(IntEnum):
     NO_CROSSING = 62
     NO_RESPONSE = 63
     STOPPED = 70
+    REFUSED = 71
+    FIT_FAILED = 80
+    NO_READINGS = 81
 
 
 _SENTENCES = {
@@ -53,6 +56,15 @@ _SENTENCES = {
         "{detail:.4g} K_c"
     ),
     SweepOutcome.STOPPED: "the transient stopped before its end, at {detail:.6g} s",
+    SweepOutcome.REFUSED: (
+        "the numbers or the data of this point cannot be solved with; the log of the run says why"
+    ),
+    SweepOutcome.FIT_FAILED: (
+        "the fit did not converge; asperity fit with the numbers of this point says more"
+    ),
+    SweepOutcome.NO_READINGS: (
+        "no readings to fit: at the true values some row of the table has no periodic response"
+    ),
 }
 
 

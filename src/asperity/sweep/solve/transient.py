@@ -58,6 +58,7 @@ class TransientSolve(SolveKind):
 
     def settings(self, plan: SweepPlan) -> dict[str, Any]:
         """As in `SolveKind`."""
+        super().settings(plan)
         table = plan.transient
         if table is None:
             raise InputError(

@@ -20,6 +20,7 @@ import zarr
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from asperity.errors import InputError
+from asperity.sweep.plan.axis import TEXTS
 from asperity.sweep.plan.grid import SweepGrid
 from asperity.sweep.plan.ratios import RATIOS
 from asperity.sweep.solve import SOLVES, Findings
@@ -28,6 +29,9 @@ from asperity.sweep.store.durable import sync_file, sync_folder
 
 #: What `status` holds for a chunk that is not done; otherwise its failed points.
 NOT_DONE = -1
+
+#: What the columns of texts are.
+_TEXTS_ARE = {"law": "friction law", "data": "file of the readings"}
 
 #: Attribute that says what kind of group this is.
 KIND = "asperity_sweep"
@@ -290,10 +294,10 @@ def write_coordinates(group: Any, grid: SweepGrid) -> list[str]:
         # Few and large: labels are read at once when the store is opened.
         length = min(axis.length, max(chunk, 65_536))
         for name in axis.names:
-            dtype = "string" if name == "law" else "float64"
+            dtype = "string" if name in TEXTS else "float64"
             about = (
-                {"units": "1", "long_name": "friction law"}
-                if name == "law"
+                {"units": "1", "long_name": _TEXTS_ARE[name]}
+                if name in TEXTS
                 else grid.known[name].attributes
             )
             array = _array(group, name, (axis.length,), (length,), [axis.name], dtype, about)
