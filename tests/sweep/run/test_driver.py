@@ -4,13 +4,17 @@ import math
 from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from asperity.errors import InputError
+from asperity.sweep import run_sweep, store_status
 from asperity.sweep.run.driver import Driver, SweepProgress, units_of
 from asperity.sweep.run.executors import Workers
 from asperity.sweep.run.tasks import Job, Report, Unit
+from references.closed_form_sweep import plan_of
 
 #: Points of a chunk; seconds of its first stage; points that it leaves, in two batches; seconds
 #: of one of those points.
@@ -98,3 +102,26 @@ def test_the_time_left_is_that_of_what_is_left(stored: set[int], begun: set[int]
     assert last.points == CHUNKS * POINTS
     # Only what this run solved is in its rate.
     assert last.kept == len(stored) * POINTS + len(begun) * 10
+
+
+class Ended(Planted):
+    """A cluster that ends after some tasks: Dask cancels those that are left."""
+
+    tasks = 0
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        self.tasks += 1
+        if self.tasks < 4:
+            return super().submit(task, *args)
+        future: Future[Any] = Future()
+        future.cancel()
+        future.set_running_or_notify_cancel()
+        return future
+
+
+def test_a_cluster_that_ends_is_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"got no answer any more \(planted\) after \d+ of 60 points; start a cl"
+    ):
+        run_sweep(plan_of(), tmp_path / "s.zarr", workers=Ended(set(), set()))
+    assert store_status(tmp_path / "s.zarr").points == 60

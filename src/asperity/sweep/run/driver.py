@@ -31,6 +31,10 @@ _LIVES = 3
 _NEWEST = 0.3
 
 
+class WorkersGoneError(RuntimeError):
+    """The workers have ended, and nothing starts others."""
+
+
 @dataclass
 class SweepProgress:
     """How far a sweep is.
@@ -172,6 +176,8 @@ class Driver:
         ------
         OSError
             If a worker could not write.
+        WorkersGoneError
+            If the cluster has ended.
         """
         while True:
             self._fill()
@@ -185,6 +191,8 @@ class Driver:
                     report = future.result()
                 except self.workers.lost:
                     dead += units
+                except self.workers.gone:
+                    raise WorkersGoneError from None
                 else:
                     self._take(report)
             if dead:
@@ -207,7 +215,10 @@ class Driver:
             self._submit(units)
 
     def _submit(self, units: tuple[Unit, ...]) -> None:
-        self._running[self.workers.submit(work, self.job, units, _TASK)] = units
+        try:
+            self._running[self.workers.submit(work, self.job, units, _TASK)] = units
+        except self.workers.gone:
+            raise WorkersGoneError from None
 
     def _next(self, window: int) -> tuple[Unit, ...]:
         """The units of the next task; none where nothing can be handed out now."""

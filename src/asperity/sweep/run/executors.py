@@ -8,7 +8,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
-from concurrent.futures import BrokenExecutor, Executor, Future
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
 from contextlib import contextmanager
 from typing import Any
 
@@ -31,11 +31,14 @@ class Workers(ABC):
         What the store says of them.
     lost : tuple of type
         Exceptions of a task whose process died.
+    gone : tuple of type
+        Exceptions where there are no workers any more, and will be none.
     """
 
     count: int
     about: str
     lost: tuple[type[BaseException], ...] = (BrokenExecutor,)
+    gone: tuple[type[BaseException], ...] = (CancelledError,)
 
     @abstractmethod
     def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
@@ -119,10 +122,13 @@ class DaskWorkers(Workers):
     """
 
     def __init__(self, client: Any, about: str) -> None:
+        from distributed.client import ClosedClientError, FutureCancelledError
+        from distributed.comm.core import CommClosedError
         from distributed.scheduler import KilledWorker
 
         self.client = client
         self.lost = (KilledWorker,)
+        self.gone = (CancelledError, FutureCancelledError, CommClosedError, ClosedClientError)
         self._recount()
         self.about = f"{about}, {self.count} threads"
         self._executor: Executor = client.get_executor(pure=False)
@@ -169,8 +175,13 @@ def local_cluster(count: int) -> Iterator[Workers]:
 
     with (
         dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ENVIRONMENT)}),
+        # Without a limit: near one Dask pauses a worker, whose compiled programs no pause frees.
         distributed.LocalCluster(
-            n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            memory_limit=0,
         ) as cluster,
         distributed.Client(cluster) as client,
     ):

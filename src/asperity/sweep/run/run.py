@@ -23,7 +23,7 @@ from asperity.outputs import differences, free_disk, require_disk, size_text
 from asperity.parameters.arguments import file_path, whole_number
 from asperity.sweep.plan import SweepGrid, SweepPlan, load_plan
 from asperity.sweep.plan.record import law_places
-from asperity.sweep.run.driver import Driver, SweepProgress, is_full, units_of
+from asperity.sweep.run.driver import Driver, SweepProgress, WorkersGoneError, is_full, units_of
 from asperity.sweep.run.executors import Workers, local_cluster, local_processes, scheduler
 from asperity.sweep.run.numerics import numerics, package_version
 from asperity.sweep.run.tasks import Job
@@ -250,6 +250,12 @@ def _run(
     driver = Driver(job, chunks, workers, counts, tick, log or (lambda _: None))
     try:
         driver.run()
+    except WorkersGoneError:
+        raise InputError(
+            f"workers must run until the sweep ends, got no answer any more ({workers.about}) "
+            f"after {counts.points:,} of {counts.total:,} points; start a cluster and repeat the "
+            "command, which goes on from there"
+        ) from None
     except OSError as error:
         room = size_text(free_disk(store.path))
         why = "the disk is full" if is_full(error) else (error.strerror or str(error)).lower()
