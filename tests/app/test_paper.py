@@ -44,6 +44,8 @@ def test_curves_are_those_of_the_package(figure):
         ({"figure": "figure-02", "numbers": {"A": -1}}, "A"),
         ({"figure": "figure-02", "numbers": {"transmission": 2}}, "transmission"),
         ({"figure": "figure-02", "numbers": {"K": "1 kg"}}, "K"),
+        ({"figure": "figure-02", "numbers": {"M": 1e-300}}, "M must be within"),
+        ({"figure": "figure-02", "numbers": {"A": 1e308}}, "A must be within"),
     ],
 )
 def test_a_wrong_figure_gets_a_sentence(ask, asked, word):

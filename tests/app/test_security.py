@@ -104,6 +104,7 @@ def test_no_parameter_names_a_file(ask, tmp_path, material):
         b'{"law": "amontons", "air": {"P0": 0}, "numbers": {"V": 1, "epsilon": 0.1}}',
         b'{"law": "amontons", "laws": 1}',
         b'{"law": "amontons", "air": {"h0": 1e-308}, "numbers": {"V": 1, "epsilon": 0.1}}',
+        b'{"law": "amontons", "air": {"R": 1e308}, "numbers": {"V": 1, "epsilon": 0.1}}',
     ],
 )  # fmt: skip
 def test_what_is_no_question_gets_a_sentence(ask, body):
@@ -114,6 +115,24 @@ def test_what_is_no_question_gets_a_sentence(ask, body):
     assert "; " in message
     assert "Traceback" not in message
     assert len(message) < 600
+
+
+FIELDS = ("V", "frequency", "K", "W0", "M", "A", "B", "D0", "V0", "lambda", "mu0", "eta")
+
+
+@pytest.mark.parametrize("value", [-1, 1e308, "NaN", "inf", "", "1,5", "1 nonsense"])
+@pytest.mark.parametrize("name", FIELDS)
+def test_a_number_that_is_none_or_out_of_reach_gets_a_sentence(ask, name, value):
+    """At once, and not after programs were compiled or a search came to nothing."""
+    numbers = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0, name: value}
+    answer = ask("explore", {"law": "elasto-plastic", "numbers": numbers})
+    assert answer.status == 400
+    assert " must " in answer.json["error"]
+    edge = {"x": {"name": name, "low": value, "high": value}}
+    edge["y"] = {"name": "epsilon", "low": 0.01, "high": 0.4}
+    del numbers[name]
+    answer = ask("map/text", {"law": "elasto-plastic", "numbers": numbers, **edge})
+    assert answer.status == 400
 
 
 def test_a_body_that_is_too_large_is_refused(ask, raw, server):

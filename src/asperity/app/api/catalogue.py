@@ -120,7 +120,7 @@ def _material(material: Material) -> dict[str, Any]:
         "air": [
             {"name": name, "kind": material[name].dimension, "rule": "positive",
              "symbol": mathml(symbol), "meaning": meaning, "value": material[name].si,
-             "slider": _around(material[name].si, _WITH_UNIT)}
+             "slider": around(material[name].si)}
             for name, (symbol, meaning) in AIR.items()
             if name in numbers
         ],
@@ -143,11 +143,12 @@ def slider(name: str, material: Material) -> dict[str, Any]:
         return {"value": value, "low": 0.0, "high": span[1] if span else 0.9, "log": False}
     if parameter.rule == "positive":
         factor = _WITH_UNIT if parameter.unit else _PURE
-        found = {"low": span[0], "high": span[1], "log": True} if span else _around(value, factor)
+        found = {"low": span[0], "high": span[1], "log": True} if span else around(value, factor)
         return {"value": value, **found}
     size = abs(value) or to_si(parameter.example, kind, name)
     return {"value": value, "low": 0.0, "high": _FROM_ZERO * size, "log": False}
 
 
-def _around(value: float, factor: float) -> dict[str, Any]:
+def around(value: float, factor: float = _WITH_UNIT) -> dict[str, Any]:
+    """Ends of a slider by a factor on both sides of a value."""
     return {"low": value / factor, "high": value * factor, "log": True}

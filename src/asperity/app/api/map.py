@@ -76,6 +76,9 @@ def check(asked: MapAsked) -> None:
         )
     refuse_foreign(asked.law, {x.name: "", y.name: ""})
     asked.fixed()
+    for axis in (x, y):
+        for end in axis.values:
+            asked.check_reach(axis.name, float(end))
 
 
 def text(asked: MapAsked) -> dict[str, Any]:

@@ -9,15 +9,26 @@ import numpy as np
 from pydantic import Field
 
 from asperity.air import AirLayer, effective_modulation, modulation_phase
-from asperity.app.api.catalogue import AIR, known_materials
+from asperity.app.api.catalogue import AIR, around, known_materials, slider
 from asperity.app.endpoints import Question
 from asperity.errors import InputError, closest
 from asperity.laws import Law, get_law, registered
 from asperity.materials import Material
-from asperity.operating_point import SourcedNumber, numbers_for, sourced_numbers
+from asperity.operating_point import (
+    SourcedNumber,
+    known_parameters,
+    numbers_for,
+    sourced_numbers,
+)
 from asperity.orbit import PeriodicResponse, periodic_response
 from asperity.parameters import obeying, point_parameters
 from asperity.slider.named import slider_from
+from asperity.units import KINDS
+
+#: A number that is written into a field may lie beyond its slider's ends by this factor, and where
+#: the slider begins at zero, below its upper end by the second one. Farther away, searches take
+#: minutes to find nothing, and numbers overflow.
+_BEYOND, _BELOW = 1e4, 1e8
 
 Name = Annotated[str, Field(max_length=60)]
 #: SI, or a text with its unit.
@@ -62,7 +73,17 @@ class OperatingPoint(Question):
         own = point_parameters(get_law(law))
         others = {n for found in registered().values() for n in point_parameters(found)}
         given = {n: v for n, v in self.numbers.items() if n in own or n not in others}
-        return numbers_for(law, sourced_numbers(given, material, "page", law))
+        found = numbers_for(law, sourced_numbers(given, material, "page", law))
+        for name in given:
+            if name in found:
+                self.check_reach(name, found[name].value)
+        return found
+
+    def check_reach(self, name: str, value: float) -> None:
+        """Refuse a number (SI) that lies too far from the ends of its slider."""
+        range_ = slider(name, self.chosen_material())
+        if "low" in range_ and known_parameters()[name].rule != "amplitude":
+            _check_reach(name, value, range_, known_parameters()[name].kind)
 
     def values(self, law: str | None = None) -> dict[str, float]:
         """SI values of the numbers."""
@@ -75,10 +96,27 @@ class OperatingPoint(Question):
         for name in given:
             if name not in AIR:
                 raise InputError(f"air must have known numbers, got '{name}'; {closest(name, AIR)}")
-        return {
+        found = {
             n: float(obeying(given.get(n, material[n].si), n, material[n].dimension, "positive"))
             for n in AIR
         }
+        for name in given:
+            number = material[name]
+            _check_reach(name, found[name], around(number.si), number.dimension)
+        return found
+
+
+def _check_reach(name: str, value: float, range_: Mapping[str, Any], kind: str) -> None:
+    low, high = range_["low"] / _BEYOND, range_["high"] * _BEYOND
+    low = low or range_["high"] / _BELOW
+    if value == 0 or low <= abs(value) <= high:
+        return
+    unit = KINDS[kind].si
+    ends = " to ".join(f"{end:.3g} {unit}".strip() for end in (low, high))
+    raise InputError(
+        f"{name} must be from {ends} on the page, got {f'{value:.3g} {unit}'.strip()}; the library "
+        "and the commands take others"
+    )
 
 
 def law_class(name: str) -> type[Law]:

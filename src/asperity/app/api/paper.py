@@ -39,7 +39,7 @@ from asperity.papers.bureau2000.numbers.machine import EXT, slider, velocities, 
 from asperity.papers.bureau2000.numbers.resonance import contact_resonance
 from asperity.papers.ledger.ledger import altered
 from asperity.parameters import law_parameters, obeying
-from asperity.units import from_si
+from asperity.units import KINDS, from_si
 
 _PAPER = "bureau2000"
 #: Intervals of a curve that follows a slider, and instants of a period.
@@ -94,6 +94,9 @@ _LABELS = {
 }
 #: A share is moved between these; other numbers by this factor to both sides.
 _SHARE, _FACTOR = (0.05, 1.0), 4.0
+#: What is written into a field may differ from the printed number by this factor: farther away the
+#: equations are so stiff that curves take minutes.
+_BEYOND = 100.0
 
 _preparation: Preparation | None = None
 
@@ -242,6 +245,11 @@ def _moved_numbers(asked: MovedFigure) -> Material:
         si = float(obeying(value, name, number.dimension, "positive"))
         if name == "transmission" and not si <= 1:
             raise InputError(f"transmission must be at most 1, got {si:g}; lower it")
+        if not number.si / _BEYOND <= si <= number.si * _BEYOND:
+            raise InputError(
+                f"{name} must be within a factor of {_BEYOND:g} of the printed {number}, got "
+                f"{f'{si:.3g} {KINDS[number.dimension].si}'.strip()}; move it nearer"
+            )
         changes[name] = float(from_si(si, number.unit, number.dimension))
     return altered(printed(), changes)
 
