@@ -87,9 +87,10 @@ async function start() {
   addEventListener("hashchange", show);
   addEventListener("resize", () => {
     clearTimeout(resized);
-    resized = setTimeout(redrawAll, 120);
+    resized = setTimeout(() => redrawAll(matchMedia("print").matches), 120);
   });
-  addEventListener("beforeprint", redrawAll);
+  addEventListener("beforeprint", () => redrawAll(true));
+  addEventListener("afterprint", () => redrawAll());
   show();
 }
 

@@ -7,6 +7,10 @@ import { csv, saveFile } from "./save.js";
 import { digits } from "./units.js";
 
 const figures = new Set();
+let printing = false;
+
+/** Width (px) of a figure across a sheet of A4. */
+const PRINTED = 680;
 
 const RIGHT = 14;
 /** Room (px) for the label of the axis upwards, and for a character of its ticks. */
@@ -74,12 +78,18 @@ export class Figure {
     this.description = description;
     this.plot.style.minHeight = `${this.height}px`;
     if (!this.ownLabel) this.plot.setAttribute("aria-label", `${this.heading.textContent}: arrow keys read its values`);
-    const width = this.plot.clientWidth;
+    const width = printing ? this.#printedWidth() : this.plot.clientWidth;
     if (!width) return;
     const drawn = drawChart(chart, width, this.height, description);
     this.plot.innerHTML = drawn.svg;
     this.frames = drawn.frames;
     if (this.cursor) this.#showCursor();
+  }
+
+  /** Width on paper, which no layout tells before it is printed: two figures side by side, or one. */
+  #printedWidth() {
+    const beside = this.element.parentElement?.classList.contains("panels") && this.name !== "whole";
+    return beside ? PRINTED / 2 - 20 : PRINTED;
   }
 
   /** Position of an event on the first row, in units of the axes; null outside. */
@@ -224,7 +234,7 @@ export class Figure {
     const gone = [];
     copy.querySelectorAll("*").forEach((node, i) => {
       const style = getComputedStyle(from[i]);
-      for (const property of ["fill", "stroke", "stroke-width", "stroke-dasharray", "font-size", "font-family", "opacity"]) {
+      for (const property of ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linecap", "font-size", "font-family", "opacity"]) {
         const value = style.getPropertyValue(property);
         if (value) node.setAttribute(property, value);
       }
@@ -248,8 +258,9 @@ export class Figure {
 
 const isKnown = (value) => value !== null && value !== undefined && Number.isFinite(value);
 
-/** Draw everything again, after the width has changed. */
-export function redrawAll() {
+/** Draw everything again, after the width has changed, for the screen or for paper. */
+export function redrawAll(onPaper = false) {
+  printing = onPaper;
   for (const figure of figures) {
     if (figure.chart && figure.element.isConnected) figure.draw(figure.chart, figure.description);
   }

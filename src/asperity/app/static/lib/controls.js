@@ -1,6 +1,6 @@
 // Sliders with number fields.
 
-import { el, formula, fresh } from "./dom.js";
+import { el, fill, formula, fresh } from "./dom.js";
 import { parse, quantity } from "./units.js";
 
 const STEPS = 400;
@@ -44,6 +44,13 @@ export class Quantity {
     if (typeof value !== "number") return;
     this.range.value = Math.round(STEPS * this.#fraction(value));
     this.range.setAttribute("aria-valuetext", this.field.value);
+    this.onShown?.();
+  }
+
+  /** Move the slider as a hand would. */
+  slideTo(step) {
+    this.range.value = step;
+    this.#moved();
   }
 
   #fraction(value) {
@@ -66,6 +73,45 @@ export class Quantity {
     if (value === this.value) return;
     this.set(value);
     this.onInput(value);
+  }
+}
+
+/**
+ * The slider that was touched last, kept at the foot of a narrow screen while its figures scroll; a
+ * list changes to another one. Wide screens have the sliders beside the figures and hide it.
+ */
+export class Dock {
+  constructor() {
+    this.quantities = [];
+    this.list = el("select", { "aria-label": "Number of the slider below", change: () => this.#choose(this.quantities[this.list.selectedIndex]) });
+    this.value = el("output", {});
+    this.range = el("input", { type: "range", min: 0, max: STEPS, step: 1, input: () => this.chosen.slideTo(this.range.value) });
+    this.element = el("div", { class: "dock", role: "group", "aria-label": "One slider beside the figures" }, this.list, this.value, this.range);
+  }
+
+  /** Offer the sliders of a form; the same number as before stays, else the one named `first`. */
+  offer(quantities, first) {
+    this.quantities = quantities;
+    fill(this.list, quantities.map(({ parameter: p }) => el("option", {}, `${p.label || p.name} – ${p.meaning}`)));
+    for (const q of quantities) {
+      q.onShown = () => { if (q === this.chosen) this.#show(); };
+      q.element.addEventListener("focusin", () => this.#choose(q));
+    }
+    const named = (name) => quantities.find((q) => q.parameter.name === name);
+    this.#choose(named(this.chosen?.parameter.name) || named(first) || quantities[0]);
+  }
+
+  #choose(quantity) {
+    this.chosen = quantity;
+    this.list.selectedIndex = this.quantities.indexOf(quantity);
+    this.range.setAttribute("aria-label", `Move the ${quantity.parameter.meaning}`);
+    this.#show();
+  }
+
+  #show() {
+    this.range.value = this.chosen.range.value;
+    this.value.textContent = this.chosen.field.value;
+    this.range.setAttribute("aria-valuetext", this.chosen.field.value);
   }
 }
 

@@ -17,7 +17,8 @@ export function digits(value, count = 4) {
   const size = Math.abs(value);
   if (size >= 1e5 || size < 1e-3) {
     const [mantissa, power] = value.toExponential(count - 1).split("e");
-    return `${String(Number(mantissa)).replace("-", "−")}·10${superscript(Number(power))}`;
+    const times = Number(mantissa) === 1 ? "" : `${String(Number(mantissa)).replace("-", "−")}·`;
+    return `${times}10${superscript(Number(power))}`;
   }
   return String(Number(value.toPrecision(count))).replace("-", "−");
 }

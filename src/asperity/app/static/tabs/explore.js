@@ -1,7 +1,7 @@
 // Explore: one operating point, and everything about it while the sliders move.
 
 import { Figure, series } from "../lib/charts.js";
-import { choice, group, Quantity, tick } from "../lib/controls.js";
+import { choice, Dock, group, Quantity, tick } from "../lib/controls.js";
 import { el, fill, formula } from "../lib/dom.js";
 import { copyText } from "../lib/save.js";
 import { get, Latest, Refused, run } from "../lib/server.js";
@@ -23,6 +23,7 @@ export function create(page) {
   let searching = null;
   let resting = 0;
   let answer = null;
+  let sliders = [];
 
   function fresh() {
     return {
@@ -93,6 +94,7 @@ export function create(page) {
 
   function changed() {
     page.setLink(name, toParameters());
+    onPaper.textContent = `${view.material}, ${view.law}: ${sliders.map((q) => `${q.parameter.name} = ${q.field.value}`).join(", ")}${view.numbers.inertia ? ", with inertia" : ""}.`;
     stopSearch();
     latest.ask(question(), { since: performance.now() });
   }
@@ -227,7 +229,7 @@ export function create(page) {
     const shown = point.converged
       ? [
         ["mean F/W₀", digits(point.mean_friction, 5)], ["Δμ̄", digits(point.delta_mu, 4)],
-        ["μ₁", digits(point.mu1, 4)], ["phase", `${digits(point.phase1, 3)} rad`],
+        ["μ₁", digits(point.mu1, 4)], ["phase of μ₁", `${digits(point.phase1, 3)} rad`],
         ["μ₂", digits(point.mu2, 4)], ["ε on the contacts", digits(answer.epsilon, 4)],
       ]
       : [["ε on the contacts", digits(answer.epsilon, 4)]];
@@ -337,8 +339,10 @@ export function create(page) {
   // --- Controls --------------------------------------------------------------------------------
 
   const controls = el("form", { class: "controls", "aria-label": "Operating point", submit: (e) => e.preventDefault() });
+  const dock = new Dock();
   const sentence = el("p", { class: "sentence", role: "status" });
   const readings = el("dl", { class: "readings" });
+  const onPaper = el("p", { class: "on-paper" });
   const message = el("p", { class: "message", role: "alert" });
   const equations = el("div", { class: "equations" });
 
@@ -346,18 +350,23 @@ export function create(page) {
     const material = catalogue.materials[view.material];
     const law = catalogue.laws[view.law];
     const byName = Object.fromEntries(law.parameters.map((p) => [p.name, p]));
-    const sliderOf = (p) => new Quantity({
+    sliders = [];
+    const slider = (own) => {
+      sliders.push(new Quantity(own));
+      return sliders.at(-1).element;
+    };
+    const sliderOf = (p) => slider({
       parameter: p,
       slider: { ...material.sliders[p.name], value: view.numbers[p.name] ?? material.sliders[p.name].value },
       onInput: (value) => { view.numbers[p.name] = value; changed(); },
-    }).element;
+    });
     const own = law.parameters.filter((p) => p.place === "law");
     const rebuild = () => { buildControls(); changed(); };
     fill(controls,
       choice("Material", Object.entries(catalogue.materials).map(([n, m]) => [n, `${n} – ${m.title}`]), view.material,
         (value) => { view.material = value; view.numbers = {}; rebuild(); }).element,
       choice("Law", laws.map((n) => [n, n]), view.law, (value) => { view.law = value; rebuild(); }).element,
-      group("Drive and machine", true,
+      group("Drive and machine", false,
         FIRST.filter((n) => byName[n]).map((n) => sliderOf(byName[n])),
         tick("The mass counts (inertia)", Boolean(view.numbers.inertia),
           (on) => { if (on) view.numbers.inertia = 1; else delete view.numbers.inertia; changed(); }).element),
@@ -365,11 +374,11 @@ export function create(page) {
       group("Air layer", false,
         tick("Air between the surfaces", view.air !== null, (on) => { view.air = on ? {} : null; rebuild(); },
           "ε is then the amplitude of the load, of which the contacts bear a share").element,
-        view.air === null ? [] : material.air.map((p) => new Quantity({
+        view.air === null ? [] : material.air.map((p) => slider({
           parameter: p,
           slider: { ...p.slider, value: view.air[p.name] ?? p.value },
           onInput: (value) => { view.air[p.name] = value; changed(); },
-        }).element)),
+        }))),
       group("Compare with", false,
         laws.filter((n) => n !== view.law).map((n) => tick(n, view.laws.includes(n), (on) => {
           view.laws = laws.filter((m) => (m === n ? on : view.laws.includes(m)));
@@ -378,13 +387,15 @@ export function create(page) {
       el("div", { class: "actions" },
         el("button", { type: "button", click: () => { Object.assign(view, fresh()); rebuild(); } }, "Start again")),
     );
+    dock.offer(sliders, "epsilon");
     fill(equations, el("p", { class: "law-title" }, law.title), law.equations.map((e) => el("div", { class: "equation" }, formula(e))));
   }
 
   const element = el("section", { class: "tab explore", "aria-label": title },
     controls,
-    el("div", { class: "results" }, el("h2", { class: "visually-hidden" }, "Response")));
-  const results = element.lastElementChild;
+    el("div", { class: "results" }, el("h2", { class: "visually-hidden" }, "Response")),
+    dock.element);
+  const results = element.querySelector(".results");
 
   const phases = tick("phases", view.phases, (on) => {
     view.phases = on;
@@ -400,7 +411,7 @@ export function create(page) {
     show(parameters) {
       if (!figures) {
         figures = makeFigures();
-        results.append(el("div", { class: "summary" }, sentence, readings, message, copies),
+        results.append(el("div", { class: "summary" }, sentence, readings, onPaper, message, copies),
           el("div", { class: "panels" }, Object.values(figures).map((f) => f.element)),
           el("section", { class: "law", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
       }

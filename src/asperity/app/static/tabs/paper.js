@@ -1,7 +1,7 @@
 // Paper: figures of a published paper that follow sliders, and the ledger of its claims.
 
 import { Figure, series } from "../lib/charts.js";
-import { choice, Quantity } from "../lib/controls.js";
+import { choice, Dock, group, Quantity } from "../lib/controls.js";
 import { el, fill, fresh } from "../lib/dom.js";
 import { copyText, csv, saveFile } from "../lib/save.js";
 import { ask, Latest, Refused, run } from "../lib/server.js";
@@ -40,10 +40,11 @@ export function create(page) {
   ].map(([label, text]) => el("button", {
     type: "button", click: (e) => { const t = text(); if (t) copyText(t, e.currentTarget); },
   }, label)));
+  const dock = new Dock();
   const figures = el("div", { class: "paper-figures" }, controls,
     el("div", { class: "results" },
       el("div", { class: "summary" }, sentence, message, el("div", { class: "work" }, massStatus, massBar), copies), drawing, figure.element,
-      el("section", { class: "law", "aria-label": "Numbers" }, el("h3", {}, "At the end of each curve"), ends)));
+      el("section", { class: "law", "aria-label": "Numbers" }, el("h3", {}, "At the end of each curve"), ends)), dock.element);
   const ledgerView = el("div", { class: "ledger" });
   const switches = el("div", { class: "switch", role: "group", "aria-label": "What is shown" });
   const heading = el("h2", {}, title);
@@ -165,9 +166,9 @@ export function create(page) {
       y: { label: row.label, log: row.log },
       lines: [
         ...(isMoved ? printed.map((curve) => ({ x: xs(curve), y: curve.values[row.column], cls: "printed dashed", name: `${curve.name}, as printed` })) : []),
-        ...(isMoved ? inertia.map(({ printed: c }) => ({ x: xs(c), y: c.values[row.column], cls: "mass dashed", name: `${c.name}, as printed` })) : []),
-        ...inertia.map(({ curve }) => ({ x: xs(curve), y: curve.values[row.column], cls: "mass", name: curve.name })),
+        ...(isMoved ? inertia.map(({ printed: c }) => ({ x: xs(c), y: c.values[row.column], cls: "printed dashed", name: `${c.name}, as printed` })) : []),
         ...moved.map((curve, k) => ({ x: xs(curve), y: curve.values[row.column], cls: series(k), name: curve.name, thick: true })),
+        ...inertia.map(({ curve }, k) => ({ x: xs(curve), y: curve.values[row.column], cls: massClass(curve, k), name: curve.name })),
         ...(stated[row.column] || []).filter((s) => s.ends.length > 1).map((s) => ({ x: s.ends.map(() => s.x), y: s.ends, cls: "stated", thick: true, name: s.text })),
       ],
       points: (stated[row.column] || []).map((s) => ({ x: s.ends.map(() => s.x), y: s.ends, cls: "stated", title: s.text })),
@@ -179,10 +180,16 @@ export function create(page) {
     const hasStated = rows.some((row) => stated[row.column]);
     fill(figure.note,
       moved.map((curve, k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), curve.name)),
-      inertia.length > 0 && el("p", { class: "key" }, el("span", { class: "swatch mass" }), inertia.map(({ curve }) => curve.name).join("; ")),
-      isMoved && el("p", { class: "key" }, el("span", { class: "swatch printed" }), "dashed: as printed"),
+      inertia.map(({ curve }, k) => el("p", { class: "key" }, el("span", { class: `swatch ${massClass(curve, k)}` }), curve.name)),
+      isMoved && el("p", { class: "key" }, el("span", { class: "swatch printed dashed" }), "as printed"),
       hasStated && el("p", { class: "key" }, el("span", { class: "swatch dot stated" }), "stated in the text"));
     drawEnds();
+  }
+
+  /** The colour of the same curve without the mass, and a pattern that grey print keeps apart. */
+  function massClass(curve, k) {
+    const partner = answer.moved.findIndex((c) => curve.name.startsWith(c.name));
+    return `${series(partner < 0 ? k : partner)} ${k % 2 ? "dash-dots" : "dots"}`;
   }
 
   function drawEnds() {
@@ -214,6 +221,15 @@ export function create(page) {
 
   function buildControls() {
     const own = current();
+    const sliders = own.numbers.map((n) => new Quantity({
+      parameter: { name: n.name, label: n.label, kind: n.kind, meaning: n.meaning, symbol: `<i>${n.label.replace("_eff", "<sub>eff</sub>")}</i>` },
+      slider: { ...n.slider, value: view.numbers[n.name] ?? n.slider.value },
+      onInput: (value) => {
+        if (value === n.slider.value) delete view.numbers[n.name];
+        else view.numbers[n.name] = value;
+        changed();
+      },
+    }));
     fill(controls,
       choice("Figure", paper.figures.map((f) => [f.name, `${f.place} – ${f.title}`]), view.figure, (value) => {
         view.figure = value;
@@ -223,18 +239,11 @@ export function create(page) {
         buildControls();
         changed();
       }).element,
-      el("fieldset", {}, el("legend", {}, "Numbers of the paper"), own.numbers.map((n) => new Quantity({
-        parameter: { name: n.name, kind: n.kind, meaning: n.meaning, symbol: `<i>${n.label.replace("_eff", "<sub>eff</sub>")}</i>` },
-        slider: { ...n.slider, value: view.numbers[n.name] ?? n.slider.value },
-        onInput: (value) => {
-          if (value === n.slider.value) delete view.numbers[n.name];
-          else view.numbers[n.name] = value;
-          changed();
-        },
-      }).element)),
+      group("Numbers of the paper", false, sliders.map((q) => q.element)),
       el("div", { class: "actions" }, el("button", {
         type: "button", click: () => { view.numbers = {}; buildControls(); changed(); },
       }, "As printed")));
+    dock.offer(sliders, own.numbers[0].name);
   }
 
   // --- Ledger ----------------------------------------------------------------------------------
