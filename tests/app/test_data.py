@@ -5,12 +5,13 @@ import gzip
 import io
 import zipfile
 from pathlib import Path
+from statistics import NormalDist
 
 import numpy as np
 import pytest
 
 import asperity as asp
-from asperity.app.api import data, recordings
+from asperity.app.api import fits, recordings
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError
 
@@ -243,13 +244,13 @@ def test_a_table_is_fitted(ask, measured):
 
 
 def test_the_report_of_a_fit_names_its_files_as_their_sender_does(monkeypatch):
-    def written(folder, found):
+    def written(folder, found, posterior):
         folder.mkdir()
         for name in ("fit.json", "report.html"):
             (folder / name).write_text(f"{found} fitted to sent-table-0.csv")
 
     monkeypatch.setattr("asperity.fit_report.write_report", written)
-    packed = data._report("a law", {"sent-table-0.csv": '<my "readings">.csv'})
+    packed = fits._report("a law", {"sent-table-0.csv": '<my "readings">.csv'})
     with zipfile.ZipFile(io.BytesIO(base64.b64decode(packed))) as folder:
         texts = {name: folder.read(name).decode() for name in folder.namelist()}
     assert texts == {
@@ -258,9 +259,68 @@ def test_the_report_of_a_fit_names_its_files_as_their_sender_does(monkeypatch):
     }
 
 
+class Drawn:
+    """A posterior whose draws are known: 2 chains of 100 quantiles of a normal distribution."""
+
+    log_density = np.zeros((2, 100))
+
+    def __init__(self, found, seed):
+        quantiles = [NormalDist().inv_cdf((k + 0.5) / 200) for k in range(200)]
+        p = found.parameters["mu0"]
+        self.draws = {"mu0": p.value + p.se * np.reshape(quantiles, (2, 100))}
+        self.seed = seed
+
+    def record(self):
+        return {"seed": self.seed, "converged": True}
+
+    def to_netcdf(self, path):
+        Path(path).write_bytes(b"draws")
+
+
+def test_a_posterior_is_sampled_as_it_was_asked_for(monkeypatch):
+    def sampled(found, *, chains, draws, seed, progress):
+        assert (chains, draws, seed) == (2, 100, 7)
+        progress(50, 800)
+        return Drawn(found, seed)
+
+    monkeypatch.setattr("asperity.inference.sample_posterior", sampled)
+    monkeypatch.setattr(
+        "asperity.fit_report.write_report",
+        lambda folder, found, posterior: folder.mkdir() or posterior.to_netcdf(folder / "a.nc"),
+    )
+    asked = {
+        "laws": ["rice-ruina"], "free": ["mu0"], "material": "bureau2000", "report": True,
+        "tables": [{"name": "readings.csv", "text": TABLE}],
+        "posterior": True, "chains": 2, "draws": 100, "seed": 7,
+    }  # fmt: skip
+    sent = []
+    whole = {"asked": fits.Fitted.model_validate(asked).model_dump(), "files": []}
+    result = fits.fit(whole, lambda **message: sent.append(message))
+    assert {"draws": 50, "of": 800} in sent
+    assert result["posterior"]["seed"] == 7
+    middles, heights = (np.array(result["posterior"]["histograms"]["mu0"][n]) for n in "xy")
+    width = middles[1] - middles[0]
+    mu0 = result["fit"]["parameters"]["mu0"]
+    assert heights.sum() * width == pytest.approx(1)
+    assert (heights * middles).sum() * width == pytest.approx(mu0["value"], abs=0.1 * width)
+    assert "--posterior --chains 2 --draws 100 --seed 7" in result["command"]
+    with zipfile.ZipFile(io.BytesIO(base64.b64decode(result["report"]))) as folder:
+        assert folder.read("report/a.nc") == b"draws"
+    # Hardly modulated, the mean does not depend on the amplitude: the band is mu0's own interval.
+    slow = result["bands"][0]["rows"][0]["velocities"][0]
+    assert slow["at"] == [1e-4]
+    assert slow["value"] == [0.49]
+    half = (slow["high"][-1] - slow["low"][-1]) / 2
+    assert half == pytest.approx(1.96 * mu0["se"], rel=0.15)
+
+
 @pytest.mark.parametrize(
     ("changed", "word"),
     [
+        ({"laws": ["rice-ruina", "nagata"], "posterior": True}, "posterior"),
+        ({"draws": 99}, "draws"),
+        ({"chains": 1}, "chains"),
+        ({"draws": 10**9}, "draws"),
         ({"laws": ["file.py:Law"]}, "law"),
         ({"material": "../x.toml"}, "material"),
         ({"tables": []}, "data"),
@@ -323,8 +383,8 @@ def steps(tmp_path):
 
 
 def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps):
-    asked = data.Fitted.model_validate(steps["asked"])
-    run = data._run(asked.runs[0], steps["files"][0])
+    asked = fits.Fitted.model_validate(steps["asked"])
+    run = fits._run(asked.runs[0], steps["files"][0])
     direct = asp.inference.recorded_run(steps["files"][0]["path"], window=(10.0, 70.0))
     assert run.name == "steps"
     assert run.velocities == direct.velocities
@@ -348,9 +408,49 @@ def test_a_recording_that_cannot_be_fitted_gets_a_sentence(steps, asked, run, wo
     steps["asked"] |= asked
     steps["asked"]["runs"][0] |= run
     with pytest.raises(InputError, match=" must ") as refused:
-        data.fit(steps, lambda **message: None)
+        fits.fit(steps, lambda **message: None)
     assert word in str(refused.value)
     assert "0123" not in str(refused.value)
+
+
+def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit, steps):
+    """A - B is the fall of the friction over a step of the velocity by a factor of ten."""
+    page = visit("#data")
+    page.locator(".drop").wait_for()
+    path = Path(steps["files"][0]["path"])
+    page.set_input_files(
+        "#data-files",
+        [{"name": "steps.csv", "mimeType": "text/csv", "buffer": path.read_bytes()}],
+    )
+    page.get_by_label("Fit the recording as a whole").wait_for()
+    form = page.locator(".fit-form")
+    for label, on in (("elasto-plastic", False), ("rice-ruina", True)):
+        form.get_by_label(label, exact=True).set_checked(on)
+    for label in ("eps_ratio", "A", "B", "D0"):
+        form.get_by_label(label, exact=True).set_checked(label != "eps_ratio")
+    form.get_by_label("Intervals by profile likelihood").check()
+    fit = page.locator("section.fit")
+    fit.get_by_role("button", name="Fit", exact=True).click()
+    fit.get_by_role("button", name="Cancel").click()
+    fit.get_by_text("Cancelled.").wait_for()
+    form.get_by_label("Intervals by profile likelihood").uncheck()
+    fit.get_by_role("button", name="Fit", exact=True).click()
+    table = fit.get_by_role("region", name="Parameters")
+    table.wait_for()
+    rows = {row.split("\t")[0]: row.split("\t")[1] for row in table.inner_text().splitlines()[1:]}
+    A, B = (number(rows[n]) for n in "AB")
+    fall = A - B
+    assert fall == pytest.approx(-0.01 / np.log(10), rel=0.02)
+    assert fit.locator(".panel.run-1 svg path.line").count() == 3
+    assert not fit.get_by_role("button", name="Cancel").is_visible()
+
+
+def number(text):
+    """A number as the page writes it."""
+    mantissa, _, power = text.replace("−", "-").partition("·10")
+    return float(mantissa) * 10.0 ** int(
+        power.translate(str.maketrans("⁰¹²³⁴⁵⁶⁷⁸⁹⁻", "0123456789-")) or 0
+    )
 
 
 def test_a_fit_needs_a_recording_that_was_sent(ask, steps):

@@ -24,6 +24,8 @@ from asperity.errors import InputError, printable
 from asperity.parameters import OUTPUTS
 from asperity.recording.roles import ROLES, candidates
 
+#: Address space (bytes) and processor time (s) of a process that reads a recording.
+LIMITS = {"memory": 6 * 1024**3, "seconds": 240}
 #: Blocks of a curve that is shown: two points each.
 _BLOCKS = 700
 #: Channels that are drawn, and findings and rows that are listed.

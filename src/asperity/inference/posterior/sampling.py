@@ -44,6 +44,8 @@ Float = NDArray[np.float64]
 _OVERDISPERSED = 2.0
 #: Tries for a first position at which the law has a solution.
 _TRIES = 100
+#: Time (s) between two calls of `progress` while no block ends.
+_ASK = 0.5
 #: One thread for XLA and for linear algebra in each process.
 _ONE_THREAD = {"NPROC": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
@@ -77,7 +79,8 @@ def sample_posterior(
     resume : bool
         Go on with what an interrupted run has kept there.
     progress : callable, optional
-        Called with finished and all draws, those of the warm-up included.
+        Called with finished and all draws, those of the warm-up included, at each block and twice
+        a second; an exception of it ends the sampling.
 
     Returns
     -------
@@ -120,7 +123,10 @@ def sample_posterior(
 
             waiting = {go_on(run): run for run in runs if len(run.kept) < blocks}
             while waiting:
-                for future in wait(waiting, return_when=FIRST_COMPLETED).done:
+                finished = wait(waiting, timeout=_ASK, return_when=FIRST_COMPLETED).done
+                if not finished:
+                    report(done * BLOCK, chains * blocks * BLOCK)
+                for future in finished:
                     run = waiting.pop(future)
                     state, transitions = future.result()
                     run.take(state, transitions)

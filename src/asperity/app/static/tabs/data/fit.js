@@ -5,15 +5,16 @@ import { choice, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
 import { copyText, csv, saveFile } from "../../lib/save.js";
 import { Refused, run } from "../../lib/server.js";
-import { digits } from "../../lib/units.js";
+import { digits, quantity } from "../../lib/units.js";
 
 const SETTINGS = {
   laws: ["elasto-plastic"], material: "bureau2000", free: ["eps_ratio", "lambda"], fixed: "",
-  prior: false, profile: false, inertia: false, report: false,
+  prior: false, profile: false, inertia: false, report: false, posterior: false, draws: "1000", chains: "4",
   trend: "linear", drift: false, initial: "steady", gauge: "", velocities: "",
 };
-const FLAGS = ["prior", "profile", "inertia", "report", "drift"];
-const TEXTS = ["material", "fixed", "trend", "initial", "gauge", "velocities"];
+const FLAGS = ["prior", "profile", "inertia", "report", "drift", "posterior"];
+const TEXTS = ["material", "fixed", "trend", "initial", "gauge", "velocities", "draws", "chains"];
+const LABELS = { mean_friction: "mean F/W₀", delta_mu: "Δμ̄", mu1: "μ₁", mu2: "μ₂" };
 
 export class FitPanel {
   constructor(page, { rows, tables, runs, changed }) {
@@ -27,9 +28,10 @@ export class FitPanel {
     this.fitButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Fit");
     this.cancel = el("button", { type: "button", click: () => this.work?.abort() }, "Cancel");
     this.cancel.hidden = true;
+    this.bar = el("progress", { max: 1, "aria-label": "Progress of the draws", hidden: true });
     this.element = el("section", { class: "recording fit", "aria-label": "Fit and compare" },
       el("h3", {}, "Fit and compare"), this.data, this.form,
-      el("div", { class: "actions" }, this.fitButton, this.cancel), this.status, this.message, this.results);
+      el("div", { class: "actions" }, this.fitButton, this.cancel), this.status, this.bar, this.message, this.results);
     this.element.hidden = true;
     this.#build();
   }
@@ -84,6 +86,8 @@ export class FitPanel {
       field.value = settings[key];
       return el("div", { class: "choice" }, el("label", { for: own }, label), field);
     };
+    this.sampling = el("div", { class: "filters" }, text("Draws of each chain", "draws", "1000"), text("Chains", "chains", "4"));
+    this.sampling.hidden = !settings.posterior;
     this.runOptions = el("fieldset", {}, el("legend", {}, "Whole recordings"),
       el("p", { class: "note" }, "Compared with the motion through the whole of it; K is free for each of them, and the noise is estimated."),
       el("div", { class: "filters" },
@@ -102,8 +106,11 @@ export class FitPanel {
         el("div", { class: "ticks" },
           tick("Published uncertainties as priors", settings.prior, set("prior")).element,
           tick("Intervals by profile likelihood", settings.profile, set("profile")).element,
+          tick("Posterior by sampling, of one law", settings.posterior, (on) => { set("posterior")(on); this.sampling.hidden = !on; },
+            "As asperity fit --posterior; it takes a minute or more").element,
           tick("The mass counts", settings.inertia, set("inertia")).element,
-          tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it").element)),
+          tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it").element),
+        this.sampling),
       this.runOptions);
     this.runOptions.hidden = !this.runs().length;
     this.#free();
@@ -146,6 +153,16 @@ export class FitPanel {
       material: settings.material || null, prior: settings.prior ? settings.material || null : null,
       profile: settings.profile, inertia: settings.inertia,
     };
+    if (settings.posterior) {
+      asked.posterior = true;
+      for (const [key, label, low, high] of [["draws", "Draws of each chain", 100, 10000], ["chains", "Chains", 2, 8]]) {
+        asked[key] = Number(settings[key]);
+        if (!settings[key] || !Number.isInteger(asked[key]) || asked[key] < low || asked[key] > high) {
+          this.message.textContent = `${label} must be a whole number from ${low} to ${high}, got “${settings[key]}”; change it.`;
+          return;
+        }
+      }
+    }
     const velocities = settings.velocities.split(",").map((v) => v.trim()).filter(Boolean);
     if (velocities.length && asked.runs.length) {
       if (asked.runs.length > 1) {
@@ -159,6 +176,12 @@ export class FitPanel {
       const last = await run("data/fit", asked, (part) => {
         if (part.waiting) this.status.textContent = "Waiting for another fit…";
         if (part.minimisations !== undefined) this.status.textContent = `Fitting… ${part.minimisations} minimisations finished.`;
+        if (part.draws !== undefined) {
+          this.bar.value = part.draws / part.of;
+          this.status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, those of the warm-up included.` : "Sampling: the processes start…";
+        }
+        this.bar.hidden = part.draws === undefined;
+        if (part.stage === "figures") this.status.textContent = "Drawing the figures…";
         if (part.stage === "report") this.status.textContent = "Writing the report folder…";
       }, signal);
       if (last.result) this.#draw(last.result);
@@ -175,22 +198,24 @@ export class FitPanel {
 
   #running(on) {
     this.cancel.hidden = !on;
+    this.bar.hidden = true;
     this.fitButton.disabled = on;
     if (on) this.status.textContent = "Fitting…";
   }
 
-  #draw({ fit, comparison, residuals, runs, report, command }) {
+  #draw({ fit, comparison, posterior, bands, residuals, runs, report, command }) {
+    this.figures = [];
     const python = () => this.#python();
     const record = fit || comparison;
     const buttons = el("div", { class: "actions" },
       el("button", { type: "button", click: (e) => copyText(python(), e.currentTarget) }, "Copy as Python"),
       el("button", { type: "button", click: (e) => copyText(command, e.currentTarget) }, "Copy as command"),
-      el("button", { type: "button", click: () => saveFile(fit ? "fit.json" : "comparison.json", JSON.stringify(record, null, 2), "application/json") }, "JSON"),
+      el("button", { type: "button", click: () => saveFile(fit ? "fit.json" : "comparison.json", JSON.stringify(posterior ? { ...record, posterior } : record, null, 2), "application/json") }, "JSON"),
       report && el("button", { type: "button", click: () => saveFile("report.zip", fromBase64(report)) }, "Report folder (ZIP)"),
       el("button", { type: "button", click: () => this.#saveCsv(fit ? { [fit.law]: fit } : comparison.laws) }, "CSV"));
     if (fit) {
       this.status.textContent = fitSentence(fit);
-      fill(this.results, buttons, ...fitTables(fit), this.#runs(runs), this.#residuals(residuals));
+      fill(this.results, buttons, ...fitTables(fit), ...this.#posterior(posterior), ...this.#bands(bands), ...this.#runs(runs), this.#residuals(residuals));
     } else {
       this.status.textContent = capital(comparison.verdict);
       const laws = Object.entries(comparison.laws);
@@ -199,13 +224,68 @@ export class FitPanel {
         table(["Law", "χ²", "degrees of freedom", "p", "AICc − lowest", "weight", ""],
           laws.map(([n, l]) => [n, digits(l.chi2), String(l.dof), digits(l.p_value, 2), l.aicc === null ? "–" : digits(l.aicc - lowest), digits(l.weight, 3), l.converged ? (l.excluded ? `excluded: ${l.why}` : "") : l.message]), "Comparison"),
         ...laws.filter(([, l]) => l.converged).map(([n, l]) => el("details", { open: n === comparison.best }, el("summary", {}, n), el("p", {}, fitSentence(l)), ...fitTables(l))),
-        this.#runs(runs), this.#residuals(residuals));
+        ...this.#bands(bands), ...this.#runs(runs), this.#residuals(residuals));
     }
     for (const draw of this.figures) draw();
   }
 
+  /** Summary and densities of the draws, as the report of `asperity fit --posterior` has them. */
+  #posterior(posterior) {
+    if (!posterior) return [];
+    const { chains, draws, parameters, divergences, histograms, warnings } = posterior;
+    const shown = Object.entries(histograms).map(([n, { x, y }]) => {
+      const p = parameters[n];
+      const figure = new Figure({ name: `posterior-${n}`, title: `Posterior of ${n}`, height: 230, columns: () => ({ [n]: x, density: y }) });
+      figure.note.textContent = `Dotted: the ends of the 95 % interval. ${priorText(p.prior)}`;
+      const [low, high] = [x[0], x.at(-1)];
+      this.figures.push(() => figure.draw({
+        x: { label: p.unit ? `${n} (${p.unit})` : n, range: [Math.min(low, p.interval_95[0]), Math.max(high, p.interval_95[1])] },
+        rows: [{ y: { label: "density", range: [0, 1.05 * Math.max(...y)] }, marks: p.interval_95, bars: [{ x, y, cls: series(0), title: (i) => `${n} about ${digits(x[i], 4)}` }] }],
+      }, `Posterior of ${n}: mean ${digits(p.mean, 4)}, standard deviation ${digits(p.sd, 2)}.`));
+      return figure.element;
+    });
+    return [
+      el("h4", {}, "Posterior"),
+      el("p", { class: "note" }, `${chains} chains of ${draws} draws, ${divergences} diverging; ${posterior.converged ? "the chains agree" : "the chains do not agree yet, or there are too few draws"}.`),
+      ...warnings.map((w) => el("p", { class: "message" }, capital(`${w}.`))),
+      table(["Parameter", "Mean", "Standard deviation", "95 % interval", "Unit", "R-hat", "ESS bulk", "ESS tail"], Object.entries(parameters).map(([n, p]) => [
+        n, digits(p.mean, 5), digits(p.sd, 2), `${digits(p.interval_95[0])} to ${digits(p.interval_95[1])}`, p.unit || "1",
+        p.r_hat === null ? "–" : p.r_hat.toFixed(4), digits(p.ess_bulk && Math.round(p.ess_bulk), 4), digits(p.ess_tail && Math.round(p.ess_tail), 4),
+      ]), "Posterior"),
+      el("div", { class: "panels" }, shown),
+    ];
+  }
+
+  /** Readings with their uncertainties, and what the law predicts between them. */
+  #bands(bands) {
+    return (bands || []).map(({ rows }, k) => {
+      const columns = () => {
+        const all = rows.flatMap(({ name, velocities }) => velocities.flatMap((v) => v.epsilon.map((e, i) => [name, v.V, e, v.low[i], v.middle[i], v.high[i]])));
+        return Object.fromEntries(["observable", "V", "epsilon", "low", "middle", "high"].map((n, j) => [n, all.map((r) => r[j])]));
+      };
+      const figure = new Figure({ name: `bands-${k + 1}`, title: "Readings and the fitted law", height: Math.max(260, 190 * rows.length), columns });
+      const many = rows[0].velocities.length;
+      fill(figure.note,
+        rows[0].velocities.slice(0, 12).map(({ V }, i) => el("p", { class: "key" }, el("span", { class: `swatch ${series(i)}` }), quantity(V, "velocity", 3))),
+        many > 12 && el("p", {}, `and ${many - 12} more velocities`),
+        el("p", {}, "Points: readings with two standard errors. Lines: the law, with its 95 % band between the thin ones."));
+      this.figures.push(() => figure.draw({
+        x: { label: "ε as applied" },
+        rows: rows.map(({ name, velocities }) => ({
+          y: { label: LABELS[name] || name },
+          lines: velocities.flatMap((v, i) => [
+            ...["low", "high"].map((end) => ({ x: v.epsilon, y: v[end], cls: series(i), name: `${name}, ${quantity(v.V, "velocity", 3)}, ${end} end of the band` })),
+            { x: v.epsilon, y: v.middle, cls: series(i), thick: true, name: `${name}, ${quantity(v.V, "velocity", 3)}, fitted` },
+            ...v.at.map((e, j) => ({ x: [e, e], y: [v.value[j] - 2 * v.error[j], v.value[j] + 2 * v.error[j]], cls: series(i), name: "two standard errors" })),
+          ]),
+          points: velocities.map((v, i) => ({ x: v.at, y: v.value, cls: series(i), size: 4, title: (j) => `${name} ${digits(v.value[j])} ± ${digits(v.error[j], 2)} at ε ${digits(v.at[j], 3)}` })),
+        })),
+      }, "Readings and what the fitted law predicts between them."));
+      return figure.element;
+    });
+  }
+
   #runs(runs) {
-    this.figures = [];
     return (runs || []).map(({ name, recorded, fitted, difference }, k) => {
       const figure = new Figure({ name: `run-${k + 1}`, title: `${name}: recorded and fitted`, height: 330, columns: () => ({ time: recorded.x, friction: recorded.y }) });
       fill(figure.note, el("p", { class: "key" }, el("span", { class: "swatch s6" }), "recorded"), el("p", { class: "key" }, el("span", { class: "swatch s2" }), "fitted"));
@@ -250,7 +330,7 @@ export class FitPanel {
   }
 
   #python() {
-    const { laws, free, material, profile, inertia } = this.settings;
+    const { laws, free, material, profile, inertia, posterior, chains, draws } = this.settings;
     const one = laws.length === 1;
     const list = (names) => `[${names.map((n) => `"${n}"`).join(", ")}]`;
     const fixed = this.settings.fixed.split(/[\n;]+/).filter((l) => l.includes("=")).map((l) => l.split("=").map((p) => p.trim()));
@@ -259,7 +339,8 @@ export class FitPanel {
     return `import asperity as asp\nfrom asperity import inference\n\nfixed = ${chosen}\ngiven = {name: fixed[name] for name in ("V", "epsilon", "frequency") if name in fixed}\ntables = [inference.read_table(path, given) for path in ${list(files)}]\n`
       + this.runs().map(({ name, python, asked }) => `${python}\ntables.append(inference.recorded_run(trace, name=${JSON.stringify(name.replace(/\.[^.]*$/, ""))}${asked.window ? `, window=(${asked.window.join(", ")})` : ""}${asked.steps ? `, steps=[${asked.steps.join(", ")}]` : ""}))\n`).join("")
       + `found = inference.${one ? "fit" : "compare"}(\n    tables,\n    ${one ? `"${laws[0]}"` : list(laws)},\n    ${list(free.filter((n) => this.names.includes(n)))},\n    fixed=fixed,\n`
-      + `${material ? `    material=asp.materials.load("${material}"),\n` : ""}${profile ? "    profile=True,\n" : ""}${inertia ? "    inertia=True,\n" : ""}${this.#runOptions()})\n`;
+      + `${material ? `    material=asp.materials.load("${material}"),\n` : ""}${profile ? "    profile=True,\n" : ""}${inertia ? "    inertia=True,\n" : ""}${this.#runOptions()})\n`
+      + (posterior && one ? `posterior = inference.sample_posterior(found, chains=${Number(chains)}, draws=${Number(draws)})\n` : "");
   }
 }
 
@@ -290,6 +371,11 @@ function fitTables(fit) {
     table(["Observable", "χ²", "data"], Object.entries(fit.observables).map(([n, o]) => [n, digits(o.chi2), String(o.n)]), "Chi-squared of each observable"),
     el("p", { class: "note" }, `Log-likelihood ${digits(fit.log_likelihood, 6)}, AICc ${digits(fit.aicc, 6)}, BIC ${digits(fit.bic, 6)}. Noise: ${fit.noise.model}.`),
   ].filter(Boolean);
+}
+
+function priorText({ kind, ...numbers }) {
+  const given = Object.entries(numbers).filter(([, v]) => typeof v === "number").map(([n, v]) => `${n} ${digits(v, 3)}`);
+  return `Prior: ${kind}${given.length ? `, ${given.join(", ")}` : ""}.`;
 }
 
 function table(head, rows, label) {
