@@ -79,7 +79,14 @@ def test_columns_and_units_are_corrected_by_hand(measured, modulated):
 
 @pytest.mark.parametrize(
     "name",
-    ["../../../etc/passwd", "..\\..\\passwd", "%2e%2e%2fpasswd", "/etc/passwd", "a\x7f/passwd"],
+    [
+        "../../../etc/passwd",
+        "..\\..\\passwd",
+        "%2e%2e%2fpasswd",
+        "/etc/passwd",
+        "a\x7f/passwd",
+        "a -> /etc/passwd",
+    ],
 )
 def test_no_name_becomes_a_path(send, name, tmp_path):
     before = Path("/etc/passwd").read_bytes()
@@ -102,6 +109,14 @@ def test_files_lie_under_names_of_the_server_and_are_deleted():
     assert not folder.exists()
 
 
+def packed(zeros):
+    """An archive that unpacks to so many MB."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
+        archive.writestr("a.npy", b"\0" * (zeros * 2**20))
+    return file.getvalue()
+
+
 HOSTILE = {
     "empty": b"",
     "zip": b"PK\x03\x04" + b"\0" * 1000,
@@ -114,6 +129,13 @@ HOSTILE = {
     "tdms garbage": b"TDSm" + b"\xff" * 500,
     "a cell without end": b"time,load,force\n" + b"9" * 100_000,
     "json that is no reading": b'{"mode": [' * 50,
+    "json without end": b"[" * 100_000,
+    "a million columns": b",".join(b"c%d" % i for i in range(10**6)) + b"\n" + b"1," * 10**6,
+    "a line without end": b"1" * 10**7,
+    "an archive of zeros": packed(zeros=50),
+    "zeros": gzip.compress(b"\0" * 10**7),
+    "code in numpy's file": b"\x93NUMPY\x01\x00v\x00{'descr': '|O'}\n\x80\x04cos\nsystem\n.",
+    "code in a pickle": b"\x80\x04cos\nsystem\n(X\x02\x00\x00\x00lstR.",
 }
 
 

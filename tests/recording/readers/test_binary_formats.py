@@ -285,3 +285,25 @@ def test_what_is_no_recording_is_refused(tmp_path):
         read(tmp_path / "nothing.csv")
     with pytest.raises(InputError, match=r"read.format must be a format"):
         read(path, format="png")
+
+
+@pytest.mark.parametrize("way", ["link", "storage", "virtual"])
+def test_hdf5_reads_no_other_file(tmp_path, way):
+    """Who sends a recording to a server must not read the server's files by it."""
+    with h5py.File(tmp_path / "secret.h5", "w") as secret:
+        secret["F"] = np.arange(50.0)
+    np.arange(50.0).tofile(tmp_path / "secret.bin")
+    path = tmp_path / "sent.h5"
+    with h5py.File(path, "w") as sent:
+        sent["time"] = np.arange(50.0) / 10
+        if way == "link":
+            sent["F"] = h5py.ExternalLink(str(tmp_path / "secret.h5"), "/F")
+        elif way == "storage":
+            outside = [(str(tmp_path / "secret.bin"), 0, 400)]
+            sent.create_dataset("F", (50,), dtype="f8", external=outside)
+        else:
+            layout = h5py.VirtualLayout((50,), dtype="f8")
+            layout[:] = h5py.VirtualSource(str(tmp_path / "secret.h5"), "F", (50,))
+            sent.create_virtual_dataset("F", layout)
+    with pytest.raises(InputError, match="whose 'F' lies in another file"):
+        read(path)

@@ -24,7 +24,8 @@ def load(path: Path, group: str | None = None) -> RawRecording:
     Parameters
     ----------
     path : Path
-        The file. One that is cut cannot be opened by the library, and is refused.
+        The file. One that is cut cannot be opened by the library, and is refused; so is one whose
+        data lie in other files, which whoever sent it may not be allowed to read.
     group : str or None
         Where to look, in a file of several recordings.
     """
@@ -32,8 +33,11 @@ def load(path: Path, group: str | None = None) -> RawRecording:
 
     try:
         with h5py.File(path, "r") as file:
+            _refuse_other_files(file, path)
             matlab = any("MATLAB_class" in item.attrs for item in file.values())
             groups, step = _walk(file, matlab)
+    except InputError:
+        raise
     # The library raises whatever the damage makes of the data.
     except Exception as refused:
         raise _unreadable(path, refused) from None
@@ -42,8 +46,31 @@ def load(path: Path, group: str | None = None) -> RawRecording:
     return RawRecording(columns, findings, provenance, step=step)
 
 
+def _refuse_other_files(file: Any, path: Path) -> None:
+    """Refuse links and datasets that lead to other files, before one of them is opened."""
+    import h5py
+
+    def outside(name: str, item: Any) -> str | None:
+        if isinstance(item, h5py.ExternalLink):
+            return name
+        stored = isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
+        return name if stored else None
+
+    # The first name that is returned ends the visit; an exception would be lost in the library.
+    found = file.visititems_links(outside) or file.visititems(outside)
+    if found:
+        raise InputError(
+            f"recording.path must hold its data itself, got '{path.name}', whose {found!r} lies in "
+            "another file; copy the data into one file"
+        )
+
+
 def _unreadable(path: Path, refused: Exception) -> InputError:
     text = str(refused)
+    if isinstance(refused, MemoryError):
+        return InputError(
+            f"recording.path must fit into memory, got '{path.name}', which holds more; cut it"
+        )
     if "truncated" in text or "addr overflow" in text or "eof" in text.lower():
         return refuse_truncated(path, "which HDF5 finds cut short")
     return refuse_truncated(path, "which HDF5 cannot open as it is damaged or not whole")

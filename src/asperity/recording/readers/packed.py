@@ -66,6 +66,8 @@ def _is_json(text: str) -> bool:
     except json.JSONDecodeError as error:
         # Where only the cut is wrong, the rest is JSON; headings in brackets fail at once.
         return error.pos > 0.9 * len(text) or "Unterminated" in error.msg
+    except RecursionError:  # brackets in brackets without end
+        return True
     # Values one after the other, a line each; "[1], [2]" is a heading.
     return text.startswith("{") or text.rstrip().endswith("]")
 
