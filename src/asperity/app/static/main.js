@@ -2,7 +2,7 @@
 
 import { redrawAll } from "./lib/charts.js";
 import { el, fill } from "./lib/dom.js";
-import { linkTo, readLink, writeLink } from "./lib/link.js";
+import { dropLink, flushLink, linkTo, readLink, writeLink } from "./lib/link.js";
 import { get } from "./lib/server.js";
 import { useKinds } from "./lib/units.js";
 import * as data from "./tabs/data.js";
@@ -30,6 +30,7 @@ const page = {
   },
   /** Open another tab with a view. */
   open(tab, parameters) {
+    flushLink();
     location.hash = linkTo(tab, parameters);
   },
   /** Say something in the header; read out by screen readers. */
@@ -39,6 +40,7 @@ const page = {
 };
 
 function show() {
+  dropLink();
   const { tab, parameters } = readLink();
   const module = TABS.find((t) => t.name === tab) || TABS[0];
   if (current && current !== module.name) opened.get(current)?.hide?.();
@@ -75,6 +77,7 @@ async function start() {
   fill(bar, TABS.map((t) => el("li", {}, el("a", {
     href: `#${t.name}`, "data-tab": t.name,
     click: (event) => {
+      flushLink();
       // A tab that was open before comes back as it was.
       const earlier = opened.get(t.name);
       if (earlier && current !== t.name) {

@@ -7,12 +7,26 @@ export function readLink() {
 }
 
 let timer = 0;
+let pending = null;
 
 /** Write tab and parameters into the address, without a new entry in the history. */
 export function writeLink(tab, parameters) {
-  clearTimeout(timer);
+  dropLink();
+  pending = linkTo(tab, parameters);
   // Browsers refuse more than some hundred changes in half a minute.
-  timer = setTimeout(() => history.replaceState(null, "", linkTo(tab, parameters)), 250);
+  timer = setTimeout(flushLink, 250);
+}
+
+/** Write at once what waits: before the address changes to that of another view. */
+export function flushLink() {
+  if (pending !== null) history.replaceState(null, "", pending);
+  dropLink();
+}
+
+/** Forget what waits: the address is another view's by now. */
+export function dropLink() {
+  clearTimeout(timer);
+  pending = null;
 }
 
 /** The fragment of a view. */

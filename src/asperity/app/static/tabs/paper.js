@@ -222,7 +222,7 @@ export function create(page) {
   function buildControls() {
     const own = current();
     const sliders = own.numbers.map((n) => new Quantity({
-      parameter: { name: n.name, label: n.label, kind: n.kind, meaning: n.meaning, symbol: `<i>${n.label.replace("_eff", "<sub>eff</sub>")}</i>` },
+      parameter: { name: n.name, label: n.label, kind: n.kind, meaning: n.meaning, symbol: `<i>${n.label.replace(/_(\w+)/, "<sub>$1</sub>")}</i>` },
       slider: { ...n.slider, value: view.numbers[n.name] ?? n.slider.value },
       onInput: (value) => {
         if (value === n.slider.value) delete view.numbers[n.name];

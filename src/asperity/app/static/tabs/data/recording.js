@@ -249,7 +249,7 @@ export class RecordingCard {
     const names = ["mean_friction", "delta_mu", ...Object.keys(record).filter((n) => /^(mu|phase)\d$/.test(n)), "epsilon", "frequency", "W0"];
     const units = { frequency: "Hz", W0: record.unit };
     const readings = el("dl", { class: "readings" }, names.filter((n) => record[n] !== null).map((n) => el("div", {},
-      el("dt", {}, n), el("dd", {}, `${withDoubt(record[n], record.uncertainties[n])} ${n.startsWith("phase") ? "rad" : units[n] || ""}`.trim()))));
+      el("dt", { title: n }, symbol(n)), el("dd", {}, `${withDoubt(record[n], record.uncertainties[n])} ${n.startsWith("phase") ? "rad" : units[n] || ""}`.trim()))));
     const whole = this.#figure("whole", "The recording", curves.force, ["time", "force over W0"]);
     const cycle = this.#figure("cycle", "Mean cycle", { x: curves.cycle.phase, y: curves.cycle.measured }, ["phase", "friction less mean"]);
     const spectrum = this.#figure("spectrum", "What the harmonics leave", curves.spectrum, ["frequency", "amplitude"]);
@@ -361,6 +361,13 @@ export class RecordingCard {
       el("thead", {}, el("tr", {}, table.header.map((h) => el("th", { scope: "col" }, h)))),
       el("tbody", {}, table.rows.map((row) => el("tr", {}, row.map((v) => el("td", {}, v)))))))); 
   }
+}
+
+/** What is read as a person writes it. */
+function symbol(name) {
+  const own = { mean_friction: "mean F/W₀", delta_mu: "Δμ̄", epsilon: "ε", frequency: "frequency", W0: "W₀" };
+  const lowered = (digit) => "₀₁₂₃₄₅₆₇₈₉"[digit];
+  return own[name] || name.replace(/^mu(\d)$/, (_, d) => `μ${lowered(d)}`).replace(/^phase(\d)$/, (_, d) => `phase of μ${lowered(d)}`);
 }
 
 function errorBars(x, y, doubt) {
