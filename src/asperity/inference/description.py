@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi_squared
 
+from asperity.inference.forward import LockInTerm
 from asperity.inference.intervals import bounded_interval
 from asperity.inference.objective import Objective, log_density
-from asperity.inference.profile import profile_interval
+from asperity.inference.profile import Profile
 from asperity.inference.residuals import Residuals
 from asperity.inference.result import Estimate, Fit, Optimum
 
@@ -25,6 +26,10 @@ _RIVAL = 9.0
 #: Where chi-squared is compared with its parabola, in standard deviations, and the rises there
 #: between which intervals of the normal approximation are taken: a quarter too wide or too narrow.
 _TRIED_AT, _LOWEST_RISE, _HIGHEST_RISE = 2.0, 2.4, 6.8
+#: Decrease of chi-squared that must not be left at a minimum: a third of a standard error.
+_STOPPED = 0.1
+#: Correlation from which a parameter's interval follows that of another.
+_TOGETHER = 0.3
 #: Coordinates, in factors of e, that are known better than this are not tried.
 _PRECISE = 0.1
 #: Decrease of chi-squared along a profile that is another minimum.
@@ -101,20 +106,20 @@ def described_fit(
         and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > _UNDETERMINED)
     )
     bent = [] if profile else _bent(objective, (u, chi2), covariance, missing)
+    profiled = _profiled(objective, covariance, {*bent, *undetermined}, everything=profile)
     estimates = {}
     for i, unknown in enumerate(objective.unknowns):
         low, high = unknown.bounds
         at_bound = min(u[i] - low, high - u[i]) < _AT_BOUND * max(sd[i], 1e-12)
         ends = []
+        along = Profile(objective, i, u, chi2, covariance) if i in profiled else None
         for level in (math.erf(1 / math.sqrt(2)), 0.95):
-            if profile:
-                interval, lowest = profile_interval(objective, i, u, chi2, covariance, level)
-                if lowest[1] < chi2 - _LOWER:
+            if along is not None:
+                ends.append(along.interval(level))
+                if along.lowest[1] < chi2 - _LOWER:
                     # The search has missed a minimum: begin again there.
-                    return described_fit(
-                        objective, [objective.minimise(lowest[0]), *minima], profile=profile
-                    )
-                ends.append(interval)
+                    missed = objective.minimise(along.lowest[0])
+                    return described_fit(objective, [missed, *minima], profile=profile)
             elif missing[i]:
                 ends.append((low, high))
             else:
@@ -157,13 +162,42 @@ def described_fit(
         objective=objective,
     )
     said = _contradicted(objective, u, covariance)
-    if bent:
+    if _is_of_tables(objective) and objective.expected_decrease(u) > _STOPPED:
         said.append(
-            f"chi-squared is no parabola in {' and '.join(bent)}: intervals of the normal "
-            "approximation do not hold, of these and of what goes with them; ask for those by "
-            "profile likelihood"
+            "chi-squared still falls where the law has no periodic orbit at some operating point: "
+            "the estimate is the last before, and intervals do not hold; leave those rows out or "
+            "doubt the law"
+        )
+    if bent:
+        also = [n for n in (objective.names[i] for i in sorted(profiled)) if n not in bent]
+        said.append(
+            f"chi-squared is no parabola in {' and '.join(bent)}: intervals of "
+            + " and ".join([*bent, *also])
+            + " are by profile likelihood; take the intervals, not the standard errors"
         )
     return _with_warnings(found, said)
+
+
+def _is_of_tables(objective: Objective) -> bool:
+    return all(isinstance(term, LockInTerm) for term in objective.terms)
+
+
+def _profiled(
+    objective: Objective, covariance: Float, odd: set[str], *, everything: bool
+) -> set[int]:
+    """Coordinates whose intervals are by profile likelihood.
+
+    All if that was asked for; otherwise those of which the normal approximation says too little,
+    and what goes with them. Objectives with recordings take minutes for it: only if asked for.
+    """
+    if everything:
+        return set(range(len(objective.unknowns)))
+    if not _is_of_tables(objective):
+        return set()
+    sd = np.sqrt(np.diag(covariance))
+    correlated = np.abs(covariance / np.outer(sd, sd)) > _TOGETHER
+    strange = [i for i, name in enumerate(objective.names) if name in odd]
+    return {i for i in range(len(sd)) if i in strange or correlated[i, strange].any()}
 
 
 def _contradicted(objective: Objective, u: Float, covariance: Float) -> list[str]:

@@ -81,7 +81,15 @@ class LockInTerm:
         predicted, derivatives, outcome = self.forward(values, search=search)
         if not all_converged(outcome):
             return None
-        return residuals_of(self.weights, predicted, derivatives)
+        found = residuals_of(self.weights, predicted, derivatives)
+        # Derivatives may overflow far from all data, where an orbit still converges.
+        finite = np.isfinite(found.values).all() and np.isfinite(found.jacobian).all()
+        return found if finite else None
+
+    @property
+    def searches(self) -> bool:
+        """Whether every call searches for the orbits that the fast method does not find."""
+        return self.forward.uses_search
 
     def search_from_now_on(self) -> None:
         """Search for the orbits that the fast method does not find, at every call."""

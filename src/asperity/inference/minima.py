@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import chi2 as chi_squared
 from scipy.stats.qmc import Sobol
 
 from asperity.inference.forward import LockInTerm
@@ -24,11 +25,11 @@ _SAME = 1e-3
 
 #: Minimisations that have stopped short and go on with the slower method.
 _SEARCHED = 2
-#: Decrease of chi-squared that is worth that method, and as a share of it: less would change no
-#: verdict on a law that is far off.
-_GAIN, _LARGE_GAIN = 1.0, 0.1
-#: A coordinate nearer to its bound is there.
-_AT_BOUND = 1e-6
+#: Decrease of chi-squared that is worth that method: a tenth of a standard error.
+_GAIN = 0.01
+#: Of a law that is far off, with a probability below this, as a share of chi-squared: less would
+#: change no verdict.
+_FAR_OFF, _LARGE_GAIN = 1e-12, 0.1
 #: Parameters that laws extend others by: without them they are another law.
 _EXTENSIONS = ("lambda", "alpha")
 #: Their coordinate there, and the starts that are tried with it.
@@ -62,10 +63,24 @@ def minima_of(
     if found and not searched and _blocked(objective, *found[0]):
         best = found[0][1]
         objective.search_from_now_on()
-        found += [objective.minimise(u) for u, _ in found[:_SEARCHED]]
-        if min(value for _, value in found) > best - _GAIN:
+        stopped = _distinct(found)
+        followed = [objective.minimise(u) for u, _ in stopped[:_SEARCHED]]
+        if min(value for _, value in followed) > best - _GAIN:
             _search_no_more(objective)
+        else:
+            # The others are minima, or only where the fast method ends.
+            rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
+            found = [*followed, *rest]
     return sorted(found, key=lambda pair: pair[1])
+
+
+def _distinct(minima: list[tuple[Float, float]]) -> list[tuple[Float, float]]:
+    """Minima without those that repeat an earlier one."""
+    kept: list[tuple[Float, float]] = []
+    for u, value in minima:
+        if all(np.abs(u - other).max() > _SAME for other, _ in kept):
+            kept.append((u, value))
+    return kept
 
 
 def with_noise(
@@ -82,10 +97,7 @@ def with_noise(
         for term in noisy:
             term.update_noise(objective.named(begin))
         objective.forget()
-        starts = [minima[0][0]]
-        for u, _ in minima[1:]:
-            if min(np.abs(u - v).max() for v in starts) > _SAME:
-                starts.append(u)
+        starts = [u for u, _ in _distinct(minima)]
         minima = sorted((objective.minimise(u) for u in starts), key=lambda pair: pair[1])
         _, jacobian = objective.residuals(minima[0][0])
         away = jacobian @ (minima[0][0] - begin)
@@ -104,13 +116,10 @@ def _blocked(objective: Objective, u: Float, value: float) -> bool:
     tables = any(isinstance(term, LockInTerm) for term in objective.terms)
     if not tables or not math.isfinite(value):
         return False
-    r, J = objective.residuals(u)
-    gradient = J.T @ r
-    low, high = np.array([k.bounds for k in objective.unknowns]).T
-    outwards = np.where(gradient > 0, u - low, high - u) < _AT_BOUND
-    J, gradient = J[:, ~outwards], gradient[~outwards]
-    decrease = float(gradient @ np.linalg.pinv(J.T @ J, hermitian=True) @ gradient)
-    return decrease > max(_GAIN, _LARGE_GAIN * value)
+    decrease = objective.expected_decrease(u)
+    r, _ = objective.residuals(u)
+    far_off = chi_squared.sf(value, max(r.size - u.size, 1)) < _FAR_OFF
+    return decrease > (_LARGE_GAIN * value if far_off else _GAIN)
 
 
 def _search_no_more(objective: Objective) -> None:
@@ -118,6 +127,7 @@ def _search_no_more(objective: Objective) -> None:
     for term in objective.terms:
         if isinstance(term, LockInTerm):
             term.forward.uses_search = False
+    objective.forget()
 
 
 def _special_cases(objective: Objective, starts: list[Float]) -> list[Float]:

@@ -22,6 +22,9 @@ from asperity.laws import Law
 
 Float = NDArray[np.float64]
 
+#: A coordinate nearer to its bound is there.
+_AT_BOUND = 1e-6
+
 
 class DataTerm(Protocol):
     """One set of data in the likelihood.
@@ -214,8 +217,11 @@ class Objective:
         """Let every term try its slower method."""
         for term in self.terms:
             term.search_from_now_on()
+        self.forget()
 
-    def minimise(self, u: Float, kept: Mapping[int, float] | None = None) -> tuple[Float, float]:
+    def minimise(
+        self, u: Float, kept: Mapping[int, float] | None = None, *, tolerance: float | None = None
+    ) -> tuple[Float, float]:
         """Coordinates of the minimum that is reached from u, and its chi-squared.
 
         Parameters
@@ -223,12 +229,17 @@ class Objective:
         u : array, shape (n,)
         kept : mapping of int to float, optional
             Coordinates that stay at the given values.
+        tolerance : float, optional
+            Relative change of the coordinates that ends it, if not that of the objective.
         """
+        tolerance = self.tolerance if tolerance is None else tolerance
         kept = dict(kept or {})
         moving = [i for i in range(len(u)) if i not in kept]
         point = np.array(u, float)
         for i, value in kept.items():
             point[i] = value
+        low, high = np.array([self.unknowns[i].bounds for i in moving]).reshape(-1, 2).T
+        point[moving] = inside = np.clip(point[moving], low + 1e-10, high - 1e-10)
         if not moving or not math.isfinite(self.chi2(point)):
             return point, self.chi2(point)
 
@@ -241,21 +252,37 @@ class Objective:
             r, jacobian = self.residuals(whole(part))
             return compressed(np.column_stack([jacobian[:, moving], r]))
 
-        low, high = np.array([self.unknowns[i].bounds for i in moving]).T
-        inside = np.clip(point[moving], low + 1e-10, high - 1e-10)
         result = least_squares(
             lambda part: triangle(part)[:, -1],
             inside,
             jac=lambda part: triangle(part)[:, :-1],
             bounds=(low, high),
             x_scale="jac",
-            xtol=self.tolerance,
-            ftol=1e-2 * self.tolerance,
-            gtol=self.tolerance,
+            xtol=tolerance,
+            ftol=1e-2 * tolerance,
+            gtol=tolerance,
             max_nfev=100,
         )
         found = whole(result.x)
         return found, self.chi2(found)
+
+    def expected_decrease(self, u: Float) -> float:
+        """Decrease of chi-squared that residuals linear in the coordinates would allow.
+
+        Nearly 0 at a minimum, bounds included. More where a minimisation has stopped at the edge of
+        the region in which the residuals exist.
+        """
+        r, J = self.residuals(u)
+        gradient = J.T @ r
+        low, high = np.array([k.bounds for k in self.unknowns]).T
+        outwards = np.where(gradient > 0, u - low, high - u) < _AT_BOUND
+        J, gradient = J[:, ~outwards], gradient[~outwards]
+        return float(gradient @ np.linalg.pinv(J.T @ J, hermitian=True) @ gradient)
+
+    @property
+    def searches(self) -> bool:
+        """Whether every lock-in table has its slower method tried at every call."""
+        return all(getattr(term, "searches", True) for term in self.terms)
 
 
 def compressed(columns: Float) -> Float:

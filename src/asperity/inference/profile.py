@@ -17,14 +17,16 @@ Float = NDArray[np.float64]
 _STEPS = 12
 #: Accuracy of an end, in standard deviations.
 _ACCURACY = 1e-2
+#: Relative change of the other coordinates that ends a minimisation: chi-squared is good to 1e-4.
+_TOLERANCE = 1e-5
+#: Standard deviations below the threshold at which a profile that ends has an edge, not an end.
+_JUMP = 0.1
 #: Rise of chi-squared that stands for values without a periodic orbit.
 _NO_ORBIT = 1e3
 
 
-def profile_interval(
-    objective: Objective, i: int, u: Float, chi2: float, covariance: Float, level: float
-) -> tuple[Interval, tuple[Float, float]]:
-    """Ends of the confidence interval of a coordinate, and the lowest point on the way.
+class Profile:
+    """chi-squared along one coordinate, minimised over the others; each point is computed once.
 
     Parameters
     ----------
@@ -35,59 +37,77 @@ def profile_interval(
         The minimum.
     covariance : array, shape (n, n)
         Of the coordinates, by the normal approximation.
-    level : float
-        Coverage.
-
-    Returns
-    -------
-    ends : (float, float)
-        Infinite or the bound where the profile stays below the threshold.
-    lowest : (array, float)
-        Coordinates and chi-squared; below the minimum where that was not the lowest one.
     """
-    low, high = objective.unknowns[i].bounds
-    side = _Side(objective, i, u, chi2, covariance, level)
-    ends = side.end(-1, low), side.end(1, high)
-    return ends, min(side.path.values(), key=lambda point: point[1])
-
-
-class _Side:
-    """The profile of one coordinate, each point of it computed once."""
 
     def __init__(
-        self, objective: Objective, i: int, u: Float, chi2: float, covariance: Float, level: float
+        self, objective: Objective, i: int, u: Float, chi2: float, covariance: Float
     ) -> None:
-        self.objective, self.i, self.u, self.chi2, self.level = objective, i, u, chi2, level
+        self.objective, self.i, self.u, self.chi2 = objective, i, u, chi2
         # No farther at once than a factor of e, where the approximation may be worth nothing.
         self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
         self.along = covariance[:, i] / covariance[i, i]
         self.path = {float(u[i]): (u, chi2)}
 
-    def end(self, sign: int, bound: float) -> float:
+    @property
+    def lowest(self) -> tuple[Float, float]:
+        """Lowest point on the way; below the minimum where that was not the lowest one."""
+        return min(self.path.values(), key=lambda point: point[1])
+
+    def interval(self, level: float) -> Interval:
+        """Ends of the confidence interval of a coverage.
+
+        An end is infinite, or the bound, where the profile stays below the threshold.
+        """
+        low, high = self.objective.unknowns[self.i].bounds
+        return self._end(level, -1, low), self._end(level, 1, high)
+
+    def _end(self, level: float, sign: int, bound: float) -> float:
         """Where the profile passes the threshold on one side."""
+
+        def excess(x: float) -> float:
+            return self._excess(x, level)
+
         inner = float(self.u[self.i])
-        width = 1.05 * self.sd * math.sqrt(bounded_threshold(math.inf, self.level))
+        width = 1.05 * self.sd * math.sqrt(bounded_threshold(math.inf, level))
         for _ in range(_STEPS):
             outer = inner + sign * width
             if sign * (outer - bound) >= 0:
                 outer = bound - sign * 1e-9 * self.sd
-                if self.excess(outer) <= 0:
+                if excess(outer) <= 0:
                     return bound
-            if self.excess(outer) > 0:
-                return float(brentq(self.excess, inner, outer, xtol=_ACCURACY * self.sd))
+            if excess(outer) > 0:
+                end = float(brentq(excess, inner, outer, xtol=_ACCURACY * self.sd))
+                within = [x for x in self.path if sign * (end - x) >= 0]
+                last = max(within, key=lambda x: sign * x)
+                if excess(last) < -_JUMP and not self.objective.searches:
+                    # The fast method has no orbit beyond, which says nothing about the data.
+                    self.objective.search_from_now_on()
+                    return self._end(level, sign, bound)
+                return end
             inner, width = outer, 2 * width
         return sign * math.inf
 
-    def excess(self, x: float) -> float:
+    def _excess(self, x: float, level: float) -> float:
         """Root of the rise of chi-squared less that of its threshold: nearly linear in x."""
         if x not in self.path:
             nearest = min(self.path, key=lambda known: abs(known - x))
-            begin = self.path[nearest][0] + self.along * (x - nearest)
-            found, value = self.objective.minimise(begin, {self.i: x})
-            if not math.isfinite(value):
+            for begin in (self._start(x), self.path[nearest][0]):
+                found, value = self.objective.minimise(begin, {self.i: x}, tolerance=_TOLERANCE)
+                if math.isfinite(value):
+                    break
+            else:
                 return math.sqrt(_NO_ORBIT)
             self.path[x] = found, value
         low, high = self.objective.unknowns[self.i].bounds
-        limit = bounded_threshold(min(x - low, high - x) / self.sd, self.level)
+        limit = bounded_threshold(min(x - low, high - x) / self.sd, level)
         rise = max(self.path[x][1] - self.chi2, 0.0)
         return math.sqrt(rise) - math.sqrt(limit)
+
+    def _start(self, x: float) -> Float:
+        """The others on the line through the nearest points known, or by the approximation."""
+        first, *others = sorted(self.path, key=lambda known: abs(known - x))
+        begin = self.path[first][0]
+        second = next((other for other in others if abs(other - first) > _ACCURACY * self.sd), None)
+        if second is None:
+            return begin + self.along * (x - first)
+        return begin + (begin - self.path[second][0]) * ((x - first) / (first - second))
