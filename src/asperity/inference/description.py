@@ -21,6 +21,8 @@ Float = NDArray[np.float64]
 
 #: Minima are the same if their chi-squared differs by less and no coordinate by more.
 _SAME_CHI2, _SAME_COORDINATE = 1e-3, 1e-2
+#: Coverage of the intervals.
+_LEVELS = (math.erf(1 / math.sqrt(2)), 0.95)
 #: Other minima this close in chi-squared are reported: 3 standard deviations.
 _RIVAL = 9.0
 #: Where chi-squared is compared with its parabola, in standard deviations, and the rises there
@@ -106,14 +108,18 @@ def described_fit(
         and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > _UNDETERMINED)
     )
     bent = [] if profile else _bent(objective, (u, chi2), covariance, missing)
+    rivals = _rivals(objective, minima, sd)
     profiled = _profiled(objective, covariance, {*bent, *undetermined}, everything=profile)
     estimates = {}
     for i, unknown in enumerate(objective.unknowns):
         low, high = unknown.bounds
         at_bound = min(u[i] - low, high - u[i]) < _AT_BOUND * max(sd[i], 1e-12)
         ends = []
-        along = Profile(objective, i, u, chi2, covariance) if i in profiled else None
-        for level in (math.erf(1 / math.sqrt(2)), 0.95):
+        searching = profile or unknown.name not in undetermined
+        along = (
+            Profile(objective, i, u, chi2, covariance, search=searching) if i in profiled else None
+        )
+        for level in _LEVELS:
             if along is not None:
                 ends.append(along.interval(level))
                 if along.lowest[1] < chi2 - _LOWER:
@@ -124,6 +130,10 @@ def described_fit(
                 ends.append((low, high))
             else:
                 ends.append(bounded_interval(unbounded[i], float(sd[i]), level, low, high))
+        ends = [
+            _hull(objective, i, interval, [(v, value - chi2) for v, value in rivals], level)
+            for interval, level in zip(ends, _LEVELS, strict=True)
+        ]
         narrow, wide = ((unknown.end(a), unknown.end(b)) for a, b in ends)
         value = float(unknown.to_value(u[i]))
         estimates[unknown.name] = Estimate(
@@ -157,7 +167,7 @@ def described_fit(
         bic=deviance + k * math.log(n),
         observables=_observables(data),
         residuals=tuple(data),
-        optima=_rivals(objective, minima, sd),
+        optima=tuple(Optimum(value, objective.named(v)) for v, value in rivals),
         warnings=(),
         objective=objective,
     )
@@ -293,7 +303,7 @@ def _lowered(objective: Objective, u: Float, i: int) -> float:
 
 def _rivals(
     objective: Objective, minima: Sequence[tuple[Float, float]], sd: Float
-) -> tuple[Optimum, ...]:
+) -> list[tuple[Float, float]]:
     """Other minima that the data do not exclude and that would be other answers."""
     asked = np.array([not k.nuisance for k in objective.unknowns])
     kept = [minima[0]]
@@ -308,7 +318,34 @@ def _rivals(
             for v, other in kept
         ):
             kept.append((u, chi2))
-    return tuple(Optimum(chi2, objective.named(u)) for u, chi2 in kept[1:])
+    return kept[1:]
+
+
+def _hull(
+    objective: Objective,
+    i: int,
+    interval: tuple[float, float],
+    rivals: Sequence[tuple[Float, float]],
+    level: float,
+) -> tuple[float, float]:
+    """An interval widened by what other minima leave below the threshold of chi-squared.
+
+    Parameters
+    ----------
+    rivals : sequence of (array, float)
+        Coordinates and rise of chi-squared above the lowest minimum.
+    """
+    low, high = interval
+    threshold = float(chi_squared.ppf(level, 1))
+    bounds = objective.unknowns[i].bounds
+    for v, rise in rivals:
+        if rise >= threshold:
+            continue
+        J = objective.residuals(v)[1]
+        sd = math.sqrt(inverse_information(J.T @ J)[0][i, i])
+        reach = sd * math.sqrt(threshold - rise)
+        low, high = min(low, v[i] - reach), max(high, v[i] + reach)
+    return max(low, min(interval[0], bounds[0])), min(high, max(interval[1], bounds[1]))
 
 
 def _with_warnings(found: Fit, said: list[str]) -> Fit:
@@ -332,10 +369,14 @@ def _with_warnings(found: Fit, said: list[str]) -> Fit:
     for name, estimate in found.parameters.items():
         if estimate.at_bound:
             said.append(f"{name} is at its bound {estimate.value:.4g} {estimate.unit}".rstrip())
-    if found.optima:
+    for other in found.optima:
+        at = ", ".join(
+            f"{n} {other.values[n]:.4g} {p.unit}".rstrip() for n, p in found.parameters.items()
+        )
         said.append(
-            f"{len(found.optima)} more minimum of chi-squared lies within 3 standard deviations; "
-            "see optima"
+            f"another minimum of chi-squared lies {other.chi2 - found.chi2:.3g} higher, at {at}: "
+            "intervals hold both where the data allow both; measure at other operating points to "
+            "tell them apart"
         )
     return replace(found, warnings=tuple(said))
 

@@ -37,12 +37,23 @@ class Profile:
         The minimum.
     covariance : array, shape (n, n)
         Of the coordinates, by the normal approximation.
+    search : bool
+        Whether orbits are searched for where the fast method ends; without, an interval that gets
+        there is open.
     """
 
     def __init__(
-        self, objective: Objective, i: int, u: Float, chi2: float, covariance: Float
+        self,
+        objective: Objective,
+        i: int,
+        u: Float,
+        chi2: float,
+        covariance: Float,
+        *,
+        search: bool,
     ) -> None:
         self.objective, self.i, self.u, self.chi2 = objective, i, u, chi2
+        self.search = search
         # No farther at once than a factor of e, where the approximation may be worth nothing.
         self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
         self.along = covariance[:, i] / covariance[i, i]
@@ -81,6 +92,8 @@ class Profile:
                 last = max(within, key=lambda x: sign * x)
                 if excess(last) < -_JUMP and not self.objective.searches:
                     # The fast method has no orbit beyond, which says nothing about the data.
+                    if not self.search:
+                        return sign * math.inf
                     self.objective.search_from_now_on()
                     return self._end(level, sign, bound)
                 return end

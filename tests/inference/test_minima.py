@@ -1,0 +1,104 @@
+"""Several minima, and minima beyond the edge of the fast method, of residuals in closed form."""
+
+import math
+
+import numpy as np
+import pytest
+
+from asperity.inference.description import described_fit
+from asperity.inference.forward import LockInTerm
+from asperity.inference.minima import minima_of
+from asperity.inference.objective import Objective
+from asperity.inference.profile import Profile
+from asperity.inference.residuals import Residuals
+from asperity.inference.unknowns import unknowns_of
+from asperity.laws import get_law
+
+LAW = get_law("rice-ruina")
+
+
+class Formula(LockInTerm):
+    """Residuals that are a function of ln D0, where a method finds them.
+
+    `values` gives residuals and their derivatives; only the slow method goes beyond `edge`.
+    """
+
+    def __init__(self, values, edge=math.inf):
+        self.values, self.edge, self.searching = values, edge, False
+
+    name, observables, noise = "formula", ("mu1",), {"model": "none", "effective_samples": 1}
+
+    @property
+    def searches(self):
+        return self.searching
+
+    def search_from_now_on(self):
+        self.searching = True
+
+    def warnings(self, residuals):
+        return []
+
+    def residuals(self, values, *, search=None):
+        x = math.log(values["D0"])
+        if x > self.edge and not self.searching:
+            return None
+        r, slope = self.values(x)
+        n = r.size
+        return Residuals(
+            r, (slope / values["D0"])[:, None], np.full(n, "mu1"), np.arange(n), log_scale=0.0
+        )
+
+
+def objective_of(values, start, edge=math.inf):
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": start}, priors={})
+    return Objective((Formula(values, edge),), LAW, unknowns, {})
+
+
+#: Minima of equal depth, in ln D0, and the slope of the residual there.
+FIRST, SECOND, SLOPE = math.log(1e-6), math.log(4e-6), 8.0
+
+
+def two_minima(x):
+    """A residual that is zero twice, and 99 that say nothing, of chi-squared 99."""
+    gap = SECOND - FIRST
+    r, slope = np.ones(100), np.zeros(100)
+    r[0] = SLOPE * (x - FIRST) * (x - SECOND) / gap
+    slope[0] = SLOPE * (2 * x - FIRST - SECOND) / gap
+    return r, slope
+
+
+def test_both_minima_are_found_and_intervals_hold_both():
+    objective = objective_of(two_minima, 5e-7)
+    found = described_fit(objective, minima_of(objective, 0, lambda _: None), profile=False)
+    (other,) = found.optima
+    pair = sorted([found.values["D0"], other.values["D0"]])
+    np.testing.assert_allclose(np.log(pair), [FIRST, SECOND], atol=1e-6)
+    low, high = found.parameters["D0"].interval_95
+    # Standard errors of 1/SLOPE about either.
+    assert math.log(low) == pytest.approx(FIRST - 1.96 / SLOPE, abs=0.02)
+    assert math.log(high) == pytest.approx(SECOND + 1.96 / SLOPE, abs=0.02)
+    assert any("another minimum" in w and "D0" in w for w in found.warnings)
+
+
+def one_minimum(x):
+    r, slope = np.ones(100), np.zeros(100)
+    r[0], slope[0] = SLOPE * (x - FIRST), SLOPE
+    return r, slope
+
+
+def test_a_minimum_beyond_the_fast_method_is_found():
+    # At the edge chi-squared is 4 above its minimum of 99: nothing that shows in its probability.
+    objective = objective_of(one_minimum, 3e-7, edge=FIRST - 2 / SLOPE)
+    found = described_fit(objective, minima_of(objective, 0, lambda _: None), profile=False)
+    assert math.log(found.values["D0"]) == pytest.approx(FIRST, abs=1e-6)
+    assert not found.optima
+
+
+def test_a_profile_goes_on_where_the_fast_method_ends():
+    objective = objective_of(one_minimum, 1e-6, edge=FIRST + 1 / SLOPE)
+    u, chi2 = objective.minimise(np.array([FIRST]))
+    covariance = np.array([[SLOPE**-2]])
+    open_end = Profile(objective, 0, u, chi2, covariance, search=False).interval(0.95)
+    assert open_end[1] == math.inf
+    closed = Profile(objective, 0, u, chi2, covariance, search=True).interval(0.95)
+    np.testing.assert_allclose(closed, FIRST + 1.96 / SLOPE * np.array([-1, 1]), atol=0.003)
