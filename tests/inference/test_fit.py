@@ -158,6 +158,9 @@ def test_laws_that_the_data_cannot_tell_apart_stay(readings, pmma):
     [
         ({"mu1_err": 0.0}, "mu1_err must be positive, got 0 in row 1"),
         ({"mu1_err": None}, "got no column mu1_err"),
+        ({"mu1": [1e-3, np.inf]}, "mu1 must be finite, got inf in row 2"),
+        ({"mu1": [-1e-3, 2e-3]}, "mu1 must be an amplitude, at least 0, got -0.001 in row 1"),
+        ({"phase1": -90.0, "phase1_err": 1.0}, "phase1 must be in rad"),
         ({"epsilon": 1.0}, "epsilon must"),
         ({"V": -1e-6}, "V must be positive"),
         ({"pull": [0.0, 0.1]}, "pull must be 0, since fits are to a harmonic load, got 0.1"),
@@ -195,6 +198,12 @@ def test_a_row_twice_is_refused():
         ({"free": ("V0",)}, "free mu0 instead"),
         ({"free": ("alpha",)}, "must be parameters of elasto-plastic"),
         ({"free": ("A", "A")}, "'A' twice"),
+        ({"free": ()}, "free must name a parameter of elasto-plastic, got none"),
+        ({"free": ("A",), "prior": {"B": Prior(0.02, 0.01, "")}}, "prior must be of free"),
+        (
+            {"free": ("A",), "prior": {"A": Prior(-1.0, 0.1, "")}},
+            "must have a positive mean, got -1",
+        ),
         ({"free": ("A",), "fixed": {"A": 0.01}}, "free or fixed"),
         ({"free": ("A",), "fixed": {"alpha": 0.1}}, "fixed must be parameters"),
         ({"free": ("A",), "fixed": {"tilt": 0.1}}, "fixed must be parameters of a harmonic load"),

@@ -69,7 +69,7 @@ def two_minima(x):
 
 def test_both_minima_are_found_and_intervals_hold_both():
     objective = objective_of(two_minima, 5e-7)
-    found = described_fit(objective, minima_of(objective, 0, lambda _: None), profile=False)
+    found = described_fit(objective, minima_of(objective, 0), profile=False)
     (other,) = found.optima
     pair = sorted([found.values["D0"], other.values["D0"]])
     np.testing.assert_allclose(np.log(pair), [FIRST, SECOND], atol=1e-6)
@@ -89,7 +89,7 @@ def one_minimum(x):
 def test_a_minimum_beyond_the_fast_method_is_found():
     # At the edge chi-squared is 4 above its minimum of 99: nothing that shows in its probability.
     objective = objective_of(one_minimum, 3e-7, edge=FIRST - 2 / SLOPE)
-    found = described_fit(objective, minima_of(objective, 0, lambda _: None), profile=False)
+    found = described_fit(objective, minima_of(objective, 0), profile=False)
     assert math.log(found.values["D0"]) == pytest.approx(FIRST, abs=1e-6)
     assert not found.optima
 
@@ -102,3 +102,10 @@ def test_a_profile_goes_on_where_the_fast_method_ends():
     assert open_end[1] == math.inf
     closed = Profile(objective, 0, u, chi2, covariance, search=True).interval(0.95)
     np.testing.assert_allclose(closed, FIRST + 1.96 / SLOPE * np.array([-1, 1]), atol=0.003)
+
+
+def test_progress_counts_the_starts_that_are_followed():
+    calls = []
+    minima_of(objective_of(one_minimum, 1e-6), 0, lambda done, total: calls.append((done, total)))
+    total = calls[-1][1]
+    assert calls == [(done, total) for done in range(1, total + 1)]

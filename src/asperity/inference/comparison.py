@@ -21,6 +21,7 @@ from asperity.inference.table import LockInTable, joined
 from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law
 from asperity.parameters import law_parameters
+from asperity.parameters.arguments import counted
 
 #: A law is excluded by its own misfit below this probability of chi-squared, if another law is not.
 _IMPOSSIBLE = 1e-3
@@ -94,7 +95,7 @@ def compare(
     free: Sequence[str],
     *,
     evidence: bool = True,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> Comparison:
     """Fit several laws to the same data and say which of them the data exclude.
@@ -108,7 +109,7 @@ def compare(
     evidence : bool
         Whether to compute evidence and leave-one-run-out cross-validation too.
     progress : callable, optional
-        As of `fit`.
+        Called with the number of laws fitted to all data so far, and of all laws.
     **options
         As of `fit`.
 
@@ -136,10 +137,14 @@ def compare(
     several = listed_data(data)
     own = {name: _own(name, free, laws) for name in dict.fromkeys(laws)}
 
-    given = {key: options.pop(key) for key in ("fixed", "start") if options.get(key)}
+    given = {
+        key: options.pop(key)
+        for key in ("fixed", "start", "prior")
+        if options.get(key) and isinstance(options[key], Mapping)
+    }
     not_compared: dict[str, str] = {}
 
-    def fits_to(data: Sequence[Any]) -> dict[str, Fit]:
+    def fits_to(data: Sequence[Any], advance: Callable[[int], None]) -> dict[str, Fit]:
         done = {}
         for name, names in own.items():
             mine: dict[str, Any] = {
@@ -147,12 +152,13 @@ def compare(
                 for key, values in given.items()
             }
             try:
-                done[name] = fit(data, name, names, progress=progress, **mine, **options)
+                done[name] = fit(data, name, names, **mine, **options)
             except MissingNumberError as error:
                 not_compared[name] = str(error)
+            advance(1)
         return done
 
-    fits = fits_to(several)
+    fits = fits_to(several, counted(progress, len(own)))
     if len(fits) < 2:
         raise InputError(
             f"laws must have numbers of two or more, got them of {len(fits)}; "
@@ -163,7 +169,7 @@ def compare(
     if outliers:
         table = joined([d for d in several if isinstance(d, LockInTable)])[0]
         out = np.isin(np.arange(table.rows), outliers)
-        rest = judge(fits_to([table.without(out)]))
+        rest = judge(fits_to([table.without(out)], lambda _: None))
         found = _without(found, rest, table.row_names[out].tolist())
     found = replace(found, not_compared=not_compared)
     return _examined(found) if evidence else found

@@ -16,7 +16,7 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.inference.description import described_fit, failed_fit
 from asperity.inference.forward import Forward, LockInTerm
-from asperity.inference.inputs import fixed_values, require_enough, start_values
+from asperity.inference.inputs import fixed_values, require_enough, require_free, start_values
 from asperity.inference.minima import minima_of, with_noise
 from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.result import Fit
@@ -55,7 +55,7 @@ def fit(
     profile: bool = False,
     starts: int = 64,
     seed: int = 0,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
     """Fit a friction law to lock-in readings and recordings.
 
@@ -88,7 +88,7 @@ def fit(
     seed : int
         Of the starts.
     progress : callable, optional
-        Called with the number of minimisations finished since the last call.
+        Called with the number of starts followed to their minima so far, and of all of them.
 
     Returns
     -------
@@ -122,7 +122,7 @@ def fit(
         options=runs or RunOptions(),
         motion={"inertia": inertia, "radiation_damping": radiation_damping},
     )
-    minima = minima_of(objective, seed, progress or (lambda _: None), drawn=starts)
+    minima = minima_of(objective, seed, progress, drawn=starts)
     if not minima:
         return failed_fit(objective)
     if recordings:
@@ -204,6 +204,8 @@ def _objective(
         )
     )
     terms: list[DataTerm] = []
+    if table is not None and not recordings:
+        require_free(law, free, priors)
     if table is not None:
         require_enough(table, unknowns)
         terms.append(LockInTerm(table, Forward(law, table, constants, **motion)))

@@ -10,7 +10,7 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.table import LockInTable
-from asperity.inference.unknowns import EPS_RATIO, MissingNumberError, Unknown
+from asperity.inference.unknowns import EPS_RATIO, MissingNumberError, Prior, Unknown
 from asperity.laws import Law
 from asperity.materials import Material
 from asperity.parameters import MODULATION, point_parameters
@@ -126,6 +126,24 @@ def _checked(law: type[Law], name: str, value: Any) -> Any:
     """A value in SI; a text has its unit."""
     known = {**point_parameters(law), EPS_RATIO.name: EPS_RATIO}
     return known[name].check(value)
+
+
+def require_free(law: type[Law], free: Sequence[str], priors: Mapping[str, Prior]) -> None:
+    """Refuse a fit to tables without free parameters, and priors of others.
+
+    Raises
+    ------
+    InputError
+    """
+    if not free:
+        raise MissingNumberError(
+            f"free must name a parameter of {law.name}, got none; free one, such as A or eps_ratio"
+        )
+    for name in priors:
+        if name not in free:
+            raise InputError(
+                f"prior must be of free parameters, got '{name}'; free it or leave the prior out"
+            )
 
 
 def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:

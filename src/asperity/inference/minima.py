@@ -13,6 +13,7 @@ from scipy.stats.qmc import Sobol
 from asperity.inference.forward import LockInTerm
 from asperity.inference.objective import Objective
 from asperity.inference.runs.term import RunTerm
+from asperity.parameters.arguments import counted
 
 Float = NDArray[np.float64]
 
@@ -37,9 +38,16 @@ _NEARLY_ZERO, _TRIED = 1e-4, 16
 
 
 def minima_of(
-    objective: Objective, seed: int, progress: Callable[[int], None], *, drawn: int = 64
+    objective: Objective,
+    seed: int,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    drawn: int = 64,
 ) -> list[tuple[Float, float]]:
-    """Minima from the given start and from the best of many drawn ones, best first."""
+    """Minima from the given start and from the best of many drawn ones, best first.
+
+    `progress` is called with the number of starts that were followed, and of all to be followed.
+    """
     unknowns = objective.unknowns
     starts: list[Float] = []
     middle = np.array([float(u.to_coordinate(u.middle)) for u in unknowns])
@@ -56,21 +64,23 @@ def minima_of(
     order = [i for i in np.argsort(chi2) if math.isfinite(chi2[i])]
     starts = [candidates[i] for i in dict.fromkeys([*(i for i in order if i == 0), *order])]
     found: list[tuple[Float, float]] = []
-    for start in [*starts[: _FOLLOWED + 1], *_special_cases(objective, starts)]:
+    followed = [*starts[: _FOLLOWED + 1], *_special_cases(objective, starts)]
+    advance = counted(progress, len(followed))
+    for start in followed:
         found.append(objective.minimise(start))
-        progress(1)
+        advance(1)
     found.sort(key=lambda pair: pair[1])
     if found and not searched and _blocked(objective, *found[0]):
         best = found[0][1]
         objective.search_from_now_on()
         stopped = _distinct(found)
-        followed = [objective.minimise(u) for u, _ in stopped[:_SEARCHED]]
-        if min(value for _, value in followed) > best - _GAIN:
+        beyond = [objective.minimise(u) for u, _ in stopped[:_SEARCHED]]
+        if min(value for _, value in beyond) > best - _GAIN:
             _search_no_more(objective)
         else:
             # The others are minima, or only where the fast method ends.
             rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
-            found = [*followed, *rest]
+            found = [*beyond, *rest]
     return sorted(found, key=lambda pair: pair[1])
 
 

@@ -399,6 +399,7 @@ def _observables(
         )
     errors = {}
     for name, column in values.items():
+        _refuse_impossible_values(table, name, column)
         if f"{name}_err" not in observed:
             raise InputError(
                 f"{table} must have the standard uncertainty of {name}, got no column {name}_err; "
@@ -428,6 +429,25 @@ def _observables(
                     f"{np.flatnonzero(alone)[0] + 1}; a phase weighs as much as its amplitude"
                 )
     return values, errors
+
+
+def _refuse_impossible_values(table: str, name: str, column: Float) -> None:
+    """Refuse infinite values, negative amplitudes, and phases that are in degrees."""
+    rules = [(np.isinf(column), "be finite", "leave the cell empty")]
+    if name in ("mu1", "mu2"):
+        rules.append(
+            (column < 0, "be an amplitude, at least 0", f"put the sign into phase{name[-1]}")
+        )
+    if name in ("phase1", "phase2"):
+        rules.append(
+            (np.abs(column) > 2 * math.pi, "be in rad, from -2 pi to 2 pi", "convert degrees")
+        )
+    for bad, rule, advice in rules:
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            raise InputError(
+                f"{table}.{name} must {rule}, got {column[row]:g} in row {row + 1}; {advice}"
+            )
 
 
 def _refuse_impossible(table: LockInTable) -> None:

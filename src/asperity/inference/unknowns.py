@@ -214,10 +214,15 @@ def unknown_of(
     Raises
     ------
     InputError
-        If nothing says where to look for it.
+        If nothing says where to look for it, or its prior is where it cannot be.
     """
     name = parameter.name
     positive = parameter.rule == "positive"
+    if prior is not None and positive and prior.mean <= 0:
+        raise InputError(
+            f"prior of {name} must have a positive mean, got {prior.mean:g} {parameter.unit}".rstrip()
+            + "; correct it"
+        )
     middle = given if given else prior.mean if prior else None
     if usual is not None:
         low, high = usual
