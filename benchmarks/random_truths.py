@@ -118,10 +118,10 @@ def main():
                 file.write(json.dumps(rows[-1]) + "\n")
     missed = sum(row["missed_by"] > 0.01 for row in rows)
     seconds = np.array([row["seconds"] for row in rows])
+    unlikely = sum(row["p_value"] < 0.05 for row in rows)
+    print(f"{chosen.law}: {len(rows)} tables, {missed} minima missed, {unlikely} with p < 0.05")
     print(
-        f"{chosen.law}: {len(rows)} tables, {missed} minima missed, p below 0.05 in "
-        f"{sum(row['p_value'] < 0.05 for row in rows)}; {np.median(seconds):.2f} s of processor time "
-        f"a fit in the median, {seconds.max():.1f} s at most"
+        f"processor time: {np.median(seconds):.2f} s a fit (median), {seconds.max():.1f} s at most"
     )
     print("| parameter | 68.3 % | 95 % |\n|---|---|---|")
     for name in rows[0]["inside"]:

@@ -220,8 +220,7 @@ def unknown_of(
     positive = parameter.rule == "positive"
     if prior is not None and positive and prior.mean <= 0:
         raise InputError(
-            f"prior of {name} must have a positive mean, got {prior.mean:g} {parameter.unit}".rstrip()
-            + "; correct it"
+            f"prior of {name} must have a positive mean, got {prior.mean:g}; correct it"
         )
     middle = given if given else prior.mean if prior else None
     if usual is not None:
