@@ -7,6 +7,7 @@ ever (seen with jaxlib 0.10.2 on two cores).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import jax
@@ -242,17 +243,32 @@ def scaled_product(maps: Array) -> tuple[Array, Array]:
         Divided by the exponential of its scale.
     log_scale : array, shape (points,)
     """
-    log_scale = jnp.zeros(maps.shape[3])
-    while maps.shape[2] > 1:  # neighbours first: many products side by side
-        if maps.shape[2] % 2:
-            identity = jnp.broadcast_to(jnp.eye(len(maps))[..., None, None], maps[:, :, :1].shape)
-            maps = jnp.concatenate([maps, identity], axis=2)
-        maps = product(maps[:, :, 1::2], maps[:, :, ::2])
-        size = jnp.abs(maps).max((0, 1))
+    n, _, intervals, points = maps.shape
+    # The root of their number side by side, and then the products of these: few operations to
+    # compile, and an error that grows with the root only.
+    length = math.isqrt(intervals - 1) + 1
+    blocks = -(-intervals // length)
+    added = (n, n, blocks * length - intervals, points)
+    padding = jnp.broadcast_to(jnp.eye(n)[..., None, None], added)
+    maps = jnp.concatenate([maps, padding], axis=2).reshape(n, n, blocks, length, points)
+    rows, scales = _scaled_products(jnp.moveaxis(maps, 3, 0))
+    whole, scale = _scaled_products(jnp.moveaxis(rows, 2, 0))
+    return whole, scale + scales.sum(0)
+
+
+def _scaled_products(factors: Array) -> tuple[Array, Array]:
+    """Products over the first axis of (count, n, n, ...), and the logarithms of their scales."""
+
+    def step(carry: tuple[Array, Array], factor: Array) -> tuple[tuple[Array, Array], None]:
+        done, log_scale = carry
+        done = product(factor, done)
+        size = jnp.abs(done).max((0, 1))
         size = jnp.where(size > 0, size, 1.0)
-        maps = maps / size
-        log_scale = log_scale + jnp.log(size).sum(0)
-    return maps[:, :, 0], log_scale
+        return (done / size, log_scale + jnp.log(size)), None
+
+    start = factors[0], jnp.zeros(factors.shape[3:])
+    (whole, log_scale), _ = jax.lax.scan(step, start, factors[1:])
+    return whole, log_scale
 
 
 def spectral_radius(matrix: Array) -> Array:

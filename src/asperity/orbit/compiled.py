@@ -13,7 +13,7 @@ from asperity.algebra.small_systems import jacobian_columns, scaled_product, spe
 from asperity.loads import Excitation, Harmonic
 from asperity.orbit.methods.collocation.condensation import condense, localise, transfer_maps
 from asperity.orbit.methods.collocation.inertial_guess import inertial_guess
-from asperity.orbit.methods.collocation.mesh import Orbit, split
+from asperity.orbit.methods.collocation.mesh import Orbit, resampled, split
 from asperity.orbit.methods.collocation.newton import (
     NewtonResult,
     averaged_orbit,
@@ -187,11 +187,11 @@ def refine_orbit(
     problem, guess = problem_and_orbit
 
     def unfinished(carry: tuple) -> Array:
-        _, error, rounds = carry
+        *_, error, rounds = carry
         return (rounds < _ROUNDS) & jnp.any(error > ACCEPTED)
 
     def body(carry: tuple) -> tuple:
-        best, error, rounds = carry
+        best, first, error, rounds = carry
         mesh = refined(*problem, best, intervals)
         result = _newton(problem, mesh, 15)
         done = error < ACCEPTED
@@ -200,13 +200,14 @@ def refine_orbit(
         moved = _where(usable, result.orbit, mesh)
         return (
             _where(done, best, moved),
+            _where(rounds == 0, mesh, first),
             jnp.where(done, error, result.error),
             rounds + 1,
         )
 
-    first = refined(*problem, guess, intervals)
-    start = (first, jnp.full(_points(problem), jnp.inf), 0)
-    orbit, error, _ = jax.lax.while_loop(unfinished, body, start)
+    cut = resampled(guess, intervals)
+    start = (cut, cut, jnp.full(_points(problem), jnp.inf), 0)
+    orbit, first, error, _ = jax.lax.while_loop(unfinished, body, start)
     orbit = _where(error < ACCEPTED, orbit, first)
     return orbit, _observables(problem, orbit, harmonics), error
 

@@ -30,7 +30,7 @@ from asperity.orbit.methods.fourier.orbit import (
 from asperity.slider.problem import Problem
 
 #: Steps that a linear system is given beyond those that the orbit took.
-_MORE_STEPS = 2
+_MORE_STEPS = 1
 #: Last change of the Floquet factor.
 _FLOQUET_TOLERANCE = 1e-11
 

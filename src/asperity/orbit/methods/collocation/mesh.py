@@ -110,28 +110,30 @@ def evaluate(orbit: Orbit, theta: Array) -> tuple[Array, Array]:
 
     index = jnp.clip(jax.vmap(find, (1, 1), 1)(orbit.mesh, theta), 0, intervals - 1)
 
-    def pick(a: Array) -> Array:
-        return jnp.take_along_axis(a, index, 0)
-
-    width = pick(orbit.widths)
-    x = (theta - pick(orbit.mesh[:-1])) / width
     coefficients = jnp.einsum("kj,njmb->nkmb", orbit.scheme.monomials, orbit.slopes)
+    size, degree = coefficients.shape[:2]
+    # All in one gather: each is a program of its own to compile.
+    rows = [orbit.mesh[None, :-1], orbit.widths[None], orbit.nodes]
+    rows = jnp.concatenate([*rows, coefficients.reshape(-1, *orbit.widths.shape)])
+    start, width, *picked = jnp.take_along_axis(rows, index[None], 1)
+    x = (theta - start) / width
     states, slopes = [], []
-    for node, coefficient in zip(orbit.nodes, coefficients, strict=True):
-        picked = [pick(c) for c in coefficient]
-        slopes.append(sum(c * x**k for k, c in enumerate(picked)))
-        rise = sum(c * x ** (k + 1) / (k + 1) for k, c in enumerate(picked))
-        states.append(pick(node) + width * rise)
+    for n, node in enumerate(picked[:size]):
+        own = picked[size + n * degree : size + (n + 1) * degree]
+        slopes.append(sum(c * x**k for k, c in enumerate(own)))
+        rise = sum(c * x ** (k + 1) / (k + 1) for k, c in enumerate(own))
+        states.append(node + width * rise)
     return jnp.stack(states), jnp.stack(slopes)
 
 
 def on_mesh(orbit: Orbit, mesh: Array) -> Orbit:
     """The same orbit represented on another mesh."""
-    nodes, _ = evaluate(orbit, mesh[:-1])
-    bare = orbit.moved(mesh=mesh, nodes=nodes)
-    phases = bare.stage_phases
-    _, slopes = evaluate(orbit, phases.reshape(-1, phases.shape[-1]))
-    return bare.moved(slopes=slopes.reshape(nodes.shape[0], *phases.shape))
+    bare = orbit.moved(mesh=mesh)
+    phases = jnp.concatenate([mesh[None, :-1], bare.stage_phases])
+    states, slopes = evaluate(orbit, phases.reshape(-1, phases.shape[-1]))
+    count, size = len(mesh) - 1, states.shape[0]
+    stages = slopes[:, count:].reshape(size, -1, count, phases.shape[-1])
+    return bare.moved(nodes=states[:, :count], slopes=stages)
 
 
 def split(orbit: Orbit, parts: int) -> Orbit:
@@ -140,6 +142,14 @@ def split(orbit: Orbit, parts: int) -> Orbit:
     inner = orbit.mesh[:-1, None] + fraction * orbit.widths[:, None]
     inner = inner.reshape(-1, orbit.mesh.shape[1])
     return on_mesh(orbit, jnp.concatenate([inner, orbit.mesh[-1:]]))
+
+
+def resampled(orbit: Orbit, intervals: int) -> Orbit:
+    """The same on `intervals` intervals that lie as densely where its own do."""
+    place = np.linspace(0.0, len(orbit.mesh) - 1, intervals + 1)
+    left = np.minimum(place.astype(int), len(orbit.mesh) - 2)
+    share = (place - left)[:, None]
+    return on_mesh(orbit, (1 - share) * orbit.mesh[left] + share * orbit.mesh[left + 1])
 
 
 def equidistributed(orbit: Orbit, scales: Array, intervals: int) -> Orbit:

@@ -181,9 +181,10 @@ def collocation_observables(
         orbit.centre[:, None, None], orbit.stage_deviations, local.at
     )
     theta = orbit.stage_phases
-    phasors = [
-        2 * (weights * rest * jnp.exp(-1j * k * theta)).sum((0, 1)) for k in range(1, harmonics + 1)
-    ]
+    orders = jnp.arange(1, harmonics + 1)
+    phasors = jax.lax.map(
+        lambda k: 2 * (weights * rest * jnp.exp(-1j * k * theta)).sum((0, 1)), orders
+    )
     mean = constant.reshape(-1) + (weights * rest).sum((0, 1))
     (response,) = condense(local, orbit)
     monodromy, log_scale = scaled_product(transfer_maps(response, orbit))
@@ -197,7 +198,7 @@ def collocation_observables(
     abscissa = spectral_abscissa(local.jacobian) if wanted else jnp.full_like(trace, jnp.inf)
     return Observables(
         mean,
-        jnp.stack(phasors),
+        phasors,
         monodromy,
         log_scale,
         2 * jnp.pi * (weights * trace).sum((0, 1)),
