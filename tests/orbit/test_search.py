@@ -108,3 +108,17 @@ def test_an_unresolved_orbit_of_another_branch_is_not_reported(monkeypatch):
     monkeypatch.setattr(frequency_path, "orbits_from_high_frequency", lambda *_: another)
     monkeypatch.setattr(collocation, "refine", unresolved)
     assert not frequency_path.FrequencyPath().solve(problem, OPTIONS).informed[0]
+
+
+def test_a_point_whose_branch_was_not_followed_is_not_said_to_have_one():
+    """Slow modulation, for which the fast method alone does not iterate."""
+    law = asp.laws.RiceRuina(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6)
+    response = asp.periodic_response(
+        asp.Slider(law, spring=2e5, load=7.0),
+        velocity=1e-6,
+        epsilon=0.24,
+        frequency=0.01,
+        methods=("fourier",),
+    )
+    assert not response.converged
+    assert "no periodic orbit found by any method that was tried" in str(response.result)

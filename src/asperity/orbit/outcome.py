@@ -93,6 +93,11 @@ _NO_RATE = (
     "nearer to V0"
 )
 
+#: Where no branch was followed at all.
+_NOT_FOUND = (
+    "no periodic orbit found by any method that was tried; allow all methods, lower epsilon or "
+    "stiffen the spring"
+)
 _LOST = (
     "an orbit was found on a coarse mesh but lost on every finer one, so it may not exist; "
     "lower epsilon or stiffen the spring"
@@ -103,6 +108,8 @@ def sentence(outcome: int, detail: float) -> str:
     """The sentence that a user reads."""
     if outcome == Outcome.NOT_RESOLVED and not math.isfinite(detail):
         return _LOST
+    if outcome == Outcome.NO_ORBIT and detail == 0:
+        return _NOT_FOUND
     if outcome == Outcome.OUT_OF_RANGE:
         return _out_of_range(detail).format(detail=detail)
     return _SENTENCES[Outcome(outcome)].format(detail=detail)
