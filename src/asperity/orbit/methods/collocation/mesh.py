@@ -113,9 +113,15 @@ def evaluate(orbit: Orbit, theta: Array) -> tuple[Array, Array]:
     coefficients = jnp.einsum("kj,njmb->nkmb", orbit.scheme.monomials, orbit.slopes)
     size, degree = coefficients.shape[:2]
     # All in one gather: each is a program of its own to compile.
-    rows = [orbit.mesh[None, :-1], orbit.widths[None], orbit.nodes]
-    rows = jnp.concatenate([*rows, coefficients.reshape(-1, *orbit.widths.shape)])
-    start, width, *picked = jnp.take_along_axis(rows, index[None], 1)
+    numbers = jnp.concatenate(
+        [
+            orbit.mesh[None, :-1],
+            orbit.widths[None],
+            orbit.nodes,
+            coefficients.reshape(-1, *orbit.widths.shape),
+        ]
+    )
+    start, width, *picked = jnp.take_along_axis(numbers, index[None], 1)
     x = (theta - start) / width
     states, slopes = [], []
     for n, node in enumerate(picked[:size]):
