@@ -135,6 +135,15 @@ def test_transients_become_named_numbers(tmp_path: Path) -> None:
         ({"material": ""}, "got none for mu0, A, B, D0, V0"),
         ({"sed": 3}, "did you mean 'seed'"),
         ({"axes": {"epsilon": {"from": 0.1, "to": 0.2, "cuont": 3}}}, "did you mean 'count'"),
+        ({"axes": {"K/Kc": {"values": (1.0,)}, "stiffness_ratio": {"values": (2.0,)}}},
+         "'stiffness_ratio' under two names"),
+        ({"axes": {"epsilon": {"values": (0.1,)}, "status": {"zip": {"K": (1e5, 3e5)}}}},
+         "axes.status must have a name of its own"),
+        ({"axes": {"epsilon": {"values": (0.1,)}, "mu1": {"zip": {"K": (1e5, 3e5)}}}},
+         "axes.mu1 must have a name of its own"),
+        ({"axes": {"epsilon": {"values": (0.1,)}, "a/b": {"zip": {"K": (1e5, 3e5)}}}},
+         "letters, digits and underscores, got 'a/b'"),
+        ({"seed": -1}, "seed must be greater than or equal to 0, got -1"),
     ],
 )  # fmt: skip
 def test_mistakes_are_told_before_anything_is_written(

@@ -231,7 +231,7 @@ class SweepPlan(BaseModel):
     parameters: Mapping[str, Given] = {}
     solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
     outputs: tuple[str, ...] | None = None
-    seed: int = 0
+    seed: int = Field(default=0, ge=0)
     chunk: PositiveInt | None = None
     threshold: ThresholdTable = ThresholdTable()
     transient: TransientTable | None = None

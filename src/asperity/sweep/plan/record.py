@@ -10,7 +10,7 @@ import hashlib
 import itertools
 import math
 import sys
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +28,9 @@ from asperity.sweep.plan.model import AxisTable, SweepPlan
 from asperity.sweep.plan.ratios import RATIOS
 from asperity.sweep.solve import SOLVES
 from asperity.units import KINDS
+
+#: Variables of every store besides numbers and outputs.
+_VARIABLES = ("outcome", "detail", "status", *TEXTS)
 
 #: Rows that an axis may list: they are kept in memory and in the record.
 MOST_LISTED = 1_000_000
@@ -49,6 +52,10 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     for name, table in plan.axes.items():
         try:
             written, axis = _axis(name, table, known, plan.seed)
+            if written in axes:
+                raise InputError(
+                    f"axis must be given once, got '{written}' under two names; leave one out"
+                )
             axes[written] = axis
         except InputError as error:
             mistakes.append(f"axes.{name}: {error}")
@@ -74,6 +81,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     if not mistakes:
         mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _twice(axes)
+        mistakes += _misnamed(axes, {*known, *outputs, *_VARIABLES})
     if mistakes:
         raise PlanError(mistakes)
     return {
@@ -428,6 +436,23 @@ def _present(axis: Mapping[str, Any], law: str) -> set[str]:
         if chosen and all(value is not None for value in chosen):
             found.add(name)
     return found
+
+
+def _misnamed(axes: Mapping[str, Any], taken: Set[str]) -> Iterator[str]:
+    """Axes of several columns whose name is no name of a dimension, or is that of a variable."""
+    for name, axis in axes.items():
+        if columns_of(axis) == (name,):
+            continue
+        if not name.isidentifier():
+            yield (
+                f"axes.{name} must have a name of letters, digits and underscores, got '{name}'; "
+                "rename it"
+            )
+        elif name in taken:
+            yield (
+                f"axes.{name} must have a name of its own, got '{name}', which a number of the "
+                "store has; rename it, like 'sample'"
+            )
 
 
 def _twice(axes: Mapping[str, Any]) -> Iterator[str]:
