@@ -11,7 +11,8 @@ from asperity.errors import InputError
 from asperity.laws import registry
 from asperity.sweep import open_store, run_sweep
 from asperity.sweep.run import run, tasks
-from references.closed_form_sweep import ClosedForm, ThisProcess, plan_of
+from asperity.sweep.run.executors import local_cluster
+from references.closed_form_sweep import ClosedForm, InClosedForm, ThisProcess, plan_of
 
 LAW = """
 from asperity.laws import RiceRuina
@@ -60,6 +61,23 @@ def test_a_law_from_a_file_reaches_the_workers(tmp_path: Path, closed_form: Clos
     file.write_text(LAW.format(name="mine") + "    # another one\n")
     with pytest.raises(InputError, match=r"same plan, got law_files\.mine = "):
         run_sweep(plan, out, workers=Elsewhere())
+
+
+def test_laws_from_a_file_and_a_module_reach_dask_workers(
+    tmp_path: Path, closed_form: ClosedForm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("distributed")
+    (tmp_path / "my_law.py").write_text(LAW.format(name="mine"))
+    (tmp_path / "my_module.py").write_text(LAW.format(name="other"))
+    monkeypatch.syspath_prepend(tmp_path)
+    plan, out, mark = tmp_path / "plan.toml", tmp_path / "s.zarr", tmp_path / "killed"
+    several = '[axes.law]\nvalues = ["my_law.py:Mine", "my_module:Mine"]'
+    plan.write_text(PLAN.replace('law = "my_law.py:Mine"', "") + several)
+    mark.touch()  # none is killed here
+    with local_cluster(1) as workers:
+        found = run_sweep(plan, out, workers=InClosedForm(workers, str(mark)))
+    assert (found.solved, found.lost) == (120, 0)
+    assert open_store(out)["law"].values.tolist() == ["mine", "other"]
 
 
 def test_a_law_that_no_worker_has_is_no_failure_of_its_points(
