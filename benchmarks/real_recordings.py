@@ -2,10 +2,11 @@
 
 ``python -m benchmarks.real_recordings FOLDER``
 
-Each law is fitted in three windows. An estimate is the mean over the windows, weighted by
-precision; its uncertainty adds the spread over the windows to that of noise, as
-`asperity.measurement` does for velocity steps. The last column is the standard error that least
-squares with white noise gives in the middle window.
+Each law is fitted in three windows by `asperity.inference.fit_windows`: an estimate is the mean
+over the windows, weighted by precision (of logarithms, as all of these are positive); its
+uncertainty adds the spread over the windows to that of noise. Columns: law, parameter, value, 95 %
+interval, standard error of noise and of the window, standard error that least squares with white
+noise gives in the first window, and the value in each window.
 """
 
 from __future__ import annotations
@@ -13,9 +14,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import numpy as np
-
-from asperity.inference import RunOptions, fit, recorded_run
+from asperity.inference import RunOptions, fit, fit_windows
 
 #: File, windows (s), the middle one first, and the channel of the load where it has no usual name.
 RECORDINGS = {
@@ -41,31 +40,33 @@ def main() -> None:
         if not (folder / file).is_file():
             print(f"{title}: no {file} in {folder}")
             continue
-        runs = [recorded_run(folder / file, window=w, name=file) for w in windows]
         for law, fixed in LAWS.items():
-            fits = [fit(run, law, FREE, fixed=fixed, starts=16) for run in runs]
-            start = {n: fits[0].values[n] for n in FREE}
+            over = fit_windows(
+                folder / file, law, FREE, windows, reading={"name": file}, fixed=fixed, starts=16
+            )
+            first = over.fits[0]
+            (term,) = first.objective.terms
+            run = term.run
+            start = {n: first.values[n] for n in FREE}
             options = RunOptions(order=0)
-            white = fit(runs[0], law, FREE, fixed=fixed, starts=4, start=start, runs=options)
+            white = fit(run, law, FREE, fixed=fixed, starts=4, start=start, runs=options)
             for name in (*FREE, "K"):
-                scale = np.array([1 / run.W0 if name == "K" else 1.0 for run in runs])
-                value = scale * [f.parameters[name].value for f in fits]
-                noise = scale * [f.parameters[name].se for f in fits]
-                weight = noise**-2.0 / np.sum(noise**-2.0)
-                mean = float(weight @ value)
-                spread = float(np.sqrt(weight @ (value - mean) ** 2))
-                total = float(np.hypot(weight @ noise, spread))
+                p = over.parameters[name]
+                scale = 1 / run.W0 if name == "K" else 1.0
+                low, high = (scale * end for end in p.interval_95)
+                each = ", ".join(f"{scale * value:.4g}" for value in p.values)
                 print(
-                    f"{title} | {law} | {'K/W0' if name == 'K' else name} | {mean:.4g} | "
-                    f"{total:.2g} | {weight @ noise:.2g} | {spread:.2g} | "
-                    f"{scale[0] * white.parameters[name].se:.2g}",
+                    f"| {law} | {'K/W0 (1/m)' if name == 'K' else f'{name} {p.unit}'.strip()} | "
+                    f"{scale * p.value:.4g} | {low:.3g} to {high:.3g} | {scale * p.se_noise:.2g} | "
+                    f"{scale * p.se_window:.2g} | {scale * white.parameters[name].se:.2g} | "
+                    f"{each} |" + (" undetermined" if name in over.undetermined else ""),
                     flush=True,
                 )
-            noise_model = fits[0].objective.terms[0].noise
+            noise = term.noise
             print(
-                f"{title} | {law} | AICc {fits[0].aicc:.2f}, {noise_model['model']}, "
-                f"{noise_model['effective_samples']:.0f} of {noise_model['samples']}, p "
-                f"{noise_model['whiteness_p']:.2g}",
+                f"{title}, {law}: AICc {first.aicc:.2f}, {noise['model']}, "
+                f"{noise['effective_samples']:.0f} of {noise['samples']}, p "
+                f"{noise['whiteness_p']:.2g}",
                 flush=True,
             )
 

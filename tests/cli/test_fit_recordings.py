@@ -51,3 +51,16 @@ def test_bad_options_are_refused(recording, more, said):
     found = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
     assert said in found.output + str(found.exception)
     assert "Traceback" not in found.output
+
+
+def test_the_choice_of_the_window_is_an_uncertainty(recording):
+    found = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", "--windows", "auto")
+    assert found.exit_code == 0, found.output
+    assert "over 4 windows (0 to 139.9, " in found.output
+    assert "of the window" in found.output
+
+
+def test_windows_and_a_window_are_refused(recording):
+    more = ["--windows", "0:100,0:140", "--window", "0:100"]
+    found = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
+    assert "--windows must stand alone" in found.output + str(found.exception)

@@ -17,7 +17,7 @@ from asperity.errors import InputError
 from asperity.outputs import require_folder
 
 if TYPE_CHECKING:
-    from asperity.inference import Fit
+    from asperity.inference import Fit, WindowedFit
 
 _EPILOG = """\b
 Examples:
@@ -113,6 +113,11 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 @click.command(epilog=_EPILOG)
 @click.option("--law", metavar="NAME", help="Friction law, such as elasto-plastic.")
+@click.option(
+    "--windows",
+    metavar="SPANS|auto",
+    help="Fit a recording in several windows, like 100:400,120:380; their spread is reported.",
+)
 @fit_options
 @posterior_options
 @click.option("--report", type=Path, metavar="DIR", help="Folder for a page, a material and draws.")
@@ -123,6 +128,7 @@ def fit(
     options: Mapping[str, Any],
     sampling: PosteriorOptions,
     reading: FitData,
+    windows: str | None,
     report: Path | None,
     as_json: bool,
 ) -> int:
@@ -138,8 +144,13 @@ def fit(
     sampling.check()
     if report is not None:
         require_folder(report, "--report")
-    read = reading.read(data, options["fixed"])
-    found = inference.fit(read, law_named(law), free, **options)
+    over = None
+    if windows is not None:
+        over = reading.fit_windows(data, windows, law_named(law), free, options)
+        found = over.fits[0]
+    else:
+        read = reading.read(data, options["fixed"])
+        found = inference.fit(read, law_named(law), free, **options)
     posterior = sampling.sample(found)
     if report is not None and found.converged:
         from asperity.fit_report import write_report
@@ -147,9 +158,12 @@ def fit(
         write_report(report, found, posterior)
     if as_json:
         more = {"posterior": posterior.record()} if posterior else {}
+        more |= {"windows": over.record()} if over else {}
         click.echo(to_json({**fit_record(found), **more}))
     else:
         click.echo(fit_text(found))
+        if over:
+            click.echo(windows_text(over))
         if posterior:
             click.echo(posterior_text(posterior))
     return 0 if found.converged and (posterior is None or posterior.converged) else 1
@@ -193,6 +207,36 @@ def fit_text(found: Fit) -> str:
         f"log-likelihood {found.log_likelihood:.6g}, AICc {found.aicc:.6g}, BIC {found.bic:.6g}",
     ]
     return "\n".join([*lines, *(f"warning: {w}" for w in found.warnings)])
+
+
+def windows_text(over: WindowedFit) -> str:
+    """Estimates over several windows as a person reads them."""
+    from asperity.cli.report import aligned
+
+    spans = ", ".join(f"{a:.6g} to {b:.6g}" for a, b in over.windows)
+    rows = [("", "estimate", "std. error", "of noise", "of the window", "95 % interval", "", "")]
+    for name, p in over.parameters.items():
+        low, high = p.interval_95
+        rows.append(
+            (
+                name,
+                f"{p.value:.6g}",
+                f"{p.se:.2g}",
+                f"{p.se_noise:.2g}",
+                f"{p.se_window:.2g}",
+                f"{low:.5g} to {high:.5g}",
+                p.unit,
+                "not determined by these data" if name in over.undetermined else "",
+            )
+        )
+    lines = [f"over {len(over.windows)} windows ({spans} s)", aligned(rows, "  ")]
+    first = set(over.fits[0].warnings)
+    return "\n".join(
+        [
+            *lines,
+            *(f"warning: {w}" for w in over.warnings if w.partition(" s: ")[2] not in first),
+        ]
+    )
 
 
 def _runs(found: Fit) -> list[str]:

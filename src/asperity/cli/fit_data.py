@@ -16,7 +16,7 @@ from asperity.cli.measure.words import naming_options
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
-    from asperity.inference import LockInTable, Prior, RecordedRun
+    from asperity.inference import LockInTable, Prior, RecordedRun, WindowedFit
 
 _PRIOR = re.compile(r"^(?P<value>.+?)\s*(?:\+-|±|\+/-)\s*(?P<sd>[-+.\deE]+)\s*(?P<unit>.*)$")
 
@@ -107,6 +107,38 @@ class FitData:
                     )
                 )
         return found
+
+    def fit_windows(
+        self, paths: Sequence[Path], windows: str, law: Any, free: Sequence[str], options: Any
+    ) -> WindowedFit:
+        """Fits of a recording in several windows.
+
+        Raises
+        ------
+        InputError
+            If there is more than one file, it is a table, or windows are given twice.
+        """
+        from asperity import inference
+
+        if len(paths) != 1 or is_table(paths[0]):
+            raise InputError(
+                f"--windows must go with one recording, got {len(paths)} files; give one recording"
+            )
+        if self.window is not None:
+            raise InputError(
+                f"--windows must stand alone, got --window {self.window} besides; leave it out"
+            )
+        reading: dict[str, Any] = {"name": paths[0].stem}
+        if self.steps is not None:
+            reading["steps"] = times_of(self.steps, "--steps")
+        if self.velocities is not None:
+            reading["velocities"] = _speeds(self.velocities)
+        automatic = windows.strip() == "auto"
+        spans = None if automatic else [span_of(w, "--windows") for w in windows.split(",")]
+        with naming_options():
+            return inference.fit_windows(
+                self.source.read(paths[0]), law, free, spans, reading=reading, **options
+            )
 
 
 def is_table(path: Path) -> bool:

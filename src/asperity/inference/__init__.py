@@ -10,6 +10,7 @@ from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.table import LockInTable, read_table, table_of
 from asperity.inference.unknowns import Prior
+from asperity.inference.windows import WindowedFit, WindowEstimate, fit_windows
 
 __all__ = [
     "Comparison",
@@ -26,9 +27,12 @@ __all__ = [
     "Prior",
     "RecordedRun",
     "RunOptions",
+    "WindowEstimate",
+    "WindowedFit",
     "compare",
     "design",
     "fit",
+    "fit_windows",
     "plan_of",
     "read_plan",
     "read_table",

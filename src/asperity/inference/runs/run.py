@@ -52,6 +52,8 @@ class RecordedRun:
         Pulling velocity of the first segment (m/s).
     velocities : tuple of float
         Of all segments (m/s); 0 in a hold.
+    origin : float
+        Time of the first sample in the recording (s).
     W0 : float
         Load at the first sample, in `load_unit`.
     load_unit : str
@@ -72,6 +74,7 @@ class RecordedRun:
     cut_uncertainty: tuple[float, ...]
     velocity: float
     velocities: tuple[float, ...]
+    origin: float
     W0: float
     load_unit: str
     load_varies: bool
@@ -200,6 +203,7 @@ def recorded_run(
         cut_uncertainty=tuple(uncertain),
         velocity=speeds[0],
         velocities=tuple(speeds),
+        origin=origin,
         W0=W,
         load_unit=unit,
         load_varies=varies,

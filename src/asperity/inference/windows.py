@@ -1,0 +1,229 @@
+"""A recording fitted in several windows: how much the choice of the window matters."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from asperity.errors import InputError
+from asperity.inference.fit import fit
+from asperity.inference.intervals import Interval
+from asperity.inference.result import Fit
+from asperity.inference.runs.run import RecordedRun, recorded_run
+from asperity.laws import Law
+from asperity.recording import Trace
+from asperity.recording.readers import read
+
+#: Share of the first and of the last segment that automatic windows leave out.
+_LEFT_OUT = 1 / 3
+#: Starts that are drawn for windows after the first, which gives them its estimate.
+_STARTS = 8
+#: Standard error of the logarithm of a parameter that says nothing about it.
+_UNDETERMINED = 1.0
+
+
+@dataclass(frozen=True)
+class WindowEstimate:
+    """A parameter over several windows of one recording, in SI.
+
+    Attributes
+    ----------
+    name, unit : str
+    value : float
+        Mean of the estimates by their precision, of logarithms where the fit has them.
+    se : float
+        Standard error: that of noise and the spread over the windows.
+    se_noise, se_window : float
+        The two parts: the mean standard error, and the spread.
+    interval_68, interval_95 : (float, float)
+    values : tuple of float
+        Of each window; NaN where the fit failed.
+    """
+
+    name: str
+    unit: str
+    value: float
+    se: float
+    se_noise: float
+    se_window: float
+    interval_68: Interval
+    interval_95: Interval
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class WindowedFit:
+    """Fits of one recording in several windows.
+
+    Attributes
+    ----------
+    windows : tuple of (float, float)
+        First and last time of each (s), in the time of the recording.
+    fits : tuple of Fit
+        In the same order.
+    parameters : mapping of str to WindowEstimate
+        Of the law and the machine, without nuisances.
+    undetermined : tuple of str
+    warnings : tuple of str
+    """
+
+    windows: tuple[tuple[float, float], ...]
+    fits: tuple[Fit, ...]
+    parameters: Mapping[str, WindowEstimate]
+    undetermined: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+    def record(self) -> dict[str, Any]:
+        """Plain numbers and texts, for JSON."""
+
+        def plain(x: float) -> float | None:
+            return float(x) if np.isfinite(x) else None
+
+        return {
+            "windows": [[plain(t) for t in window] for window in self.windows],
+            "parameters": {
+                name: {
+                    "value": plain(p.value),
+                    "unit": p.unit,
+                    "se": plain(p.se),
+                    "se_noise": plain(p.se_noise),
+                    "se_window": plain(p.se_window),
+                    "interval_68": [plain(x) for x in p.interval_68],
+                    "interval_95": [plain(x) for x in p.interval_95],
+                    "values": [plain(x) for x in p.values],
+                }
+                for name, p in self.parameters.items()
+            },
+            "undetermined": list(self.undetermined),
+            "warnings": list(self.warnings),
+        }
+
+
+def fit_windows(
+    recording: Trace | str | os.PathLike[str],
+    law: str | type[Law],
+    free: Sequence[str],
+    windows: Sequence[tuple[float, float]] | None = None,
+    *,
+    reading: Mapping[str, Any] | None = None,
+    **options: Any,
+) -> WindowedFit:
+    """Fit a law to several windows of a recording.
+
+    Parameters
+    ----------
+    recording : Trace or path
+    law : str or type of Law
+    free : sequence of str
+    windows : sequence of (float, float), optional
+        First and last times (s), two or more; the first is the one to look at. By default the
+        whole recording, and the same without a third of its first segment, of its last, and of
+        both.
+    reading : mapping, optional
+        Further arguments of `recorded_run`.
+    **options
+        Further arguments of `fit`.
+
+    Returns
+    -------
+    WindowedFit
+
+    Raises
+    ------
+    InputError
+        As of `recorded_run` and `fit`; if there are fewer than two windows.
+
+    Notes
+    -----
+    Windows overlap: their spread is no second measurement of the noise but what the choice of the
+    window adds to it, such as trends that the model does not have.
+    """
+    trace = recording if isinstance(recording, Trace) else read(recording)
+    given = dict(reading or {})
+    if windows is not None and len(windows) < 2:
+        raise InputError(f"windows must be two or more, got {len(windows)}; add one")
+    first = recorded_run(trace, **given, window=None if windows is None else windows[0])
+    spans = (
+        _automatic(first) if windows is None else tuple((float(a), float(b)) for a, b in windows)
+    )
+    fits = [fit(first, law, free, **options)]
+    if fits[0].converged:
+        begun = {k.name: fits[0].values[k.name] for k in _physical(fits[0])}
+        options = {"starts": _STARTS, **options, "start": begun}
+    fits += [
+        fit(recorded_run(trace, **given, window=span), law, free, **options) for span in spans[1:]
+    ]
+    failed = [i for i, found in enumerate(fits) if not found.converged]
+    said = [f"{_shown(spans[i])}: {fits[i].message}" for i in failed]
+    usable = [found for found in fits if found.converged]
+    estimates: dict[str, WindowEstimate] = {}
+    undetermined = []
+    for unknown in _physical(usable[0]) if usable else []:
+        estimates[unknown.name], known = _over(unknown, fits)
+        if not known:
+            undetermined.append(unknown.name)
+    for i, found in enumerate(fits):
+        said += [f"{_shown(spans[i])}: {w}" for w in found.warnings]
+    return WindowedFit(spans, tuple(fits), estimates, tuple(undetermined), tuple(said))
+
+
+def _shown(span: tuple[float, float]) -> str:
+    return f"window {span[0]:.6g} to {span[1]:.6g} s"
+
+
+def _physical(found: Fit) -> list[Any]:
+    return [k for k in found.objective.unknowns if not k.nuisance]
+
+
+def _automatic(run: RecordedRun) -> tuple[tuple[float, float], ...]:
+    """The whole run, and the same without parts of the first and the last segment."""
+    if not run.cuts:
+        raise InputError(
+            f"windows must be given for {run.name}, got none: its velocity does not change; write "
+            "them"
+        )
+    begin, end = run.origin, run.origin + float(run.time[-1])
+    edges = run.drive.edges[[run.cuts[0], run.cuts[-1]]]
+    later = begin + _LEFT_OUT * float(edges[0])
+    earlier = end - _LEFT_OUT * (end - begin - float(edges[1]))
+    return (begin, end), (later, end), (begin, earlier), (later, earlier)
+
+
+def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
+    """One parameter over the windows, and whether they say anything about it."""
+    found = [f.parameters[unknown.name] for f in fits if f.converged]
+    u = np.array([float(unknown.to_coordinate(p.value)) for p in found])
+    noise = np.array(
+        [abs(p.se / unknown.slope(p.value)) if np.isfinite(p.se) else 1e6 for p in found]
+    )
+    weight = np.maximum(noise, 1e-12) ** -2.0
+    weight /= weight.sum()
+    mean = float(weight @ u)
+    spread = float(np.sqrt(weight @ (u - mean) ** 2))
+    own = float(weight @ noise)
+    total = float(np.hypot(own, spread))
+    value = float(unknown.to_value(mean))
+    slope = abs(float(unknown.slope(value)))
+
+    def interval(level: float) -> Interval:
+        reach = float(norm.isf((1 - level) / 2)) * total
+        low, high = unknown.bounds
+        return unknown.end(max(mean - reach, low)), unknown.end(min(mean + reach, high))
+
+    estimate = WindowEstimate(
+        unknown.name,
+        found[0].unit,
+        value,
+        slope * total,
+        slope * own,
+        slope * spread,
+        interval(0.6826894921370859),
+        interval(0.95),
+        tuple(f.parameters[unknown.name].value if f.converged else np.nan for f in fits),
+    )
+    return estimate, not (unknown.logarithmic and total > _UNDETERMINED)

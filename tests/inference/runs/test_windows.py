@@ -1,0 +1,55 @@
+"""Fits in several windows: a disturbance in one of them widens the interval."""
+
+import numpy as np
+import pytest
+from benchmarks.coverage import CASES, TRUE, runs_of
+
+from asperity.errors import InputError
+from asperity.inference import fit_windows
+from asperity.recording import Channel, Trace
+
+FREE = ["A", "B", "D0"]
+#: The whole of it, and without parts of the first and the last segment.
+WINDOWS = [(0.0, 140.0), (13.0, 140.0), (0.0, 120.0)]
+
+
+def trace_of(run, friction):
+    channels = {
+        "friction": Channel(friction, "dimensionless", "", "friction", ""),
+        "displacement": Channel(run.slip, "length", "m", "displacement", "m"),
+        "normal stress": Channel(
+            np.full(run.time.size, run.W0), "pressure", "Pa", "normal stress", "Pa"
+        ),
+    }
+    return Trace(run.time, channels)
+
+
+@pytest.fixture(scope="module")
+def run():
+    return next(runs_of(CASES["steps"], 1))
+
+
+def over(run, friction):
+    # Where the search begins is no question here.
+    return fit_windows(trace_of(run, friction), "rice-ruina", FREE, WINDOWS, start=TRUE, starts=1)
+
+
+def test_a_disturbance_outside_some_windows_is_their_spread(run):
+    calm = over(run, run.friction)
+    assert [f.converged for f in calm.fits] == [True] * 3
+    for name, truth in TRUE.items():
+        p = calm.parameters[name]
+        assert p.interval_95[0] < truth < p.interval_95[1]
+        assert min(p.values) <= p.value <= max(p.values)
+        assert p.se == pytest.approx(np.hypot(p.se_noise, p.se_window))
+    # A hump that no trend describes, after the end of the third window.
+    hump = 0.02 * np.clip((run.time - 121.0) / 19.0, 0, 1) ** 2
+    bent = over(run, run.friction + hump)
+    share = [o.parameters["B"].se_window / o.parameters["B"].se_noise for o in (calm, bent)]
+    assert share[1] > 1.5 * share[0]
+    assert bent.record()["parameters"]["B"]["se_window"] == bent.parameters["B"].se_window
+
+
+def test_windows_that_are_not_several_are_refused(run):
+    with pytest.raises(InputError, match="windows must be two or more"):
+        fit_windows(trace_of(run, run.friction), "rice-ruina", FREE, [(0, 100)])
