@@ -23,6 +23,8 @@ from asperity.recording.readers import read
 _LEFT_OUT = 1 / 3
 #: Starts that are drawn for windows after the first, which gives them its estimate.
 _STARTS = 8
+#: Standard errors over all windows that a window is far off by.
+_FAR_OFF = 3.0
 #: Standard error of the logarithm of a parameter that says nothing about it.
 _UNDETERMINED = 1.0
 
@@ -167,6 +169,7 @@ def fit_windows(
         estimates[unknown.name], known = _over(unknown, fits)
         if not known:
             undetermined.append(unknown.name)
+        said += disagreeing(unknown, estimates[unknown.name], spans)
     for i, found in enumerate(fits):
         said += [f"{_shown(spans[i])}: {w}" for w in found.warnings]
     return WindowedFit(spans, tuple(fits), estimates, tuple(undetermined), tuple(said))
@@ -192,6 +195,22 @@ def _automatic(run: RecordedRun) -> tuple[tuple[float, float], ...]:
     later = begin + _LEFT_OUT * float(edges[0])
     earlier = end - _LEFT_OUT * (end - begin - float(edges[1]))
     return (begin, end), (later, end), (begin, earlier), (later, earlier)
+
+
+def disagreeing(
+    unknown: Any, over: WindowEstimate, spans: Sequence[tuple[float, float]]
+) -> list[str]:
+    """A sentence on a window that is far off: it has another minimum, or is too short."""
+    mean = float(unknown.to_coordinate(over.value))
+    total = over.se / abs(float(unknown.slope(over.value)))
+    found = []
+    for span, value in zip(spans, over.values, strict=True):
+        if abs(float(unknown.to_coordinate(value)) - mean) > _FAR_OFF * total:
+            found.append(
+                f"{_shown(span)}: {over.name} is {value:.4g} {over.unit}, far outside what the "
+                "other windows say, and counts for little; look at its fit before believing theirs"
+            )
+    return found
 
 
 def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:

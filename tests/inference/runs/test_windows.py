@@ -5,7 +5,11 @@ import pytest
 from benchmarks.coverage import CASES, TRUE, runs_of
 
 from asperity.errors import InputError
-from asperity.inference import fit_windows
+from asperity.inference import WindowEstimate, fit_windows
+from asperity.inference.unknowns import unknown_of
+from asperity.inference.windows import disagreeing
+from asperity.laws import RiceRuina
+from asperity.parameters import law_parameters
 from asperity.recording import Channel, Trace
 
 FREE = ["A", "B", "D0"]
@@ -53,3 +57,11 @@ def test_a_disturbance_outside_some_windows_is_their_spread(run):
 def test_windows_that_are_not_several_are_refused(run):
     with pytest.raises(InputError, match="windows must be two or more"):
         fit_windows(trace_of(run, run.friction), "rice-ruina", FREE, [(0, 100)])
+
+
+def test_a_window_that_is_far_off_is_named():
+    values = (1e-4, 9e-8, np.nan)
+    over = WindowEstimate("D0", "m", 1e-4, 2e-5, 1e-5, 1e-5, (8e-5, 1e-4), (6e-5, 2e-4), values)
+    D0 = unknown_of(law_parameters(RiceRuina)["D0"], None, None, (1e-8, 1e-3))
+    (said,) = disagreeing(D0, over, WINDOWS)
+    assert said.startswith("window 13 to 140 s: D0 is 9e-08 m")
