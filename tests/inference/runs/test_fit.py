@@ -105,6 +105,31 @@ def test_samples_without_a_number_are_said_to_be_left_out():
     assert any(doubt.startswith("2 samples are left out") for doubt in run.doubts)
 
 
+def said_of(friction, **options):
+    time = np.arange(friction.size) / 10
+    options = {"steps": [30.0], **options}
+    return recorded_run(trace_of(time, friction, 1e-6 * time), **options).doubts
+
+
+def test_a_clipped_gauge_is_named():
+    time = np.arange(600) / 10
+    noise = 1e-3 * np.random.default_rng(0).normal(size=600)
+    whole = 0.6 + noise + 0.02 * np.exp(-np.abs(time - 31.0))
+    assert said_of(whole) == ()
+    (said,) = said_of(np.minimum(whole, 0.61))
+    assert "at the highest value, 0.61" in said
+    # Coarse resolution repeats values everywhere, and a computed recording begins at rest.
+    assert said_of(np.round(whole, 2)) == ()
+    assert said_of(np.where(time < 30, 0.6, 0.6 + np.abs(whole - 0.6))) == ()
+
+
+def test_given_velocities_that_the_displacement_contradicts_are_named():
+    friction = 0.6 + 1e-3 * np.random.default_rng(0).normal(size=600)
+    assert said_of(friction, velocities=[1e-6, 1.02e-6]) == ()
+    (said,) = said_of(friction, velocities=[1e-6, 1.1e-6])
+    assert "velocity 2 is given as 1.1e-06 m/s" in said
+
+
 def test_a_load_that_is_not_positive_is_refused():
     time = np.arange(600) / 10
     load = np.where(time < 30, 1e6, -1.0)

@@ -27,6 +27,11 @@ _LOAD_NOISE = 5.0
 #: A segment stands still that moves by less than so many standard deviations of the displacement's
 #: noise, or by less than this share of the fastest velocity.
 _STILL_NOISE, _STILL_SHARE = 6.0, 5e-3
+#: Equal samples in a row at an extreme that may be a clipped gauge, and the chance below which
+#: they are.
+_CLIPPED, _BY_CHANCE = 3, 1e-3
+#: A given velocity that differs by this share from that of the displacement is contradicted.
+_OTHER_VELOCITY = 0.05
 #: Samples of a stretch of one sampling rate, at least, and the change of the interval that ends it.
 _SHORTEST, _OTHER_RATE = 16, 1.5
 
@@ -188,6 +193,10 @@ def recorded_run(
         i = int(np.clip(np.searchsorted(times, at), 1, times.size - 1))
         uncertain.append(float(np.median(np.diff(times[max(0, i - 3) : i + 3]))))
     doubts = list(found.doubts)
+    doubts += clipped(trace, force, window)
+    if velocities is not None and signals.displacement is not None:
+        measured = partition_at(time, signals.displacement, np.array(steps)).velocities
+        doubts += contradicted_velocities(velocities, measured)
     if signals.left_out:
         doubts.append(
             f"{signals.left_out} samples are left out, where a value is no number or time does not "
@@ -210,6 +219,59 @@ def recorded_run(
         stretches=_stretches(times),
         doubts=tuple(doubts),
     )
+
+
+def clipped(trace: Trace, force: str, window: tuple[float, float] | None) -> list[str]:
+    """A sentence on a gauge at the end of its range: too many equal samples in a row there.
+
+    Parameters
+    ----------
+    trace : Trace
+    force : str
+    window : (float, float), optional
+
+    Notes
+    -----
+    How many are too many follows from how often neighbours are equal elsewhere, which they are in
+    a recording of coarse resolution. A recording that begins or ends at its extreme is at rest.
+    """
+    try:
+        values = trace.channel(force).values
+    except InputError:
+        values = trace.channel("friction").values
+    low, high = window or (-np.inf, np.inf)
+    use = (trace.time >= low) & (trace.time <= high) & np.isfinite(values)
+    time, y = trace.time[use], values[use]
+    said = []
+    for extreme, end in ((y.max(), "highest"), (y.min(), "lowest")):
+        at = np.concatenate([[False], y == extreme, [False]])
+        begins, ends = (np.flatnonzero(at[1:] & ~at[:-1]), np.flatnonzero(at[:-1] & ~at[1:]))
+        inside = (begins > 0) & (ends < y.size)
+        if not inside.any():
+            continue
+        begins, ends = begins[inside], ends[inside]
+        longest = int(np.argmax(ends - begins))
+        count = int(ends[longest] - begins[longest])
+        equal = np.diff(y) == 0
+        others = int(equal.sum()) - int(np.sum(ends - begins - 1))
+        share = (others + 1) / (equal.size - int(np.sum(ends - begins - 1)) + 1)
+        if count >= _CLIPPED and y.size * share ** (count - 1) < _BY_CHANCE:
+            said.append(
+                f"{count} samples in a row from {time[begins[longest]]:.6g} s on are at the "
+                f"{end} value, {extreme:.6g}: the gauge seems to be at the end of its range, and a "
+                "fit to clipped friction is wrong; give a window without"
+            )
+    return said
+
+
+def contradicted_velocities(given: Sequence[float], measured: Sequence[float]) -> list[str]:
+    """Sentences on given velocities (m/s) that the recorded displacement contradicts."""
+    return [
+        f"velocity {k} is given as {abs(V):.4g} m/s, and the recorded displacement has "
+        f"{abs(v):.4g} m/s; correct one of them"
+        for k, (V, v) in enumerate(zip(given, measured, strict=True), start=1)
+        if V != 0 and np.isfinite(v) and abs(abs(v) - abs(V)) > _OTHER_VELOCITY * abs(V)
+    ]
 
 
 def _load(
