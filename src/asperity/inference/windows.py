@@ -71,6 +71,7 @@ class WindowedFit:
     parameters : mapping of str to WindowEstimate
         Of the law and the machine, without nuisances.
     undetermined : tuple of str
+        Parameters of which the windows say nothing, or contradict each other.
     warnings : tuple of str
     """
 
@@ -167,9 +168,10 @@ def fit_windows(
     undetermined = []
     for unknown in _physical(usable[0]) if usable else []:
         estimates[unknown.name], known = _over(unknown, fits)
-        if not known:
+        far_off = disagreeing(unknown, estimates[unknown.name], spans)
+        if far_off or not known:
             undetermined.append(unknown.name)
-        said += disagreeing(unknown, estimates[unknown.name], spans)
+        said += far_off
     for i, found in enumerate(fits):
         said += [f"{_shown(spans[i])}: {w}" for w in found.warnings]
     return WindowedFit(spans, tuple(fits), estimates, tuple(undetermined), tuple(said))
