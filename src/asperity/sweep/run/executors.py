@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import threading
 import time
@@ -235,4 +236,6 @@ def _distributed(option: str) -> Any:
             f"{option} must have Dask, got none installed; install it with pip install "
             "'asperity[dask]', or leave the option out for processes of this machine"
         ) from None
+    # What it logs of a lost scheduler, with tracebacks, reaches the driver as an exception.
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     return distributed
