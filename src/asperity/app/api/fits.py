@@ -168,12 +168,9 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
 
     asked = Fitted.model_validate(argument["asked"])
     files = argument["files"]
-    done = 0
 
-    def on_progress(count: int) -> None:
-        nonlocal done
-        done += count
-        report(minimisations=done)
+    def on_progress(done: int, total: int) -> None:
+        report(minimisations=done, of=total)
 
     materials = known_materials()
     options: dict[str, Any] = {

@@ -175,7 +175,7 @@ export class FitPanel {
     try {
       const last = await run("data/fit", asked, (part) => {
         if (part.waiting) this.status.textContent = "Waiting for another fit…";
-        if (part.minimisations !== undefined) this.status.textContent = `Fitting… ${part.minimisations} minimisations finished.`;
+        if (part.minimisations !== undefined) this.status.textContent = `Fitting… ${part.minimisations}${part.of ? ` of ${part.of}` : ""} finished.`;
         if (part.draws !== undefined) {
           this.bar.value = part.draws / part.of;
           this.status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, those of the warm-up included.` : "Sampling: the processes start…";
