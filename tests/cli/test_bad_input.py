@@ -192,3 +192,27 @@ def test_a_report_folder_is_tried_before_data_are_read(asperity, tmp_path, comma
     shown = asperity(*command, tmp_path / "none.csv", "--free", "A", "--report", blocked)
     refused(shown, "--report must be a folder that can be written")
     assert list(tmp_path.iterdir()) == [blocked]
+
+
+READINGS = "V,epsilon,frequency,mu1,mu1_err\n1e-6,0.1,120,1e-3,1e-5\n1e-6,0.2,120,2e-3,1e-5\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "parts"),
+    [
+        (
+            ("fit", "t.csv", "t.csv", "--law", "rice-ruina", "--free", "A"),
+            ["row 1 of t.csv (table 2) equal to row 1 of t.csv (table 1)"],
+        ),
+        (("compare", "t.csv", "t.csv", "--free", "A"), ["it would count twice"]),
+        (
+            ("compare", "t.csv", "--laws", "rice-ruina,elasto-plastic", "--free", "lambda"),
+            ["no parameter of rice-ruina"],
+        ),
+        (("fit", "t.csv", "--law", "rice-ruina", "--free", "M"), ["add --inertia"]),
+    ],
+)
+def test_questions_to_tables_that_have_no_answer(asperity, tmp_path, monkeypatch, command, parts):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "t.csv").write_text(READINGS, encoding="utf-8")
+    refused(asperity(*command, "--material", "bureau2000"), *parts)

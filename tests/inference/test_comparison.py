@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import quad
 
 from asperity import Slider, periodic_response
+from asperity.errors import InputError
 from asperity.inference import compare, fit, table_of
 from asperity.inference.comparison import judge
 from asperity.inference.cross_validation import leave_one_run_out
@@ -159,3 +160,12 @@ def test_second_opinions_stand_beside_the_verdict(made, pmma):
     assert "evidence prefers" in found.verdict
     assert all(j.evidence.effective_samples > 50 for j in found.laws.values())
     assert judge({n: j.fit for n, j in found.laws.items()}).decided == found.decided
+
+
+def test_a_law_without_a_free_parameter_is_named(made, pmma):
+    table = made("elasto-plastic", 1)
+    with pytest.raises(InputError, match="got lambda, no parameter of rice-ruina; free also one"):
+        compare(table, ("rice-ruina", "elasto-plastic"), ("lambda",), material=pmma)
+    found = compare(table, LAWS, ("lambda", "alpha"), material=pmma, evidence=False)
+    assert set(found.laws) == {"linker-dieterich", "elasto-plastic"}
+    assert "rice-ruina has no parameter among lambda and alpha" in found.not_compared["rice-ruina"]

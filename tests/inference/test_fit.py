@@ -6,7 +6,7 @@ from scipy.stats import chi2
 
 from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
-from asperity.inference.table import LockInTable
+from asperity.inference.table import LockInTable, joined
 
 TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 7e-7, "eps_ratio": 0.48}
 FREE = ("lambda", "eps_ratio", "A")
@@ -156,7 +156,9 @@ def test_laws_that_the_data_cannot_tell_apart_stay(readings, pmma):
 @pytest.mark.parametrize(
     ("changed", "said"),
     [
-        ({"mu1_err": 0.0}, "mu1_err must be positive, got 0 in row 1"),
+        ({"mu1_err": 0.0}, "mu1_err must be a finite positive number, got 0 in row 1"),
+        ({"mu1_err": [1e-5, np.inf]}, "mu1_err must be a finite positive number, got inf in row 2"),
+        ({"mu1_err": [1e-5, np.nan]}, "mu1_err must be a finite positive number, got nan in row 2"),
         ({"mu1_err": None}, "got no column mu1_err"),
         ({"mu1": [1e-3, np.inf]}, "mu1 must be finite, got inf in row 2"),
         ({"mu1": [-1e-3, 2e-3]}, "mu1 must be an amplitude, at least 0, got -0.001 in row 1"),
@@ -192,6 +194,37 @@ def test_a_row_twice_is_refused():
         table_of(columns)
 
 
+def row_of(epsilon, **columns):
+    return {"V": 1e-6, "epsilon": epsilon, "frequency": 120.0, "mu1_err": 1e-5} | columns
+
+
+def test_a_reading_in_two_tables_is_refused(pmma):
+    first = table_of(row_of([0.1, 0.2], mu1=[1e-3, 2e-3]), name="first")
+    second = table_of(row_of([0.3, 0.2], mu1=[3e-3, 2e-3]), name="second")
+    said = r"row 2 of second \(table 2\) equal to row 2 of first \(table 1\)"
+    with pytest.raises(InputError, match=said):
+        fit([first, second], "elasto-plastic", ("lambda",), material=pmma)
+    # What one table does not have cannot make its readings others.
+    more = {"W0": 7.0, "mu2": [1e-4, 2e-4], "mu2_err": 1e-5}
+    second = table_of(row_of([0.3, 0.2], mu1=[3e-3, 2e-3], **more), name="second")
+    with pytest.raises(InputError, match=said):
+        fit([first, second], "elasto-plastic", ("lambda",), material=pmma)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"mu1": [3e-3, 2.001e-3]},  # measured again at the same point
+        {"mu1": [1e-3, 2e-3], "frequency": 121.0},
+        {"mu1": [3e-3, np.nan], "mu2": [1e-4, 2e-4], "mu2_err": 1e-5},  # another observable
+    ],
+)
+def test_readings_that_differ_are_joined(other):
+    first = table_of(row_of([0.1, 0.2], mu1=[1e-3, 2e-3]), name="first")
+    second = table_of(row_of([0.3, 0.2], **other), name="second")
+    assert joined([first, second])[0].rows == 4
+
+
 @pytest.mark.parametrize(
     ("options", "said"),
     [
@@ -199,6 +232,8 @@ def test_a_row_twice_is_refused():
         ({"free": ("alpha",)}, "must be parameters of elasto-plastic"),
         ({"free": ("A", "A")}, "'A' twice"),
         ({"free": ()}, "free must name a parameter of elasto-plastic, got none"),
+        ({"free": ("A", "M")}, "'M', which has no influence without inertia; add --inertia"),
+        ({"free": ("eta",), "inertia": True}, "no influence without radiation damping; add --rad"),
         ({"free": ("A",), "prior": {"B": Prior(0.02, 0.01, "")}}, "prior must be of free"),
         (
             {"free": ("A",), "prior": {"A": Prior(-1.0, 0.1, "")}},

@@ -16,7 +16,13 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.inference.description import described_fit, failed_fit
 from asperity.inference.forward import Forward, LockInTerm
-from asperity.inference.inputs import fixed_values, require_enough, require_free, start_values
+from asperity.inference.inputs import (
+    fixed_values,
+    require_enough,
+    require_free,
+    require_motion,
+    start_values,
+)
 from asperity.inference.minima import minima_of, with_noise
 from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.result import Fit
@@ -182,6 +188,7 @@ def _objective(
     motion: Mapping[str, bool],
 ) -> Objective:
     """The function to minimise, with everything that can be refused before computing refused."""
+    require_motion(free, motion)
     if recordings and table is None:
         require_seen(recordings, free)
     # The stiffness of a recording is free, shared by all data if it is named.

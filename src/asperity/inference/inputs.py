@@ -146,6 +146,24 @@ def require_free(law: type[Law], free: Sequence[str], priors: Mapping[str, Prior
             )
 
 
+def require_motion(free: Sequence[str], motion: Mapping[str, bool]) -> None:
+    """Refuse a free M without inertia and a free eta without radiation damping.
+
+    Raises
+    ------
+    InputError
+    """
+    for name, option, word in (
+        ("M", "inertia", "inertia"),
+        ("eta", "radiation_damping", "radiation damping"),
+    ):
+        if name in free and not motion[option]:
+            raise InputError(
+                f"free must be parameters that count, got '{name}', which has no influence without "
+                f"{word}; add --{option.replace('_', '-')} ({option}=True in Python) or fix {name}"
+            )
+
+
 def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
     """Refuse fewer data than free parameters."""
     count = int(sum(np.isfinite(v).sum() for v in table.values.values()))

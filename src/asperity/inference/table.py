@@ -410,8 +410,8 @@ def _observables(
         if bad.any():
             row = int(np.flatnonzero(bad)[0])
             raise InputError(
-                f"{table}.{name}_err must be positive, got {error[row]:g} in row {row + 1}; give "
-                "the standard uncertainty"
+                f"{table}.{name}_err must be a finite positive number, got {error[row]:g} in row "
+                f"{row + 1}; give the standard uncertainty"
             )
         errors[name] = error
     for harmonic in (1, 2):
@@ -523,13 +523,48 @@ def _refuse_duplicates(table: LockInTable) -> None:
         )
 
 
+def _refuse_shared(tables: Sequence[LockInTable]) -> None:
+    """Refuse a reading that two tables hold: columns that both have are equal.
+
+    One table may have columns that the other has not, such as the load or another observable.
+    """
+    for j, second in enumerate(tables):
+        for i, first in enumerate(tables[:j]):
+            inputs = [n for n in first.points if n in second.points]
+            observed = [n for n in first.values if n in second.values]
+            if not observed:
+                continue
+            values, readings = (
+                np.column_stack([t.values[n] for n in observed]) for t in (first, second)
+            )
+            places: dict[tuple[float, ...], list[int]] = {}
+            for row, point in enumerate(zip(*(first.points[n] for n in inputs), strict=True)):
+                places.setdefault(point, []).append(row)
+            for row, point in enumerate(zip(*(second.points[n] for n in inputs), strict=True)):
+                for place in places.get(point, []):
+                    both = np.isfinite(values[place]) & np.isfinite(readings[row])
+                    if both.any() and (values[place] == readings[row])[both].all():
+                        raise InputError(
+                            "data must hold each reading once, got "
+                            f"{second.row_names[row]} of {second.name} (table {j + 1}) equal to "
+                            f"{first.row_names[place]} of {first.name} (table {i + 1}); remove the "
+                            "copy: it would count twice"
+                        )
+
+
 def joined(tables: Iterable[LockInTable]) -> tuple[LockInTable, NDArray[np.intp]]:
     """Several tables as one, and the number of the table of each row.
 
     A parameter that only some tables have must have a fixed value for the others, which is not
     known here: it is NaN there.
+
+    Raises
+    ------
+    InputError
+        If two tables hold the same reading.
     """
     tables = list(tables)
+    _refuse_shared(tables)
     run = np.concatenate([np.full(t.rows, i) for i, t in enumerate(tables)])
 
     def stacked(field: str) -> dict[Any, Float]:
