@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, fsolve
 
-from asperity import Slider, periodic_response, response_function
+from asperity import Slider, periodic_response, perturbation_response, response_function
 from asperity.errors import InputError
 from asperity.laws import ElastoPlastic, RiceRuina, get_law, law_parameters, registered
 from asperity.loads import modulated
@@ -75,6 +75,25 @@ def worst_difference(model, parameters, names=None, columns=columns):
 def test_derivatives_of_every_law(law):
     model = response_function(law, multipliers=law in WITH_MULTIPLIERS, search=False)
     assert worst_difference(model, point(law)) < DIFFERENCES
+
+
+@pytest.mark.parametrize("law", ["rice-ruina", "elasto-plastic"])
+def test_derivatives_at_steady_sliding(law):
+    """Without modulation: the steady state in closed form, and the linear response."""
+    V = np.logspace(-7, -5, 4)
+    own = {n + "_" * (n == "lambda"): BASE[n] for n in law_parameters(get_law(law))}
+    slider = Slider(get_law(law)(**own), spring=MACHINE["K"], load=MACHINE["W0"])
+    model = response_function(law, search=False)
+    values, jacobian = model.value_and_jacobian(point(law, V=V, epsilon=0.0))
+    assert (values.outcome == Outcome.CONVERGED).all()
+    logarithm = np.log(V / BASE["V0"])
+    steady = BASE["mu0"] + (BASE["A"] - BASE["B"]) * logarithm
+    np.testing.assert_allclose(values.mean_friction, steady, rtol=1e-12)
+    for name, expected in (("mu0", 1.0), ("A", logarithm), ("B", -logarithm), ("epsilon", 0.0)):
+        np.testing.assert_allclose(jacobian[name].mean_friction, expected, atol=1e-10)
+    linear = perturbation_response(slider, velocity=V, frequency=MACHINE["frequency"])
+    first = jacobian["epsilon"].harmonics[:, 0]
+    np.testing.assert_allclose(first, linear.transfer, rtol=1e-8)
 
 
 class TestElastoPlastic:

@@ -11,6 +11,8 @@ from jax import Array
 
 #: Largest last change of a solution, relative to its size.
 _TOLERANCE = 1e-8
+#: Times that the steps are taken.
+_PASSES = 12
 
 
 def contracted(
@@ -18,8 +20,9 @@ def contracted(
 ) -> Any:
     """Solve y = right + contract(y) by repetition; NaN at points where it does not converge.
 
-    All points take the same number of steps, known beforehand: a test within the loop would cost
-    as much as the step when derivatives in many directions are solved for together.
+    All points take the same number of steps before it is looked how much they still change: a test
+    at every step would cost as much as the step when derivatives in many directions are solved for
+    together. Where one is not done then but on its way, all take as many steps again.
 
     Parameters
     ----------
@@ -28,6 +31,7 @@ def contracted(
     right : pytree of arrays
         Of shape (points,), (..., points) or (points, ...).
     steps : int
+        That are enough, as a rule.
     points_last : bool
         Whether the points are the last axis of the arrays, or the first.
     """
@@ -42,12 +46,25 @@ def contracted(
             [jnp.abs(a).max(range(a.ndim - 1) if points_last else range(1, a.ndim)) for a in leaves]
         ).max(0)
 
-    last = jax.lax.fori_loop(0, steps, step, right)
-    new = step(0, last)
-    good = largest(jax.tree.map(jnp.subtract, new, last)) <= _TOLERANCE * largest(new)
+    def several(carry: tuple) -> tuple:
+        y, _, change, passes = carry
+        last = jax.lax.fori_loop(0, steps, step, y)
+        new = step(0, last)
+        now = largest(jax.tree.map(jnp.subtract, new, last))
+        good = now <= _TOLERANCE * largest(new)
+        return new, jnp.where(good, 0.0, jnp.where(now < change, now, jnp.inf)), now, passes + 1
+
+    def unfinished(carry: tuple) -> Array:
+        _, left, _, passes = carry
+        return (passes < _PASSES) & jnp.any((left > 0) & (left < jnp.inf))
+
+    size = largest(right)
+    start = (right, jnp.full_like(size, jnp.nan), size, 0)
+    new, left, _, _ = jax.lax.while_loop(unfinished, several, several(start))
 
     def kept(y: Array) -> Array:
         shape = (1,) * (y.ndim - 1)
-        return jnp.where(good.reshape((*shape, -1) if points_last else (-1, *shape)), y, jnp.nan)
+        good = (left == 0).reshape((*shape, -1) if points_last else (-1, *shape))
+        return jnp.where(good, y, jnp.nan)
 
     return jax.tree.map(kept, new)

@@ -1,0 +1,245 @@
+"""Fits and posteriors of one lock-in table, beside what is at hand elsewhere.
+
+    python -m benchmarks.fits [--rows 60] [--draws 1000] [--without-scipy]
+
+A table of mean, mu1 and mu2 by the elasto-plastic law with the parameters of Bureau et al. (2000),
+computed by SciPy's integration of the published equations, with 1 % noise; free are A, B, D0,
+lambda and eps_ratio, with a prior of D0. Rows of the answer:
+
+- SciPy's `least_squares` with differences over that integration, from 10 % off the truth, which
+  asperity is not told;
+- emcee and numpyro with the response of asperity, as their own models would take hours; they are
+  left out where they are not installed.
+
+"Off" is the largest distance from the parameters of asperity's fit, or from the means of its
+posterior, in standard errors. The effective draws are the smallest of bulk and tail. Times are
+those of a clock on the wall, to be taken on an idle machine; samplers compile within theirs.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import time
+from collections.abc import Callable
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from scipy.optimize import least_squares
+
+import asperity as asp
+from asperity.inference import Fit, Prior, fit, sample_posterior, table_of
+from benchmarks import scipy_shooting
+from benchmarks.cases import FREQUENCY
+
+PAPER = asp.materials.load("bureau2000")
+LAW = "elasto-plastic"
+#: Free parameters and their true values in SI, and those that are fixed.
+TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 6.2e-7, "eps_ratio": 0.5}
+FIXED = {"mu0": 0.5, "V0": 1e-6, "K": 2e5, "W0": 7.0}
+NOISE = 0.01
+#: Far above D0 the likelihood is flat, where samplers that know no bounds get lost.
+PRIOR = {"D0": Prior(mean=4e-7, sd=2e-7, source="benchmark")}
+COLUMNS = ("mean_friction", "mu1", "mu2")
+
+
+class Points:
+    """The rows of a table as the integration takes them."""
+
+    def __init__(self, inputs: dict[str, np.ndarray], free: dict[str, float]) -> None:
+        self._inputs, self._free = inputs, free
+
+    def __len__(self) -> int:
+        return len(self._inputs["V"])
+
+    def numbers(self) -> dict[str, np.ndarray]:
+        """As `benchmarks.cases.Batch.numbers`."""
+        p = FIXED | self._free
+        V, omega = self._inputs["V"], 2 * np.pi * FREQUENCY
+        numbers = {
+            "mu": p["mu0"] - (p["B"] - p["A"]) * np.log(V / p["V0"]),
+            "A": p["A"],
+            "B": p["B"],
+            "kappa": V * p["K"] / (omega * p["W0"]),
+            "ratio": p["lambda"] * p["K"] / p["W0"],
+            "ageing": V / (omega * p["D0"]),
+            "epsilon": p["eps_ratio"] * self._inputs["epsilon"],
+        }
+        return {name: np.broadcast_to(value, len(self)) for name, value in numbers.items()}
+
+
+def integrated(inputs: dict[str, np.ndarray], free: dict[str, float]) -> np.ndarray:
+    """Mean, mu1 and mu2 by integration, shape (3, rows)."""
+    answer = scipy_shooting.solve(Points(inputs, free), tolerance=1e-9)
+    return np.stack([answer.mean, answer.mu1, answer.mu2])
+
+
+def measured(rows: int) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Inputs, readings and their errors, (3, rows)."""
+    rng = np.random.default_rng(14)
+    inputs = {
+        "V": rng.choice([3e-7, 1e-6, 3e-6], rows),
+        "epsilon": rng.uniform(0.05, 0.5, rows),
+        "frequency": np.full(rows, FREQUENCY),
+    }
+    exact = integrated(inputs, TRUTH)
+    errors = NOISE * exact
+    return inputs, exact + errors * rng.normal(size=exact.shape), errors
+
+
+def scipy_fit(inputs: dict, readings: np.ndarray, errors: np.ndarray) -> dict[str, float]:
+    """Least squares in the logarithms, with forward differences."""
+
+    def residuals(u: np.ndarray) -> np.ndarray:
+        free = dict(zip(TRUTH, np.exp(u), strict=True))
+        gaps = [(free[name] - prior.mean) / prior.sd for name, prior in PRIOR.items()]
+        return np.concatenate([((integrated(inputs, free) - readings) / errors).ravel(), gaps])
+
+    start = np.log(list(TRUTH.values())) + 0.1
+    found = least_squares(residuals, start, diff_step=1e-5, method="lm")
+    return dict(zip(TRUTH, np.exp(found.x), strict=True))
+
+
+def log_density(inputs: dict, readings: np.ndarray, errors: np.ndarray) -> Callable[[Any], Any]:
+    """Of the posterior by the logarithms of the parameters, with asperity's response."""
+    response = asp.response_function(LAW, search=False)
+
+    def density(u: Any) -> Any:
+        free = {name: jnp.exp(u[..., i]) for i, name in enumerate(TRUTH)}
+        shape = (*u.shape[:-1], len(inputs["V"]))
+        given = {name: free[name][..., None] for name in TRUTH if name != "eps_ratio"}
+        given |= {"epsilon": free["eps_ratio"][..., None] * inputs["epsilon"]}
+        given |= {"V": inputs["V"], "frequency": inputs["frequency"], "M": 0.0, **FIXED}
+        flat = {n: jnp.broadcast_to(v, shape).reshape(-1) for n, v in given.items()}
+        values = response(flat)
+        model = jnp.stack([values.mean_friction, *jnp.abs(values.harmonics.T)])
+        gap = (model.reshape(3, *shape) - readings.reshape(3, *(1,) * (u.ndim - 1), -1)) / (
+            errors.reshape(3, *(1,) * (u.ndim - 1), -1)
+        )
+        total = -0.5 * (gap**2).sum((0, -1))
+        for name, prior in PRIOR.items():
+            # Flat in the logarithm, but for parameters with a prior, which is one of the parameter.
+            total += jnp.log(free[name]) - 0.5 * ((free[name] - prior.mean) / prior.sd) ** 2
+        return jnp.where(jnp.isfinite(total), total, -jnp.inf)
+
+    return density
+
+
+def emcee_draws(density: Callable, found: Fit, draws: int) -> np.ndarray:
+    """Draws of 32 walkers about the fit, half as many again before them; (walkers, draws, n)."""
+    emcee = importlib.import_module("emcee")
+    rng = np.random.default_rng(1)
+    centre = np.log([found.parameters[name].value for name in TRUTH])
+    spread = [found.parameters[name].se / found.parameters[name].value for name in TRUTH]
+    start = centre + 0.5 * np.array(spread) * rng.normal(size=(32, len(TRUTH)))
+    compiled = jax.jit(density)
+    sampler = emcee.EnsembleSampler(
+        32, len(TRUTH), lambda u: np.asarray(compiled(u)), vectorize=True
+    )
+    sampler.run_mcmc(start, draws + draws // 2)
+    return np.exp(np.moveaxis(sampler.get_chain(discard=draws // 2), 0, 1))
+
+
+def numpyro_draws(density: Callable, found: Fit, draws: int) -> np.ndarray:
+    """Draws of four chains from the fit, half as many again before them; (4, draws, n)."""
+    infer = importlib.import_module("numpyro.infer")
+    centre = np.log([found.parameters[name].value for name in TRUTH])
+    sampler = infer.NUTS(potential_fn=lambda u: -density(u), dense_mass=True)
+    chains = infer.MCMC(
+        sampler,
+        num_warmup=draws // 2,
+        num_samples=draws,
+        num_chains=4,
+        chain_method="sequential",
+        progress_bar=False,
+    )
+    chains.run(jax.random.PRNGKey(2), init_params=jnp.tile(centre, (4, 1)))
+    return np.exp(np.asarray(chains.get_samples(group_by_chain=True)))
+
+
+def asperity_draws(found: Fit, draws: int) -> np.ndarray:
+    """The same by asperity, in this process."""
+    posterior = sample_posterior(found, chains=4, draws=draws, jobs=1)
+    return np.stack([posterior.draws[name] for name in TRUTH], axis=-1)
+
+
+def effective(draws: np.ndarray) -> float:
+    """Smallest effective sample size of bulk and tail, of (chains, draws, n)."""
+    ess = importlib.import_module("arviz_stats.base").array_stats.ess
+    methods = {"bulk": {}, "tail": {"prob": (0.05, 0.95)}}
+    return float(
+        min(
+            ess(column, chain_axis=0, draw_axis=1, method=method, **more)
+            for column in np.moveaxis(draws, -1, 0)
+            for method, more in methods.items()
+        )
+    )
+
+
+def timed(run: Callable[[], Any]) -> tuple[float, Any]:
+    """Time and result; chains of asperity run in a process of their own."""
+    began = time.perf_counter()
+    result = run()
+    return time.perf_counter() - began, result
+
+
+def off(values: dict[str, float], found: Fit) -> float:
+    """Largest distance from the fit in standard errors."""
+    return max(abs(values[n] - p.value) / p.se for n, p in found.parameters.items() if n in values)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.fits", description=__doc__)
+    parser.add_argument("--rows", type=int, default=60)
+    parser.add_argument("--draws", type=int, default=1000)
+    parser.add_argument("--without-scipy", action="store_true")
+    chosen = parser.parse_args()
+    data = inputs, readings, errors = measured(chosen.rows)
+    columns = dict(zip(COLUMNS, readings, strict=True))
+    columns |= {f"{name}_err": e for name, e in zip(COLUMNS, errors, strict=True)}
+    table = table_of(inputs | columns)
+    print("| method | time (s) | off (standard errors) | effective draws | of a second |")
+    print("|---|---|---|---|---|")
+
+    def fitted() -> Fit:
+        return fit(table, LAW, list(TRUTH), fixed=FIXED, prior=PRIOR)
+
+    first, _ = timed(fitted)
+    seconds, found = timed(fitted)
+    print(f"| asperity fit (the first {first:.1f} s) | {seconds:.2f} | 0 | | |", flush=True)
+    if not chosen.without_scipy:
+        seconds, values = timed(lambda: scipy_fit(*data))
+        name = "SciPy least_squares, differences"
+        print(f"| {name} | {seconds:.0f} | {off(values, found):.0e} | | |", flush=True)
+    density = log_density(*data)
+    reference = None
+    samplers: dict[str, Callable[[], np.ndarray]] = {
+        "asperity posterior": lambda: asperity_draws(found, chosen.draws),
+        "numpyro, same density": lambda: numpyro_draws(density, found, chosen.draws),
+        "emcee, same density": lambda: emcee_draws(density, found, chosen.draws),
+    }
+    for name, sample in samplers.items():
+        try:
+            seconds, draws = timed(sample)
+        except ModuleNotFoundError as absent:
+            print(f"| {name} | not installed: {absent.name} | | | |")
+            continue
+        means = draws.mean((0, 1))
+        reference = means if reference is None else reference
+        gap = max(
+            abs(m - r) / found.parameters[n].se
+            for n, m, r in zip(TRUTH, means, reference, strict=True)
+        )
+        count = effective(draws)
+        print(
+            f"| {name}, {draws.shape[0]} x {draws.shape[1]} | {seconds:.1f} | {gap:.2f} | "
+            f"{count:.0f} | {count / seconds:.0f} |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
