@@ -6,6 +6,7 @@ from scipy.stats import chi2
 
 from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
+from asperity.inference.objective import Objective
 from asperity.inference.table import LockInTable, joined
 
 TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 7e-7, "eps_ratio": 0.48}
@@ -257,3 +258,13 @@ def test_more_parameters_than_data_are_refused(pmma):
     columns = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0, "mu1": 1e-3, "mu1_err": 1e-5}
     with pytest.raises(InputError, match="at least as many data"):
         fit(table_of(columns), "elasto-plastic", ("A", "B"), material=pmma)
+
+
+def test_no_interval_leaves_its_estimate_out_where_chi_squared_ends(readings, pmma, monkeypatch):
+    """Where the law has no orbit beyond the estimate, the parabola's minimum lies there too."""
+    monkeypatch.setattr(Objective, "expected_decrease", lambda self, u: 1.0)
+    found = fit(readings(3), "elasto-plastic", FREE, material=pmma)
+    assert any("still falls where the law has no periodic orbit" in w for w in found.warnings)
+    for p in found.parameters.values():
+        assert p.interval_95[0] <= p.interval_68[0] < p.value < p.interval_68[1] <= p.interval_95[1]
+        assert p.interval_68[1] - p.interval_68[0] > 100 * p.se

@@ -107,6 +107,7 @@ def described_fit(
         if not unknown.nuisance
         and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > _UNDETERMINED)
     )
+    stopped = _is_of_tables(objective) and objective.expected_decrease(u) > _STOPPED
     bent = [] if profile else _bent(objective, (u, chi2), covariance, missing)
     rivals = _rivals(objective, minima, sd)
     profiled = _profiled(objective, covariance, {*bent, *undetermined}, everything=profile)
@@ -126,7 +127,7 @@ def described_fit(
                     # The search has missed a minimum: begin again there.
                     missed = objective.minimise(along.lowest[0])
                     return described_fit(objective, [missed, *minima], profile=profile)
-            elif missing[i]:
+            elif missing[i] or stopped:
                 ends.append((low, high))
             else:
                 ends.append(bounded_interval(unbounded[i], float(sd[i]), level, low, high))
@@ -172,11 +173,11 @@ def described_fit(
         objective=objective,
     )
     said = _contradicted(objective, u, covariance)
-    if _is_of_tables(objective) and objective.expected_decrease(u) > _STOPPED:
+    if stopped:
         said.append(
             "chi-squared still falls where the law has no periodic orbit at some operating point: "
-            "the estimate is the last before, and intervals do not hold; leave those rows out or "
-            "doubt the law"
+            "the estimate is the last before, and intervals are by profile likelihood or the whole "
+            "range; leave those rows out or doubt the law"
         )
     if bent:
         also = [n for n in (objective.names[i] for i in sorted(profiled)) if n not in bent]
