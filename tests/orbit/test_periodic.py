@@ -73,8 +73,13 @@ SLOW += [(1e-6, 0.24, 0.4), (1e-5, 0.5, 4.0)]
 #: Where the first grid of the fast method is enough, and one point for which it is not.
 MILD = [(V, eps, 120.0) for V in (1e-6, 3e-6) for eps in (0.005, 0.05)]
 STRONG = (1e-6, 0.12, 120.0)
-#: One law with and one without elastic asperities: each has the robust method compiled.
+#: One law with and one without elastic asperities: each has the robust method compiled. The others
+#: have the points that the fast method answers.
 POINTS = {name: FAST + SLOW * (name in ("rice-ruina", "elasto-plastic")) for name in LAWS}
+POINTS |= {
+    name: [point for point in FAST if point[1] < 0.9]
+    for name in ("elasto-plastic-age", "strength-area")
+}
 
 
 def respond(name, V, epsilon, frequency, **options):
