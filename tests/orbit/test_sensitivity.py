@@ -19,8 +19,8 @@ LAWS = {
     "rice-ruina": (RiceRuina, BASE),
     "elasto-plastic": (ElastoPlastic, BASE | {"lambda_": 7e-7}),
 }
-#: V, frequency, epsilon: a complex pair of multipliers, a real one; a negative one, at an orbit that
-#: only the search finds, which one law is enough for.
+#: V, frequency, epsilon: a complex pair of multipliers, a real one; a negative one, at an orbit
+#: that only the search finds, which one law is enough for.
 FAST = [(1e-6, 120.0, 0.24), (1e-5, 120.0, 0.5)]
 DRIVES = {"rice-ruina": FAST, "elasto-plastic": [*FAST, (1e-6, 0.4, 0.24)]}
 CASES = [(law, row) for law, drives in DRIVES.items() for row in range(len(drives))]
@@ -123,7 +123,8 @@ def test_mass_changes_nothing_without_inertia(found):
 def test_dimensions_of_the_derivatives(found):
     # F/W0 has no unit: lengths, times and forces may be scaled without any effect.
     name, result = found
-    numbers = numbers_of(name, np.transpose(DRIVES[name])) | {"lambda": LAWS[name][1].get("lambda_")}
+    numbers = numbers_of(name, np.transpose(DRIVES[name]))
+    numbers["lambda"] = LAWS[name][1].get("lambda_")
     length = {"D0": 1, "V0": 1, "V": 1, "lambda": 1, "K": -1}
     time = {"V0": -1, "V": -1, "frequency": -1}
     force = {"K": 1, "W0": 1}
