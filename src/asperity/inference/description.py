@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi_squared
 
 from asperity.inference.forward import LockInTerm
-from asperity.inference.intervals import bounded_interval
+from asperity.inference.intervals import LEVELS, bounded_interval
 from asperity.inference.objective import Objective, log_density
 from asperity.inference.profile import Profile
 from asperity.inference.residuals import Residuals
@@ -21,8 +21,6 @@ Float = NDArray[np.float64]
 
 #: Minima are the same if their chi-squared differs by less and no coordinate by more.
 _SAME_CHI2, _SAME_COORDINATE = 1e-3, 1e-2
-#: Coverage of the intervals.
-_LEVELS = (math.erf(1 / math.sqrt(2)), 0.95)
 #: Other minima this close in chi-squared are reported: 3 standard deviations.
 _RIVAL = 9.0
 #: Where chi-squared is compared with its parabola, in standard deviations, and the rises there
@@ -120,7 +118,7 @@ def described_fit(
         along = (
             Profile(objective, i, u, chi2, covariance, search=searching) if i in profiled else None
         )
-        for level in _LEVELS:
+        for level in LEVELS:
             if along is not None:
                 ends.append(along.interval(level))
                 if along.lowest[1] < chi2 - _LOWER:
@@ -133,7 +131,7 @@ def described_fit(
                 ends.append(bounded_interval(unbounded[i], float(sd[i]), level, low, high))
         ends = [
             _hull(objective, i, interval, [(v, value - chi2) for v, value in rivals], level)
-            for interval, level in zip(ends, _LEVELS, strict=True)
+            for interval, level in zip(ends, LEVELS, strict=True)
         ]
         narrow, wide = ((unknown.end(a), unknown.end(b)) for a, b in ends)
         value = float(unknown.to_value(u[i]))

@@ -14,6 +14,8 @@ from scipy.stats import norm
 
 Interval = tuple[float, float]
 
+#: Coverage of the intervals of a fit: one standard deviation of a normal estimate, and 95 %.
+LEVELS = (math.erf(1 / math.sqrt(2)), 0.95)
 #: Standard deviations from a bound beyond which it has no influence.
 _FAR = 8.0
 

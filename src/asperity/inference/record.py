@@ -21,15 +21,15 @@ def fit_record(found: Fit) -> dict[str, Any]:
         "parameters": {name: _estimate(p) for name, p in found.parameters.items()},
         "correlation": {
             "names": list(found.parameters),
-            "matrix": [[_plain(x) for x in row] for row in found.correlation.tolist()],
+            "matrix": [[plain(x) for x in row] for row in found.correlation.tolist()],
         },
         "undetermined": list(found.undetermined),
-        "chi2": _plain(found.chi2),
+        "chi2": plain(found.chi2),
         "dof": found.dof,
-        "p_value": _plain(found.p_value),
-        "log_likelihood": _plain(found.log_likelihood),
-        "aicc": _plain(found.aicc),
-        "bic": _plain(found.bic),
+        "p_value": plain(found.p_value),
+        "log_likelihood": plain(found.log_likelihood),
+        "aicc": plain(found.aicc),
+        "bic": plain(found.bic),
         "observables": {
             name: {"chi2": chi2, "n": n} for name, (chi2, n) in found.observables.items()
         },
@@ -49,7 +49,7 @@ def comparison_record(found: Comparison) -> dict[str, Any]:
                 **fit_record(judged.fit),
                 "excluded": judged.excluded,
                 "why": judged.why,
-                "weight": _plain(judged.weight),
+                "weight": plain(judged.weight),
                 "evidence": _evidence(judged.evidence),
                 "leave_one_run_out": _cross_validation(judged.cross_validation),
             }
@@ -66,11 +66,11 @@ def comparison_record(found: Comparison) -> dict[str, Any]:
 def _estimate(found: Estimate) -> dict[str, Any]:
     prior = found.prior
     return {
-        "value": _plain(found.value),
+        "value": plain(found.value),
         "unit": found.unit,
-        "se": _plain(found.se),
-        "interval_68": [_plain(x) for x in found.interval_68],
-        "interval_95": [_plain(x) for x in found.interval_95],
+        "se": plain(found.se),
+        "interval_68": [plain(x) for x in found.interval_68],
+        "interval_95": [plain(x) for x in found.interval_95],
         "at_bound": found.at_bound,
         "prior": None
         if prior is None
@@ -95,10 +95,10 @@ def _evidence(found: Evidence | None) -> dict[str, Any] | None:
     if found is None:
         return None
     return {
-        "log": _plain(found.log),
-        "standard_error": _plain(found.standard_error),
-        "effective_samples": _plain(found.effective_samples),
-        "laplace": _plain(found.laplace),
+        "log": plain(found.log),
+        "standard_error": plain(found.standard_error),
+        "effective_samples": plain(found.effective_samples),
+        "laplace": plain(found.laplace),
         "failed": found.failed,
         "prior": found.prior,
     }
@@ -108,11 +108,12 @@ def _cross_validation(found: CrossValidation | None) -> dict[str, Any] | None:
     if found is None:
         return None
     return {
-        "log_density": _plain(found.log_density),
-        "runs": {name: _plain(value) for name, value in found.runs.items()},
+        "log_density": plain(found.log_density),
+        "runs": {name: plain(value) for name, value in found.runs.items()},
         "message": found.message,
     }
 
 
-def _plain(x: float) -> float | None:
+def plain(x: float) -> float | None:
+    """A number as JSON has it: None where it is not finite."""
     return float(x) if math.isfinite(x) else None

@@ -12,7 +12,8 @@ from scipy.stats import norm
 
 from asperity.errors import InputError
 from asperity.inference.fit import fit
-from asperity.inference.intervals import Interval
+from asperity.inference.intervals import LEVELS, Interval
+from asperity.inference.record import plain
 from asperity.inference.result import Fit
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law
@@ -83,10 +84,6 @@ class WindowedFit:
 
     def record(self) -> dict[str, Any]:
         """Plain numbers and texts, for JSON."""
-
-        def plain(x: float) -> float | None:
-            return float(x) if np.isfinite(x) else None
-
         return {
             "windows": [[plain(t) for t in window] for window in self.windows],
             "parameters": {
@@ -243,8 +240,8 @@ def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
         slope * total,
         slope * own,
         slope * spread,
-        interval(0.6826894921370859),
-        interval(0.95),
+        interval(LEVELS[0]),
+        interval(LEVELS[1]),
         tuple(f.parameters[unknown.name].value if f.converged else np.nan for f in fits),
     )
     return estimate, not (unknown.logarithmic and total > _UNDETERMINED)

@@ -258,8 +258,9 @@ class Driver:
         progress.memory = max(progress.memory, report.memory)
         for message in report.messages:
             self.log(message)
-        found = {unit.chunk for unit, seconds, _ in report.done
-                 if unit.stage == "first" and seconds < 0}  # fmt: skip
+        found = {
+            unit.chunk for unit, seconds, _ in report.done if unit.stage == "first" and seconds < 0
+        }
         stored = found & {chunk for chunk, _, _ in report.finished}
         for unit in report.opened:
             self._second.append(unit)
