@@ -25,11 +25,11 @@ from asperity.app.endpoints import Answer, Job, Upload, asked
 from asperity.app.jobs import processes
 from asperity.app.jobs.processes import Jobs
 from asperity.app.lane import Busy, Lane, Superseded
-from asperity.app.plain import to_json
 from asperity.app.preparation import Preparation
 from asperity.app.security import BODY_LIMIT, BodyTooLarge, BodyTooSlow, Guard, sentence, too_large
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError
+from asperity.outputs.json import to_json
 
 STATIC = Path(__file__).parent / "static"
 

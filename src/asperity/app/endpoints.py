@@ -35,7 +35,7 @@ class Answer:
         Below ``/api/``.
     question : type of Question
     answer : callable
-        From the question to anything that `asperity.app.plain` knows; called in a thread.
+        From the question to anything that `asperity.outputs.json` knows; called in a thread.
     """
 
     path: str

@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from asperity.cli.fit import checked_laws, fit_options
-from asperity.cli.fit_data import FitData
+from asperity.cli.fit.command import checked_laws, fit_options
+from asperity.cli.fit.data import FitData
 from asperity.outputs import require_folder
 
 _EPILOG = """\b

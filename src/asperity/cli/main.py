@@ -34,7 +34,7 @@ Examples:
         "air": "asperity.cli.air",
         "compare": "asperity.cli.compare",
         "design": "asperity.cli.design",
-        "fit": "asperity.cli.fit",
+        "fit": "asperity.cli.fit.command",
         "map": "asperity.cli.map",
         "materials": "asperity.cli.materials",
         "measure": "asperity.cli.measure.command",

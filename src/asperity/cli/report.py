@@ -1,14 +1,13 @@
-"""Records for people and programs: strict JSON, and aligned columns of text."""
+"""Records for people and programs: responses as JSON has them, and aligned columns of text."""
 
 from __future__ import annotations
 
-import json
-import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from asperity.outputs import json
 from asperity.parameters import OUTPUTS
 
 if TYPE_CHECKING:
@@ -17,8 +16,8 @@ if TYPE_CHECKING:
 
 
 def to_json(record: Mapping[str, Any]) -> str:
-    """JSON as its standard has it: a number that is not finite becomes null."""
-    return json.dumps(_plain(record), allow_nan=False, indent=2, ensure_ascii=False)
+    """JSON for people and programs, indented; a number that is not finite becomes null."""
+    return json.to_json(record, indent=2)
 
 
 def aligned(rows: Iterable[Sequence[str]], indent: str = "") -> str:
@@ -87,14 +86,3 @@ def _provenance(response: PeriodicResponse, numbers: Mapping[str, SourcedNumber]
         },
         "citation": cited_works(provenance["source"]),
     }
-
-
-def _plain(value: Any) -> Any:
-    """A tree of JSON values, None for numbers that are not finite."""
-    if isinstance(value, Mapping):
-        return {key: _plain(v) for key, v in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(v) for v in value]
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 from asperity._version import __version__
@@ -10,6 +9,7 @@ from asperity.inference.comparison import Comparison
 from asperity.inference.cross_validation import CrossValidation
 from asperity.inference.evidence import Evidence
 from asperity.inference.result import Estimate, Fit
+from asperity.outputs.json import plain
 
 
 def fit_record(found: Fit) -> dict[str, Any]:
@@ -112,8 +112,3 @@ def _cross_validation(found: CrossValidation | None) -> dict[str, Any] | None:
         "runs": {name: plain(value) for name, value in found.runs.items()},
         "message": found.message,
     }
-
-
-def plain(x: float) -> float | None:
-    """A number as JSON has it: None where it is not finite."""
-    return float(x) if math.isfinite(x) else None

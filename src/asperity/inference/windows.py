@@ -13,10 +13,10 @@ from scipy.stats import norm
 from asperity.errors import InputError
 from asperity.inference.fit import fit
 from asperity.inference.intervals import LEVELS, Interval
-from asperity.inference.record import plain
 from asperity.inference.result import Fit
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law
+from asperity.outputs.json import plain
 from asperity.recording import Trace
 from asperity.recording.readers import read
 

@@ -12,11 +12,11 @@ from latex2mathml.converter import convert
 
 from asperity import materials
 from asperity._version import __version__
-from asperity.app.plain import to_json
 from asperity.laws import registered
 from asperity.materials import Material
 from asperity.materials.loader import packaged
 from asperity.operating_point import known_parameters
+from asperity.outputs.json import to_json
 from asperity.parameters import MODULATION, OUTPUTS, Parameter, point_parameters, required
 from asperity.parameters.parameter import plain_text
 from asperity.units import KINDS, to_si

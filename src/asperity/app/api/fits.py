@@ -32,9 +32,9 @@ from asperity.app.api.recordings import (
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Question
 from asperity.app.jobs.limits import limited
-from asperity.app.plain import to_json
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError, closest
+from asperity.outputs.json import to_json
 from asperity.units import to_si
 
 #: Blocks of a curve that is shown.

@@ -18,8 +18,8 @@ from collections.abc import Callable
 from typing import IO, Any
 
 from asperity.app.jobs.limits import set_limits
-from asperity.app.plain import to_json
 from asperity.errors import InputError
+from asperity.outputs.json import to_json
 
 #: Where jobs may be defined.
 _ROOM = "asperity.app.api."

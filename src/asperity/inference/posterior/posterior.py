@@ -19,6 +19,7 @@ from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.nuts import Transitions
 from asperity.inference.result import Fit
 from asperity.inference.runs.term import RunTerm
+from asperity.outputs.json import plain
 
 Float = NDArray[np.float64]
 
@@ -119,9 +120,9 @@ class Posterior:
                     "median": p.median,
                     "interval_68": list(p.interval_68),
                     "interval_95": list(p.interval_95),
-                    "r_hat": _plain(p.r_hat),
-                    "ess_bulk": _plain(p.ess_bulk),
-                    "ess_tail": _plain(p.ess_tail),
+                    "r_hat": plain(p.r_hat),
+                    "ess_bulk": plain(p.ess_bulk),
+                    "ess_tail": plain(p.ess_tail),
                     "prior": self.prior[name],
                 }
                 for name, p in self.parameters.items()
@@ -262,7 +263,3 @@ def _observed(found: Fit) -> dict[str, Float]:
             observed[f"time{suffix}"] = term.run.time
             observed[f"friction{suffix}"] = term.run.friction
     return observed
-
-
-def _plain(x: float) -> float | None:
-    return x if math.isfinite(x) else None

@@ -53,7 +53,7 @@ def check(claim: str, *arguments: Any) -> Callable[[Function], Function]:
 
 
 def find_checks(module: ModuleType) -> dict[str, Callable[[Any], CheckResult]]:
-    """All marked functions of a module, or of all modules of a package, by the id of their claim.
+    """Marked functions of a module, or of all modules of a package, by the id of their claim.
 
     Raises
     ------
@@ -61,8 +61,8 @@ def find_checks(module: ModuleType) -> dict[str, Callable[[Any], CheckResult]]:
         If two functions compute one claim.
     """
     modules = [module]
-    for info in pkgutil.iter_modules(getattr(module, "__path__", [])):
-        modules.append(importlib.import_module(f"{module.__name__}.{info.name}"))
+    for info in pkgutil.walk_packages(getattr(module, "__path__", []), f"{module.__name__}."):
+        modules.append(importlib.import_module(info.name))
     found: dict[str, Callable[[Any], CheckResult]] = {}
     for own in modules:
         for value in vars(own).values():

@@ -10,6 +10,7 @@ from typing import Any, Literal, TypeAlias, get_args
 from pydantic import BaseModel, ConfigDict, Field
 
 from asperity.errors import InputError, closest
+from asperity.outputs.json import plain
 from asperity.papers.ledger import rules
 from asperity.papers.ledger.checks import CheckResult
 
@@ -171,15 +172,7 @@ class Claim:
 
     def as_dict(self) -> dict[str, Any]:
         """Fields by name, for JSON; a number that is not finite is None."""
-        return dict(_without_nan(asdict(self)))
-
-
-def _without_nan(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {key: _without_nan(inner) for key, inner in value.items()}
-    if isinstance(value, list | tuple):
-        return [_without_nan(inner) for inner in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+        return dict(plain(asdict(self)))
 
 
 def judge(entry: Entry, outcome: CheckResult, stated: Mapping[str, float]) -> Claim:

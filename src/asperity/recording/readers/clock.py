@@ -11,7 +11,7 @@ import numpy as np
 
 from asperity.errors import InputError, listed
 from asperity.recording.finding import Finding
-from asperity.recording.readers.stamps import elapsed
+from asperity.recording.readers.dates import elapsed
 from asperity.recording.roles import candidates, words
 from asperity.units import to_si
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asperity.recording.readers.raw import RawRecording
-    from asperity.recording.readers.unit_text import Unit
+    from asperity.recording.readers.units import Unit
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,16 +5,16 @@ from __future__ import annotations
 from pathlib import Path
 
 from asperity.errors import InputError
-from asperity.recording.readers.look_header import looks_like_look
-from asperity.recording.readers.packed import GZIP, refuse_archive, refuse_document
+from asperity.recording.readers.compressed import GZIP, refuse_archive, refuse_document
+from asperity.recording.readers.look.header import looks_like_look
 
 #: Formats, with the module that reads each.
 FORMATS = {
-    "text": "text",
+    "text": "text.file",
     "hdf5": "hdf5",
-    "matlab": "matlab",
+    "matlab": "matlab.file",
     "tdms": "tdms",
-    "look": "look",
+    "look": "look.file",
 }
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"

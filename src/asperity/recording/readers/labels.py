@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from asperity.recording.readers.unit_text import usual
+from asperity.recording.readers.units import usual
 from asperity.recording.roles import ROLES, candidates
 
 _BRACKETS = re.compile(r"(?P<name>.*?)[\s_]*[\[({<](?P<unit>[^\[\](){}<>]*)[\])}>]\s*", re.S)

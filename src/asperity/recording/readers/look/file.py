@@ -14,7 +14,7 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.recording.finding import Finding
-from asperity.recording.readers.look_header import LookHeader, headers
+from asperity.recording.readers.look.header import LookHeader, headers
 from asperity.recording.readers.raw import RawColumn, RawRecording, refuse_truncated, truncated
 from asperity.recording.roles import candidates
 

@@ -1,27 +1,25 @@
-"""Plans of an experiment: what can be set, what is measured how well, and what is asked."""
+"""The fields of a plan, each checked and converted to SI by itself."""
 
 from __future__ import annotations
 
-import itertools
 import math
-import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
+from asperity.inference.design.plan.record import Axis, Budget, Hypothesis, NoiseLevel
 from asperity.inference.inputs import fixed_values, start_values
 from asperity.inference.table import OBSERVABLES, LockInTable
-from asperity.inference.unknowns import EPS_RATIO, Prior, Unknown, material_priors, unknowns_of
+from asperity.inference.unknowns import EPS_RATIO, Prior, material_priors, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.laws.registry import known_law
 from asperity.materials import Material
 from asperity.materials import load as load_material
-from asperity.parameters import MODULATION, Parameter, point_parameters
-from asperity.parameters.toml_file import toml_content
+from asperity.parameters import Parameter, point_parameters
 from asperity.units import to_radians, to_si
 
 Float = NDArray[np.float64]
@@ -32,288 +30,32 @@ _LEVELS = 7
 _LOGARITHMIC = ("V", "frequency")
 #: Candidates beyond this number are refused: a design would take hours.
 _MOST_CANDIDATES = 100_000
-#: Largest number of draws and readings.
-_MOST_DRAWS, _MOST_POINTS = 1000, 100_000
+#: Largest number of readings.
+_MOST_POINTS = 100_000
 
 
 @dataclass(frozen=True)
-class Axis:
-    """Values that one quantity of the experiment can take.
+class PlanFields:
+    """The content of a plan file, one method a field.
+
+    Every method raises `InputError` where the field breaks its rule.
 
     Attributes
-    ----------
-    name : str
-        V, epsilon (as applied), frequency, or a parameter of the machine.
-    levels : array, shape (n,)
-        In SI, as given or evenly spaced between the ends of a range.
-    """
-
-    name: str
-    levels: Float
-
-
-@dataclass(frozen=True)
-class NoiseLevel:
-    """Standard uncertainty of one reading: sqrt(absolute^2 + (relative * value)^2).
-
-    Attributes
-    ----------
-    absolute : float
-        In the unit of the observable; phases in rad.
-    relative : float
-    """
-
-    absolute: float
-    relative: float = 0.0
-
-    def at(self, value: Float) -> Float:
-        """Standard uncertainty of readings of a value."""
-        return np.asarray(np.hypot(self.absolute, self.relative * value))
-
-
-@dataclass(frozen=True)
-class Budget:
-    """What limits the experiment: a number of readings, or a time.
-
-    Attributes
-    ----------
-    readings : int or None
-    time : float or None
-        Time available (s).
-    settling_slip : float
-        Slip before each reading (m): it takes settling_slip/V.
-    integration : float
-        Duration of a reading (s).
-    """
-
-    readings: int | None = None
-    time: float | None = None
-    settling_slip: float = 0.0
-    integration: float = 0.0
-
-    @property
-    def total(self) -> float:
-        """What may be spent: a number of readings, or a time (s)."""
-        return float(self.readings if self.readings is not None else self.time or 0.0)
-
-    def cost(self, V: Float) -> Float:
-        """What one reading costs at each velocity, in the unit of `total`."""
-        if self.readings is not None:
-            return np.ones_like(V)
-        return self.settling_slip / V + self.integration
-
-
-@dataclass(frozen=True, eq=False)
-class Hypothesis:
-    """A law with its free parameters, as a later fit would have them.
-
-    Attributes
-    ----------
-    law : type of Law
-    unknowns : tuple of Unknown
-    values : mapping of str to float
-        Values of the free parameters that the design is made for, in SI.
-    fixed : mapping of str to float
-    """
-
-    law: type[Law]
-    unknowns: tuple[Unknown, ...]
-    values: Mapping[str, float]
-    fixed: Mapping[str, float]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the free parameters."""
-        return tuple(u.name for u in self.unknowns)
-
-    @property
-    def coordinates(self) -> Float:
-        """Coordinates of `values`."""
-        return np.array([float(u.to_coordinate(self.values[u.name])) for u in self.unknowns])
-
-
-@dataclass(frozen=True, eq=False)
-class DesignPlan:
-    """A checked plan.
-
-    Attributes
-    ----------
-    name : str
-        What messages call the plan.
-    axes : tuple of Axis
-    noise : mapping of str to NoiseLevel
-        By observable: what is measured.
-    budget : Budget
-    truth : Hypothesis
-        The law that the readings are expected to follow.
-    rival : Hypothesis or None
-        The law to be excluded; None where parameters are to be measured.
-    measured : tuple of str
-        Parameters to be measured; empty where a law is to be excluded.
-    draws : int
-        Values of the uncertain parameters to average over; 0 for the given values alone.
-    uncertainty : mapping of str to float
-        Standard deviation of the free parameters over which is averaged, in SI.
-    usable_share : float
-        Share of the draws in which a point must slide steadily to be a candidate.
-    inertia, radiation_damping : bool
-    seed : int
-    """
-
-    name: str
-    axes: tuple[Axis, ...]
-    noise: Mapping[str, NoiseLevel]
-    budget: Budget
-    truth: Hypothesis
-    rival: Hypothesis | None = None
-    measured: tuple[str, ...] = ()
-    draws: int = 0
-    uncertainty: Mapping[str, float] = field(default_factory=dict)
-    usable_share: float = 0.9
-    inertia: bool = False
-    radiation_damping: bool = False
-    seed: int = 0
-
-    @property
-    def shape(self) -> tuple[int, ...]:
-        """Number of levels along each axis."""
-        return tuple(a.levels.size for a in self.axes)
-
-    def candidates(self) -> dict[str, Float]:
-        """Every combination of the levels, by name of the axis, the last axis fastest."""
-        grid = np.array(list(itertools.product(*(a.levels for a in self.axes))))
-        return {a.name: grid[:, i] for i, a in enumerate(self.axes)}
-
-
-_KEYS = (
-    *("law", "free", "material", "prior", "measure", "rival", "rival_free", "points", "time"),
-    *("settling_slip", "integration", "draws", "usable_share", "inertia", "radiation_damping"),
-    *("seed", "ranges", "fixed", "values", "uncertainty", "noise"),
-)
-
-
-def read_plan(path: str | os.PathLike[str]) -> DesignPlan:
-    """Read a plan from a TOML file; quantities carry their unit.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or anything in it is wrong.
-    """
-    file, content = toml_content(path, "plan")
-    for key in ("law", "rival"):
-        place = content.get(key)
-        # A law in a file of its own stands beside the plan.
-        if isinstance(place, str) and ".py:" in place:
-            content[key] = str(file.parent / place)
-    return plan_of(content, name=file.name, require_unit=True)
-
-
-def plan_of(
-    content: Mapping[str, Any], *, name: str = "plan", require_unit: bool = False
-) -> DesignPlan:
-    """A plan from the content of a file, or the same as a dictionary.
-
-    Parameters
     ----------
     content : mapping
-        Keys as in docs/design.md.
+        As the file has it.
     name : str
         What messages call the plan.
     require_unit : bool
-        Refuse numbers without a unit, as files do; else they are SI.
-
-    Raises
-    ------
-    InputError
-        If anything is wrong.
+        Refuse numbers without a unit.
     """
-    for key in content:
-        if key not in _KEYS:
-            raise InputError(f"{name} must have known keys, got '{key}'; {closest(key, _KEYS)}")
-    reader = _Reader(content, name, require_unit)
-    law = reader.law("law")
-    material = reader.material("material")
-    known = {
-        n: p
-        for n, p in {**point_parameters(law), EPS_RATIO.name: EPS_RATIO}.items()
-        if n not in MODULATION and n != "inertia"
-    }
-    axes = reader.axes({n: p for n, p in known.items() if p.place != "law" and n != "eps_ratio"})
-    ratio = reader.numbers("values", known).get("eps_ratio", 1.0)
-    table = _first_rows(name, axes)
-    measured = reader.names("measure")
-    rival_law = reader.law("rival") if "rival" in content else None
-    if bool(measured) == (rival_law is not None):
-        raise InputError(
-            f"{name} must have one aim, measure or rival, got "
-            f"{'both' if measured else 'none'}; name parameters to measure, or a rival law"
-        )
-    truth = reader.hypothesis(law, reader.names("free", required=True), material, table)
-    rival = None
-    if rival_law is not None:
-        own = {*point_parameters(rival_law), EPS_RATIO.name}
-        free = reader.names("rival_free") or tuple(n for n in truth.names if n in own)
-        rival = reader.hypothesis(rival_law, free, material, table)
-    elif "rival_free" in content:
-        raise InputError(f"{name}.rival_free must go with a rival, got no rival; leave it out")
-    for parameter in measured:
-        if parameter not in truth.names:
-            raise InputError(
-                f"{name}.measure must name free parameters, got '{parameter}'; free it or "
-                f"choose among {', '.join(truth.names)}"
-            )
-    draws = reader.whole("draws", 0, 0, _MOST_DRAWS)
-    if draws and rival is not None:
-        raise InputError(
-            f"{name}.draws must be 0 with a rival, got {draws}; laws are separated at one set of "
-            "values"
-        )
-    uncertainty = reader.uncertainties(known, material, truth) if draws else {}
-    for hypothesis in (truth, rival) if rival else (truth,):
-        largest = max(float(a.levels.max()) for a in axes if a.name == "epsilon")
-        carried = hypothesis.values.get("eps_ratio", hypothesis.fixed.get("eps_ratio", ratio))
-        if carried * largest >= 1:
-            raise InputError(
-                f"{name}.ranges.epsilon times eps_ratio must be below 1, got "
-                f"{carried * largest:g}; contact would be lost"
-            )
-    return DesignPlan(
-        name=name,
-        axes=axes,
-        noise=reader.noise(),
-        budget=reader.budget(),
-        truth=truth,
-        rival=rival,
-        measured=measured,
-        draws=draws,
-        uncertainty=uncertainty,
-        usable_share=reader.share("usable_share", 0.9),
-        inertia=reader.switch("inertia"),
-        radiation_damping=reader.switch("radiation_damping"),
-        seed=reader.whole("seed", 0, 0, 2**31 - 1),
-    )
-
-
-def _first_rows(name: str, axes: Sequence[Axis]) -> LockInTable:
-    """The ends of all axes as rows, which stand for the candidates in checks."""
-    ends = {a.name: np.array([a.levels.min(), a.levels.max()]) for a in axes}
-    return LockInTable(name, ends, {}, {})
-
-
-@dataclass(frozen=True)
-class _Reader:
-    """Fields of a plan, each checked."""
 
     content: Mapping[str, Any]
     name: str
     require_unit: bool
 
     def table(self, key: str) -> Mapping[str, Any]:
+        """A table of the plan; empty where it is not given."""
         value = self.content.get(key, {})
         if not isinstance(value, Mapping):
             raise InputError(
@@ -323,6 +65,7 @@ class _Reader:
         return value
 
     def law(self, key: str) -> type[Law]:
+        """A law by its name or place."""
         value = self.content.get(key)
         if not isinstance(value, str):
             raise InputError(
@@ -338,6 +81,7 @@ class _Reader:
         return law
 
     def material(self, key: str) -> Material | None:
+        """A material by its name; None where it is not given."""
         value = self.content.get(key)
         if value is not None and not isinstance(value, str):
             raise InputError(
@@ -347,6 +91,7 @@ class _Reader:
         return None if value is None else load_material(value)
 
     def names(self, key: str, *, required: bool = False) -> tuple[str, ...]:
+        """A list of names; one name stands for a list of one."""
         value = self.content.get(key, [])
         value = [value] if isinstance(value, str) else value
         if not isinstance(value, Sequence) or not all(isinstance(n, str) for n in value):
@@ -361,10 +106,12 @@ class _Reader:
         return tuple(value)
 
     def quantity(self, value: Any, parameter: Parameter, label: str) -> Any:
+        """A value of a parameter in SI, checked by the rule of the parameter."""
         si = to_si(value, parameter.kind, label, require_unit=self.require_unit)
         return parameter.check(si, label)
 
     def numbers(self, key: str, known: Mapping[str, Parameter]) -> dict[str, float]:
+        """A table of values of parameters, in SI."""
         found = {}
         for name, value in self.table(key).items():
             if name not in known:
@@ -376,6 +123,7 @@ class _Reader:
         return found
 
     def axes(self, known: Mapping[str, Parameter]) -> tuple[Axis, ...]:
+        """The ranges, in the order of the plan."""
         table = self.table("ranges")
         missing = [n for n in ("V", "epsilon", "frequency") if n not in table]
         if missing:
@@ -400,6 +148,7 @@ class _Reader:
         return tuple(axes)
 
     def levels(self, name: str, given: Any, parameter: Parameter) -> Float:
+        """Values of one axis in SI: given ones, or divisions of a range."""
         label = f"{self.name}.ranges.{name}"
         if not isinstance(given, Mapping):
             values = given if isinstance(given, list | tuple | np.ndarray) else [given]
@@ -436,6 +185,7 @@ class _Reader:
         return np.geomspace(low, high, count) if spacing == "log" else np.linspace(low, high, count)
 
     def noise(self) -> dict[str, NoiseLevel]:
+        """Standard uncertainties of a reading, by observable."""
         table = self.table("noise")
         if not table:
             raise InputError(
@@ -457,6 +207,7 @@ class _Reader:
         return found
 
     def level(self, name: str, given: Any) -> NoiseLevel:
+        """Standard uncertainty of one observable."""
         label = f"{self.name}.noise.{name}"
         parts = given if isinstance(given, Mapping) else {"absolute": given}
         for key in parts:
@@ -478,6 +229,7 @@ class _Reader:
         return NoiseLevel(a, r)
 
     def budget(self) -> Budget:
+        """The number of readings, or the time and what a reading takes of it."""
         points, time = self.content.get("points"), self.content.get("time")
         if (points is None) == (time is None):
             raise InputError(
@@ -516,6 +268,7 @@ class _Reader:
     def hypothesis(
         self, law: type[Law], free: Sequence[str], material: Material | None, table: LockInTable
     ) -> Hypothesis:
+        """A law with its free and fixed parameters; `table` stands for the candidates."""
         known = {**point_parameters(law), EPS_RATIO.name: EPS_RATIO}
         every = {**known, **point_parameters(self.law("law"))}
         given = {n: v for n, v in self.numbers("values", every).items() if n in known}
@@ -575,6 +328,7 @@ class _Reader:
     def uncertainties(
         self, known: Mapping[str, Parameter], material: Material | None, truth: Hypothesis
     ) -> dict[str, float]:
+        """Standard deviations of the free parameters that are drawn, in SI."""
         given = self.numbers_of_spread(known)
         found = {}
         for name in truth.names:
@@ -596,6 +350,7 @@ class _Reader:
         return found
 
     def numbers_of_spread(self, known: Mapping[str, Parameter]) -> dict[str, float]:
+        """The table of standard deviations, in SI."""
         found = {}
         for name, value in self.table("uncertainty").items():
             label = f"{self.name}.uncertainty.{name}"
@@ -612,9 +367,11 @@ class _Reader:
         return found
 
     def whole(self, key: str, default: int, low: int, high: int) -> int:
+        """A whole number between two limits."""
         return _whole(self.content.get(key, default), f"{self.name}.{key}", low, high)
 
     def share(self, key: str, default: float) -> float:
+        """A number above 0 and at most 1."""
         value = self.content.get(key, default)
         found = float(to_si(value, "dimensionless", f"{self.name}.{key}"))
         if not 0 < found <= 1:
@@ -624,6 +381,7 @@ class _Reader:
         return found
 
     def switch(self, key: str) -> bool:
+        """True or false."""
         value = self.content.get(key, False)
         if not isinstance(value, bool):
             raise InputError(f"{self.name}.{key} must be true or false, got {value!r}; choose one")

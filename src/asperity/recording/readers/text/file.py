@@ -13,13 +13,13 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.recording.finding import Finding
+from asperity.recording.readers.compressed import GZIP, unpacked
 from asperity.recording.readers.detect import is_text, wide_order
-from asperity.recording.readers.packed import GZIP, unpacked
 from asperity.recording.readers.raw import RawColumn, RawRecording, refuse_truncated, truncated
-from asperity.recording.readers.text_columns import malformed, numbers_of, without_text_rows
-from asperity.recording.readers.text_end import ending_of
-from asperity.recording.readers.text_layout import Layout, layout_of
-from asperity.recording.readers.text_lines import MISSING, lines_of
+from asperity.recording.readers.text.columns import malformed, numbers_of, without_text_rows
+from asperity.recording.readers.text.last_line import ending_of
+from asperity.recording.readers.text.layout import Layout, layout_of
+from asperity.recording.readers.text.lines import MISSING, lines_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

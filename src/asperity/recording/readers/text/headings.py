@@ -6,8 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from asperity.recording.readers.text_lines import TextLine, cells_of, decoded
-from asperity.recording.readers.unit_text import is_empty, usual
+from asperity.recording.readers.text.lines import TextLine, cells_of, decoded
+from asperity.recording.readers.units import is_empty, usual
 from asperity.recording.roles import ROLES, candidates
 
 _DELIMITERS = ("\t", ";", ",", "|", None)

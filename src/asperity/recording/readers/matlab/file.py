@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from asperity.recording.finding import Finding
-from asperity.recording.readers.matlab_4 import whole_part
-from asperity.recording.readers.matlab_elements import is_sound
+from asperity.recording.readers.matlab.version_4 import whole_part
+from asperity.recording.readers.matlab.version_5 import is_sound
 from asperity.recording.readers.named_arrays import group_columns
 from asperity.recording.readers.raw import (
     RawColumn,

@@ -9,8 +9,8 @@ from itertools import islice, pairwise
 from pathlib import Path
 
 from asperity.errors import InputError
-from asperity.recording.readers.text_headings import Headings, headings, names_of_another_width
-from asperity.recording.readers.text_lines import (
+from asperity.recording.readers.text.headings import Headings, headings, names_of_another_width
+from asperity.recording.readers.text.lines import (
     MISSING,
     TextLine,
     cells_of,

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.fit_data import RUN_OPTIONS, FitData, priors_of, run_options
+from asperity.cli.fit.data import RUN_OPTIONS, FitData, priors_of, run_options
+from asperity.cli.fit.posterior import PosteriorOptions, posterior_options, posterior_text
 from asperity.cli.measure.source import RecordingSource, source_options
 from asperity.cli.options import json_option, law_named, material_named, settings_of
-from asperity.cli.posterior import PosteriorOptions, posterior_options, posterior_text
 from asperity.errors import InputError
 from asperity.outputs import require_folder
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, BinaryIO
 
-from asperity.recording.readers.text_lines import cells_of, digits, lines_of
+from asperity.recording.readers.text.lines import cells_of, digits, lines_of
 
 if TYPE_CHECKING:
-    from asperity.recording.readers.text_layout import Layout
+    from asperity.recording.readers.text.layout import Layout
 
 _TAIL = 1 << 16
 #: Rows that must agree before a last line without its end is trusted.

@@ -1,4 +1,4 @@
-"""Results as JSON: arrays become lists, and numbers that are not finite become null."""
+"""Strict JSON: arrays become lists, and numbers that are not finite become null."""
 
 from __future__ import annotations
 
@@ -10,9 +10,12 @@ from typing import Any
 import numpy as np
 
 
-def to_json(value: Any) -> str:
-    """JSON in one line."""
-    return json.dumps(plain(value), allow_nan=False, separators=(",", ":"), ensure_ascii=False)
+def to_json(value: Any, *, indent: int | None = None) -> str:
+    """JSON, in one line without blanks unless an indent is given."""
+    separators = (",", ":") if indent is None else None
+    return json.dumps(
+        plain(value), allow_nan=False, separators=separators, indent=indent, ensure_ascii=False
+    )
 
 
 def plain(value: Any) -> Any:

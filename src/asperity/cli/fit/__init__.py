@@ -1,0 +1,1 @@
+"""``asperity fit``: data read, a law fitted to them, its posterior sampled."""
