@@ -28,7 +28,7 @@ class ClosedForm(SolveKind):
     def __init__(self) -> None:
         self.solved: set[tuple[float, float]] = set()
 
-    def chunk_points(self, grid: Any) -> int:
+    def chunk_points(self, points: int, record: Any) -> int:
         return 10
 
     def first(self, points: Any, record: Any) -> Findings:

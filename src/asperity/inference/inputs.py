@@ -146,8 +146,20 @@ def require_free(law: type[Law], free: Sequence[str], priors: Mapping[str, Prior
             )
 
 
-def require_motion(free: Sequence[str], motion: Mapping[str, bool]) -> None:
+def require_motion(
+    free: Sequence[str], motion: Mapping[str, bool], *, label: str = "free", plan: bool = False
+) -> None:
     """Refuse a free M without inertia and a free eta without radiation damping.
+
+    Parameters
+    ----------
+    free : sequence of str
+    motion : mapping of str to bool
+        ``inertia`` and ``radiation_damping``.
+    label : str
+        What the message calls `free`.
+    plan : bool
+        Whether the switches are those of a plan file.
 
     Raises
     ------
@@ -158,9 +170,10 @@ def require_motion(free: Sequence[str], motion: Mapping[str, bool]) -> None:
         ("eta", "radiation_damping", "radiation damping"),
     ):
         if name in free and not motion[option]:
+            switch = f"--{option.replace('_', '-')} ({option}=True in Python)"
             raise InputError(
-                f"free must be parameters that count, got '{name}', which has no influence without "
-                f"{word}; add --{option.replace('_', '-')} ({option}=True in Python) or fix {name}"
+                f"{label} must be parameters that count, got '{name}', which has no influence "
+                f"without {word}; add {f'{option} = true' if plan else switch} or fix {name}"
             )
 
 

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from asperity.sweep.export import export_store
-    from asperity.sweep.plan import SweepPlan, load_plan
+    from asperity.sweep.load import load_plan
+    from asperity.sweep.plan.model import SweepPlan
     from asperity.sweep.read import open_store, reasons
     from asperity.sweep.run.dry_run import dry_run
     from asperity.sweep.run.run import SweepSummary, run_sweep
@@ -17,12 +18,12 @@ if TYPE_CHECKING:
 
 #: Public names and their modules.
 _HOMES = {
-    "SweepPlan": "plan",
+    "SweepPlan": "plan.model",
     "SweepStatus": "status",
     "SweepSummary": "run.run",
     "dry_run": "run.dry_run",
     "export_store": "export",
-    "load_plan": "plan",
+    "load_plan": "load",
     "open_store": "read",
     "reasons": "read",
     "run_sweep": "run.run",

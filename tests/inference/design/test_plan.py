@@ -102,6 +102,10 @@ def test_time_is_spent_on_settling_and_reading():
         ({"prior": 3}, "prior must be the name of a material"),
         ({"material": None}, "got none for lambda"),
         ({"inertia": "yes"}, "true or false"),
+        (
+            {"free": ["lambda", "M"]},
+            "'M', which has no influence without inertia",
+        ),
         ({"usable_share": 2}, "above 0 and at most 1"),
     ],
 )

@@ -8,7 +8,7 @@ from scipy.stats import kstest
 
 from asperity.errors import InputError
 from asperity.sweep import SweepPlan, load_plan
-from asperity.sweep.plan import SweepGrid
+from asperity.sweep.grid import SweepGrid
 
 FIXED = {"law": "rice-ruina", "material": "bureau2000",
          "parameters": {"V": 1e-6, "frequency": 120.0}}  # fmt: skip

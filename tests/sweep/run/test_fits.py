@@ -136,6 +136,8 @@ def test_harmonics_are_disturbed_in_the_complex_plane_with_the_correlations_of_t
          r"fit\.prior must be of free parameters, got 'A'"),
         ("[fit]\nfree = ['B']\ndata = 'a.csv'\nstart = 3", "did you mean 'starts'"),
         ("[fit]\nfree = ['B']\ndata = 'a.csv'\n[axes.data]\nvalues = ['a.csv']", "got both"),
+        ("[fit]\nfree = ['M']\ndata = 'a.csv'", "got 'M', which has no influence without inertia"),
+        ("[fit]\nfree = ['M']\ndata = 'a.csv'\n[axes.inertia]\nvalues = [true, false]", "got 'M'"),
         ("[transient]\nsteps = []\nsampling = 1\nnumbers = {}", "transient must be left out"),
     ],
 )  # fmt: skip

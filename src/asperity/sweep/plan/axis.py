@@ -178,3 +178,8 @@ class DrawnAxis(SweepAxis):
             # Any part of a Sobol sequence is taken, its balanced powers of two or not.
             warnings.simplefilter("ignore", UserWarning)
             return np.asarray(sequence.random(stop - start))
+
+
+def columns_of(axis: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the columns of an axis's record."""
+    return tuple(axis["columns"] if "columns" in axis else axis["over"])

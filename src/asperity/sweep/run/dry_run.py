@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from asperity.sweep.plan import SweepGrid, SweepPlan, load_plan
-from asperity.sweep.plan.grid import Points
+from asperity.sweep.grid import SweepGrid
+from asperity.sweep.load import load_plan
+from asperity.sweep.plan.model import SweepPlan
+from asperity.sweep.plan.points import Points
 from asperity.sweep.solve import SOLVES, SolveKind
 
 #: Points of the sample, and seconds that each of its stages may take.
@@ -66,7 +68,7 @@ def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
     grid = SweepGrid.of(plan)
     solve = SOLVES[plan.solve]
     record = {**grid.record, "folder": str(plan.folder.resolve())}
-    count = min(_SAMPLE, grid.points, max(1, solve.chunk_points(grid)))
+    count = min(_SAMPLE, grid.points, max(1, solve.chunk_points(grid.points, grid.record)))
     numbers = np.random.default_rng(0).choice(grid.points, count, replace=False) if (
         grid.points < 10**7
     ) else np.unique(np.random.default_rng(0).integers(0, grid.points, count))  # fmt: skip

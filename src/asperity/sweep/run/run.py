@@ -21,8 +21,10 @@ from asperity.materials import cited_works
 from asperity.orbit.processes import available_cores
 from asperity.outputs import differences, free_disk, require_disk, size_text
 from asperity.parameters.arguments import file_path, whole_number
-from asperity.sweep.plan import SweepGrid, SweepPlan, load_plan
-from asperity.sweep.plan.record import law_places
+from asperity.sweep.grid import SweepGrid
+from asperity.sweep.load import load_plan
+from asperity.sweep.plan.model import SweepPlan
+from asperity.sweep.record import law_places
 from asperity.sweep.run.driver import Driver, SweepProgress, WorkersGoneError, is_full, units_of
 from asperity.sweep.run.executors import Workers, local_cluster, local_processes, scheduler
 from asperity.sweep.run.numerics import numerics, package_version

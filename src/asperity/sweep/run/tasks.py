@@ -21,7 +21,7 @@ from asperity.outputs import differences
 from asperity.sweep.run.numerics import numerics
 
 if TYPE_CHECKING:
-    from asperity.sweep.plan.grid import Points
+    from asperity.sweep.plan.points import Points
     from asperity.sweep.solve import Findings
     from asperity.sweep.store.store import SweepStore
 

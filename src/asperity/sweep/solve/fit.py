@@ -24,13 +24,13 @@ from asperity.parameters import (
     point_parameters,
 )
 from asperity.parameters.arguments import some_of
+from asperity.sweep.plan.model import FitTable, SweepPlan
+from asperity.sweep.plan.points import Points
 from asperity.sweep.solve.kind import Findings, SolveKind, laws_of
 from asperity.sweep.solve.outcome import SweepOutcome
 
 if TYPE_CHECKING:
     from asperity.inference import Fit, LockInTable
-    from asperity.sweep.plan.grid import Points, SweepGrid
-    from asperity.sweep.plan.model import FitTable, SweepPlan
 
 #: Outputs of a fit as a whole.
 _QUALITY = (
@@ -88,6 +88,11 @@ class FitSolve(SolveKind):
         super().settings(plan)
         table = _table(plan)
         free = _free(table)
+        if "M" in free and not _all_inertial(plan):
+            raise InputError(
+                "fit.free must be parameters that count, got 'M', which has no influence without "
+                "inertia; add inertia = true to parameters or fix M"
+            )
         return {
             "free": free,
             "prior": _priors(plan, table, free),
@@ -119,9 +124,9 @@ class FitSolve(SolveKind):
         known = {**all_parameters(map(get_law, record["laws"])), **self.parameters()}
         return _outputs(record["settings"]["free"], known)
 
-    def chunk_points(self, grid: SweepGrid) -> int:
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
         """As in `SolveKind`."""
-        return max(1, min(64, grid.points // 8))
+        return max(1, min(64, points // 8))
 
     def first(self, points: Points, record: Mapping[str, Any]) -> Findings:
         """Nothing: every fit takes its time."""
@@ -168,6 +173,12 @@ def _table(plan: SweepPlan) -> FitTable:
             "and free"
         )
     return plan.fit
+
+
+def _all_inertial(plan: SweepPlan) -> bool:
+    """Whether every point of a plan has inertia."""
+    values = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
+    return all(value in (True, "true", "yes", 1) for value in values)
 
 
 def _free(table: FitTable) -> list[str]:

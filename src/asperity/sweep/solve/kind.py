@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +13,9 @@ from numpy.typing import NDArray
 from asperity.errors import InputError
 from asperity.parameters import Output, Parameter
 from asperity.parameters.arguments import some_of
+from asperity.sweep.plan.model import SweepPlan
+from asperity.sweep.plan.points import Points
 from asperity.sweep.solve.outcome import SweepOutcome
-
-if TYPE_CHECKING:
-    from asperity.sweep.plan.grid import Points, SweepGrid
-    from asperity.sweep.plan.model import SweepPlan
 
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -140,8 +138,8 @@ class SolveKind(ABC):
         return {}
 
     @abstractmethod
-    def chunk_points(self, grid: SweepGrid) -> int:
-        """Points of a chunk, about: a fraction of a second of the first stage."""
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
+        """About how many of all points a chunk has: a fraction of a second of the first stage."""
 
     @abstractmethod
     def first(self, points: Points, record: Mapping[str, Any]) -> Findings:

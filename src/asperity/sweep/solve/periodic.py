@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -12,11 +12,10 @@ from asperity.operating_point import motions, respond, without_contact, without_
 from asperity.orbit import PeriodicResponse
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import OUTPUTS
+from asperity.sweep.plan.axis import columns_of
+from asperity.sweep.plan.points import Points
 from asperity.sweep.solve.kind import Findings, Index, SolveKind, laws_of
 from asperity.sweep.solve.outcome import SweepOutcome
-
-if TYPE_CHECKING:
-    from asperity.sweep.plan.grid import Points, SweepGrid
 
 #: Outputs with one number a point.
 _NAMES = (
@@ -52,13 +51,13 @@ class PeriodicSolve(SolveKind):
     smooth: ClassVar[tuple[str, ...]] = ("series",)
     thorough: ClassVar[tuple[str, ...]] = ("series", "collocation")
 
-    def chunk_points(self, grid: SweepGrid) -> int:
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
         """As in `SolveKind`."""
-        inertial = grid.record["numbers"].get("inertia", 0) or any(
-            "inertia" in axis.names for axis in grid.axes
+        inertial = record["numbers"].get("inertia", 0) or any(
+            "inertia" in columns_of(axis) for axis in record["axes"].values()
         )
         most = _MOST // _INERTIAL if inertial else _MOST
-        return max(min(_FEWEST, most), min(most, grid.points // _SHARES))
+        return max(min(_FEWEST, most), min(most, points // _SHARES))
 
     def first(self, points: Points, record: Mapping[str, Any]) -> Findings:
         """As in `SolveKind`."""

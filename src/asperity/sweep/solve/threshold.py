@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -11,14 +11,12 @@ from asperity.errors import InputError
 from asperity.laws import get_law
 from asperity.operating_point import motions
 from asperity.parameters import Output
+from asperity.sweep.plan.model import SweepPlan
+from asperity.sweep.plan.points import Points
 from asperity.sweep.solve.kind import Findings, SolveKind, laws_of
 from asperity.sweep.solve.outcome import SweepOutcome
 from asperity.sweep.solve.periodic import solvable
 from asperity.sweep.threshold import search_thresholds
-
-if TYPE_CHECKING:
-    from asperity.sweep.plan.grid import Points, SweepGrid
-    from asperity.sweep.plan.model import SweepPlan
 
 #: Codes of the bifurcations, in the order of `flag_meanings`.
 KINDS = ("fold", "period doubling", "Neimark-Sacker")
@@ -59,9 +57,9 @@ class ThresholdSolve(SolveKind):
             )
         return {"between": [low, high], "scan": plan.threshold.scan}
 
-    def chunk_points(self, grid: SweepGrid) -> int:
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
         """As in `SolveKind`."""
-        return max(self.batch, min(20 * self.batch, grid.points // 8))
+        return max(self.batch, min(20 * self.batch, points // 8))
 
     def first(self, points: Points, record: Mapping[str, Any]) -> Findings:
         """Only what cannot be solved is found out: every threshold takes a search."""

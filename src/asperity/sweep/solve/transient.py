@@ -5,7 +5,7 @@ from __future__ import annotations
 import string
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -16,14 +16,12 @@ from asperity.parameters import EXPERIMENT, Output, all_parameters
 from asperity.parameters.arguments import number
 from asperity.protocol.plan import plan as planned_steps
 from asperity.slider.named import slider_from
+from asperity.sweep.plan.model import SweepPlan, TransientTable
+from asperity.sweep.plan.points import Points
 from asperity.sweep.solve.kind import Findings, SolveKind, laws_of
 from asperity.sweep.solve.outcome import SweepOutcome
 from asperity.sweep.solve.periodic import solvable
 from asperity.transients import Trajectory, transient
-
-if TYPE_CHECKING:
-    from asperity.sweep.plan.grid import Points, SweepGrid
-    from asperity.sweep.plan.model import SweepPlan, TransientTable
 
 #: Channels of a trajectory and their units.
 CHANNELS = {
@@ -96,9 +94,9 @@ class TransientSolve(SolveKind):
             for name, one in record["settings"]["numbers"].items()
         }
 
-    def chunk_points(self, grid: SweepGrid) -> int:
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
         """As in `SolveKind`."""
-        return max(1, min(64, grid.points // 8))
+        return max(1, min(64, points // 8))
 
     def first(self, points: Points, record: Mapping[str, Any]) -> Findings:
         """Only what cannot be integrated is found out: every transient takes its time."""

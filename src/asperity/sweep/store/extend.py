@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import zarr
 
-from asperity.sweep.plan.grid import SweepGrid
+from asperity.sweep.grid import SweepGrid
 from asperity.sweep.store.store import SweepStore, write_coordinates
 
 

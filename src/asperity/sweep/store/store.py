@@ -20,8 +20,8 @@ import zarr
 from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from asperity.errors import InputError
+from asperity.sweep.grid import SweepGrid
 from asperity.sweep.plan.axis import TEXTS
-from asperity.sweep.plan.grid import SweepGrid
 from asperity.sweep.plan.ratios import RATIOS
 from asperity.sweep.solve import SOLVES, Findings
 from asperity.sweep.solve.outcome import SweepOutcome, flag_attributes

@@ -11,6 +11,7 @@ import numpy as np
 from asperity.errors import InputError, closest
 from asperity.inference.design.plan.fields import PlanFields
 from asperity.inference.design.plan.record import Axis, DesignPlan
+from asperity.inference.inputs import require_motion
 from asperity.inference.table import LockInTable
 from asperity.inference.unknowns import EPS_RATIO
 from asperity.parameters import MODULATION, point_parameters
@@ -95,6 +96,10 @@ def plan_of(
         rival = reader.hypothesis(rival_law, free, material, table)
     elif "rival_free" in content:
         raise InputError(f"{name}.rival_free must go with a rival, got no rival; leave it out")
+    motion = {name: reader.switch(name) for name in ("inertia", "radiation_damping")}
+    require_motion(truth.names, motion, label=f"{name}.free", plan=True)
+    if rival is not None:
+        require_motion(rival.names, motion, label=f"{name}.rival_free", plan=True)
     for parameter in measured:
         if parameter not in truth.names:
             raise InputError(
@@ -127,8 +132,7 @@ def plan_of(
         draws=draws,
         uncertainty=uncertainty,
         usable_share=reader.share("usable_share", 0.9),
-        inertia=reader.switch("inertia"),
-        radiation_damping=reader.switch("radiation_damping"),
+        **motion,
         seed=reader.whole("seed", 0, 0, 2**31 - 1),
     )
 

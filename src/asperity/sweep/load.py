@@ -1,4 +1,4 @@
-"""Files of plans."""
+"""Plans of sweeps from their files."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 from asperity.parameters.toml_file import toml_content
 from asperity.sweep.plan.mistakes import PlanError
 from asperity.sweep.plan.model import SweepPlan
-from asperity.sweep.plan.record import without_unit
+from asperity.sweep.record import without_unit
 
 
 def load_plan(path: str | os.PathLike[str]) -> SweepPlan:

@@ -6,7 +6,6 @@ import hashlib
 import json
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -14,11 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.laws import get_law
-from asperity.parameters import Parameter, all_parameters, point_parameters
+from asperity.parameters import Parameter, all_parameters
 from asperity.sweep.plan.axis import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
 from asperity.sweep.plan.model import SweepPlan
+from asperity.sweep.plan.points import Points
 from asperity.sweep.plan.ratios import RATIOS
-from asperity.sweep.plan.record import plan_record
+from asperity.sweep.record import plan_record
+from asperity.sweep.solve import SOLVES
 
 Float = NDArray[np.float64]
 Slices = tuple[slice, ...]
@@ -27,49 +28,13 @@ Slices = tuple[slice, ...]
 _LAWS_APART = 64
 
 
-@dataclass(frozen=True)
-class Points:
-    """Operating points of a chunk, along one axis.
-
-    Attributes
-    ----------
-    laws : str array, shape (points,)
-    values : dict of str to array, shape (points,)
-        SI numbers by name, NaN where a point has none.
-    data : str array, shape (points,), or None
-        Files of data, where they vary.
-    """
-
-    laws: NDArray[np.object_]
-    values: dict[str, Float]
-    data: NDArray[np.object_] | None = None
-
-    def __len__(self) -> int:
-        return len(self.laws)
-
-    def take(self, index: Any) -> Points:
-        """The points `index`."""
-        data = None if self.data is None else self.data[index]
-        return Points(self.laws[index], {n: v[index] for n, v in self.values.items()}, data)
-
-    def of_law(self, law: str) -> dict[str, Float]:
-        """Values of all parameters of one law, with defaults where a point has none."""
-        rows = len(self)
-        found = {}
-        for name, parameter in point_parameters(get_law(law)).items():
-            default = math.nan if parameter.default is None else parameter.default
-            values = self.values.get(name, np.full(rows, default))
-            found[name] = np.where(np.isnan(values), default, values)
-        return found
-
-
 class SweepGrid:
     """The points of a sweep, none of which is in memory.
 
     Parameters
     ----------
     record : mapping
-        From `asperity.sweep.plan.record.plan_record`.
+        From `asperity.sweep.record.plan_record`.
     chunks : tuple of int, optional
         Chunk length along each axis; chosen from the record by default.
 
@@ -121,8 +86,6 @@ class SweepGrid:
     def known(self) -> dict[str, Parameter]:
         """Parameters of all laws of the sweep, and ratios."""
         laws = [get_law(name) for name in self.record["laws"]]
-        from asperity.sweep.solve import SOLVES
-
         own = SOLVES[self.record["solve"]].parameters()
         return {**all_parameters(laws), **own, **{n: r.parameter for n, r in RATIOS.items()}}
 
@@ -188,9 +151,9 @@ class SweepGrid:
 
     def _chunks(self) -> tuple[int, ...]:
         """Chunk lengths: laws apart, then as many points of the last axes as belong together."""
-        from asperity.sweep.solve import SOLVES
-
-        wanted = self.record.get("chunk") or SOLVES[self.record["solve"]].chunk_points(self)
+        wanted = self.record.get("chunk") or SOLVES[self.record["solve"]].chunk_points(
+            self.points, self.record
+        )
         lengths = []
         for axis in reversed(self.axes):
             apart = "law" in axis.names and axis.length <= _LAWS_APART

@@ -22,7 +22,7 @@ from asperity.laws import get_law, known_law
 from asperity.operating_point import known_parameters, sourced_numbers
 from asperity.parameters import Parameter, canonical_name, point_parameters, suggestion
 from asperity.parameters.arguments import shown
-from asperity.sweep.plan.axis import SOBOL_BITS, TEXTS
+from asperity.sweep.plan.axis import SOBOL_BITS, TEXTS, columns_of
 from asperity.sweep.plan.mistakes import PlanError
 from asperity.sweep.plan.model import AxisTable, SweepPlan
 from asperity.sweep.plan.ratios import RATIOS
@@ -339,11 +339,6 @@ def _cases(cases: Sequence[Mapping[str, Any]], known: Mapping[str, Parameter]) -
     if not columns:
         raise InputError("cases must have at least one case, got none; write [{ law = '...' }]")
     return columns
-
-
-def columns_of(axis: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the columns of an axis's record."""
-    return tuple(axis["columns"] if "columns" in axis else axis["over"])
 
 
 def _numbers(
