@@ -22,6 +22,7 @@ from pathlib import Path
 from types import ModuleType
 
 from asperity.errors import InputError, closest
+from asperity.laws.consistency import checked_class
 from asperity.laws.law import Law
 
 GROUP = "asperity.laws"
@@ -135,15 +136,4 @@ def _checked(found: object, where: str) -> type[Law]:
             f"law must be a subclass of asperity.laws.Law, got {where}, a "
             f"{type(found).__name__}; see the page 'Write your own law'"
         )
-    for attribute in ("name", "source", "state_names"):
-        if not hasattr(found, attribute):
-            raise InputError(
-                f"law.{attribute} must be given, got none in {where}; add it to the class"
-            )
-    missing = sorted(getattr(found, "__abstractmethods__", ()))
-    if missing:
-        raise InputError(
-            f"law must have all its equations, got none for {', '.join(missing)} in {where}; "
-            "write them"
-        )
-    return found
+    return checked_class(found, where)

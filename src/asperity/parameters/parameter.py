@@ -80,8 +80,9 @@ class Parameter:
 
     def __post_init__(self) -> None:
         # A mistake here is one of the programmer, found when the module is imported.
-        if self.kind not in KINDS or self.rule not in RULES:
-            raise ValueError(f"{self.name}: no kind '{self.kind}' or no rule '{self.rule}'")
+        for word, known in ((self.kind, KINDS), (self.rule, RULES)):
+            if word not in known:
+                raise ValueError(f"{self.name} must have a known kind and rule, got '{word}'")
 
     @property
     def unit(self) -> str:
