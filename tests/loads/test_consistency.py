@@ -81,6 +81,11 @@ class NotScaled(Skewed):
         return self
 
 
+class Fails(Skewed):
+    def scaled(self, share):
+        return Skewed(self.b)
+
+
 @pytest.mark.parametrize(
     ("load", "message"),
     [
@@ -91,6 +96,7 @@ class NotScaled(Skewed):
         (NoShearSlope, "shear_slope as the derivative of shear"),
         (OtherAmplitude, "that of the first harmonic of W/W0, 0.535898, got 0.5"),
         (NotEven, "even must be False"),
+        (Fails, r"work on arrays of jax.numpy, got AttributeError .*'b'"),
         (NotScaled, r"scaled\(0\) must be a constant load"),
     ],
 )

@@ -72,6 +72,7 @@ def test_the_second_paper_is_reproduced_by_its_name(installed, tmp_path):
     [
         ('id = "weight"', 'id = "frequency"', "claim.id must be unique, got 'frequency' twice"),
         ('claims = ["frequency"]', 'claims = ["mass"]', "must name claims of the file, got 'mass'"),
+        ('found = "{frequency}."', 'found = "{mass}."', "found must name claims .*got 'mass'"),
         ('depends_on = ["K"]', 'depends_on = ["M"]', "must name an uncertainty of the file"),
         ('kind = "test"', 'kind = "guess"', "kind must be valid"),
         ("[[claim]]", "[[claim]", "must be TOML"),
@@ -84,3 +85,40 @@ def test_a_mistake_in_the_words_is_refused(installed, old, new, message):
     words.write_text(text.replace(old, new, 1), encoding="utf-8")
     with pytest.raises(InputError, match=message):
         _ = find_paper("toy2020").contents
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("checks.py", "value = 9.80665 * numbers.M", "1 / 0", "'weight' must be code that runs"),
+        ("checks.py", "9.80665", "float('nan')", "must compute finite numbers, got nan"),
+        (
+            "checks.py",
+            'return CheckResult({"weight": value}',
+            "return ({}",
+            "must be a CheckResult",
+        ),
+        ("checks.py", "import math", "import nothing_here", "toy_papers_2020.checks must be code"),
+        ("figures.py", "return PaperFigure(", "return (", "swing must be a PaperFigure"),
+        ("figures.py", "figure = Figure()", "figure = Figure().nothing", "draw must be code that"),
+        ("figures.py", "FIGURES = (swing,)", "FIGURES = swing", "must have FIGURES, a tuple of"),
+    ],
+)
+def test_a_mistake_in_the_code_is_one_sentence(installed, tmp_path, file, old, new, message):
+    text = (installed / file).read_text(encoding="utf-8")
+    assert old in text
+    (installed / file).write_text(text.replace(old, new, 1), encoding="utf-8")
+    out = tmp_path / "report"
+    shown = CliRunner().invoke(main, ["reproduce", "toy2020", "--out", str(out)])
+    assert shown.exit_code == 2
+    assert message in shown.output
+    assert "Traceback" not in shown.output
+    assert not out.exists()
+
+
+def test_a_paper_with_the_name_of_another_is_refused(installed):
+    points = installed.parent / "toy_papers-1.dist-info" / "entry_points.txt"
+    points.write_text("[asperity.papers]\nbureau2000 = toy_papers_2020\n")
+    importlib.invalidate_caches()
+    with pytest.raises(InputError, match="a name of its own, got 'bureau2000'"):
+        available()

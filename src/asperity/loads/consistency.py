@@ -8,7 +8,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import InputError, printable
 from asperity.loads.excitation import Excitation
 from asperity.loads.harmonic import Harmonic
 from asperity.loads.modulation import Modulation
@@ -45,7 +45,8 @@ def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
         If it is no `Modulation`, or its fields are no numbers or arrays that broadcast; if over a
         period a value is not finite, W does not stay positive, the mean of W/W0 or of the pull
         is not 1, `w_slope` is not the derivative of `w`, `amplitude` is not that of the first
-        harmonic, `scaled(0)` is not steady sliding, or the load is not `even` and says so.
+        harmonic, `scaled(0)` is not steady sliding, a member fails, or the load is not `even` and
+        says so.
     """
     advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
     modulation: Modulation = instance(given, Modulation, name, advice)
@@ -65,7 +66,17 @@ def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
             f"{', '.join(str(np.shape(leaf)) for leaf in leaves)}; give arrays of one shape"
         ) from None
     flat = [np.ravel(np.broadcast_to(np.asarray(leaf, float), shape)) for leaf in leaves]
-    fault = _first_fault(structure, flat, int(np.prod(shape)), name)
+    try:
+        fault = _first_fault(structure, flat, int(np.prod(shape)), name)
+    except InputError:
+        raise
+    except Exception as error:  # code of others may raise anything
+        text = printable(" ".join(str(error).split()), 200)
+        raise InputError(
+            f"{name} must have members that work on arrays of jax.numpy, got "
+            f"{type(error).__name__} ({text}) of {type(modulation).__name__}; see the page 'Write "
+            "your own load'"
+        ) from error
     if fault:
         raise InputError(fault)
     return modulation

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.loads.periodic import Periodic, Series
+from asperity.parameters.arguments import shown
 from asperity.units import to_radians, to_si
 
 #: Phases of the period at which the load is held to be positive.
@@ -121,11 +122,18 @@ def sampled(
 def _load_series(epsilon: ArrayLike | str, load: Mapping[int, tuple[Any, Any]] | None) -> Series:
     """Fourier coefficients of the load."""
     terms = {1: (to_si(epsilon, "dimensionless", "epsilon"), 0.0)}
-    for n, (amplitude, phase) in (load or {}).items():
+    for n, term in (load or {}).items():
         if n < 2 or n != int(n):
             raise InputError(
                 f"load must have harmonics from 2 on, got {n}; give the first one as epsilon"
             )
+        try:
+            amplitude, phase = term
+        except (TypeError, ValueError):
+            raise InputError(
+                f"load[{n}] must be a pair of amplitude and phase, got {shown(term)}; write it "
+                f"like load={{{n}: (0.1, 0.0)}}"
+            ) from None
         size = to_si(amplitude, "dimensionless", f"load[{n}]")
         terms[int(n)] = (size, to_radians(phase, f"load[{n}]"))
     return tuple(_pair(*terms.get(n, (0.0, 0.0))) for n in range(1, max(terms) + 1))

@@ -17,9 +17,8 @@ Papers of this package are its sub-packages; others register theirs as an entry 
 
 from __future__ import annotations
 
-import importlib
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from importlib.metadata import entry_points
@@ -28,14 +27,16 @@ from typing import TYPE_CHECKING, Any
 
 from asperity import materials
 from asperity.errors import InputError, closest
+from asperity.papers.code import guarded, guarded_check, guarded_section, imported
 from asperity.papers.ledger.checks import find_checks
 from asperity.papers.ledger.claim import Claim
 from asperity.papers.ledger.contents import Contents, read_contents
 from asperity.papers.ledger.headline import Headline, headlines
 from asperity.papers.ledger.ledger import judge_claims
+from asperity.parameters.arguments import shown
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from types import ModuleType
 
     from asperity.materials import Material
     from asperity.papers.report.sections import Section
@@ -59,9 +60,15 @@ class Paper:
     name: str
     package: str
 
+    @property
+    def own(self) -> bool:
+        """Whether it is a paper of this package."""
+        return self.package.startswith("asperity.")
+
     @cached_property
     def contents(self) -> Contents:
         """What claims.toml holds."""
+        imported(self.package)
         return read_contents(files(self.package).joinpath(_WORDS))
 
     @cached_property
@@ -77,11 +84,16 @@ class Paper:
         self, *, sensitivity: bool = False, progress: Callable[[int, int], None] | None = None
     ) -> list[Claim]:
         """Compute all claims; see `asperity.papers.ledger.ledger.judge_claims`."""
-        checks = importlib.import_module(f"{self.package}.checks")
-        model: Callable[[Material], Any] = getattr(checks, "model", lambda numbers: numbers)
+        module = imported(f"{self.package}.checks")
+        model: Callable[[Material], Any] = getattr(module, "model", lambda numbers: numbers)
+        checks = find_checks(module)
+        if not self.own:
+            model = guarded(model, f"{self.package}.checks.model")
+            where = f"{self.package}.checks, the check of"
+            checks = {name: guarded_check(f, f"{where} '{name}'") for name, f in checks.items()}
         return judge_claims(
             self.contents,
-            find_checks(checks),
+            checks,
             self.numbers,
             model,
             sensitivity=sensitivity,
@@ -94,13 +106,29 @@ class Paper:
 
     def sections(self) -> AbstractContextManager[Sequence[Section]]:
         """The sections of its figures, in a context that ends what computes them."""
-        figures = importlib.import_module(f"{self.package}.figures")
-        if hasattr(figures, "sections"):
-            made: AbstractContextManager[Sequence[Section]] = figures.sections()
+        module = imported(f"{self.package}.figures")
+        if self.own:
+            made: AbstractContextManager[Sequence[Section]] = module.sections()
             return made
+        return self._sections(module)
+
+    @contextmanager
+    def _sections(self, module: ModuleType) -> Iterator[Sequence[Section]]:
+        """The sections of a paper from outside the package."""
         from asperity.papers.report.sections import Section
 
-        return nullcontext((Section("figures", "Figures", tuple(figures.FIGURES)),))
+        where = f"{self.package}.figures"
+        if hasattr(module, "sections"):
+            with module.sections() as made:
+                yield tuple(guarded_section(section, self.package) for section in made)
+            return
+        figures = getattr(module, "FIGURES", None)
+        if not isinstance(figures, Sequence) or not all(callable(f) for f in figures):
+            raise InputError(
+                f"{where} must have FIGURES, a tuple of functions, or sections, got "
+                f"{shown(figures)}; write FIGURES = (first_figure,)"
+            )
+        yield (guarded_section(Section("figures", "Figures", tuple(figures)), self.package),)
 
 
 def available() -> dict[str, str]:
@@ -111,7 +139,13 @@ def available() -> dict[str, str]:
         for folder in here.iterdir()
         if folder.is_dir() and folder.joinpath(_WORDS).is_file()
     }
-    return found | {point.name: point.value for point in entry_points(group=GROUP)}
+    for point in entry_points(group=GROUP):
+        if found.setdefault(point.name, point.value) != point.value:
+            raise InputError(
+                f"paper must have a name of its own, got '{point.name}' of {point.value}, which "
+                f"{found[point.name]} has; rename the entry point"
+            )
+    return found
 
 
 def find_paper(name: str) -> Paper:

@@ -99,6 +99,10 @@ UNEQUAL = (
     "    return RawRecording([RawColumn('t', np.arange(3.0)), RawColumn('F', np.arange(4.0))])\n"
 )
 LISTS = UNEQUAL.replace("np.arange(4.0)", "[0, 1, 2]")
+NUMBER_UNIT = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0), 3)]")
+BARE = UNEQUAL.replace("RawColumn('F', np.arange(4.0))", "np.arange(3.0)")
+START = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], start='now'")
+FINDING = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], findings=['odd']")
 TEXT_STEP = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], step='1 ms'")
 
 
@@ -110,6 +114,10 @@ TEXT_STEP = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], step='1 ms'")
         (UNEQUAL, "must be a reader of columns of one length"),
         (LISTS, "hold arrays of one dimension, got another thing in 'F'"),
         (TEXT_STEP, "whose step is a positive number of seconds, got '1 ms'"),
+        (NUMBER_UNIT, "texts for label and unit, got 'F' and 3"),
+        (BARE, "returns a RawRecording of RawColumns"),
+        (START, "start is a number of seconds, got 'now'"),
+        (FINDING, "with a list of Findings"),
         ("def read(path): ...\n", "must be a reader with is_format"),
         ("import nothing_of_this_name\n", "must be a reader that can be loaded"),
     ],
@@ -118,6 +126,12 @@ def test_a_reader_with_a_mistake_is_one_sentence(package, recording, module, rul
     package("broken = broken_reader", broken_reader=module)
     with pytest.raises(InputError, match=rule):
         read(recording, format="broken")
+
+
+def test_a_reader_with_the_name_of_a_format_is_refused(package, recording):
+    package("text = lab_reader", lab_reader=EXAMPLE.read_text())
+    with pytest.raises(InputError, match="a name of its own, got 'text'"):
+        read(recording)
 
 
 def test_a_format_that_nobody_reads_is_answered_with_those_that_are_known(recording):

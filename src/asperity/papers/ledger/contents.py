@@ -124,7 +124,13 @@ def read_contents(file: Traversable) -> Contents:
         a claim or an uncertainty that it does not have.
     """
     try:
-        contents = Contents.model_validate(tomllib.loads(file.read_text(encoding="utf-8")))
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{file} must be a readable text, got {type(error).__name__}; write the claims there"
+        ) from None
+    try:
+        contents = Contents.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:
         raise InputError(f"{file} must be TOML, got: {error}; correct that line") from None
     except ValidationError as error:
@@ -156,7 +162,10 @@ def _check_names(contents: Contents, file: str) -> None:
                 "correct it"
             )
     for headline in contents.headline:
-        for name in set(headline.claims) - set(ids):
-            raise InputError(
-                f"{file}: headline.claims must name claims of the file, got '{name}'; correct it"
-            )
+        quoted = {name for _, name, _, _ in Formatter().parse(headline.found) if name is not None}
+        for field, names in (("claims", set(headline.claims)), ("found", quoted)):
+            for name in sorted(names - set(ids)):
+                raise InputError(
+                    f"{file}: headline.{field} must name claims of the file, got '{name}'; "
+                    "correct it"
+                )

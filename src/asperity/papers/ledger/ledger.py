@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from numbers import Real
 from typing import Any
 
 from asperity.errors import InputError
@@ -52,7 +54,9 @@ def judge_claims(
     central = model(numbers)
     claims = []
     for entry in contents.claim:
-        claims.append(judge(entry, checks[entry.id](central), stated))
+        outcome = checks[entry.id](central)
+        _require_numbers(entry.id, outcome)
+        claims.append(judge(entry, outcome, stated))
         report(1)
     if not sensitivity:
         return claims
@@ -64,6 +68,16 @@ def judge_claims(
             outcomes = [checks[entry.id](end).numbers for end in ends]
             found[entry.id].append(_sensitivity(entry, uncertainty, outcomes, stated))
     return [replace(claim, sensitivity=tuple(found[claim.id])) for claim in claims]
+
+
+def _require_numbers(name: str, outcome: CheckResult) -> None:
+    numbers: Mapping[str, Any] = outcome.numbers
+    for key, value in numbers.items():
+        if not isinstance(value, Real) or not math.isfinite(value):
+            raise InputError(
+                f"checks must compute finite numbers, got {value!r} for '{key}' of '{name}'; "
+                "correct the check"
+            )
 
 
 def _sensitivity(

@@ -10,13 +10,16 @@ from __future__ import annotations
 
 from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
+from numbers import Real
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, cast
 
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.recording.readers.raw import RawRecording
+from asperity.recording.finding import Finding
+from asperity.recording.readers.detect import FORMATS
+from asperity.recording.readers.raw import RawColumn, RawRecording
 
 GROUP = "asperity.readers"
 
@@ -35,8 +38,20 @@ class Reader(Protocol):
 
 @lru_cache(maxsize=1)
 def reader_points() -> dict[str, EntryPoint]:
-    """Entry points by the name of the format; none of them is loaded yet."""
-    return {point.name: point for point in entry_points(group=GROUP)}
+    """Entry points by the name of the format; none of them is loaded yet.
+
+    Raises
+    ------
+    InputError
+        If one has the name of a format of the package.
+    """
+    found = {point.name: point for point in entry_points(group=GROUP)}
+    for name in sorted(set(found) & set(FORMATS)):
+        raise InputError(
+            f"read.format must have a name of its own, got '{name}' of '{found[name].value}', "
+            "which asperity reads itself; rename the entry point"
+        )
+    return found
 
 
 def reader_named(name: str) -> Reader:
@@ -95,9 +110,14 @@ def read_by_plugin(name: str, path: Path) -> RawRecording:
             f"recording.path must be a file of format '{name}', got '{path.name}', which its "
             f"reader could not read ({type(error).__name__}: {error}); check the file or the reader"
         ) from None
-    if not isinstance(recorded, RawRecording) or not recorded.columns:
+    if (
+        not isinstance(recorded, RawRecording)
+        or not isinstance(columns := cast(Any, recorded.columns), list | tuple)
+        or not columns
+        or not all(isinstance(column, RawColumn) for column in columns)
+    ):
         raise InputError(
-            f"read.format must be a reader that returns a RawRecording with columns, got "
+            f"read.format must be a reader that returns a RawRecording of RawColumns, got "
             f"{type(recorded).__name__} of '{name}'; correct the reader"
         )
     for column in recorded.columns:
@@ -107,11 +127,33 @@ def read_by_plugin(name: str, path: Path) -> RawRecording:
                 f"read.format must be a reader whose columns hold arrays of one dimension, got "
                 f"another thing in '{column.label}' of '{name}'; write numpy.asarray around it"
             )
+        unit: Any = column.unit
+        label: Any = column.label
+        if not isinstance(label, str) or not (unit is None or isinstance(unit, str)):
+            raise InputError(
+                f"read.format must be a reader whose columns have texts for label and unit, got "
+                f"{label!r} and {unit!r} of '{name}'; correct the reader"
+            )
     step: Any = recorded.step
-    if step is not None and not (isinstance(step, int | float) and 0 < step < np.inf):
+    if step is not None and not (isinstance(step, Real) and 0 < float(step) < np.inf):
         raise InputError(
             f"read.format must be a reader whose step is a positive number of seconds, got "
             f"{step!r} of '{name}'; correct the reader"
+        )
+    start: Any = recorded.start
+    if not (isinstance(start, Real) and np.isfinite(float(start))):
+        raise InputError(
+            f"read.format must be a reader whose start is a number of seconds, got {start!r} of "
+            f"'{name}'; correct the reader"
+        )
+    provenance: Any = recorded.provenance
+    findings: Any = recorded.findings
+    if not isinstance(provenance, dict) or not (
+        isinstance(findings, list) and all(isinstance(f, Finding) for f in findings)
+    ):
+        raise InputError(
+            f"read.format must be a reader with a list of Findings and a dict of provenance, got "
+            f"others of '{name}'; leave them out or correct the reader"
         )
     sizes = {c.values.size for c in recorded.columns}
     if len(sizes) > 1:
