@@ -190,3 +190,8 @@ def test_bad_arguments_are_answered_by_one_sentence():
         bessel_ratio(np.nan)
     with pytest.raises(InputError, match=r"shear.V must be finite and positive, got 0 m/s;"):
         shear_viscosity_ratio(0.0, W0=7.0, A=0.013, layer=LAYER)
+
+
+def test_a_radius_without_a_finite_area_is_refused():
+    with pytest.raises(InputError, match=r"AirLayer.R must have a square .*got 1e\+308 m"):
+        AirLayer(P0=1e5, h0=6.5e-6, eta=1e-5, R=1e308)

@@ -111,8 +111,8 @@ class AirLayer:
     Raises
     ------
     InputError
-        When a field is not finite and positive, the shapes do not broadcast, or `gas_flow` is
-        unknown.
+        When a field or the area is not finite and positive, the shapes do not broadcast, or
+        `gas_flow` is unknown.
     """
 
     P0: Real
@@ -133,6 +133,13 @@ class AirLayer:
         for field, (unit, what) in advice.items():
             value = as_real(f"AirLayer.{field}", getattr(self, field), unit, what)
             object.__setattr__(self, field, value)
+        with np.errstate(over="ignore"):
+            finite = np.isfinite(np.square(self.R))
+        if not np.all(finite):
+            raise InputError(
+                "AirLayer.R must have a square that is a finite number, got "
+                f"{np.max(self.R):g} m; give the radius of the contact patch in metres"
+            )
         check_shapes("AirLayer.fields", *(getattr(self, field) for field in advice))
         if self.gas_flow not in get_args(GasFlow):
             way_out = closest(str(self.gas_flow), get_args(GasFlow))

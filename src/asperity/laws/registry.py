@@ -7,6 +7,7 @@ import warnings
 from pathlib import Path
 
 from asperity.errors import InputError, closest
+from asperity.laws.consistency import checked_class
 from asperity.laws.discovery import installed, law_at, load_installed
 from asperity.laws.law import Law
 from asperity.parameters.arguments import shown
@@ -22,8 +23,11 @@ def register(law: type[Law]) -> type[Law]:
     Raises
     ------
     InputError
-        If another law has that name.
+        If another law has that name, or a law from outside the package breaks a rule of
+        `asperity.laws.consistency.checked_class`.
     """
+    if not law.__module__.startswith("asperity."):
+        checked_class(law, f"the class {law.__name__}")
     known = _LAWS.setdefault(law.name, law)
     if known is not law and _same_source(known, law):
         _LAWS[law.name] = law

@@ -21,6 +21,7 @@ from asperity.sweep import (
     store_status,
     summary_statistics,
 )
+from asperity.sweep.run import run as run_module
 from asperity.sweep.store import store as store_module
 from asperity.sweep.store.lock import StoreLock
 from references.closed_form_sweep import ClosedForm, ThisProcess, files_of, plan_of
@@ -183,6 +184,22 @@ def test_a_full_disk_is_a_sentence_and_costs_nothing(
     run(out)
     run(tmp_path / "whole.zarr")
     assert files_of(out) == files_of(tmp_path / "whole.zarr")
+
+
+def test_a_refused_start_leaves_no_store(tmp_path: Path, closed_form: ClosedForm) -> None:
+    out = tmp_path / "s.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module, "_bytes_left", lambda store: 1e30)
+        with pytest.raises(InputError, match="what there is room for"):
+            run(out)
+        assert not out.exists()
+    assert run(out).points == POINTS
+    before = files_of(out)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module, "_bytes_left", lambda store: 1e30)
+        with pytest.raises(InputError, match="what there is room for"):
+            run(out)
+    assert files_of(out) == before
 
 
 @pytest.mark.parametrize("name", ["mu1", "outcome", "status"])

@@ -146,8 +146,8 @@ def coefficients_of(load: Modulation) -> tuple[int, int, int] | None:
         return None
     if not isinstance(load, Periodic):
         raise InputError(
-            f"modulation must be harmonic or periodic, got {type(load).__name__}; build it with "
-            "asperity.loads.modulated or asperity.loads.sampled"
+            "modulation must be given by its Fourier coefficients where derivatives are asked for, "
+            f"got {type(load).__name__}; give its samples to asperity.loads.sampled"
         )
     return len(load.load), len(load.shear), len(load.pull)
 

@@ -6,10 +6,11 @@ import contextlib
 import json
 import os
 import platform
+import shutil
 import socket
 import time
 from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -117,19 +118,26 @@ def run_sweep(
         plan = load_plan(plan)
     grid = SweepGrid.of(plan)
     pool = _workers(workers, cluster, address)
-    with StoreLock(path) as lock:
+    with StoreLock(path) as lock, ExitStack() as stack:
+        fresh = not path.exists()
         store = _opened(path, plan, text, grid, extend_store, retry_failed)
         swept = store.sweep_orphans()
         if swept and log is not None:
             log(f"{swept} files that killed writers had left half-written were removed")
-        require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
-                     "choose another disk or fewer outputs")  # fmt: skip
-        with pool as found:
-            job = Job(
-                str(store.path), store.grid.digest, lock.token, retry_failed, law_places(plan),
-                str(plan.folder.resolve()), numerics(),
-            )  # fmt: skip
-            return _run(store, lock, found, job, progress, log)
+        try:
+            require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
+                         "choose another disk or fewer outputs")  # fmt: skip
+            found = stack.enter_context(pool)
+        except InputError:
+            # A refused start leaves nothing behind.
+            if fresh:
+                shutil.rmtree(path)
+            raise
+        job = Job(
+            str(store.path), store.grid.digest, lock.token, retry_failed, law_places(plan),
+            str(plan.folder.resolve()), numerics(),
+        )  # fmt: skip
+        return _run(store, lock, found, job, progress, log)
 
 
 def _workers(

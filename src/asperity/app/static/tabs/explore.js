@@ -355,8 +355,11 @@ export function create(page) {
       sliders.push(new Quantity(own));
       return sliders.at(-1).element;
     };
+    // With an air layer the contacts bear a share of what is applied.
+    const applied = (p) => (p.name === "epsilon" && view.air !== null
+      ? { ...p, meaning: "relative amplitude of the load as applied" } : p);
     const sliderOf = (p) => slider({
-      parameter: p,
+      parameter: applied(p),
       slider: { ...material.sliders[p.name], value: view.numbers[p.name] ?? material.sliders[p.name].value },
       onInput: (value) => { view.numbers[p.name] = value; changed(); },
     });
