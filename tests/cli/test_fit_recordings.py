@@ -45,6 +45,11 @@ def test_a_recording_is_fitted(recording):
         (["--prior", "K=3+-0 1/um"], "must have a positive deviation"),
         (["--velocities", "1 um/s"], "must be one more than the steps"),
         (["--gauge", "-1 Hz"], "--gauge must be positive"),
+        (["--fit-rate", "-1 Hz"], "fit_rate must be positive"),
+        (
+            ["--fit-rate", "0.1 Hz"],
+            "fit_rate must leave 16 means or more of steps",
+        ),
     ],
 )
 def test_bad_options_are_refused(recording, more, said):
@@ -54,8 +59,10 @@ def test_bad_options_are_refused(recording, more, said):
 
 
 def test_the_choice_of_the_window_is_an_uncertainty(recording):
-    found = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", "--windows", "auto")
+    options = ["--windows", "auto", "--fit-rate", "5 Hz"]
+    found = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", *options)
     assert found.exit_code == 0, found.output
+    assert "1400 samples are compared as 700 means over blocks of 2" in found.output
     assert "over 4 windows (0 to 139.9, " in found.output
     assert "of the window" in found.output
 

@@ -13,10 +13,11 @@ from scipy.integrate import quad
 from scipy.special import ndtri
 
 from asperity.errors import InputError
-from asperity.inference import fit
+from asperity.inference import RunOptions, fit
 from asperity.inference.posterior import sample_posterior
 from asperity.inference.posterior.coordinates import Coordinates
 from asperity.inference.posterior.nuts import WARM_UP, first_state, run_block, warmed_up
+from asperity.inference.posterior.recordings import likelihood_of_run
 from asperity.inference.posterior.sampling import whitened_posterior
 from asperity.outputs import Interrupted
 
@@ -152,8 +153,8 @@ def steps():
     return run
 
 
-def fit_of_steps(run):
-    return fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1)
+def fit_of_steps(run, options=None):
+    return fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1, runs=options)
 
 
 def test_blocks_of_a_recording_are_the_same_after_another_fit(steps):
@@ -168,6 +169,25 @@ def test_blocks_of_a_recording_are_the_same_after_another_fit(steps):
     np.testing.assert_array_equal(
         gradient(z, data)[1], jax.jit(jax.value_and_grad(again))(z, same)[1]
     )
+
+
+def test_the_likelihood_of_means_is_that_of_their_fit(steps):
+    found = fit_of_steps(steps, RunOptions(fit_rate=2.5))
+    (term,) = found.objective.terms
+    assert found.observables["friction"][1] == 350
+    likelihood, data = likelihood_of_run(term, found.objective.names)
+
+    def both(factor):
+        values = found.values | {"A": factor * found.values["A"]}
+        compiled = jax.value_and_grad(lambda x: likelihood({**values, "A": x}, data))(values["A"])
+        expected = term.residuals(values)
+        j = list(values).index("A")
+        return compiled, (-0.5 * expected.values @ expected.values, expected, j)
+
+    one, other = both(1.0), both(1.01)
+    assert float(one[0][0] - other[0][0]) == pytest.approx(one[1][0] - other[1][0], abs=1e-6)
+    for (_, gradient), (_, r, j) in (one, other):
+        assert float(gradient) == pytest.approx(-r.values @ r.jacobian[:, j], rel=1e-6)
 
 
 def test_the_density_of_a_recording_is_that_of_its_fit(steps):

@@ -215,6 +215,7 @@ def _recording(term: RunTerm) -> str:
     said = (
         f"{run.name}: {noise['samples']} samples, of which {noise['effective_samples']:.4g} are "
         f"independent; noise {noise['model']}, whiteness p = {noise['whiteness_p']:.2g}."
+        + (f" {noise['averaged']}." if noise["averaged"] else "")
     )
     return f"<p>{escape(said)}</p>" + table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
 

@@ -17,6 +17,7 @@ from asperity.inference.forward import Forward, LockInTerm, all_converged
 from asperity.inference.outliers import outlying_rows
 from asperity.inference.residuals import residuals_of, weights_of
 from asperity.inference.result import Fit
+from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.table import LockInTable, joined
 from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law
@@ -134,7 +135,7 @@ def compare(
         raise InputError(
             f"laws must be two or more, got {', '.join(laws) or 'none'}; name those to compare"
         )
-    several = listed_data(data)
+    several = listed_data(data, options.get("runs") or RunOptions())
     own = {name: _own(name, free, laws) for name in dict.fromkeys(laws)}
 
     tables_only = all(isinstance(d, LockInTable) for d in several)

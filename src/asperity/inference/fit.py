@@ -36,6 +36,7 @@ from asperity.inference.runs.assembly import (
     stiffness_in,
     usual_ranges,
 )
+from asperity.inference.runs.blocks import coarser, reduced
 from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.table import LockInTable, joined
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
@@ -112,23 +113,30 @@ def fit(
             f"law must depend on the velocity, got {chosen.name}; its one number follows from the "
             "mean friction"
         )
-    several = listed_data(data)
+    options = runs or RunOptions()
+    several = listed_data(data, options)
     tables = [d for d in several if isinstance(d, LockInTable)]
     recordings = [d for d in several if isinstance(d, RecordedRun)]
     table = joined(tables)[0] if tables else None
-    objective = _objective(
-        chosen,
-        table,
-        recordings,
-        list(free),
-        fixed=fixed or {},
-        material=material,
-        prior=prior,
-        start=start,
-        options=runs or RunOptions(),
-        motion={"inertia": inertia, "radiation_damping": radiation_damping},
-    )
-    minima = minima_of(objective, seed, progress, drawn=starts)
+
+    def compared(recordings: Sequence[RecordedRun]) -> Objective:
+        return _objective(
+            chosen,
+            table,
+            recordings,
+            list(free),
+            fixed=fixed or {},
+            material=material,
+            prior=prior,
+            start=start,
+            options=options,
+            motion={"inertia": inertia, "radiation_damping": radiation_damping},
+        )
+
+    objective = compared(recordings)
+    # Minima of a long recording are looked for in fewer, longer blocks.
+    searched = compared(coarse) if (coarse := coarser(recordings)) else objective
+    minima = minima_of(searched, seed, progress, drawn=starts)
     if not minima:
         return failed_fit(objective)
     if recordings:
@@ -168,10 +176,14 @@ def _begun(
     }
 
 
-def listed_data(data: Data | Iterable[Data]) -> list[LockInTable | RecordedRun]:
+def listed_data(
+    data: Data | Iterable[Data], options: RunOptions
+) -> list[LockInTable | RecordedRun]:
     """One set of data or several as a list, recordings made ready."""
     several = [data] if isinstance(data, LockInTable | RecordedRun | Trace) else list(data)
-    return [d if isinstance(d, LockInTable) else run_of(d) for d in several]
+    return [
+        d if isinstance(d, LockInTable) else reduced(run_of(d), options.fit_rate) for d in several
+    ]
 
 
 def _objective(

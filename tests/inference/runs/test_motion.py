@@ -17,7 +17,7 @@ FREE = ("A", "B", "D0", "K", "alpha", "shift_1", "start_force", "start_state_0")
 AT = {**VALUES, "alpha": 0.2, "shift_1": 0.03, "start_force": 0.002, "start_state_0": -0.3}
 
 
-def by_scipy(values):
+def by_scipy(values, TIMES=TIMES):
     """F/W of the Linker-Dieterich law, its age as the state, from the printed equations."""
     p = values
     edges = EDGES.copy()
@@ -68,6 +68,26 @@ def test_derivatives_are_those_of_an_independent_integration(computed, name):
     near = np.abs(TIMES - 20.03) > 0.2 if name == "shift_1" else np.ones(TIMES.size, bool)
     scale = np.abs(expected).max()
     np.testing.assert_allclose(found[near], expected[near], atol=1e-3 * scale)
+
+
+def test_means_over_blocks_are_those_of_an_independent_integration(computed):
+    drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
+    motion = RunMotion(get_law("linker-dieterich"), 3e-6)
+    # Blocks of 0.6 s, each change of the drive within one, and a gap.
+    edges = np.linspace(0.0, 69.0, 116)
+    blocks = np.stack([edges[:-1], edges[1:]], axis=1)[np.arange(115) != 60]
+    means = motion(AT, FREE, drive, blocks)
+    times = (blocks[:, :1] + 0.6 * (np.arange(50) + 0.5) / 50).ravel()
+    expected = by_scipy(AT, times).reshape(-1, 50).mean(axis=1)
+    # The midpoint rule over 12 ms, where friction turns by 0.04 a second; steps of it are 0.02.
+    np.testing.assert_allclose(means.friction, expected, atol=5e-6)
+    # About the step and the beginning of the hold.
+    some = slice(31, 51)
+    at = times.reshape(-1, 50)[some].ravel()
+    points = motion(AT, FREE, drive, at).derivatives.reshape(20, 50, -1).mean(axis=1)
+    for name, mean, point in zip(FREE, means.derivatives[some].T, points.T, strict=True):
+        # That to the time of the step jumps within a fiftieth of a block.
+        np.testing.assert_allclose(mean, point, atol=1e-2 * np.abs(point).max(), err_msg=name)
 
 
 def test_a_motion_that_runs_away_is_no_motion():

@@ -42,6 +42,7 @@ the share of epsilon that the contacts carry.
 Recording: any file that 'asperity measure' reads, with friction (or force and
 load) and the displacement or velocity of the load point. It is compared with the
 motion through the whole of it; its stiffness K is free, its noise autoregressive.
+More than 20,000 samples are compared as means over blocks (--fit-rate).
 """
 
 
@@ -68,6 +69,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         initial: str,
         gauge: str | None,
         gauge_order: int,
+        fit_rate: str | None,
         **others: Any,
     ) -> Any:
         names = [name.strip() for name in free.split(",") if name.strip()]
@@ -80,7 +82,12 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
             "inertia": inertia,
             "radiation_damping": radiation_damping,
             "runs": run_options(
-                trend=trend, drift=drift, initial=initial, gauge=gauge, gauge_order=gauge_order
+                trend=trend,
+                drift=drift,
+                initial=initial,
+                gauge=gauge,
+                gauge_order=gauge_order,
+                fit_rate=fit_rate,
             ),
         }
         reading = FitData(source, window, steps, velocities)
@@ -251,6 +258,8 @@ def _runs(found: Fit) -> list[str]:
                 f"{term.name}: noise {noise['model']}, {noise['effective_samples']:.4g} effective "
                 f"of {noise['samples']} samples, whiteness p = {noise['whiteness_p']:.2g}"
             )
+            if noise["averaged"]:
+                lines.append(f"{term.name}: {noise['averaged']}")
     return lines
 
 

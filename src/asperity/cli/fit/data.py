@@ -51,6 +51,12 @@ RUN_OPTIONS = (
     click.option(
         "--gauge-order", type=click.IntRange(1, 8), default=1, show_default=True, help="Its order."
     ),
+    click.option(
+        "--fit-rate",
+        metavar="HZ|full",
+        help='Means a second that stand for the samples of a recording, like "100 Hz"; by default '
+        "as many as it needs where it has more than 20,000 samples.",
+    ),
 )
 
 
@@ -158,7 +164,13 @@ def is_table(path: Path) -> bool:
 
 
 def run_options(
-    *, trend: str, drift: bool, initial: str, gauge: str | None, gauge_order: int
+    *,
+    trend: str,
+    drift: bool,
+    initial: str,
+    gauge: str | None,
+    gauge_order: int,
+    fit_rate: str | None,
 ) -> Any:
     """How recordings are compared with the motion, from the options."""
     from asperity.inference import RunOptions
@@ -175,7 +187,7 @@ def run_options(
         if not corner[1] > 0:
             raise InputError(f"--gauge must be positive, got '{gauge}'; give its corner frequency")
     linear = ("offset", *trends[trend], *(("drift",) if drift else ()))
-    return RunOptions(linear=linear, initial=initial, gauge=corner)
+    return RunOptions(linear=linear, initial=initial, gauge=corner, fit_rate=fit_rate)
 
 
 def priors_of(texts: Sequence[str], free: Sequence[str]) -> dict[str, Prior]:

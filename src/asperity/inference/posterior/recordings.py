@@ -25,6 +25,8 @@ from asperity.inference.runs.term import RunTerm
 class RunArrays(NamedTuple):
     """Numbers of a recording; samples that fill up have taps of 0.
 
+    A sample is a mean over a block where `RunLikelihood.means` says so.
+
     Attributes
     ----------
     motion : Motion
@@ -32,7 +34,11 @@ class RunArrays(NamedTuple):
     fixed : dict of str to array, shape ()
         Parameters of the motion that are not free.
     drive : Drive
-    times, recorded : array, shape (n,)
+    times : array, shape (m,)
+        Of the samples, or edges of blocks.
+    taken : array of int, shape (n,)
+        Which of the times, or of the blocks between them, each sample is.
+    recorded : array, shape (n,)
     taps : array, shape (n, order + 1)
         Whitening: w_t = sum_k taps[t, k] x_(t-k).
     basis : array, shape (n, columns)
@@ -43,6 +49,7 @@ class RunArrays(NamedTuple):
     fixed: dict[str, Any]
     drive: Drive
     times: Any
+    taken: Any
     recorded: Any
     taps: Any
     basis: Any
@@ -60,11 +67,14 @@ class RunLikelihood:
         Free parameters that this recording depends on, and their names in the motion.
     room : int
         Steps of the integrator at most.
+    means : bool
+        Whether samples are means over blocks.
     """
 
     equation: Any
     own: tuple[tuple[str, str], ...]
     room: int
+    means: bool
 
     def __call__(self, values: Mapping[str, Array], data: RunArrays) -> Array:
         """Log likelihood of parameters by name; NaN where the motion cannot be computed."""
@@ -73,13 +83,19 @@ class RunLikelihood:
         def both(x: Array) -> tuple[Array, Array]:
             moving = {inner: x[i] for i, (_, inner) in enumerate(self.own)}
             friction, slopes, _, done = through(
-                motion, moving, {**data.fixed, **moving}, data.drive, data.times, room=self.room
+                motion,
+                moving,
+                {**data.fixed, **moving},
+                data.drive,
+                data.times,
+                room=self.room,
+                means=self.means,
             )
-            white = _whitened(data.taps, friction - data.recorded)
+            white = _whitened(data.taps, friction[data.taken] - data.recorded)
             white = white - data.basis @ (data.basis.T @ white)
             value = jnp.where(done, -0.5 * jnp.sum(white**2), jnp.nan)
             back = _transposed(data.taps, white)
-            return value, -jnp.stack([slopes[inner] @ back for _, inner in self.own])
+            return value, -jnp.stack([slopes[inner][data.taken] @ back for _, inner in self.own])
 
         @jax.custom_vjp
         def likelihood(x: Array) -> Array:
@@ -121,10 +137,10 @@ def likelihood_of_run(term: RunTerm, names: tuple[str, ...]) -> tuple[RunLikelih
     own = tuple((n, inner) for n in names if (inner := term.inner(n)) is not None)
     fixed = {n: np.float64(v) for n, v in {**term.fixed, "W0": term.run.W0}.items()}
     # Any numbers serve for the template: those of the parameters take their place.
-    motion, drive, times = term.motion.prepared(
+    motion, drive, times, taken = term.motion.prepared(
         {**fixed, **{inner: np.float64(1.0) for _, inner in own if inner not in fixed}},
         term.run.drive,
-        term.run.time,
+        term.run.at,
     )
     n, size = term.run.time.size, times.size
     taps = np.zeros((size, max(m.order for m in term.models) + 1))
@@ -132,11 +148,13 @@ def likelihood_of_run(term: RunTerm, names: tuple[str, ...]) -> tuple[RunLikelih
         taps[a:b, : model.order + 1] = model.taps(b - a)
     arrays, equation = eqx.partition(motion, eqx.is_array_like)
     more = (0, size - n)
-    return RunLikelihood(equation, own, term.motion.room), RunArrays(
+    means = term.run.blocks is not None
+    return RunLikelihood(equation, own, term.motion.room, means), RunArrays(
         jax.tree.map(np.asarray, arrays),
         fixed,
         drive,
         times,
+        np.pad(taken, more),
         np.pad(term.run.friction, more),
         taps,
         np.pad(term.basis, (more, (0, 0))),

@@ -10,6 +10,7 @@ import numpy as np
 
 from asperity.errors import InputError, closest
 from asperity.inference.result import Fit
+from asperity.inference.runs.blocks import checked_rate
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm, cut_delays
 from asperity.inference.unknowns import Prior, Unknown, unknown_of
@@ -45,14 +46,20 @@ class RunOptions:
         Order and corner frequency (Hz) of the low-pass of the force gauge.
     order : int, optional
         Of the noise; chosen by the data by default.
+    fit_rate : float or str, optional
+        Means a second (Hz) that stand for the samples, or "full" for every sample. By default
+        recordings of up to 20,000 samples are compared sample by sample, and longer ones by means
+        over blocks as short as their changes need.
     """
 
     linear: tuple[str, ...] = ("offset", "trend")
     initial: str = "steady"
     gauge: tuple[int, float] | None = None
     order: int | None = None
+    fit_rate: float | str | None = None
 
     def __post_init__(self) -> None:
+        checked_rate(self.fit_rate)
         for name in self.linear:
             if name not in LINEAR:
                 raise InputError(

@@ -4,8 +4,9 @@ The states are carried from one piece of the drive to the next: velocity steps, 
 load changes follow each other as in the experiment. Within a piece the pulling velocity and the
 load are linear in time. The integrator is the pair of Dormand and Prince (J. Comput. Appl. Math. 6,
 19, 1980) of orders 5 and 4 with adaptive steps that end at every change of the drive, and its
-continuous extension gives the friction at the samples. Derivatives are those of the computed
-solution at its steps, by forward differentiation; step ends move with the changes of the drive.
+continuous extension gives the friction at the samples, or its means over blocks of time.
+Derivatives are those of the computed solution at its steps, by forward differentiation; step ends
+move with the changes of the drive.
 """
 
 from __future__ import annotations
@@ -57,6 +58,8 @@ _DENSE = np.array(
         69997945 / 29380423,
     ]
 )
+#: Gauss-Legendre on (0, 1): exact for the continuous extension, which is of degree 4.
+_GAUSS = np.stack(np.polynomial.legendre.leggauss(3), axis=1) / 2 + [0.5, 0.0]
 
 
 class Drive(NamedTuple):
@@ -78,6 +81,14 @@ class Drive(NamedTuple):
     pull_slope: Any
     load: Any
     load_slope: Any
+
+    def load_at(self, times: Float) -> Float:
+        """W/W0 at times (s) from the beginning."""
+        piece = np.searchsorted(self.edges, times, side="right") - 1
+        piece = np.clip(piece, 0, len(self.load) - 1)
+        return np.asarray(
+            self.load[piece] + self.load_slope[piece] * (times - self.edges[piece]), np.float64
+        )
 
 
 class Motions(NamedTuple):
@@ -136,36 +147,45 @@ class RunMotion:
         free : tuple of str
             Names for derivatives, of those.
         drive : Drive
-        times : array, shape (n,)
-            Of the samples, from the beginning of the drive (s).
+        times : array, shape (n,) or (n, 2)
+            Of the samples, or of the beginnings and ends of blocks over which friction is averaged,
+            from the beginning of the drive (s).
         """
-        n = times.size
         given: dict[str, Any] = {name: np.float64(value) for name, value in values.items()}
-        motion, padded, at = self.prepared(given, drive, times)
+        motion, padded, at, taken = self.prepared(given, drive, times)
         friction, slopes, steps, done = through(
-            motion, {k: given[k] for k in free}, given, padded, at, room=self.room
+            motion,
+            {k: given[k] for k in free},
+            given,
+            padded,
+            at,
+            room=self.room,
+            means=times.ndim == 2,
         )
         if not bool(done):
             return None
-        f = np.asarray(friction)[:n]
-        columns = [np.asarray(slopes[name])[:n] for name in free]
-        jacobian = np.stack(columns, axis=1) if columns else np.zeros((n, 0))
+        f = np.asarray(friction)[taken]
+        columns = [np.asarray(slopes[name])[taken] for name in free]
+        jacobian = np.stack(columns, axis=1) if columns else np.zeros((f.size, 0))
         if not (np.isfinite(f).all() and np.isfinite(jacobian).all()):
             return None
         return Motions(f, jacobian, int(steps))
 
     def prepared(
         self, given: Mapping[str, Any], drive: Drive, times: Float
-    ) -> tuple[Motion, Drive, Float]:
+    ) -> tuple[Motion, Drive, Float, NDArray[np.intp]]:
         """What `through` takes: equation of motion, drive and times, filled up to a few lengths.
 
-        The numbers of the equation are replaced by those that `through` is given.
+        The numbers of the equation are replaced by those that `through` is given. The last of the
+        four says which of what it returns belongs to which of the times.
         """
         if self._equations is None:
             self._equations = self._template(given)
-        size = 1024 * int(np.ceil(times.size / 1024))
-        at = np.concatenate([times, np.full(size - times.size, times[-1])])
-        return self._equations, _padded(drive), at
+        at = times if times.ndim == 1 else np.unique(times)
+        taken = np.arange(at.size) if times.ndim == 1 else np.searchsorted(at, times[:, 0])
+        size = 1024 * int(np.ceil(at.size / 1024))
+        at = np.concatenate([at, np.full(size - at.size, at[-1])])
+        return self._equations, _padded(drive), at, taken
 
     @property
     def room(self) -> int:
@@ -228,6 +248,7 @@ def through(
     times: Any,
     *,
     room: int,
+    means: bool = False,
 ) -> tuple[Array, dict[str, Array], Array, Array]:
     """Friction at the samples under given numbers, differentiated forwards.
 
@@ -243,11 +264,13 @@ def through(
     times : array, shape (n,)
     room : int
         Steps at most.
+    means : bool
+        Whether friction is averaged between neighbouring times, which are then in order.
 
     Returns
     -------
-    friction : array, shape (n,)
-    derivatives : dict of str to array, shape (n,)
+    friction : array, shape (n,), or (n - 1,) for means
+    derivatives : dict of str to array, of the same shape
     steps : array, shape ()
     done : array, shape ()
         Whether the end was reached.
@@ -258,7 +281,7 @@ def through(
         changed = _with_values(motion, values)
         moved = _shifted(drive, values)
         dense = _integrated(changed, moved, values, room)
-        f = _observed(changed, moved, values, dense, times)
+        f = (_averaged if means else _observed)(changed, moved, values, dense, times)
         return f, (f, dense.steps, dense.done)
 
     if not free:
@@ -394,13 +417,61 @@ def _observed(
     motion: Motion, drive: Drive, values: Mapping[str, Array], dense: _Dense, times: Array
 ) -> Array:
     """F/W at the samples."""
-    still = jax.lax.stop_gradient
-    i = jnp.clip(jnp.searchsorted(still(dense.begin), times, side="right") - 1, 0)
-    i = jnp.minimum(i, dense.steps - 1)
-    x = ((times - dense.begin[i]) / dense.length[i])[:, None]
-    c = dense.coefficients[i]
+    i = _step_of(dense, times)
+    share = (times - dense.begin[i]) / dense.length[i]
+    return _friction(motion, drive, values, dense, i, share, times)
+
+
+def _averaged(
+    motion: Motion, drive: Drive, values: Mapping[str, Array], dense: _Dense, edges: Array
+) -> Array:
+    """Mean F/W between neighbouring edges; 0 where there is no time between them."""
+    numbers = jnp.arange(dense.begin.size)
+    taken = numbers < dense.steps
+    begin = jnp.where(taken, dense.begin, 0.0)
+    # Means are differences of an integral: of what is small, they keep more digits.
+    level = jax.lax.stop_gradient(
+        _friction(motion, drive, values, dense, numbers[:1], jnp.zeros(1), begin[:1])
+    )
+
+    def integral(step: Array, share: Array) -> Array:
+        """Of F/W from the beginning of a step to a share of its length."""
+        total = jnp.zeros(share.shape)
+        for node, weight in _GAUSS:
+            at = begin[step] + node * share * dense.length[step]
+            f = _friction(motion, drive, values, dense, step, node * share, at)
+            total = total + weight * (f - level)
+        return total * share * dense.length[step]
+
+    whole = jnp.where(taken, integral(numbers, jnp.ones(numbers.size)), 0.0)
+    before = jnp.cumsum(whole) - whole
+    i = _step_of(dense, edges)
+    rise = jnp.diff(before[i] + integral(i, (edges - begin[i]) / dense.length[i]))
+    apart = jnp.diff(edges)
+    return jnp.where(apart > 0, level + rise / jnp.where(apart > 0, apart, 1.0), 0.0)
+
+
+def _step_of(dense: _Dense, times: Array) -> Array:
+    """Step of the integrator that each time lies in."""
+    begin = jax.lax.stop_gradient(dense.begin)
+    i = jnp.clip(jnp.searchsorted(begin, times, side="right") - 1, 0)
+    return jnp.minimum(i, dense.steps - 1)
+
+
+def _friction(
+    motion: Motion,
+    drive: Drive,
+    values: Mapping[str, Array],
+    dense: _Dense,
+    step: Array,
+    share: Array,
+    times: Array,
+) -> Array:
+    """F/W at times, each a share of the length of a step after its beginning."""
+    x = share[:, None]
+    c = dense.coefficients[step]
     y = c[:, 0] + x * (c[:, 1] + (1 - x) * (c[:, 2] + x * (c[:, 3] + (1 - x) * c[:, 4])))
-    piece = jnp.searchsorted(still(drive.edges), times, side="right") - 1
+    piece = jnp.searchsorted(jax.lax.stop_gradient(drive.edges), times, side="right") - 1
     piece = jnp.clip(piece, 0, drive.pull.shape[0] - 1)
     at = _excitation(drive, values, piece, times)
     load = drive.load[piece] + drive.load_slope[piece] * (times - drive.edges[piece])

@@ -5,11 +5,14 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solveh_banded
+from scipy.stats import norm
 
 from asperity.errors import InputError
 from asperity.inference.runs.motion import Drive
@@ -24,6 +27,11 @@ Float = NDArray[np.float64]
 _CONSTANT_LOAD = 1e-3
 #: The load is followed to this many standard deviations of its noise.
 _LOAD_NOISE = 5.0
+#: Samples up to which a recording is compared sample by sample.
+LONGEST = 20_000
+#: Of longer ones: parts into which the load between its quick
+#: changes is averaged, and the chance of a sample that noise puts beyond the limit.
+_LOAD_BLOCKS, _LOAD_BY_CHANCE = 4_000, 1e-3
 #: A segment stands still that moves by less than so many standard deviations of the displacement's
 #: noise, or by less than this share of the fastest velocity.
 _STILL_NOISE, _STILL_SHARE = 6.0, 5e-3
@@ -37,6 +45,50 @@ _SHORTEST, _OTHER_RATE = 16, 1.5
 
 
 @dataclass(frozen=True, eq=False)
+class Blocks:
+    """Blocks of samples whose means stand for a long recording.
+
+    Attributes
+    ----------
+    edges : array, shape (n, 2)
+        Beginning and end of each (s).
+    samples : tuple of int
+        Samples in a block, of each stretch of one sampling rate.
+    recorded : int
+        Samples of the recording.
+    lines : tuple of float
+        Lines (Hz) that were taken off the friction before.
+    spikes : int
+        Samples that were left out of their blocks as farther off than noise can be.
+    """
+
+    edges: Float
+    samples: tuple[int, ...]
+    recorded: int
+    lines: tuple[float, ...] = ()
+    spikes: int = 0
+
+    @property
+    def sentence(self) -> str:
+        """What was averaged, for readers."""
+        lengths = np.unique(np.round(np.diff(self.edges, axis=1)[:, 0], 9))
+        spread = [f"{1e3 * x:.4g}" for x in (lengths[0], lengths[-1])]
+        said = (
+            f"{self.recorded} samples are compared as {len(self.edges)} means over blocks of "
+            + (" or ".join(map(str, sorted(set(self.samples)))))
+            + f" ({' to '.join(dict.fromkeys(spread))} ms)"
+        )
+        if self.lines:
+            said += (
+                f", after lines at {', '.join(f'{f:.4g}' for f in self.lines)} Hz were taken off"
+            )
+        if self.spikes:
+            those = "samples that were" if self.spikes > 1 else "sample that was"
+            said += f", without {self.spikes} {those} farther off than noise can be"
+        return said
+
+
+@dataclass(frozen=True, eq=False)
 class RecordedRun:
     """A recording with its drive.
 
@@ -45,7 +97,7 @@ class RecordedRun:
     name : str
         What messages and names of nuisances call the run.
     time, friction : array, shape (n,)
-        Seconds from the first sample, and F/W.
+        Seconds from the first sample, and F/W; means over blocks if there are any.
     slip : array, shape (n,)
         Displacement of the load point from the first sample (m), of the drive.
     drive : Drive
@@ -68,6 +120,8 @@ class RecordedRun:
         First sample and the one after the last of each stretch of one sampling rate.
     doubts : tuple of str
         Sentences on what about the drive is open.
+    blocks : Blocks or None
+        None where `friction` is that of single samples.
     """
 
     name: str
@@ -85,6 +139,12 @@ class RecordedRun:
     load_varies: bool
     stretches: tuple[tuple[int, int], ...]
     doubts: tuple[str, ...]
+    blocks: Blocks | None = None
+
+    @property
+    def at(self) -> Float:
+        """Where the motion is compared: times (n,), or edges of blocks (n, 2), in seconds."""
+        return self.time if self.blocks is None else self.blocks.edges
 
     @property
     def stiffness_unit(self) -> str:
@@ -189,9 +249,12 @@ def recorded_run(
         np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
     )
     uncertain = []
-    for at in cut_times:
-        i = int(np.clip(np.searchsorted(times, at), 1, times.size - 1))
-        uncertain.append(float(np.median(np.diff(times[max(0, i - 3) : i + 3]))))
+    for k in kept:
+        cut = found.cuts[k]
+        i = int(np.clip(np.searchsorted(time, cut.time), 1, time.size - 1))
+        interval = float(np.median(np.diff(time[max(0, i - 3) : i + 3])))
+        # Found between so many samples, a time is known worse than their interval.
+        uncertain.append(max(interval, cut.doubt / 2) if time.size > LONGEST else interval)
     doubts = list(found.doubts)
     doubts += clipped(trace, force, window)
     if velocities is not None and signals.displacement is not None:
@@ -299,14 +362,47 @@ def _load(
     t, W = t[order], W[order]
     mean = float(W.mean())
     noise = float(np.median(np.abs(np.diff(W, 2)))) / 0.6745 / np.sqrt(6.0) if W.size > 4 else 0.0
-    knots = _line_knots(t, W, max(_LOAD_NOISE * noise, _CONSTANT_LOAD * mean))
+    knots = _load_knots(t, W, noise, _CONSTANT_LOAD * mean)
     if len(knots) == 2 and abs(W[0] - W[-1]) < _CONSTANT_LOAD * mean + _LOAD_NOISE * noise:
         return mean, unit, False, ends, np.full(2, mean)
     at = t[knots]
-    basis = np.stack([np.interp(t, at, row) for row in np.eye(len(knots))], axis=1)
-    values: Float = np.asarray(np.linalg.lstsq(basis, W, rcond=None)[0], np.float64)
+    values = _line_through(t, W, at)
     at[0], at[-1] = time[0], time[-1]
     return float(values[0]), unit, True, at, values
+
+
+def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
+    """Samples at the corners of a line that follows the load within its noise.
+
+    Of very many samples some are farther off by chance than the noise seems to be: what is quick is
+    found within a wider limit, and what is slow between, in means over blocks.
+    """
+    if t.size <= LONGEST:
+        return _line_knots(t, W, max(_LOAD_NOISE * noise, least))
+    chance = float(norm.isf(_LOAD_BY_CHANCE / t.size))
+    knots = _line_knots(t, W, max(2 * chance * noise, least))
+    found = set(knots)
+    for a, b in pairwise(knots):
+        q = max(1, (b - a) // _LOAD_BLOCKS)
+        if q == 1:
+            continue
+        whole = (b - a) // q * q
+        means = [x[a : a + whole].reshape(-1, q).mean(1) for x in (t, W)]
+        limit = max(_LOAD_NOISE * noise / np.sqrt(q), least)
+        found |= {a + k * q + q // 2 for k in _line_knots(means[0], means[1], limit)[1:-1]}
+    return sorted(found)
+
+
+def _line_through(t: Float, y: Float, at: Float) -> Float:
+    """Values at the knots of the line, linear between them, that is nearest to y."""
+    i = np.clip(np.searchsorted(at, t, side="right") - 1, 0, at.size - 2)
+    share = (t - at[i]) / (at[i + 1] - at[i])
+    # Normal equations of the hat functions, each of which has the sample at its knot.
+    bands = np.zeros((2, at.size))
+    bands[1] = np.bincount(i, (1 - share) ** 2, at.size) + np.bincount(i + 1, share**2, at.size)
+    bands[0, 1:] = np.bincount(i, share * (1 - share), at.size)[:-1]
+    right = np.bincount(i, (1 - share) * y, at.size) + np.bincount(i + 1, share * y, at.size)
+    return np.asarray(solveh_banded(bands, right))
 
 
 def _line_knots(t: Float, y: Float, tolerance: float) -> list[int]:
@@ -346,12 +442,17 @@ def _stretches(times: Float) -> tuple[tuple[int, int], ...]:
 
     steps = np.log(median_filter(np.diff(times), 7, mode="nearest"))
     bounds = [0]
-    level = steps[0]
-    for i, step in enumerate(steps):
-        if abs(step - level) > np.log(_OTHER_RATE):
-            if i - bounds[-1] >= _SHORTEST:
-                bounds.append(i)
-            level = step
+    level, begin, reach = steps[0], 0, 64
+    while begin < steps.size:
+        # The next other interval, looked for in growing parts.
+        other = np.abs(steps[begin : begin + reach] - level) > np.log(_OTHER_RATE)
+        if not other.any():
+            begin, reach = begin + reach, 4 * reach
+            continue
+        begin, reach = begin + int(np.argmax(other)), 64
+        if begin - bounds[-1] >= _SHORTEST:
+            bounds.append(begin)
+        level = steps[begin]
     if times.size - bounds[-1] < _SHORTEST and len(bounds) > 1:
         bounds.pop()
     return tuple(zip(bounds, [*bounds[1:], times.size], strict=True))

@@ -38,6 +38,8 @@ _AT_STEP = 5
 _NAMED = 5
 #: Samples that the quickest part of the gauge's response is resolved by.
 _FILTER_SAMPLES = 8.0
+#: Samples of the filtered motion in a block.
+_BLOCK_SAMPLES = 4
 
 
 class RunTerm:
@@ -125,6 +127,7 @@ class RunTerm:
         return {
             "model": "AR(" + ", ".join(map(str, orders)) + ")",
             "samples": int(sum(sizes)),
+            "averaged": "" if self.run.blocks is None else self.run.blocks.sentence,
             "effective_samples": round(
                 sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
@@ -166,7 +169,7 @@ class RunTerm:
                 given[inner] = values[name]
                 free.append(name)
         inner_names = tuple(str(self.inner(name)) for name in free)
-        at = self.run.time
+        at = self.run.at
         if self.gauge is not None:
             at, rate = self._filter_times()
         computed = self.motion(given, inner_names, self.run.drive, at)
@@ -176,7 +179,7 @@ class RunTerm:
         if self.gauge is not None:
             poles = low_pass(*self.gauge)
             whole = np.column_stack(
-                [between(filtered(c, rate, *poles), rate, self.run.time) for c in whole.T]
+                [self._as_recorded(filtered(c, rate, *poles), rate) for c in whole.T]
             )
         jacobian = np.zeros((self.run.time.size, len(values)))
         for j, name in enumerate(values):
@@ -364,10 +367,23 @@ class RunTerm:
         white = self._whitened(difference[:, None])[:, 0]
         return np.asarray(-np.linalg.solve(self._triangle, self.basis.T @ white))
 
+    def _as_recorded(self, values: Float, rate: float) -> Float:
+        """What a line through evenly spaced values has at the samples, or as means over blocks."""
+        if self.run.blocks is None:
+            return between(values, rate, self.run.time)
+        rises = np.concatenate([[0.0], np.cumsum(values[1:] + values[:-1])]) / (2 * rate)
+        edges = self.run.blocks.edges
+        position = np.clip(edges * rate, 0, values.size - 1)
+        k = np.minimum(position.astype(np.intp), values.size - 2)
+        share = position - k
+        beyond = share * (values[k] + 0.5 * share * (values[k + 1] - values[k])) / rate
+        return np.asarray(np.diff(rises[k] + beyond, axis=1)[:, 0] / np.diff(edges, axis=1)[:, 0])
+
     def _filter_times(self) -> tuple[Float, float]:
         assert self.gauge is not None  # asked for by the caller
         time = self.run.time
-        rate = max(1 / float(np.median(np.diff(time))), _FILTER_SAMPLES * self.gauge[1])
+        inside = 1 if self.run.blocks is None else _BLOCK_SAMPLES
+        rate = max(inside / float(np.median(np.diff(time))), _FILTER_SAMPLES * self.gauge[1])
         count = math.ceil(time[-1] * rate) + 1
         return np.minimum(np.arange(count) / rate, time[-1]), rate
 

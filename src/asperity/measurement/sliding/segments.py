@@ -24,6 +24,9 @@ _CELLS = 4000
 _LONGEST = 0.02
 #: Neighbours with a smaller ratio of velocities are one segment; up to the second it is doubtful.
 _RATIO, _CLEAR_RATIO = 1.2, 1.45
+#: Of recordings with more samples than this, the lines beside a cut are known better than one
+#: sample is: as well as so many means, of more samples than that.
+_LONG, _MEANS, _MANY = 20_000, 64, 1024
 #: A cut must explain so many standard deviations of a cell's log velocity.
 _SIGNIFICANT = 5.0
 #: A piece with less than this share of its neighbours' slip and of their time is their transition.
@@ -49,10 +52,21 @@ _MAYBE_HOLD = 0.02
 
 @dataclass(frozen=True)
 class Cut:
-    """Where a recording is cut: the time of the change, and the first sample after it."""
+    """Where a recording is cut: the time of the change, and the first sample after it.
+
+    Attributes
+    ----------
+    time : float
+        Seconds.
+    sample : int
+    doubt : float
+        Twice what the noise of the displacement leaves open about the time (s); 0 where it was
+        given.
+    """
 
     time: float
     sample: int
+    doubt: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -348,13 +362,13 @@ def _refined(
     cut = after[0]
     cell = int(np.searchsorted(edges, cut))
     lines = []
+    first, last = (int(np.searchsorted(edges, end)) for end in (before[0], after[1]))
+    if time.size > _LONG:
+        # The cells at the ends of a piece, long ones in a hold, may hold a part of the next one.
+        first, last = first + (first > 0), last - (last < edges.size - 1)
     sides = (
-        (before, max(before[0], int(edges[max(cell - 8, 0)])), int(edges[max(cell - 1, 0)])),
-        (
-            after,
-            int(edges[min(cell + 1, edges.size - 1)]),
-            min(after[1], int(edges[min(cell + 8, edges.size - 1)])),
-        ),
+        (before, int(edges[max(cell - 8, first)]), int(edges[max(cell - 1, 0)])),
+        (after, int(edges[min(cell + 1, edges.size - 1)]), int(edges[min(cell + 8, last)])),
     )
     for piece, low, high in sides:
         if high - low < 4 or low < piece[0] or high > piece[1]:
@@ -367,6 +381,9 @@ def _refined(
         slope = _velocity(time, displacement, low, high)
         middle = float(t.mean())
         left = x - x.mean() - slope * (t - middle)
+        if time.size > _LONG and left.size > _MANY:
+            # Of many samples, what counts is the scatter of their means.
+            left = left[: left.size // _MEANS * _MEANS].reshape(_MEANS, -1).mean(axis=1)
         lines.append((slope, float(x.mean()) - slope * middle, float(left.std()), low, high))
     (v1, c1, s1, low, _), (v2, c2, s2, _, high) = lines
     at = (c1 - c2) / (v2 - v1)
@@ -377,7 +394,7 @@ def _refined(
         time, friction, at, doubt, float(time[before[0]]), float(time[after[1] - 1])
     )
     sample = int(np.clip(np.searchsorted(time, at), before[0] + 4, after[1] - 4))
-    return Cut(at, sample)
+    return Cut(at, sample, doubt)
 
 
 def _kink_of_friction(

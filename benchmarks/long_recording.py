@@ -1,0 +1,124 @@
+"""A recording of ten minutes at 10 kHz: read, averaged over blocks and fitted.
+
+``python -m benchmarks.long_recording [--seconds 600] [--rate 10000] [--full]``
+
+The motion is computed by SciPy (`benchmarks.coverage`): velocity steps, two holds and load steps.
+The noise of the gauge is white, a resonance at 300 Hz (an autoregression of order 2), wanders over
+0.5 and 8 s, and has the mains with a harmonic, whose frequency wanders too. With ``--full`` the
+same recording is fitted at its full rate besides.
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import tempfile
+import time as clock
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import lfilter
+
+from benchmarks.clock import pin_to_one_core
+from benchmarks.coverage import LOAD, Case, friction
+
+FREE = ["A", "B", "D0", "alpha"]
+#: Standard deviations over friction: white, resonance, wandering over 0.5 and 8 s, mains.
+WHITE, RESONANCE, QUICK, SLOW, MAINS = 1e-3, 1e-3, 3e-4, 3e-4, 2e-3
+
+
+def programme(seconds: float, rate: float) -> Case:
+    """Velocity steps, holds and load steps, in shares of the duration."""
+    at = np.array([0.15, 0.3, 0.4, 0.45, 0.6, 0.7]) * seconds
+    velocities = (3e-6, 1e-5, 3e-6, 0.0, 1e-5, 0.0, 1e-5)
+    up, down = 0.8 * seconds, 0.9 * seconds
+    loads = ((up, 1.0), (up + 0.01, 1.1), (down, 1.1), (down + 0.01, 1.0))
+    return Case(velocities, tuple(at.tolist()), seconds, rate, loads)
+
+
+def noise(random: np.random.Generator, time: np.ndarray) -> np.ndarray:
+    """Noise of a gauge at a high rate."""
+    n, step = time.size, time[1] - time[0]
+    radius, turn = np.exp(-2 * np.pi * 20 * step), np.cos(2 * np.pi * 300 * step)
+    ringing = lfilter([1.0], [1.0, -2 * radius * turn, radius**2], random.normal(size=n))
+
+    def wandering(tau: float) -> np.ndarray:
+        a = np.exp(-step / tau)
+        steps = random.normal(size=n) * np.sqrt(1 - a * a)
+        return np.asarray(lfilter([1.0], [1.0, -a], steps, zi=[a * random.normal()])[0])
+
+    phase = 2 * np.pi * (50.01 * time + 0.2 * np.sin(2 * np.pi * time / 97.0))
+    mains = np.sqrt(2) * (np.cos(phase) + 0.3 * np.cos(3 * phase + 1.0))
+    return np.asarray(
+        WHITE * random.normal(size=n)
+        + RESONANCE * ringing / ringing.std()
+        + QUICK * wandering(0.5)
+        + SLOW * wandering(8.0)
+        + MAINS * mains
+    )
+
+
+def columns(case: Case, seed: int = 0) -> dict[str, np.ndarray]:
+    """Time (s), normal stress (MPa), shear stress (MPa) and displacement (um) of a recording."""
+    random = np.random.default_rng(seed)
+    time = np.arange(round(case.end * case.rate)) / case.rate
+    edges = np.array([0.0, *case.changes, case.end])
+    slip = np.concatenate([[0.0], np.cumsum(np.array(case.velocities) * np.diff(edges))])
+    mu = friction(case, time) + noise(random, time)
+    load = 1e-6 * LOAD * case.load(time)
+    return {
+        "time_s": time,
+        "normal_stress_MPa": load * (1 + 2e-4 * random.normal(size=time.size)),
+        "friction": mu,
+        "displacement_um": 1e6 * np.interp(time, edges, slip)
+        + 0.02 * random.normal(size=time.size),
+    }
+
+
+def written(path: Path, table: dict[str, np.ndarray]) -> None:
+    """A text file of 8 significant digits."""
+    whole = np.stack(list(table.values()), axis=1)
+    with path.open("w", encoding="utf-8") as file:
+        file.write(",".join(table) + "\n")
+        for part in np.array_split(whole, max(1, len(whole) // 100_000)):
+            np.savetxt(file, part, fmt="%.8g", delimiter=",")
+
+
+def main() -> None:
+    """Print times, memory and estimates."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seconds", type=float, default=600.0)
+    parser.add_argument("--rate", type=float, default=1e4)
+    parser.add_argument("--file", type=Path, help="use this file, and write it where it is not")
+    parser.add_argument("--full", action="store_true", help="fit at the full rate besides")
+    arguments = parser.parse_args()
+    case = programme(arguments.seconds, arguments.rate)
+    with tempfile.TemporaryDirectory() as folder:
+        path = arguments.file or Path(folder) / "long.csv"
+        if not path.exists():
+            written(path, columns(case))
+        pin_to_one_core()
+        from asperity import inference, read
+
+        begun = clock.perf_counter()
+        trace = read(path)
+        read_in = clock.perf_counter() - begun
+        run = inference.recorded_run(trace)
+        cut_in = clock.perf_counter() - begun
+        print(f"{run.time.size} samples: read in {read_in:.1f} s, drive found by {cut_in:.1f} s")
+        for rate in (None, "full") if arguments.full else (None,):
+            begun = clock.perf_counter()
+            found = inference.fit(run, case.law, FREE, runs=inference.RunOptions(fit_rate=rate))
+            took = clock.perf_counter() - begun
+            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
+            print(f"rate {rate or 'by the data'}: fit in {took:.1f} s, {peak:.2f} GB at most")
+            print(found.objective.terms[0].noise)
+            for name, truth in case.true.items():
+                p = found.parameters[name]
+                off = (p.value - truth) / p.se
+                print(f"  {name:6} {p.value:.5g} +- {p.se:.2g} {p.unit}, {off:+.1f} s.e. off")
+            print(*found.warnings, sep="\n")
+
+
+if __name__ == "__main__":
+    main()

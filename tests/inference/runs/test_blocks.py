@@ -1,0 +1,159 @@
+"""Long recordings as means over blocks, against every sample of them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from benchmarks.coverage import LOAD, TRUE, Case, friction
+from scipy.signal import lfilter
+
+from asperity.errors import InputError
+from asperity.inference import RunOptions, fit, recorded_run
+from asperity.inference.runs.blocks import averaged, reduced
+from asperity.recording import Channel, Trace
+
+#: Ten seconds at 2.4 kHz: D0/V is 65 ms after the step up, and the spring takes 23 ms.
+CASE = Case((3e-5, 1e-4, 0.0, 1e-4), (2.5, 5.0, 7.5), 10.0, 2400.0)
+FREE = ["A", "B", "D0"]
+NOISE = 3e-4
+
+
+def trace_of(values, case=CASE):
+    time = np.arange(values.size) / case.rate
+    edges = np.array([0.0, *case.changes, case.end])
+    slip = np.concatenate([[0.0], np.cumsum(np.array(case.velocities) * np.diff(edges))])
+    displacement = np.interp(time, edges, slip)
+    channels = {
+        "friction": Channel(values, "dimensionless", "", "friction", ""),
+        "displacement": Channel(displacement, "length", "m", "displacement", "m"),
+        "normal stress": Channel(np.full(values.size, LOAD), "pressure", "Pa", "stress", "Pa"),
+    }
+    return Trace(time, channels)
+
+
+def mains(time):
+    """50 Hz, wandering by 0.04 Hz."""
+    return 1e-3 * np.cos(2 * np.pi * 50 * time + 0.3 * np.sin(2 * np.pi * time / 8))
+
+
+@pytest.fixture(scope="module")
+def clean():
+    return friction(CASE, np.arange(24_000) / CASE.rate)
+
+
+@pytest.fixture(scope="module")
+def ringing():
+    """Noise of a gauge that rings at 200 Hz: an autoregression of order 2."""
+    turn = 2 * 0.9 * np.cos(2 * np.pi * 200 / CASE.rate)
+    x = lfilter([1.0], [1.0, -turn, 0.81], np.random.default_rng(0).normal(size=24_000))
+    return NOISE * x / x.std()
+
+
+def recorded(values):
+    return recorded_run(
+        trace_of(values), name="run", steps=CASE.changes, velocities=CASE.velocities
+    )
+
+
+@pytest.fixture(scope="module")
+def by_blocks(clean, ringing):
+    run = recorded(clean + ringing + mains(np.arange(24_000) / CASE.rate))
+    return fit(run, "rice-ruina", FREE, start=TRUE, starts=1)
+
+
+def test_short_recordings_are_compared_sample_by_sample(clean, ringing):
+    run = recorded(clean + ringing)
+    short = replace(run, time=run.time[:20_000], friction=run.friction[:20_000])
+    assert reduced(short) is short
+    assert reduced(run, "full") is run
+    assert reduced(run).blocks is not None
+
+
+def test_intervals_agree_with_those_of_every_sample(by_blocks, clean, ringing):
+    """Noise that an autoregression at the full rate can be: both are right, and nothing is lost."""
+    (term,) = by_blocks.objective.terms
+    assert term.run.blocks.recorded == 24_000
+    assert term.run.time.size < 6_000
+    # The mains are no part of the noise that is left of them.
+    np.testing.assert_allclose(term.run.blocks.lines, [50.0], atol=0.1)
+    full = fit(
+        recorded(clean + ringing),
+        "rice-ruina",
+        FREE,
+        start=TRUE,
+        starts=1,
+        runs=RunOptions(fit_rate="full"),
+    )
+    for name, truth in TRUE.items():
+        one, other = by_blocks.parameters[name], full.parameters[name]
+        assert abs(one.value - truth) < 4 * one.se
+        # What one loses and the other does not is a part of the noise.
+        assert one.value == pytest.approx(other.value, abs=0.5 * other.se)
+        assert one.se == pytest.approx(other.se, rel=0.15)
+
+
+def test_what_was_averaged_is_said_in_one_sentence(by_blocks):
+    said = by_blocks.objective.terms[0].noise["averaged"]
+    assert said.startswith("24000 samples are compared as ")
+    assert "means over blocks of" in said
+    assert "lines at 50" in said
+
+
+def test_long_blocks_stay_right_with_steps_inside_them(clean):
+    run = recorded(clean + 1e-9 * np.sin(np.arange(24_000) ** 2))
+    found = fit(run, "rice-ruina", FREE, start=TRUE, starts=1, runs=RunOptions(fit_rate="7 Hz"))
+    (term,) = found.objective.terms
+    # Blocks of 143 ms: longer than what they are fitted to.
+    assert term.run.time.size < 72
+    for name, truth in TRUE.items():
+        assert found.values[name] == pytest.approx(truth, rel=1e-4)
+
+
+def test_motion_is_averaged_exactly(clean):
+    (run,) = (reduced(recorded(clean), 40.0),)
+    by_scipy = clean.reshape(-1, 60).mean(axis=1)
+    np.testing.assert_allclose(run.friction, by_scipy, atol=1e-12)
+
+
+def test_blocks_over_a_gap_are_left_out(clean):
+    whole = trace_of(clean)
+    kept = np.ones(24_000, bool)
+    kept[6_000:6_500] = False
+    channels = {n: replace(c, values=c.values[kept]) for n, c in whole.channels.items()}
+    run = recorded_run(Trace(whole.time[kept], channels), steps=[2.5], velocities=[3e-5, 1e-4])
+    short = averaged(run, 0.05)
+    begin, end = short.blocks.edges.T
+    missing = (begin < 6_499 / 2400) & (end > 6_001 / 2400)
+    assert not missing.any()
+    np.testing.assert_allclose(end - begin, 0.05, rtol=0.02)
+    assert (begin[1:] >= end[:-1]).all()
+
+
+def test_mains_are_taken_off_and_motion_is_not(clean):
+    time = np.arange(24_000) / CASE.rate
+    with_mains, without = (reduced(recorded(clean + m), 500.0) for m in (mains(time), 0 * time))
+    assert without.blocks.lines == ()
+    away = with_mains.friction - without.friction
+    # Of an amplitude of 1e-3; the wandering is linear over pieces of 2 s.
+    assert np.sqrt(np.mean(away**2)) < 0.05 * 1e-3 / np.sqrt(2)
+    assert np.abs(away).max() < 1e-4
+
+
+def test_single_samples_far_off_do_not_count(clean, ringing):
+    spoiled = clean + ringing
+    spoiled[[3_000, 9_001, 20_202]] += [0.05, -0.1, 1.0]
+    right, run = (reduced(recorded(x), 100.0) for x in (clean + ringing, spoiled))
+    assert run.blocks.spikes == 3
+    assert "3 samples" in run.blocks.sentence
+    np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
+
+
+@pytest.mark.parametrize("rate", [0.0, "-3 Hz", "fast", "3 N"])
+def test_a_rate_that_is_none_is_refused(rate):
+    with pytest.raises(InputError, match="fit_rate must"):
+        RunOptions(fit_rate=rate)
+
+
+def test_too_low_a_rate_is_refused(clean):
+    with pytest.raises(InputError, match=r"fit_rate must leave 16 means or more of run, got 0.5"):
+        reduced(recorded(clean), 0.5)
