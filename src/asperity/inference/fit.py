@@ -37,6 +37,7 @@ from asperity.inference.runs.assembly import (
     usual_ranges,
 )
 from asperity.inference.runs.blocks import coarser, reduced
+from asperity.inference.runs.copies import require_own_samples
 from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.table import LockInTable, joined
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
@@ -181,9 +182,10 @@ def listed_data(
 ) -> list[LockInTable | RecordedRun]:
     """One set of data or several as a list, recordings made ready."""
     several = [data] if isinstance(data, LockInTable | RecordedRun | Trace) else list(data)
-    return [
-        d if isinstance(d, LockInTable) else reduced(run_of(d), options.fit_rate) for d in several
-    ]
+    ready = [d if isinstance(d, LockInTable) else run_of(d) for d in several]
+    require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
+    rate = options.fit_rate
+    return [d if isinstance(d, LockInTable) else reduced(d, rate) for d in ready]
 
 
 def _objective(

@@ -8,6 +8,7 @@ from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
 
 from asperity.errors import InputError
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
+from asperity.inference.runs.copies import require_own_samples
 from asperity.laws import RiceRuina
 from asperity.orbit import periodic_response
 from asperity.recording import Channel, Trace
@@ -143,6 +144,19 @@ def test_too_short_a_recording_is_refused(found):
     short = replace(run, time=run.time[:40], friction=run.friction[:40], slip=run.slip[:40])
     with pytest.raises(InputError, match="must have at least"):
         fit(short, "rice-ruina", FREE)
+
+
+def test_samples_that_two_recordings_hold_are_refused():
+    one, other = runs_of(CASE, 2)
+    later = replace(
+        one, name="later", time=one.time[500:] - one.time[500], friction=one.friction[500:]
+    )
+    with pytest.raises(InputError, match=r"later must hold samples of its own, got those from"):
+        fit([one, later], "rice-ruina", FREE)
+    require_own_samples([one, replace(other, name="other")])
+    # Of a coarse gauge at rest many samples are equal by chance.
+    coarse = [replace(run, friction=np.round(run.friction, 3)) for run in (one, other)]
+    require_own_samples(coarse)
 
 
 def test_unknown_options_are_refused():
