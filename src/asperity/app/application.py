@@ -22,9 +22,9 @@ from starlette.staticfiles import StaticFiles
 
 from asperity.app.api import TABS, catalogue
 from asperity.app.endpoints import Answer, Job, Upload, asked
+from asperity.app.interactive import Busy, Lane, Superseded
 from asperity.app.jobs import processes
 from asperity.app.jobs.processes import Jobs
-from asperity.app.lane import Busy, Lane, Superseded
 from asperity.app.preparation import Preparation
 from asperity.app.security import BODY_LIMIT, BodyTooLarge, BodyTooSlow, Guard, sentence, too_large
 from asperity.app.uploads import Uploads

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from asperity.app.extra import require_extra
+from asperity.app.dependencies import require_extra
 from asperity.errors import InputError
 from asperity.parameters.arguments import shown
 

@@ -16,7 +16,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from asperity.branches.follower import BranchFollower, BranchOrbit
+from asperity.branches.steps import BranchFollower, BranchOrbit
 
 Kind = Literal["fold", "period doubling", "Neimark-Sacker", "branch point"]
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.branches.bifurcation import Kind, criterion, kind_of, root_near
-from asperity.branches.follower import BranchFollower, BranchOrbit
 from asperity.branches.parameters import ContinuedParameter, line_through
+from asperity.branches.steps import BranchFollower, BranchOrbit
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]

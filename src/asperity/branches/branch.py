@@ -1,4 +1,4 @@
-"""The recorder of a branch of periodic orbits."""
+"""A branch of periodic orbits as it was followed: points, stability and bifurcations."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from asperity.slider import Motion
 if TYPE_CHECKING:
     import xarray
 
-    from asperity.branches.follower import BranchFollower, BranchOrbit
     from asperity.branches.parameters import ContinuedParameter
+    from asperity.branches.steps import BranchFollower, BranchOrbit
     from asperity.orbit.methods.branch_following.arclength import ContinuationPoint
     from asperity.slider.problem import Problem
 

@@ -19,8 +19,8 @@ from jax.typing import ArrayLike
 
 from asperity._jax import jit_large
 from asperity.branches.branch import Bifurcation, Branch
-from asperity.branches.follower import BranchFollower, BranchOrbit
 from asperity.branches.recorder import INTERVALS, BranchRecorder
+from asperity.branches.steps import BranchFollower, BranchOrbit
 from asperity.errors import InputError
 from asperity.loads import Excitation, Modulation
 from asperity.orbit.methods.branch_following.arclength import (

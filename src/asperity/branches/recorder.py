@@ -8,9 +8,9 @@ import numpy as np
 
 from asperity.branches.bifurcation import LocatedBifurcation, bifurcations_between, polished
 from asperity.branches.branch import Bifurcation, Branch, BranchOrigin
-from asperity.branches.follower import BranchFollower, BranchOrbit, follow_branch
 from asperity.branches.operating_point import held_parameters
 from asperity.branches.parameters import ContinuedParameter
+from asperity.branches.steps import BranchFollower, BranchOrbit, follow_branch
 from asperity.slider.problem import Problem
 
 #: Mesh for a branch of simple period; bifurcations are solved again on three times as many.

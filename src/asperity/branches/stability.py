@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from asperity._version import __version__
 from asperity.branches.bifurcation import bifurcations_between
 from asperity.branches.boundary import BoundaryPoint, ParameterPlane, TracedBoundary, trace_boundary
-from asperity.branches.follower import BranchOrbit, follow_branch
 from asperity.branches.operating_point import (
     held_parameters,
     one_problem,
@@ -23,6 +22,7 @@ from asperity.branches.operating_point import (
 )
 from asperity.branches.parameters import fixed_as_text, moving_parameter
 from asperity.branches.recorder import INTERVALS
+from asperity.branches.steps import BranchOrbit, follow_branch
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.parameters.arguments import counted, function, whole_number

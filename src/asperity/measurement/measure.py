@@ -21,7 +21,7 @@ from asperity.measurement.verdicts import (
     checks,
     instrument,
     interference,
-    plausible,
+    plausibility,
     steadiness,
 )
 from asperity.measurement.verdicts.shift import shifting_response
@@ -312,10 +312,10 @@ def _asked(reading: LockInReading, time: Array, load: Array, force: Array) -> tu
         checks.modulation(reading),
         checks.periods(reading),
         checks.signal(reading),
-        plausible.contact(reading),
-        plausible.friction(reading),
-        plausible.response(reading),
-        plausible.aliasing(reading, rate),
+        plausibility.contact(reading),
+        plausibility.friction(reading),
+        plausibility.response(reading),
+        plausibility.aliasing(reading, rate),
         steadiness.leakage(reading),
         steadiness.steady_load(reading, time, load),
         steadiness.steady_force(reading, time, force),

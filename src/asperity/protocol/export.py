@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.outputs import output_file, written_file
-from asperity.protocol.growing import CHUNKS
+from asperity.protocol.growing_file import CHUNKS
 
 #: Columns of the text, with the heading of each.
 _COLUMNS = {

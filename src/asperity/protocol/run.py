@@ -20,7 +20,7 @@ from asperity.outputs import (
     require_disk,
     undisturbed,
 )
-from asperity.protocol.growing import CHUNKS, append, describe
+from asperity.protocol.growing_file import CHUNKS, append, describe
 from asperity.protocol.progress import RunProgress
 from asperity.protocol.protocol import Protocol
 from asperity.protocol.stability import stability_statement

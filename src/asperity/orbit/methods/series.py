@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.algebra.small_systems import jacobian_columns
 from asperity.orbit.batches import Indices, put, run_chunks, take
-from asperity.orbit.changes import exponent_change
 from asperity.orbit.compiled import (
     STIFFNESS_CHUNK,
     sharpness_of_slip,
@@ -37,6 +36,7 @@ from asperity.orbit.methods.collocation.mesh import Orbit
 from asperity.orbit.methods.collocation.refinement import accept
 from asperity.orbit.methods.collocation.scheme import scheme_for
 from asperity.orbit.methods.method import Method
+from asperity.orbit.newton_step import exponent_change
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem

@@ -28,7 +28,6 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.algebra.cyclic import Border, solve_bordered
 from asperity.algebra.small_systems import jacobian_columns
-from asperity.orbit.changes import exponent_change
 from asperity.orbit.compiled import ACCEPTED
 from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
 from asperity.orbit.methods.collocation.condensation import (
@@ -43,6 +42,7 @@ from asperity.orbit.methods.collocation.newton import (
     refined,
     swing_change,
 )
+from asperity.orbit.newton_step import exponent_change
 from asperity.orbit.observables import Observables
 from asperity.slider import Motion
 

@@ -25,7 +25,6 @@ from asperity.algebra.small_systems import (
     spectral_radius,
 )
 from asperity.loads import Modulation
-from asperity.orbit.changes import exponent_change
 from asperity.orbit.methods.collocation.condensation import (
     LinearisedEquations,
     condense,
@@ -38,6 +37,7 @@ from asperity.orbit.methods.collocation.mesh import (
     graded_mesh,
 )
 from asperity.orbit.methods.collocation.scheme import STAGES, scheme_for
+from asperity.orbit.newton_step import exponent_change
 from asperity.orbit.observables import Observables
 from asperity.slider import Motion, QuasiStatic
 from asperity.theory.averaged import averaged_limit

@@ -27,7 +27,7 @@ from jax import Array
 from asperity.algebra.kepler import eccentric_phase
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import Matrix, inverse_points, jacobian_columns, product
-from asperity.orbit.changes import exponent_change
+from asperity.orbit.newton_step import exponent_change
 from asperity.orbit.observables import waveform_of
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases

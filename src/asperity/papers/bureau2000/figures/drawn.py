@@ -8,9 +8,9 @@ from types import MappingProxyType
 
 from matplotlib.figure import Figure
 
+from asperity.papers.bureau2000.figures.additional import draw_period, draw_phases, draw_resonance
 from asperity.papers.bureau2000.figures.harmonics import draw_4, draw_8, draw_9, draw_11
 from asperity.papers.bureau2000.figures.mean import draw_2, draw_3, draw_5, draw_6, draw_7
-from asperity.papers.bureau2000.figures.own import draw_period, draw_phases, draw_resonance
 from asperity.papers.bureau2000.figures.schematics import draw_1, draw_10
 from asperity.papers.bureau2000.figures.stability import draw_floquet
 from asperity.papers.bureau2000.numbers import FigureNumbers

@@ -18,7 +18,7 @@ from asperity.figures.style import (
     SLOW,
     STATED_FILL,
 )
-from asperity.papers.bureau2000.figures.parts import (
+from asperity.papers.bureau2000.figures.elements import (
     AMPLITUDE,
     APPLIED,
     BORNE,

@@ -16,7 +16,7 @@ from asperity.figures.style import (
     STATED,
     new_figure,
 )
-from asperity.papers.bureau2000.figures.parts import (
+from asperity.papers.bureau2000.figures.elements import (
     AMPLITUDE,
     APPLIED,
     DROP,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from asperity.papers.bureau2000.figures.parts import APPLIED, BORNE
+from asperity.papers.bureau2000.figures.elements import APPLIED, BORNE
 from asperity.papers.report.points import Observable
 
 

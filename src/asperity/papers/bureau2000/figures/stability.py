@@ -16,7 +16,7 @@ from asperity.figures.style import (
     LINKER_DIETERICH_LOW,
     RICE_RUINA,
 )
-from asperity.papers.bureau2000.figures.parts import BORNE, EFFECTIVE, key, stacked
+from asperity.papers.bureau2000.figures.elements import BORNE, EFFECTIVE, key, stacked
 from asperity.papers.bureau2000.numbers import FigureNumbers
 
 _LAWS = (

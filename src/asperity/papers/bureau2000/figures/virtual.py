@@ -13,7 +13,7 @@ from matplotlib.container import ErrorbarContainer
 from matplotlib.figure import Figure
 
 from asperity.figures.style import ELASTO_PLASTIC, FAST, SLOW, new_figure
-from asperity.papers.bureau2000.figures.parts import (
+from asperity.papers.bureau2000.figures.elements import (
     AMPLITUDE,
     APPLIED,
     DROP,

@@ -6,11 +6,11 @@ the same reading that a laboratory's recordings get.
 """
 
 from asperity.papers.bureau2000.virtual.apparatus import description
-from asperity.papers.bureau2000.virtual.beside import experiment_beside
 from asperity.papers.bureau2000.virtual.harmonics import virtual_4
 from asperity.papers.bureau2000.virtual.mean import virtual_2, virtual_3
 from asperity.papers.bureau2000.virtual.numbers import RecoveredQuantity, VirtualNumbers, covered
 from asperity.papers.bureau2000.virtual.pressure import virtual_5
+from asperity.papers.bureau2000.virtual.process import experiment_beside
 from asperity.papers.bureau2000.virtual.recordings import (
     NORMAL,
     POINT_COLUMNS,

@@ -20,7 +20,7 @@ from asperity.figures.style import (
     STATED_FILL,
     new_figure,
 )
-from asperity.papers.bureau2000.figures.parts import (
+from asperity.papers.bureau2000.figures.elements import (
     BORNE,
     DROP,
     EFFECTIVE,

@@ -9,10 +9,10 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from asperity.branches.branch import Branch
-from asperity.branches.follower import BranchFollower
 from asperity.branches.operating_point import one_problem, start_of, starting_orbit
 from asperity.branches.parameters import ContinuedParameter, line_through, moving_parameter
 from asperity.branches.recorder import INTERVALS, BranchRecorder
+from asperity.branches.steps import BranchFollower
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.parameters.arguments import counted, function, whole_number
