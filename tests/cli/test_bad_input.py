@@ -206,8 +206,8 @@ READINGS = "V,epsilon,frequency,mu1,mu1_err\n1e-6,0.1,120,1e-3,1e-5\n1e-6,0.2,12
         ),
         (("compare", "t.csv", "t.csv", "--free", "A"), ["it would count twice"]),
         (
-            ("compare", "t.csv", "--laws", "rice-ruina,elasto-plastic", "--free", "lambda"),
-            ["no parameter of rice-ruina"],
+            ("compare", "t.csv", "--free", "A", "--windows", "auto"),
+            ["--windows must go with asperity fit", "--window START:END"],
         ),
         (("fit", "t.csv", "--law", "rice-ruina", "--free", "M"), ["add --inertia"]),
     ],

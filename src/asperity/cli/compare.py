@@ -10,6 +10,7 @@ import click
 
 from asperity.cli.fit.command import checked_laws, fit_options
 from asperity.cli.fit.data import FitData
+from asperity.errors import InputError
 from asperity.outputs import require_folder
 
 _EPILOG = """\b
@@ -26,6 +27,7 @@ if its AICc exceeds the lowest by 10 or more.
 
 @click.command(epilog=_EPILOG)
 @click.option("--laws", default="all", metavar="NAMES", help="Laws to compare: a,b,c or all.")
+@click.option("--windows", hidden=True, metavar="SPANS")
 @fit_options
 @click.option("--report", type=Path, metavar="DIR", help="Folder for a page and materials.")
 def compare(
@@ -34,6 +36,7 @@ def compare(
     free: list[str],
     options: Mapping[str, Any],
     reading: FitData,
+    windows: str | None,
     report: Path | None,
     as_json: bool,
 ) -> int:
@@ -42,6 +45,12 @@ def compare(
     from asperity.cli.report import aligned, to_json
     from asperity.inference.record import comparison_record
 
+    if windows is not None:
+        raise InputError(
+            "--windows must go with asperity fit, got it with compare: windows of one recording "
+            "overlap, so that what they say against a law does not add up; compare with --window "
+            "START:END, one at a time"
+        )
     if report is not None:
         require_folder(report, "--report")
     read = reading.read(data, options["fixed"])

@@ -106,7 +106,8 @@ def compare(
     data : LockInTable, RecordedRun or Trace, or several
     laws : sequence of str
     free : sequence of str
-        Free parameters; each law takes those that it has.
+        Free parameters; each law takes those that it has. One that has none of them is compared
+        as it stands, with its fixed numbers.
     evidence : bool
         Whether to compute evidence and leave-one-run-out cross-validation too.
     progress : callable, optional
@@ -137,10 +138,6 @@ def compare(
         )
     several = listed_data(data, options.get("runs") or RunOptions())
     own = {name: _own(name, free, laws) for name in dict.fromkeys(laws)}
-
-    tables_only = all(isinstance(d, LockInTable) for d in several)
-    if tables_only:
-        _require_own(own, free)
     given = {
         key: options.pop(key)
         for key in ("fixed", "start", "prior")
@@ -151,19 +148,12 @@ def compare(
     def fits_to(data: Sequence[Any], advance: Callable[[int], None]) -> dict[str, Fit]:
         done = {}
         for name, names in own.items():
-            if not names and tables_only:
-                not_compared[name] = (
-                    f"{name} has no parameter among {_listed(list(free))}; free also one that it "
-                    "has, such as A or eps_ratio"
-                )
-                advance(1)
-                continue
             mine: dict[str, Any] = {
                 key: {n: values[n] for n in _own(name, list(values), laws)}
                 for key, values in given.items()
             }
             try:
-                done[name] = fit(data, name, names, **mine, **options)
+                done[name] = fit(data, name, names, bare=True, **mine, **options)
             except MissingNumberError as error:
                 not_compared[name] = str(error)
             advance(1)
@@ -281,17 +271,6 @@ def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
     others = {p for law in laws for p in law_parameters(get_law(law))}
     mine = law_parameters(get_law(name))
     return [p for p in free if p in mine or p not in others]
-
-
-def _require_own(own: Mapping[str, Sequence[str]], free: Sequence[str]) -> None:
-    """Refuse a comparison to tables in which fewer than two laws have a free parameter."""
-    bare = [name for name, names in own.items() if not names]
-    if len(own) - len(bare) < 2:
-        asked = f"{_listed(list(free))}, no parameter of {_listed(bare)}" if free else "none"
-        raise InputError(
-            f"free must name a parameter of two laws or more, got {asked}; free also one that "
-            "every law has, such as A or eps_ratio"
-        )
 
 
 def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:

@@ -75,7 +75,7 @@ def leave_one_run_out(found: Fit) -> CrossValidation:
 def _predictive(found: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> float:
     """Log density of the rows left out, given the others."""
     objective = found.objective
-    low, high = np.array([k.bounds for k in objective.unknowns]).T
+    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
 
     def parts(u: Float) -> tuple[Float, Float, Float, Float] | None:
         """Residuals and Jacobian of what stays, priors included, and of what is left out."""
@@ -95,7 +95,7 @@ def _predictive(found: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> fl
     u = objective.coordinates(found.values)
     now = parts(u)
     assert now is not None  # the fit has converged there
-    for _ in range(_STEPS):
+    for _ in range(_STEPS if u.size else 0):
         step = -np.linalg.lstsq(now[1], now[0], rcond=1e-10)[0]
         for _ in range(_HALVINGS):
             trial = np.clip(u + step, low + 1e-12, high - 1e-12)
@@ -111,7 +111,7 @@ def _predictive(found: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> fl
             break
     _, J, r_out, J_out = now
     information = J.T @ J
-    if np.linalg.cond(information) > 1e14:
+    if u.size and np.linalg.cond(information) > 1e14:
         return math.nan
     spread = np.eye(r_out.size) + J_out @ np.linalg.solve(information, J_out.T)
     log_scale = float(term.weights.log_scales[left_out].sum())

@@ -180,9 +180,14 @@ def described_fit(
     if bent:
         also = [n for n in (objective.names[i] for i in sorted(profiled)) if n not in bent]
         said.append(
-            f"chi-squared is no parabola in {' and '.join(bent)}: intervals of "
-            + " and ".join([*bent, *also])
-            + " are by profile likelihood; take the intervals, not the standard errors"
+            f"chi-squared is no parabola in {' and '.join(bent)}: "
+            + (
+                f"intervals of {' and '.join([*bent, *also])} are by profile likelihood; take the "
+                "intervals, not the standard errors"
+                if profiled
+                else "intervals of the normal approximation are wrong there, and those by profile "
+                "likelihood (--profile) take minutes for a recording"
+            )
         )
     return _with_warnings(found, said)
 
@@ -244,6 +249,8 @@ def _observables(data: Sequence[Residuals]) -> dict[str, tuple[float, int]]:
 
 def inverse_information(information: Float) -> tuple[Float, NDArray[np.bool_]]:
     """Inverse of an information matrix, and which coordinates it leaves without bound."""
+    if not information.size:
+        return information, np.zeros(0, bool)
     scale = np.sqrt(np.diag(information))
     blind = ~(scale > 0)
     scale = np.where(blind, 1.0, scale)
@@ -267,7 +274,7 @@ def _bent(
     risen by four.
     """
     u, chi2 = minimum
-    low, high = np.array([k.bounds for k in objective.unknowns]).T
+    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
     sd = np.sqrt(np.diag(covariance))
     found = []
     for i, unknown in enumerate(objective.unknowns):

@@ -77,6 +77,10 @@ def evidence_of(found: Fit, *, samples: int = _SAMPLES, seed: int = 0) -> Eviden
     The prior is `PriorDensity`. A range k times as wide of a parameter that these data determine
     lowers the logarithm by ln k.
     """
+    if not found.objective.unknowns:
+        # Nothing to average over.
+        density = found.log_likelihood
+        return Evidence(density, 0.0, float(samples), density, 0, {})
     whitened = whitened_posterior(found)
     n = whitened.mode.size
     proposal = multivariate_t(np.zeros(n), np.eye(n), df=_TAILS, seed=seed)

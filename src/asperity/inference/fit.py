@@ -34,6 +34,7 @@ from asperity.inference.runs.assembly import (
     run_terms,
     shared_stiffness,
     stiffness_in,
+    unusual_numbers,
     usual_ranges,
 )
 from asperity.inference.runs.blocks import coarser, reduced
@@ -61,6 +62,7 @@ def fit(
     radiation_damping: bool = False,
     runs: RunOptions | None = None,
     profile: bool = False,
+    bare: bool = False,
     starts: int = 64,
     seed: int = 0,
     progress: Callable[[int, int], None] | None = None,
@@ -91,6 +93,8 @@ def fit(
         How recordings are compared with the motion.
     profile : bool
         Intervals by profile likelihood rather than by the normal approximation.
+    bare : bool
+        Whether `free` may be empty with tables: the law is compared with them as it stands.
     starts : int
         Starts that are drawn and evaluated besides the given one; the best are followed.
     seed : int
@@ -132,6 +136,7 @@ def fit(
             start=start,
             options=options,
             motion={"inertia": inertia, "radiation_damping": radiation_damping},
+            bare=bare,
         )
 
     objective = compared(recordings)
@@ -146,6 +151,7 @@ def fit(
             return failed_fit(objective)
         found = described_fit(objective, minima, profile=profile)
         said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
+        said += unusual_numbers(found, recordings)
         if "K" in (fixed or {}) and table is None:
             freed = fit(
                 recordings,
@@ -200,6 +206,7 @@ def _objective(
     start: Mapping[str, Any] | None,
     options: RunOptions,
     motion: Mapping[str, bool],
+    bare: bool,
 ) -> Objective:
     """The function to minimise, with everything that can be refused before computing refused."""
     require_motion(free, motion)
@@ -226,7 +233,7 @@ def _objective(
     )
     terms: list[DataTerm] = []
     if table is not None and not recordings:
-        require_free(law, free, priors)
+        require_free(law, free, priors, bare=bare)
     if table is not None:
         require_enough(table, unknowns)
         terms.append(LockInTerm(table, Forward(law, table, constants, **motion)))

@@ -128,15 +128,17 @@ def _checked(law: type[Law], name: str, value: Any) -> Any:
     return known[name].check(value)
 
 
-def require_free(law: type[Law], free: Sequence[str], priors: Mapping[str, Prior]) -> None:
-    """Refuse a fit to tables without free parameters, and priors of others.
+def require_free(
+    law: type[Law], free: Sequence[str], priors: Mapping[str, Prior], *, bare: bool
+) -> None:
+    """Refuse a fit to tables without free parameters unless asked for, and priors of others.
 
     Raises
     ------
     InputError
     """
-    if not free:
-        raise MissingNumberError(
+    if not free and not bare:
+        raise InputError(
             f"free must name a parameter of {law.name}, got none; free one, such as A or eps_ratio"
         )
     for name in priors:

@@ -49,6 +49,8 @@ def minima_of(
     `progress` is called with the number of starts that were followed, and of all to be followed.
     """
     unknowns = objective.unknowns
+    if not unknowns:
+        return _as_it_stands(objective)
     starts: list[Float] = []
     middle = np.array([float(u.to_coordinate(u.middle)) for u in unknowns])
     low = np.array([u.to_coordinate(u.start[0]) for u in unknowns])
@@ -82,6 +84,16 @@ def minima_of(
             rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
             found = [*beyond, *rest]
     return sorted(found, key=lambda pair: pair[1])
+
+
+def _as_it_stands(objective: Objective) -> list[tuple[Float, float]]:
+    """The one point of an objective without free parameters, if the law has a solution there."""
+    nowhere = np.zeros(0)
+    chi2 = objective.chi2(nowhere)
+    if not math.isfinite(chi2):
+        objective.search_from_now_on()
+        chi2 = objective.chi2(nowhere)
+    return [(nowhere, chi2)] if math.isfinite(chi2) else []
 
 
 def _distinct(minima: list[tuple[Float, float]]) -> list[tuple[Float, float]]:

@@ -274,7 +274,7 @@ class Objective:
         """
         r, J = self.residuals(u)
         gradient = J.T @ r
-        low, high = np.array([k.bounds for k in self.unknowns]).T
+        low, high = np.array([k.bounds for k in self.unknowns]).reshape(-1, 2).T
         outwards = np.where(gradient > 0, u - low, high - u) < _AT_BOUND
         J, gradient = J[:, ~outwards], gradient[~outwards]
         return float(gradient @ np.linalg.pinv(J.T @ J, hermitian=True) @ gradient)

@@ -8,6 +8,7 @@ from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
 
 from asperity.errors import InputError
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
+from asperity.inference.runs.assembly import unusual_numbers
 from asperity.inference.runs.copies import require_own_samples
 from asperity.laws import RiceRuina
 from asperity.orbit import periodic_response
@@ -120,8 +121,16 @@ def test_a_clipped_gauge_is_named():
     (said,) = said_of(np.minimum(whole, 0.61))
     assert "at the highest value, 0.61" in said
     # Coarse resolution repeats values everywhere, and a computed recording begins at rest.
-    assert said_of(np.round(whole, 2)) == ()
+    (said,) = said_of(np.round(whole, 2))
+    assert "rounded more coarsely" in said
+    assert "differ from it by 0.01" in said
+    assert said_of(np.round(whole, 3)) == ()
     assert said_of(np.where(time < 30, 0.6, 0.6 + np.abs(whole - 0.6))) == ()
+
+
+def test_friction_in_wrong_units_is_named():
+    (said,) = said_of(600 + np.random.default_rng(0).normal(size=600))
+    assert "friction is 600" in said
 
 
 def test_given_velocities_that_the_displacement_contradicts_are_named():
@@ -187,6 +196,36 @@ def test_samples_that_are_far_off_are_left_out_and_named(found):
     assert "30, 70.5, 110 s" in said
     for name in TRUE:
         assert bad.values[name] == pytest.approx(found.values[name], rel=0.02)
+
+
+def test_a_jump_of_the_gauge_is_fitted_and_named(found):
+    (run,) = runs_of(CASE, 1)
+    # Soon after the second step, where it bends the parameters by up to fifteen standard errors.
+    moved = replace(run, friction=run.friction + 0.01 * (run.time > 90))
+    bad = fit(moved, "rice-ruina", FREE, starts=8)
+    (said,) = (w for w in bad.warnings if "jumps by itself" in w)
+    assert "at 90" in said
+    for name, truth in TRUE.items():
+        assert abs(bad.values[name] - truth) < 2.5 * bad.parameters[name].se
+        assert bad.parameters[name].se < 1.3 * found.parameters[name].se
+    assert not any("jumps" in w for w in found.warnings)
+
+
+def test_a_motion_that_the_law_cannot_make_is_named(found):
+    (run,) = runs_of(CASE, 1)
+    mirrored = replace(run, friction=1.2 - run.friction)
+    bad = fit(mirrored, "rice-ruina", FREE, start=TRUE, starts=1)
+    assert any("just after changes of its drive" in w for w in bad.warnings)
+    assert not any("just after changes" in w for w in found.warnings)
+
+
+def test_numbers_far_from_those_of_contacts_are_named(found):
+    run = found.objective.terms[0].run
+    assert unusual_numbers(found, [run]) == []
+    far = replace(found.parameters["D0"], value=0.006)
+    strange = replace(found, parameters={**found.parameters, "D0": far})
+    (said,) = unusual_numbers(strange, [run])
+    assert said.startswith("D0 of 0.006 m is outside")
 
 
 def test_a_fixed_stiffness_that_the_recording_contradicts_is_named():

@@ -22,6 +22,9 @@ _STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
 #: Where the stiffness over the load is looked for (1/m): what deformation apparatus and
 #: tribometers show.
 _USUAL_STIFFNESS = (5e2, 5e4)
+#: Estimates outside are named: of A, of D0 (m), and of the stiffness over the load (1/m).
+_FAR: Mapping[str, tuple[float, float]] = {"A": (5e-4, 0.2), "D0": (1e-8, 2e-3)}
+_FAR_STIFFNESS = (1e2, 1e6)
 #: Samples that a run needs, per free parameter.
 _SAMPLES_PER_PARAMETER = 8
 #: Decrease of AICc with the stiffness free that contradicts a fixed one.
@@ -300,6 +303,35 @@ def contradicted_stiffness(
             + (f", which gives {moved}" if moved else "")
             + "; leave K free, or give it a prior"
         )
+    return said
+
+
+def unusual_numbers(found: Fit, runs: Sequence[RecordedRun]) -> list[str]:
+    """Sentences on estimates far from those of any contact: units are wrong, or the law is.
+
+    Parameters
+    ----------
+    found : Fit
+        Converged.
+    runs : sequence of RecordedRun
+    """
+    numbers = [(n, found.values[n], found.parameters[n].unit) for n in _FAR if n in found.values]
+    ranges = dict(_FAR)
+    for run in runs:
+        name = next((n for n in (f"K[{run.name}]", "K") if n in found.values), None)
+        if name is not None:
+            numbers.append((f"{name}/W0", found.values[name] / run.W0, "1/m"))
+            ranges[f"{name}/W0"] = _FAR_STIFFNESS
+    said = []
+    for name, value, unit in numbers:
+        low, high = ranges[name]
+        if not low <= value <= high:
+            said.append(
+                f"{name} of {value:.3g} {unit}".rstrip()
+                + f" is outside {low:.3g} to {high:.3g}, where those of contacts lie: check the "
+                "units and signs of displacement, force and load, and look at the recording with "
+                "the motion (--report)"
+            )
     return said
 
 

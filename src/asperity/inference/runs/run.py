@@ -43,6 +43,10 @@ _OTHER_VELOCITY = 0.05
 #: Samples of a stretch of one sampling rate, at least, and the change of the interval that ends it.
 _SHORTEST, _OTHER_RATE = 16, 1.5
 
+#: Friction above this is a mistake of units; a share of equal neighbours is coarse rounding.
+#: whose other differences are whole multiples of one step.
+_LARGEST_FRICTION, _MOSTLY_EQUAL, _WHOLE = 5.0, 0.5, 0.02
+
 
 @dataclass(frozen=True, eq=False)
 class Blocks:
@@ -257,6 +261,7 @@ def recorded_run(
         uncertain.append(max(interval, cut.doubt / 2) if time.size > LONGEST else interval)
     doubts = list(found.doubts)
     doubts += clipped(trace, force, window)
+    doubts += strange_friction(friction)
     if velocities is not None and signals.displacement is not None:
         measured = partition_at(time, signals.displacement, np.array(steps)).velocities
         doubts += contradicted_velocities(velocities, measured)
@@ -324,6 +329,39 @@ def clipped(trace: Trace, force: str, window: tuple[float, float] | None) -> lis
                 f"{end} value, {extreme:.6g}: the gauge seems to be at the end of its range, and a "
                 "fit to clipped friction is wrong; give a window without"
             )
+    return said
+
+
+def strange_friction(friction: Float) -> list[str]:
+    """Sentences on friction of no usual size, and on friction whose digits are too coarse.
+
+    Parameters
+    ----------
+    friction : array, shape (n,)
+
+    Notes
+    -----
+    Rounding is noise like other noise as long as there is some before it (Widrow, 1956): if most
+    neighbours are equal there is not, and the rounding follows the signal.
+    """
+    said = []
+    usual = float(np.median(np.abs(friction)))
+    if usual > _LARGEST_FRICTION:
+        said.append(
+            f"friction is {usual:.4g} as a rule, more than contacts have: correct the units of "
+            "force and load, or the column"
+        )
+    steps = np.abs(np.diff(friction))
+    moved = steps[steps > 1e-9 * max(usual, 1e-300)]
+    digits = moved / moved.min() if moved.size else moved
+    whole = float(np.abs(digits - np.round(digits)).max(initial=0.0)) < _WHOLE
+    if moved.size and whole and moved.size < (1 - _MOSTLY_EQUAL) * steps.size:
+        said.append(
+            f"{1 - moved.size / steps.size:.0%} of the values of friction repeat the one before, "
+            f"and others differ from it by {np.median(moved):.2g}: it was rounded more coarsely "
+            "than its noise, which may bend parameters by more than the intervals say; record or "
+            "write more digits"
+        )
     return said
 
 

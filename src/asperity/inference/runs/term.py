@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from asperity.inference.residuals import Residuals
+from asperity.inference.runs.misfit import departures_of_jumps, misfit_after_changes
 from asperity.inference.runs.motion import RunMotion
 from asperity.inference.runs.noise import Autoregression, fitted, strongest_peak, whiteness
 from asperity.inference.runs.run import RecordedRun
@@ -34,6 +35,13 @@ _OUTLIER, _MOST_OUTLIERS = 1e-4, 0.01
 _CUT_INTERVALS = 2.0
 #: Samples on either side of a velocity change that are never left out.
 _AT_STEP = 5
+#: Jumps of the level that are removed at most, and samples about a change and share of the segments
+#: beside it in which none is looked for.
+_JUMPS, _NEAR_CHANGE, _SHARE_NEAR_CHANGE = 5, 20, 0.05
+#: Changes of the load are few if there are so many samples to each.
+_FEW_CHANGES = 100
+#: Below this probability innovations after the changes are too large for the law.
+_LAW_FAILS = 1e-4
 #: Outliers that a warning names.
 _NAMED = 5
 #: Samples that the quickest part of the gauge's response is resolved by.
@@ -106,6 +114,8 @@ class RunTerm:
         self._whiteness = math.nan
         self._lines: list[float] = []
         self._outliers: list[int] = []
+        self._jumps: list[int] = []
+        self._after_changes = (1.0, 1.0)
         self.models = [self._first_noise(a, b) for a, b in run.stretches]
         self._prepare()
 
@@ -133,6 +143,7 @@ class RunTerm:
             ),
             "lines_removed": list(self._lines),
             "outliers": [float(self.run.time[k]) for k in sorted(self._outliers)],
+            "jumps": [float(self.run.time[k]) for k in sorted(self._jumps)],
             "whiteness_p": self._whiteness,
             "standard_deviation": [math.sqrt(m.variance) for m in self.models],
         }
@@ -197,10 +208,12 @@ class RunTerm:
                 self._estimate_noise(*raw)
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             white = self._whitened(left[:, None])[:, 0]
-            if not (self._add_outliers(white) or (self._order != 0 and self._add_line(white))):
+            added = self._add_jump(white, raw[1]) or self._add_outliers(white)
+            if not (added or (self._order != 0 and self._add_line(white))):
                 break
         innovations = [white[a:b] for a, b in self.run.stretches]
         self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
+        self._after_changes = misfit_after_changes(white, self._first_after_changes())
         return True
 
     def _estimate_noise(self, difference: Float, jacobian: Float) -> None:
@@ -239,9 +252,8 @@ class RunTerm:
             known = [k - a for k in self._outliers if a <= k < b]
             apart[known] = 0.0
             # At a step a wrong motion is off by a few samples, and must not hide its misfit.
-            edges = self.run.drive.edges[list(self.run.cuts)]
-            after = np.searchsorted(self.run.time, edges) - a
-            for first in after:
+            for first in self._first_after_changes():
+                first -= a
                 apart[max(first - _AT_STEP, 0) : max(first + _AT_STEP, 0)] = 0.0
             reach = max(3, model.order)
             for k in np.argsort(-apart):
@@ -256,6 +268,61 @@ class RunTerm:
         columns[found, np.arange(len(found))] = 1.0
         self._columns = np.column_stack([self._columns, columns])
         self._outliers += found
+        self._prepare()
+        return True
+
+    @property
+    def jumps(self) -> tuple[float, ...]:
+        """Times (s) of jumps of the level that were removed, from the first sample on."""
+        return tuple(float(self.run.time[k]) for k in sorted(self._jumps))
+
+    def _first_after_changes(self) -> list[int]:
+        """First samples after changes of the velocity, and of the load where they are few."""
+        inner = self.run.drive.edges[1:-1]
+        few = inner.size * _FEW_CHANGES <= self.run.time.size
+        edges = inner if few else self.run.drive.edges[list(self.run.cuts)]
+        return [int(k) for k in np.searchsorted(self.run.time, edges)]
+
+    def _add_jump(self, white: Float, jacobian: Float) -> bool:
+        """Remove the largest jump of the gauge's offset, if there is one.
+
+        Beside a change of the drive, where the friction itself jumps, none is looked for.
+        """
+        if len(self._jumps) >= _JUMPS or self._order == 0:
+            return False
+        curves = self._whitened(jacobian[:, np.any(jacobian, axis=0)])
+        joined = np.column_stack([curves, self._white_columns])
+        fitted_curves = np.linalg.qr(joined / np.sqrt(np.einsum("ij,ij->j", joined, joined)))[0]
+        limit = float(norm.isf(_OUTLIER / (2 * white.size)))
+        largest, best = limit, -1
+        time, edges = self.run.time, self.run.drive.edges
+        for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
+            apart = np.abs(departures_of_jumps(model, white[a:b], fitted_curves[a:b]))
+            alone = np.abs(model.departures_of_single_samples(white[a:b]))
+            apart[apart <= alone] = 0.0
+            # The first sample and one beside a change of the sampling rate have no level before.
+            apart[: _AT_STEP + 1] = apart[-_AT_STEP:] = 0.0
+            for before, at, after in zip(edges[:-2], edges[1:-1], edges[2:], strict=True):
+                first, last = np.searchsorted(
+                    time,
+                    [
+                        at - _SHARE_NEAR_CHANGE * (at - before),
+                        at + _SHARE_NEAR_CHANGE * (after - at),
+                    ],
+                )
+                apart[max(first - _NEAR_CHANGE - a, 0) : max(last + _NEAR_CHANGE - a, 0)] = 0.0
+            for k in self._jumps:
+                apart[max(k - a - 1, 0) : max(k - a + 2, 0)] = 0.0
+            k = int(np.argmax(apart))
+            if apart[k] > largest:
+                largest, best = float(apart[k]), k + a
+        if best < 0:
+            return False
+        step = (np.arange(white.size) >= best).astype(float)
+        self._columns = np.column_stack([self._columns, step])
+        self._jumps.append(best)
+        # The noise that was estimated with the jump in it is far too slow to begin from.
+        self.models = [self._first_noise(a, b) for a, b in self.run.stretches]
         self._prepare()
         return True
 
@@ -321,6 +388,21 @@ class RunTerm:
             )
         if self._outliers:
             said.append(self._said_of_outliers())
+        if self._jumps:
+            times = ", ".join(f"{t:.6g}" for t in self.jumps)
+            said.append(
+                f"{self.name} jumps by itself at {times} s after the first sample, as a gauge does "
+                "that slips or is moved: its level there is fitted; look at the recording, or give "
+                "a window without it"
+            )
+        chance, size = self._after_changes
+        if chance < _LAW_FAILS:
+            said.append(
+                f"what {self.name} shows just after changes of its drive is {size:.2g} times "
+                f"as far from the motion as elsewhere (p = {chance:.2g}): the law, the gauge's lag "
+                "(--gauge), the drive or its times are not those of the recording, and intervals "
+                "do not hold"
+            )
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said
 
