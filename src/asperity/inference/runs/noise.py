@@ -2,9 +2,9 @@
 
 The residual of a fit is a stretch of noise e_t with e_t = sum_k a_k e_(t-k) + s n_t, n_t normal and
 independent. Coefficients are estimated by Burg's method, which gives every lower order besides and
-a stationary process always; the order is that of the lowest AICc, since an order that is too low
-makes intervals too narrow, and one that is too high costs little. The first samples are predicted
-by the lower orders, so that the likelihood is that of all samples.
+a stationary process always; the order is that of the lowest AICc, but at least 10 log10 n, since an
+order that is too low makes intervals too narrow, and one that is too high costs little. The first
+samples are predicted by the lower orders, so that the likelihood is that of all samples.
 """
 
 from __future__ import annotations
@@ -22,6 +22,9 @@ Float = NDArray[np.float64]
 
 #: Highest order that is tried, as a number and as a share of the samples.
 _HIGHEST, _SHARE = 60, 0.05
+#: The order is at least this times the decimal logarithm of the number of samples (Berk, Ann. Stat.
+#: 2, 489, 1974): what matters is the spectrum at low frequency, and criteria choose for all of it.
+_ORDERS_PER_DECADE = 10
 #: Lags of the test of whiteness, at least.
 _LAGS = 20
 
@@ -140,7 +143,7 @@ def fitted(
     stretches : sequence of array
         Noise, evenly sampled, of one process.
     order : int, optional
-        By default the order of the lowest AICc.
+        By default the order of the lowest AICc, but at least 10 log10 n.
     parameters : int
         That were fitted to the same samples: the variance is larger than that of the residual.
     uncertain : sequence of array, shape (columns, samples of the stretch), optional
@@ -178,13 +181,20 @@ def fitted(
         k = len(reflection) + 1
         penalty = 2 * k + 2 * k * (k + 1) / max(n - k - 1, 1)
         criteria.append(n * math.log(max(rest, 1e-300)) + penalty)
-    best = len(reflection) if order is not None else int(np.argmin(criteria))
+    best = len(reflection)
+    if order is None:
+        best = min(best, max(int(np.argmin(criteria)), _lowest_order(n)))
     chosen = np.array(reflection[:best])
     found = Autoregression(chosen, variance)
     # The variance of the likelihood: innovations of unit mean square.
     white = np.concatenate([found.whiten(s) for s in stretches])
     left = max(n - parameters - best, 1)
     return Autoregression(chosen, variance * float(white @ white) / left)
+
+
+def _lowest_order(n: int) -> int:
+    """Order of n samples below which the spectrum of slow noise is too smooth."""
+    return round(_ORDERS_PER_DECADE * math.log10(n))
 
 
 def _dot(a: Float, b: Float) -> float:
