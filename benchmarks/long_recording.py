@@ -1,11 +1,12 @@
 """A recording of ten minutes at 10 kHz: read, averaged over blocks and fitted.
 
-``python -m benchmarks.long_recording [--seconds 600] [--rate 10000] [--full]``
+``python -m benchmarks.long_recording [--seconds 600] [--rate 10000] [--full] [--sets N]``
 
 The motion is computed by SciPy (`benchmarks.coverage`): velocity steps, two holds and load steps.
 The noise of the gauge is white, a resonance at 300 Hz (an autoregression of order 2), wanders over
 0.5 and 8 s, and has the mains with a harmonic, whose frequency wanders too. With ``--full`` the
-same recording is fitted at its full rate besides.
+same recording is fitted at its full rate besides. With ``--sets`` there are so many recordings of
+six seconds and faster steps instead, with a third of the noise, whose intervals are counted.
 """
 
 from __future__ import annotations
@@ -14,11 +15,15 @@ import argparse
 import resource
 import tempfile
 import time as clock
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 from scipy.signal import lfilter
 
+from asperity import read
+from asperity.inference import RecordedRun, RunOptions, fit, recorded_run
+from asperity.recording import Channel, Trace
 from benchmarks.clock import pin_to_one_core
 from benchmarks.coverage import LOAD, Case, friction
 
@@ -84,6 +89,46 @@ def written(path: Path, table: dict[str, np.ndarray]) -> None:
             np.savetxt(file, part, fmt="%.8g", delimiter=",")
 
 
+#: Six seconds in which contacts slide as far as they do in minutes at usual velocities.
+SHORT = Case((3e-5, 1e-4, 3e-5, 0.0, 1e-4), (1.2, 2.4, 3.6, 4.2), 6.0, 1e4)
+
+
+def short_runs(case: Case, sets: int) -> Iterator[RecordedRun]:
+    """Recordings of one motion with different noise."""
+    time = np.arange(round(case.end * case.rate)) / case.rate
+    clean = friction(case, time)
+    edges = np.array([0.0, *case.changes, case.end])
+    slip = np.concatenate([[0.0], np.cumsum(np.array(case.velocities) * np.diff(edges))])
+    for seed in range(sets):
+        random = np.random.default_rng([7, seed])
+        mu = clean + 0.3 * noise(random, time)
+        displacement = np.interp(time, edges, slip) + 2e-8 * random.normal(size=time.size)
+        load = np.full(time.size, LOAD)
+        channels = {
+            "friction": Channel(mu, "dimensionless", "", "friction", ""),
+            "displacement": Channel(displacement, "length", "m", "displacement", "m"),
+            "normal_stress": Channel(load, "pressure", "Pa", "normal stress", "Pa"),
+        }
+        yield recorded_run(Trace(time, channels), name="run")
+
+
+def counted(sets: int) -> None:
+    """Print how many intervals hold the truth, standard errors and the scatter of estimates."""
+    rows: dict[str, list[tuple[float, ...]]] = {name: [] for name in SHORT.true}
+    for run in short_runs(SHORT, sets):
+        found = fit(run, SHORT.law, FREE[:3], start={n: SHORT.true[n] for n in FREE[:3]}, starts=1)
+        for name, truth in SHORT.true.items():
+            p = found.parameters[name]
+            held = [low <= truth <= high for low, high in (p.interval_68, p.interval_95)]
+            rows[name].append((*held, p.se / truth, p.value / truth - 1))
+    for name, values in rows.items():
+        held_68, held_95, error, off = np.array(values, float).T
+        print(
+            f"{name:3} 68 %: {100 * held_68.mean():.0f}  95 %: {100 * held_95.mean():.0f}  "
+            f"standard error {error.mean():.3g}  scatter {off.std():.3g}"
+        )
+
+
 def main() -> None:
     """Print times, memory and estimates."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -91,24 +136,26 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=1e4)
     parser.add_argument("--file", type=Path, help="use this file, and write it where it is not")
     parser.add_argument("--full", action="store_true", help="fit at the full rate besides")
+    parser.add_argument("--sets", type=int, help="count intervals of so many short recordings")
     arguments = parser.parse_args()
+    if arguments.sets:
+        counted(arguments.sets)
+        return
     case = programme(arguments.seconds, arguments.rate)
     with tempfile.TemporaryDirectory() as folder:
         path = arguments.file or Path(folder) / "long.csv"
         if not path.exists():
             written(path, columns(case))
         pin_to_one_core()
-        from asperity import inference, read
-
         begun = clock.perf_counter()
         trace = read(path)
         read_in = clock.perf_counter() - begun
-        run = inference.recorded_run(trace)
+        run = recorded_run(trace)
         cut_in = clock.perf_counter() - begun
         print(f"{run.time.size} samples: read in {read_in:.1f} s, drive found by {cut_in:.1f} s")
         for rate in (None, "full") if arguments.full else (None,):
             begun = clock.perf_counter()
-            found = inference.fit(run, case.law, FREE, runs=inference.RunOptions(fit_rate=rate))
+            found = fit(run, case.law, FREE, runs=RunOptions(fit_rate=rate))
             took = clock.perf_counter() - begun
             peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
             print(f"rate {rate or 'by the data'}: fit in {took:.1f} s, {peak:.2f} GB at most")
