@@ -323,3 +323,19 @@ def test_derivatives_at_orbits_of_the_search(law, options, more):
     model = response_function(law, multipliers=True, **options)
     names = ["A", "K", "eta" if more else "M"]
     assert worst_difference(model, point(law) | more, names, force) < SEARCHED
+
+
+def test_second_derivatives_at_orbits_of_the_search():
+    # Slow modulation, where the fast method does not converge.
+    model = response_function("rice-ruina", harmonics=1)
+    own = {n: BASE[n] for n in law_parameters(RiceRuina)} | MACHINE | {"V": 1e-6, "epsilon": 0.24}
+    logs = STEP * jnp.array([1.0, -1.0, 0.5, -0.5])
+
+    def mean(logs):
+        changed = own | {"frequency": 0.4, "A": own["A"] * jnp.exp(logs)}
+        return model(changed).mean_friction.sum()
+
+    gradient, second = map(np.asarray, jax.jvp(jax.grad(mean), (logs,), (jnp.ones(4),)))
+    coarse, fine = (gradient[0] - gradient[1]) / (2 * STEP), (gradient[2] - gradient[3]) / STEP
+    middle = (4 * (second[2] + second[3]) - (second[0] + second[1])) / 6
+    assert middle == pytest.approx((4 * fine - coarse) / 3, rel=SEARCHED)

@@ -24,7 +24,7 @@ from asperity.orbit.gradient.fourier import (
 )
 from asperity.orbit.gradient.implicit import implicit_solution
 from asperity.orbit.gradient.multipliers import log_multipliers_of_exponent
-from asperity.orbit.gradient.program import Parameters, Program, ResponseValues
+from asperity.orbit.gradient.program import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.methods.fourier.balance import BalanceEquations, balanced_orbit
 from asperity.orbit.methods.fourier.observables import force_spectrum, orbit_error
 from asperity.orbit.methods.fourier.orbit import fourier_orbit, load_cycle
@@ -99,7 +99,7 @@ def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
 
 def fast_values(parameters: Parameters, fast: FastOrbits, program: Program) -> ResponseValues:
     """Response of the orbits, with its derivatives to the parameters."""
-    problem = program.equations.problem(parameters)
+    problem = program.equations.problem(only_where(fast.converged, parameters))
     evaluate = _fourier_values if _quasi_static(program) else _balanced_values
     mean, harmonics, logs = evaluate(problem, fast, program)
     outcome = jnp.where(fast.converged, int(Outcome.CONVERGED), int(Outcome.NO_ORBIT))

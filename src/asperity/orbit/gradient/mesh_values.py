@@ -12,7 +12,7 @@ from jax import Array
 from asperity.orbit.gradient.collocation import CollocationEquations, unknowns_of
 from asperity.orbit.gradient.implicit import implicit_solution
 from asperity.orbit.gradient.multipliers import log_multipliers, sorted_logs
-from asperity.orbit.gradient.program import Parameters, Program, ResponseValues
+from asperity.orbit.gradient.program import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.gradient.search import (
     MeshOrbits,
     mesh_orbit_shapes,
@@ -57,6 +57,7 @@ def mesh_values(parameters: Parameters, meshed: MeshOrbits, program: Program) ->
     """Values of the search, with the derivatives of the orbits on their meshes."""
     meshed = jax.lax.stop_gradient(meshed)
     converged = meshed.outcome == Outcome.CONVERGED
+    parameters = only_where(converged, parameters)
     # Points with an orbit first: chunks without one take no time.
     order = jnp.argsort(~converged, stable=True)
     back = jnp.argsort(order)

@@ -57,3 +57,14 @@ def by_point(values: Array, like: Array) -> Array:
 def chosen(condition: Array, yes: Any, no: Any) -> Any:
     """Point by point one of two pytrees, the points along the first axis."""
     return jax.tree.map(lambda a, b: jnp.where(by_point(condition, a), a, b), yes, no)
+
+
+def only_where(condition: Array, parameters: Parameters) -> Parameters:
+    """The parameters, constant at points where the condition does not hold.
+
+    Equations without a solution there have NaN for derivatives. Second derivatives multiply these
+    by the zero that a choice of the other method leaves, which is NaN too.
+    """
+    return {
+        name: jnp.where(condition, a, jax.lax.stop_gradient(a)) for name, a in parameters.items()
+    }
