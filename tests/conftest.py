@@ -1,5 +1,7 @@
 """References that the tests of several rooms share, and how rooms go to the processes of xdist."""
 
+import gc
+
 import pytest
 
 pytest_plugins = [
@@ -28,6 +30,13 @@ def scope(nodeid):
 def pytest_collection_modifyitems(items):
     order = {name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: order.get(room(item.nodeid), len(order)))
+
+
+def pytest_collection_finish():
+    """Leave what is imported out of the collections of garbage, a twentieth of the time."""
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(100_000, 50, 100)
 
 
 @pytest.hookimpl(optionalhook=True)

@@ -108,15 +108,16 @@ def test_what_the_data_cannot_see_is_named(readings, pmma):
 
 def test_a_prior_pulls_by_its_weight(readings, pmma):
     table = readings(6)
-    alone = fit(table, "elasto-plastic", ("lambda",), material=pmma)
-    estimate = alone.parameters["lambda"]
+    ask = {"material": pmma, "start": {"eps_ratio": TRUTH["eps_ratio"]}}
+    alone = fit(table, "elasto-plastic", ("eps_ratio",), **ask)
+    estimate = alone.parameters["eps_ratio"]
     prior = Prior(estimate.value + 2 * estimate.se, estimate.se, "a second experiment")
-    both = fit(table, "elasto-plastic", ("lambda",), material=pmma, prior={"lambda": prior})
+    both = fit(table, "elasto-plastic", ("eps_ratio",), prior={"eps_ratio": prior}, **ask)
     # Two normal estimates of one weight: the middle, and a standard error smaller by sqrt(2).
-    assert both.values["lambda"] == pytest.approx(
+    assert both.values["eps_ratio"] == pytest.approx(
         estimate.value + estimate.se, abs=0.05 * estimate.se
     )
-    assert both.parameters["lambda"].se == pytest.approx(estimate.se / np.sqrt(2), rel=0.03)
+    assert both.parameters["eps_ratio"].se == pytest.approx(estimate.se / np.sqrt(2), rel=0.03)
 
 
 def test_an_outlier_is_named(readings, pmma):

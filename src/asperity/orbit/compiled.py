@@ -90,7 +90,7 @@ def deepest_unloading(problem: Problem) -> Array:
     return 1 - jnp.min(w, axis=0) * jnp.ones(_points(problem))
 
 
-@partial(jax.jit, static_argnames=("nodes", "grading", "harmonics"))
+@partial(jit_large, static_argnames=("nodes", "grading", "harmonics"))
 def fast_solve(
     problem: Problem, *, nodes: int, grading: float, harmonics: int
 ) -> tuple[Observables, Array, FourierOrbit]:

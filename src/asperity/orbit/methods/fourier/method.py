@@ -23,7 +23,7 @@ from asperity.slider.problem import Problem
 
 #: Grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for: the
 #: nodes that a pulse needs grow with the root of it.
-_GRIDS = ((5.0, 24, 0.3), (9.5, 28, 0.3), (18.0, 32, 0.3), (300.0, 128, 0.5))
+_GRIDS = ((5.0, 24, 0.3), (18.0, 32, 0.3), (300.0, 128, 0.5))
 #: Points in a call: enough for the time that a call costs, few enough for a single point.
 _CHUNK = 4 * FAST_BLOCK
 #: Estimated error that is accepted.
