@@ -28,6 +28,7 @@ from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.result import Fit
 from asperity.inference.runs.assembly import (
     RunOptions,
+    contradicted_sharing,
     contradicted_stiffness,
     require_newtons,
     require_seen,
@@ -152,34 +153,40 @@ def fit(
         found = described_fit(objective, minima, profile=profile)
         said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
         said += unusual_numbers(found, recordings)
-        if "K" in (fixed or {}) and table is None:
+        given = (fixed or {}).get("K")
+        shared = "K" in free and len(recordings) > 1
+        if table is None and (given is not None or shared):
             freed = fit(
                 recordings,
                 law,
-                free,
+                [n for n in free if n != "K"],
                 fixed={n: v for n, v in (fixed or {}).items() if n != "K"},
                 material=material,
                 prior=prior,
-                start={**(start or {}), **_begun(found, recordings, fixed or {})},
+                start={**(start or {}), **_begun(found, recordings, given)},
                 inertia=inertia,
                 radiation_damping=radiation_damping,
                 runs=runs,
                 starts=1,
                 seed=seed,
             )
-            said += contradicted_stiffness(found, freed, recordings, (fixed or {})["K"])
+            if shared:
+                said += contradicted_sharing(found, freed, recordings)
+            else:
+                said += contradicted_stiffness(found, freed, recordings, given)
         return replace(found, warnings=(*said, *found.warnings))
     return described_fit(objective, minima, profile=profile)
 
 
-def _begun(
-    found: Fit, recordings: Sequence[RecordedRun], fixed: Mapping[str, Any]
-) -> dict[str, Any]:
-    """Where a fit with the stiffness free begins: at one with it fixed."""
+def _begun(found: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[str, Any]:
+    """Where a fit with a stiffness for each recording begins: at one with it fixed or shared."""
     laws = {k.name: found.values[k.name] for k in found.objective.unknowns if not k.nuisance}
     several = len(recordings) > 1
     return laws | {
-        f"K[{run.name}]" if several else "K": stiffness_in(run, fixed["K"]) for run in recordings
+        f"K[{run.name}]" if several else "K": (
+            laws["K"] if given is None else stiffness_in(run, given)
+        )
+        for run in recordings
     }
 
 

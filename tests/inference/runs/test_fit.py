@@ -1,9 +1,11 @@
 """Recordings computed by SciPy, with the noise of gauges: recovery, coverage, refusals."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks import coverage
 from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
 
 from asperity.errors import InputError
@@ -236,6 +238,27 @@ def test_a_fixed_stiffness_that_the_recording_contradicts_is_named():
     assert "D0" in said
     right = fit(run, "rice-ruina", FREE, fixed={"K": TRUE["K"]}, start=TRUE, starts=1)
     assert not any("the fixed K" in w for w in right.warnings)
+
+
+def test_a_shared_stiffness_that_the_recordings_contradict_is_named(monkeypatch):
+    (first,) = runs_of(CASE, 1)
+    begin = {**TRUE, "K": 1.3 * TRUE["K"]}
+
+    def said_with(factor):
+        monkeypatch.setattr(coverage, "STIFFNESS", factor * coverage.STIFFNESS)
+        (other,) = runs_of(CASE, 1, seed=1)
+        pair = [first, replace(other, name="stiffer")]
+        both = fit(pair, "rice-ruina", [*FREE, "K"], start=begin, starts=1)
+        return [w for w in both.warnings if "share" in w]
+
+    assert said_with(1.0) == []
+    (said,) = said_with(1.8)
+    for name, factor in (("run", 1.0), ("stiffer", 1.8)):
+        low, high = (
+            float(x) for x in re.search(rf"{name} has \S+ \((\S+) to (\S+),", said).groups()
+        )
+        assert low < factor * TRUE["K"] < high
+    assert "leave K out of the free parameters" in said
 
 
 def test_a_prior_that_the_recording_contradicts_is_named(found):

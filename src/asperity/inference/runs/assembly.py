@@ -27,7 +27,7 @@ _FAR: Mapping[str, tuple[float, float]] = {"A": (5e-4, 0.2), "D0": (1e-8, 2e-3)}
 _FAR_STIFFNESS = (1e2, 1e6)
 #: Samples that a run needs, per free parameter.
 _SAMPLES_PER_PARAMETER = 8
-#: Decrease of AICc with the stiffness free that contradicts a fixed one.
+#: Decrease of AICc with the stiffness of each run free that contradicts a fixed or shared one.
 _CONTRADICTED_AICC = 6.0
 LINEAR = ("offset", "trend", "bend", "drift")
 #: Standard deviations of the departures of the initial friction and states from steady sliding.
@@ -291,19 +291,53 @@ def contradicted_stiffness(
         low, high = estimate.interval_95
         if low <= fixed <= high:
             continue
-        moved = ", ".join(
-            f"{n} {freed.values[n]:.4g} instead of {found.values[n]:.4g}"
-            for n in ("A", "B", "D0")
-            if n in found.values and n in freed.values
-        )
         said.append(
             f"the fixed K of {fixed:.4g} {estimate.unit} is contradicted by {run.name}, which has "
             f"{estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %): AICc falls by "
             f"{found.aicc - freed.aicc:.3g} with K free"
-            + (f", which gives {moved}" if moved else "")
+            + _moved(found, freed)
             + "; leave K free, or give it a prior"
         )
     return said
+
+
+def contradicted_sharing(found: Fit, freed: Fit, runs: Sequence[RecordedRun]) -> list[str]:
+    """A sentence on a stiffness that is one for several recordings while theirs differ.
+
+    Parameters
+    ----------
+    found, freed : Fit
+        With one stiffness for all, and the same with one for each.
+    runs : sequence of RecordedRun
+    """
+    if not freed.converged or found.aicc - freed.aicc < _CONTRADICTED_AICC:
+        return []
+    shared = found.parameters["K"]
+    own = []
+    for run in runs:
+        estimate = freed.parameters[f"K[{run.name}]"]
+        low, high = estimate.interval_95
+        own.append(
+            f"{run.name} has {estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %), "
+            f"{estimate.value / shared.value:.3g} times it"
+        )
+    return [
+        f"the K of {shared.value:.4g} {shared.unit} that the recordings share is contradicted: "
+        + ", ".join(own)
+        + f"; AICc falls by {found.aicc - freed.aicc:.3g} with a K for each"
+        + _moved(found, freed)
+        + "; leave K out of the free parameters, so that each has its own"
+    ]
+
+
+def _moved(found: Fit, freed: Fit) -> str:
+    """What the law's parameters are with the stiffness free, and what they were."""
+    moved = ", ".join(
+        f"{n} {freed.values[n]:.4g} instead of {found.values[n]:.4g}"
+        for n in ("A", "B", "D0")
+        if n in found.values and n in freed.values
+    )
+    return f", which gives {moved}" if moved else ""
 
 
 def unusual_numbers(found: Fit, runs: Sequence[RecordedRun]) -> list[str]:
