@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from benchmarks import coverage
 from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
 
 from asperity.errors import InputError
@@ -16,6 +15,7 @@ from asperity.laws import RiceRuina
 from asperity.orbit import periodic_response
 from asperity.recording import Channel, Trace
 from asperity.slider import Slider
+from benchmarks import coverage
 
 CASE = CASES["steps"]
 FREE = ["A", "B", "D0"]
