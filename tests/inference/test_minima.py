@@ -7,10 +7,11 @@ import pytest
 
 from asperity.inference.description import described_fit
 from asperity.inference.forward import LockInTerm
-from asperity.inference.minima import minima_of
+from asperity.inference.minima import minima_of, with_noise
 from asperity.inference.objective import Objective
 from asperity.inference.profile import Profile
 from asperity.inference.residuals import Residuals
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import unknowns_of
 from asperity.laws import get_law
 
@@ -109,3 +110,50 @@ def test_progress_counts_the_starts_that_are_followed():
     minima_of(objective_of(one_minimum, 1e-6), 0, lambda done, total: calls.append((done, total)))
     total = calls[-1][1]
     assert calls == [(done, total) for done in range(1, total + 1)]
+
+
+class TwoNoises(RunTerm):
+    """A recording of two halves, each with a noise of the size that its residual shows.
+
+    Residuals are of size 1 and 2 at FIRST, of size 10 and 1 at SECOND.
+    """
+
+    name, observables, profiled = "halves", ("friction",), 2
+
+    def __init__(self, half=50):
+        self.half, self.sizes = half, np.ones(2)
+
+    def _raw(self, x):
+        phase = 0.5 * math.pi * (x - FIRST) / (SECOND - FIRST)
+        share, slope = math.sin(phase) ** 2, math.sin(2 * phase) * phase / (x - FIRST)
+        return np.array([1 + 9 * share, 2 - share]), np.array([9 * slope, -slope])
+
+    def residuals(self, values, *, search=None):
+        r, slope = (np.repeat(v / self.sizes, self.half) for v in self._raw(math.log(values["D0"])))
+        scale = self.half * float(np.log(self.sizes).sum())
+        names, rows = np.full(r.size, "friction"), np.arange(r.size)
+        return Residuals(r, (slope / values["D0"])[:, None], names, rows, scale)
+
+    def update_noise(self, values):
+        self.sizes = self._raw(math.log(values["D0"]))[0]
+        return True
+
+    def noise_state(self):
+        return self.sizes
+
+    def restore_noise(self, state):
+        self.sizes = state
+
+
+def test_minima_of_recordings_are_compared_with_the_noise_of_each():
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
+    term = TwoNoises()
+    objective = Objective((term,), LAW, unknowns, {})
+    near = [(np.array([SECOND - 0.02]), 1.0), (np.array([FIRST + 0.02]), 2.0)]
+    (best, chi2), (other, above) = with_noise(objective, near)[0]
+    # Under the noise of SECOND, FIRST is a maximum of chi-squared; its likelihood is the higher.
+    np.testing.assert_allclose([best[0], other[0]], [FIRST, SECOND], atol=1e-3)
+    assert above - chi2 == pytest.approx(2 * term.half * math.log(5), rel=1e-3)
+    # The noise is that of the best.
+    np.testing.assert_allclose(term.sizes, [1, 2], atol=0.01)
+    assert chi2 == pytest.approx(2 * term.half, rel=0.01)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +13,7 @@ from scipy.stats.qmc import Sobol
 
 from asperity.inference.forward import LockInTerm
 from asperity.inference.objective import Objective
-from asperity.inference.runs.term import RunTerm
+from asperity.inference.runs.term import NoiseState, RunTerm
 from asperity.parameters.arguments import counted
 
 Float = NDArray[np.float64]
@@ -108,25 +109,67 @@ def _distinct(minima: list[tuple[Float, float]]) -> list[tuple[Float, float]]:
 def with_noise(
     objective: Objective, minima: list[tuple[Float, float]]
 ) -> tuple[list[tuple[Float, float]], bool]:
-    """Minima once the noise is that of the residual, and whether the two agree.
+    """Minima once the noise is that of the residual, and whether the two agree at the best.
 
-    The noise of each `RunTerm` is estimated from the residual at the best minimum, the minima are
-    followed under it, and so on until the best one stays where it is.
+    Each minimum has the noise that its own residual shows. They are compared by the likelihood,
+    noise included: under the noise of one, which holds its misfit, another is no minimum.
+
+    Returns
+    -------
+    list of (array, float)
+        Best first, with the chi-squared of the best under its noise; that of the others is as much
+        higher as twice the logarithm of their likelihood is lower.
+    bool
     """
     noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
+    first = [term.noise_state() for term in noisy]
+    ends = []
+    for u, _ in _distinct(minima):
+        for term, state in zip(noisy, first, strict=True):
+            term.restore_noise(state)
+        ends.append(_with_own_noise(objective, noisy, u))
+    best = min(ends, key=lambda end: end.deviance)
+    for term, state in zip(noisy, best.states, strict=True):
+        term.restore_noise(state)
+    objective.forget()
+    chi2 = objective.chi2(best.u)
+    found = [(best.u, chi2)]
+    for end in sorted(ends, key=lambda end: end.deviance):
+        if end is not best and math.isfinite(end.deviance):
+            found.append((end.u, chi2 + end.deviance - best.deviance))
+    return found, best.agreed
+
+
+class _End(NamedTuple):
+    """A minimum under its own noise."""
+
+    u: Float
+    #: Twice the negative logarithm of likelihood and priors, and twice the parameters of the noise.
+    deviance: float
+    states: list[NoiseState]
+    agreed: bool
+
+
+def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _End:
+    """Noise and parameters in turn, until the parameters stay where they are."""
+    agreed = False
     for _ in range(_ROUNDS):
-        begin = minima[0][0]
+        begin = u
         for term in noisy:
             term.update_noise(objective.named(begin))
         objective.forget()
-        starts = [u for u, _ in _distinct(minima)]
-        minima = sorted((objective.minimise(u) for u in starts), key=lambda pair: pair[1])
-        _, jacobian = objective.residuals(minima[0][0])
-        away = jacobian @ (minima[0][0] - begin)
+        u, value = objective.minimise(begin)
+        if not math.isfinite(value):
+            break
+        _, jacobian = objective.residuals(u)
+        away = jacobian @ (u - begin)
         # chi-squared of the change, under the noise as it is now.
-        if float(away @ away) < _STILL**2:
-            return minima, True
-    return minima, False
+        if agreed := float(away @ away) < _STILL**2:
+            break
+    priors = objective.prior_residuals(u)[0]
+    deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
+    deviance += 2 * sum(term.profiled for term in noisy)
+    return _End(u, deviance, [term.noise_state() for term in noisy], agreed)
 
 
 def _blocked(objective: Objective, u: Float, value: float) -> bool:

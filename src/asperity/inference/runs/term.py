@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,6 +48,18 @@ _NAMED = 5
 _FILTER_SAMPLES = 8.0
 #: Samples of the filtered motion in a block.
 _BLOCK_SAMPLES = 4
+
+
+class NoiseState(NamedTuple):
+    """Noise of a recording, and what is taken off it: the parts of a `RunTerm` that change."""
+
+    models: tuple[Autoregression, ...]
+    columns: Float
+    whiteness: float
+    lines: tuple[float, ...]
+    outliers: tuple[int, ...]
+    jumps: tuple[int, ...]
+    after_changes: tuple[float, float]
 
 
 class RunTerm:
@@ -147,6 +159,26 @@ class RunTerm:
             "whiteness_p": self._whiteness,
             "standard_deviation": [math.sqrt(m.variance) for m in self.models],
         }
+
+    def noise_state(self) -> NoiseState:
+        """Everything that `update_noise` changes."""
+        return NoiseState(
+            tuple(self.models),
+            self._columns,
+            self._whiteness,
+            tuple(self._lines),
+            tuple(self._outliers),
+            tuple(self._jumps),
+            self._after_changes,
+        )
+
+    def restore_noise(self, state: NoiseState) -> None:
+        """Take the noise back to an earlier state."""
+        self.models, self._columns = list(state.models), state.columns
+        self._whiteness, self._after_changes = state.whiteness, state.after_changes
+        self._lines, self._outliers = list(state.lines), list(state.outliers)
+        self._jumps = list(state.jumps)
+        self._prepare()
 
     def search_from_now_on(self) -> None:
         """Let the motion take more steps."""
