@@ -53,6 +53,7 @@ def compare(
         )
     if report is not None:
         require_folder(report, "--report")
+    options = {**options, "prior": reading.stiffness_prior(data, options)}
     read = reading.read(data, options["fixed"])
     found = inference.compare(read, checked_laws(laws), free, **options)
     without = found.not_compared

@@ -8,6 +8,7 @@ from asperity.inference.posterior import Posterior, sample_posterior
 from asperity.inference.result import Estimate, Fit, Optimum
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
+from asperity.inference.runs.unloading import MeasuredStiffness, measured_stiffness
 from asperity.inference.table import LockInTable, read_table, table_of
 from asperity.inference.unknowns import Prior
 from asperity.inference.windows import WindowedFit, WindowEstimate, fit_windows
@@ -21,6 +22,7 @@ __all__ = [
     "Fit",
     "Judged",
     "LockInTable",
+    "MeasuredStiffness",
     "Objective",
     "Optimum",
     "Posterior",
@@ -33,6 +35,7 @@ __all__ = [
     "design",
     "fit",
     "fit_windows",
+    "measured_stiffness",
     "plan_of",
     "read_plan",
     "read_table",

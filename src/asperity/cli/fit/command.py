@@ -64,6 +64,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         window: str | None,
         steps: str | None,
         velocities: str | None,
+        stiffness_from: str | None,
         trend: str,
         drift: bool,
         initial: str,
@@ -90,7 +91,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
                 fit_rate=fit_rate,
             ),
         }
-        reading = FitData(source, window, steps, velocities)
+        reading = FitData(source, window, steps, velocities, stiffness_from)
         return command(free=names, options=options, reading=reading, **others)
 
     found: Callable[..., Any] = source_options(gathered)
@@ -151,6 +152,7 @@ def fit(
     sampling.check()
     if report is not None:
         require_folder(report, "--report")
+    options = {**options, "prior": reading.stiffness_prior(data, options, windows)}
     over = None
     if windows is not None:
         over = reading.fit_windows(data, windows, law_named(law), free, options)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -31,6 +32,11 @@ RUN_OPTIONS = (
         "--velocities",
         metavar="VALUES",
         help='Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.',
+    ),
+    click.option(
+        "--stiffness-from",
+        metavar="START:END",
+        help="Seconds of unloading and reloading whose slope is the prior of K; outside --window.",
     ),
     click.option(
         "--trend",
@@ -68,7 +74,7 @@ class FitData:
     ----------
     source : RecordingSource
         Columns and units of recordings.
-    window, steps, velocities : str or None
+    window, steps, velocities, stiffness_from : str or None
         As the options of these names.
     """
 
@@ -76,6 +82,46 @@ class FitData:
     window: str | None
     steps: str | None
     velocities: str | None
+    stiffness_from: str | None = None
+
+    def stiffness_prior(
+        self, paths: Sequence[Path], options: Mapping[str, Any], windows: str | None = None
+    ) -> dict[str, Prior]:
+        """Priors of the options, with that of K by the slope of a span.
+
+        Raises
+        ------
+        InputError
+            If K has a number already, there are several files, the span is fitted too, or it gives
+            no slope.
+        """
+        from asperity import inference
+
+        priors: dict[str, Prior] = dict(options["prior"])
+        if self.stiffness_from is None:
+            return priors
+        label = "--stiffness-from"
+        given = "--fix" if "K" in options["fixed"] else "--prior" if "K" in priors else None
+        if given is not None:
+            raise InputError(f"{label} must be the only number of K, got {given} K too; drop one")
+        if len(paths) != 1 or is_table(paths[0]):
+            raise InputError(
+                f"{label} must go with one recording, got {len(paths)} files; give one recording"
+            )
+        low, high = span_of(self.stiffness_from, label)
+        texts = [self.window] if windows is None else windows.split(",")
+        for text in texts:
+            whole = text is None or text.strip() == "auto"
+            begin, end = (-math.inf, math.inf) if whole else span_of(str(text), "window")
+            if low < end and begin < high:
+                raise InputError(
+                    f"{label} must lie outside what is fitted, got {low:g} to {high:g} s in "
+                    f"{'the whole recording' if whole else f'{begin:g} to {end:g} s'}; give a "
+                    "window without it: its samples would count twice"
+                )
+        with naming_options():
+            found = inference.measured_stiffness(self.source.read(paths[0]), (low, high))
+        return {**priors, "K": found.prior}
 
     def read(
         self, paths: Sequence[Path], fixed: Mapping[str, str]

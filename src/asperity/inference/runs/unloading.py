@@ -1,0 +1,264 @@
+"""Stiffness of a machine from a stretch in which the contact sticks: force over drive.
+
+While the slider is unloaded, reloaded or loaded for the first time, it does not slide: the force
+follows the load point along a line of slope K. Near the onset of sliding the line bends.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.inference.runs.noise import fitted
+from asperity.inference.unknowns import Prior
+from asperity.measurement.sliding.segments import displacement_noise
+from asperity.measurement.sliding.signals import sliding_signals
+from asperity.recording import Trace
+from asperity.recording.readers import read
+
+Float = NDArray[np.float64]
+
+#: Samples that a line needs, and to which longer spans are averaged.
+_FEWEST, _MOST = 32, 2000
+#: Rounds between the line and its noise.
+_ROUNDS = 3
+#: A slope is seen that is so many standard errors off zero.
+_SEEN = 5.0
+#: Change of the friction over the span, over the friction of the recording, at least: a trend of
+#: sliding friction over slip is a line too.
+_CHANGES = 0.05
+#: The force is no line whose slope changes by so many standard errors and this share of itself, or
+#: by the larger share, whatever the noise: part of what bends passes for noise.
+_BENT, _BENT_SHARE, _BENT_ANYHOW = 2.6, 0.05, 0.25
+#: A column that others explain to this share tells nothing of its own.
+_OWN = 0.05
+#: The displacement spreads by at least so many standard deviations of its noise.
+_MOVES = 5.0
+
+
+@dataclass(frozen=True)
+class MeasuredStiffness:
+    """Slope of the friction force over the displacement of the load point, in a span of time.
+
+    Attributes
+    ----------
+    over_load, over_load_se : float
+        K over the mean load of the span, and its standard uncertainty (1/m).
+    value, se : float
+        K in `unit`; the same as over the load where no load is recorded.
+    unit : str
+        "N/m", "Pa/m" or "1/m".
+    span : (float, float)
+        Seconds.
+    samples : int
+    bend, bend_se : float
+        Change of the slope from one end to the other over the slope, and its standard uncertainty.
+    """
+
+    over_load: float
+    over_load_se: float
+    value: float
+    se: float
+    unit: str
+    span: tuple[float, float]
+    samples: int
+    bend: float
+    bend_se: float
+
+    @property
+    def prior(self) -> Prior:
+        """Prior of K for a fit of a window that leaves the span out."""
+        low, high = self.span
+        source = f"slope of the force from {low:g} to {high:g} s"
+        return Prior(self.value, self.se, source, self.unit)
+
+
+def measured_stiffness(
+    recording: Trace | str | os.PathLike[str],
+    span: tuple[float, float],
+    *,
+    load: str = "W",
+    force: str = "F",
+) -> MeasuredStiffness:
+    """Stiffness from a span in which the contact sticks: unloading, reloading or first loading.
+
+    Parameters
+    ----------
+    recording : Trace or path
+        What `asperity.read` returns, or a file that it reads without further arguments.
+    span : (float, float)
+        First and last time (s).
+    load, force : str
+        Channels, by name or role.
+
+    Returns
+    -------
+    MeasuredStiffness
+
+    Raises
+    ------
+    InputError
+        If the load point does not move there, the force does not rise with it, or its slope is not
+        the same over the whole span: then the contact slides.
+
+    Notes
+    -----
+    The line is that of least squares, which for a slope is as good as any under stationary noise
+    (Grenander and Rosenblatt, 1957); its uncertainty is that under an autoregression fitted to the
+    residual with what the line takes off it. Noise of the displacement lowers a slope by its
+    variance over that of the displacement: that is put back, and added to the uncertainty. So is
+    the bend, or what noise hides of it: the slope without creep lies anywhere between that of the
+    line and that of the steeper end, half a bend away. A contact that creeps along with the drive
+    at a constant rate cannot be told from a softer machine.
+    """
+    trace = recording if isinstance(recording, Trace) else read(recording)
+    low, high = span
+    if not low < high:
+        raise InputError(
+            f"span must end after it begins, got {low:g} s to {high:g} s; give its two times"
+        )
+    signals = sliding_signals(trace, load, force, None)
+    if signals.displacement is None:
+        raise InputError(
+            f"recording must have the displacement of the load point, got none: "
+            f"{signals.no_motion}; name a channel"
+        )
+    here = (signals.time >= low) & (signals.time <= high)
+    count = int(here.sum())
+    if count < _FEWEST:
+        raise InputError(
+            f"span must hold at least {_FEWEST} samples, got {count} from {low:g} to {high:g} s; "
+            "give a longer one"
+        )
+    weight, unit = _load(trace, load, signals.time[here], signals.load_unit)
+    x = signals.displacement
+    columns = np.stack([signals.time[here], x[here], signals.friction[here] * weight], axis=1)
+    noise = displacement_noise(columns[:, 0], columns[:, 1])
+    q = max(1, count // _MOST)
+    t, moved, F = columns[: count // q * q].reshape(-1, q, 3).mean(axis=1).T
+    noise /= math.sqrt(q)
+    spread = float(moved.std())
+    if not spread > _MOVES * noise:
+        raise InputError(
+            f"span must have a load point that moves, got {spread:.3g} m from {low:g} to {high:g} s"
+            f" beside noise of {noise:.2g} m; give a stretch of unloading or reloading"
+        )
+    half = float(np.ptp(moved)) / 2
+    u = (moved - moved.mean()) / half
+    (_, slope), covariance = _least_squares(np.stack([np.ones_like(u), u], axis=1), F)
+    direction = _direction(x, here, 2 * half) or float(np.sign(slope))
+    slope *= direction
+    se = math.sqrt(covariance[1, 1])
+    usual = float(np.median(np.abs(signals.friction))) * float(weight.mean())
+    share = 2 * slope / max(usual, 1e-300)
+    if slope < _SEEN * se or share < _CHANGES:
+        raise InputError(
+            f"span must have a force that rises with the load point's displacement, got a change by"
+            f" {share:.2g} of the friction ({2 * se / max(usual, 1e-300):.1g} standard error) from "
+            f"{low:g} to {high:g} s; give a stretch of unloading or reloading"
+        )
+    bend, bend_se = _bend(u, t, F, slope, low, high)
+    # Of the slope over the attenuated one: noise of the displacement has no part in the force.
+    attenuation = (noise / spread) ** 2
+    doubt = max(abs(bend), bend_se) / (2 * math.sqrt(3))
+    K = slope / half / (1 - attenuation)
+    error = K * math.hypot(se / slope, attenuation, doubt)
+    mean = float(weight.mean())
+    return MeasuredStiffness(
+        over_load=K / mean,
+        over_load_se=error / mean,
+        value=K,
+        se=error,
+        unit={"N": "N/m", "Pa": "Pa/m"}.get(unit, "1/m"),
+        span=(float(columns[0, 0]), float(columns[-1, 0])),
+        samples=count,
+        bend=bend,
+        bend_se=bend_se,
+    )
+
+
+def _load(trace: Trace, load: str, time: Float, unit: str) -> tuple[Float, str]:
+    """Load at the samples and its unit; ones where none is recorded."""
+    try:
+        channel = trace.channel(load)
+    except InputError:
+        if load != "W":
+            raise
+        return np.ones_like(time), ""
+    good = np.isfinite(channel.values) & np.isfinite(trace.time)
+    if not good.any():
+        return np.ones_like(time), ""
+    order = np.argsort(trace.time[good], kind="stable")
+    W = np.interp(time, trace.time[good][order], channel.values[good][order])
+    if not (W > 0).all():
+        raise InputError(
+            f"span must be under a positive load, got {W.min():.4g} {unit}; give another one"
+        )
+    return W, unit
+
+
+def _direction(x: Float, here: NDArray[np.bool_], length: float) -> float:
+    """Sign of the displacement in which the slider is pulled outside the span; 0 if unknown."""
+    outside = ~(here[1:] & here[:-1])
+    net = float(np.diff(x)[outside].sum())
+    return float(np.sign(net)) if abs(net) > length else 0.0
+
+
+def _bend(
+    u: Float, t: Float, F: Float, slope: float, low: float, high: float
+) -> tuple[float, float]:
+    """Change of the slope over the span over the slope, and its standard error.
+
+    Raises
+    ------
+    InputError
+        If the force is no line over the displacement, or another one on the way back.
+    """
+    line = np.stack([np.ones_like(u), u], axis=1)
+    square = np.column_stack([line, u * u])
+    coefficients, covariance = _least_squares(square, F)
+    bend, bend_se = 4 * coefficients[2] / slope, 4 * math.sqrt(covariance[2, 2]) / slope
+    if abs(bend) > min(max(_BENT * bend_se, _BENT_SHARE), _BENT_ANYHOW):
+        raise InputError(
+            f"span must have one slope of the force over the displacement, got one that changes by "
+            f"{abs(bend):.1%} ({bend_se:.1%} standard error) from {low:g} to {high:g} s: the "
+            "contact slides in a part of it; give a shorter span"
+        )
+    clock = 2 * (t - t[0]) / (t[-1] - t[0]) - 1
+    own = clock - square @ np.linalg.lstsq(square, clock, rcond=None)[0]
+    if own.std() > _OWN * clock.std():
+        coefficients, covariance = _least_squares(np.column_stack([square, own]), F)
+        apart, apart_se = (
+            abs(v) * float(np.ptp(own)) / (2 * slope)
+            for v in (coefficients[3], math.sqrt(covariance[3, 3]))
+        )
+        if apart > min(max(_BENT * apart_se, _BENT_SHARE), _BENT_ANYHOW):
+            raise InputError(
+                f"span must have one line of the force on the ways back and forth, got lines that "
+                f"are {apart:.1%} of the force apart ({apart_se:.1%} standard error) from {low:g} "
+                f"to {high:g} s: the contact slides in a part of it; give a shorter span"
+            )
+    return float(bend), float(bend_se)
+
+
+def _least_squares(columns: Float, y: Float) -> tuple[Float, Float]:
+    """Coefficients of columns, and their covariance under autoregressive noise."""
+    inverse = np.linalg.pinv(columns)
+    coefficients = inverse @ y
+    left = y - columns @ coefficients
+    size = max(float(left.std()), 1e-12 * float(np.abs(y).max()))
+    left = left / size
+    covariance = np.zeros((columns.shape[1],) * 2)
+    for _ in range(_ROUNDS):
+        values, vectors = np.linalg.eigh(covariance)
+        root = columns @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+        model = fitted([left], parameters=columns.shape[1], uncertain=[root.T])
+        transform = np.fft.fft(inverse, 8 * y.size, axis=1)
+        power = model.spectrum(np.fft.fftfreq(8 * y.size))
+        covariance = ((transform * power) @ transform.conj().T).real / (8 * y.size)
+    return coefficients, covariance * size**2

@@ -1,0 +1,121 @@
+"""Stiffness from unloading and reloading: of a recording by SciPy, with noise, and refusals."""
+
+import numpy as np
+import pytest
+from benchmarks.coverage import STIFFNESS, TRUTH, coloured
+from scipy.integrate import solve_ivp
+
+from asperity.errors import InputError
+from asperity.inference import measured_stiffness
+from asperity.recording import Channel, Trace
+
+#: Sliding, 60 um back at the same velocity, forth again, and on.
+TIMES, VELOCITIES = (0.0, 20.0, 26.0, 40.0), (1e-5, -1e-5, 1e-5)
+#: Where the contact sticks, and where it begins to slide.
+STICKS, SLIDES = (21.5, 30.5), (26.0, 34.0)
+#: Of every test but one that looks at the law: a load in newtons.
+LOAD = 50.0
+
+
+def displacement(time):
+    corners = np.concatenate([[0.0], np.cumsum(np.diff(TIMES) * VELOCITIES)])
+    return np.interp(time, TIMES, corners)
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """Friction of the ageing law by SciPy, 20 samples a second."""
+    A, B, D0, V0, mu0 = (TRUTH[n] for n in ("A", "B", "D0", "V0", "mu0"))
+    time = np.arange(0.0, 40.0, 0.05)
+
+    def rates(t, y, V):
+        v = V0 * np.exp((y[0] - mu0 - B * y[1]) / A)
+        return [STIFFNESS * (V - v), (V0 * np.exp(-y[1]) - v) / D0]
+
+    first = np.log(VELOCITIES[0] / V0)
+    y, friction = [mu0 + (A - B) * first, -first], np.empty_like(time)
+    for a, b, V in zip(TIMES[:-1], TIMES[1:], VELOCITIES, strict=True):
+        here = (time >= a) & (time < b)
+        found = solve_ivp(
+            rates, (a, b), y, "Radau", [*time[here], b], args=(V,), rtol=1e-10, atol=1e-12
+        )
+        friction[here], y = found.y[0, :-1], found.y[:, -1]
+    return time, friction
+
+
+def recorded(exact, seed=None, *, load=None, blur=0.0, sign=1.0):
+    time, friction = exact
+    random = np.random.default_rng(seed)
+    noise = 0.0 if seed is None else coloured(random, time.size, 20.0)
+    x = sign * displacement(time) + blur * random.normal(size=time.size)
+    channels = {"displacement": Channel(x, "length", "m", "displacement", "m")}
+    if load is None:
+        channels["friction"] = Channel(sign * (friction + noise), "dimensionless", "", "friction")
+    else:
+        W = np.full(time.size, load)
+        channels["F"] = Channel(sign * (friction + noise) * W, "force", "N", "shear force", "N")
+        channels["W"] = Channel(W, "force", "N", "normal force", "N")
+    return Trace(time, channels)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_exact_slope_is_the_stiffness(exact, sign):
+    found = measured_stiffness(recorded(exact, load=LOAD, sign=sign), STICKS)
+    # Ahead of the onset the contact creeps by some 0.1 % of the way.
+    assert found.over_load == pytest.approx(STIFFNESS, rel=2e-3)
+    assert found.value == pytest.approx(STIFFNESS * LOAD, rel=2e-3)
+    assert found.unit == "N/m"
+    assert (found.prior.mean, found.prior.unit) == (found.value, "N/m")
+
+
+def test_the_uncertainty_is_the_scatter_under_slow_noise(exact):
+    found = [measured_stiffness(recorded(exact, seed), STICKS) for seed in range(25)]
+    values, errors = (np.array([getattr(f, n) for f in found]) for n in ("over_load", "se"))
+    scatter = float(np.std(values - STIFFNESS))
+    # Not narrower; wider by the bend that noise may hide.
+    assert 0.9 < np.mean(errors) / scatter < 3
+    assert np.mean(np.abs(values - STIFFNESS) < 1.96 * errors) > 0.9
+    assert found[0].unit == "1/m"
+    # White noise of the residual's size would say less than half of it.
+    time = exact[0]
+    here = (time >= STICKS[0]) & (time <= STICKS[1])
+    white = 8e-4 / (displacement(time[here]).std() * np.sqrt(here.sum()))
+    assert white < 0.5 * scatter
+
+
+def test_noise_of_the_displacement_does_not_lower_the_slope(exact):
+    # 1.5 um beside a spread of 13 um: by 1.3 % otherwise.
+    found = measured_stiffness(recorded(exact, 3, blur=1.5e-6), STICKS)
+    assert abs(found.value - STIFFNESS) < 2 * found.se
+    assert found.se > 0.01 * STIFFNESS
+
+
+@pytest.mark.parametrize("seed", [None, 1, 2])
+def test_a_span_in_which_the_contact_slides_is_refused(exact, seed):
+    with pytest.raises(InputError, match="the contact slides in a part of it"):
+        measured_stiffness(recorded(exact, seed), SLIDES)
+
+
+@pytest.mark.parametrize(
+    ("span", "said"),
+    [
+        ((5.0, 19.0), "must have a force that rises"),
+        ((21.5, 22.5), "must hold at least 32 samples"),
+        ((30.0, 21.0), "must end after it begins"),
+    ],
+)
+def test_spans_that_say_nothing_are_refused(exact, span, said):
+    with pytest.raises(InputError, match=said):
+        measured_stiffness(recorded(exact, 1), span)
+
+
+def test_a_hold_is_refused(exact):
+    time, friction = exact
+    x = np.where(time < 20, 1e-5 * time, 2e-4) + 1e-8 * np.random.default_rng(0).normal(
+        size=time.size
+    )
+    channels = {"displacement": Channel(x, "length", "m", "displacement", "m")}
+    channels["friction"] = Channel(friction, "dimensionless", "", "friction")
+    trace = Trace(time, channels)
+    with pytest.raises(InputError, match="must have a load point that moves"):
+        measured_stiffness(trace, (21.0, 39.0))
