@@ -259,6 +259,6 @@ def _least_squares(columns: Float, y: Float) -> tuple[Float, Float]:
         root = columns @ (vectors * np.sqrt(np.maximum(values, 0.0)))
         model = fitted([left], parameters=columns.shape[1], uncertain=[root.T])
         transform = np.fft.fft(inverse, 8 * y.size, axis=1)
-        power = model.spectrum(np.fft.fftfreq(8 * y.size))
+        power = model.spectrum(np.asarray(np.fft.fftfreq(8 * y.size), np.float64))
         covariance = ((transform * power) @ transform.conj().T).real / (8 * y.size)
     return coefficients, covariance * size**2
