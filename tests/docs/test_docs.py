@@ -33,7 +33,9 @@ def code(text: str) -> set[str]:
 
 def options(name: str) -> list[str]:
     module = importlib.import_module(main.modules[name])
-    return [option for p in getattr(module, name).params for option in p.opts if option[0] == "-"]
+    # An option that is hidden is there to be refused.
+    seen = [p for p in getattr(module, name).params if not getattr(p, "hidden", False)]
+    return [option for p in seen for option in p.opts if option[0] == "-"]
 
 
 @pytest.mark.parametrize("law", LAWS)

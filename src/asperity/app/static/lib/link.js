@@ -12,14 +12,17 @@ let pending = null;
 /** Write tab and parameters into the address, without a new entry in the history. */
 export function writeLink(tab, parameters) {
   dropLink();
-  pending = linkTo(tab, parameters);
+  pending = { tab, address: linkTo(tab, parameters) };
   // Browsers refuse more than some hundred changes in half a minute.
   timer = setTimeout(flushLink, 250);
 }
 
 /** Write at once what waits: before the address changes to that of another view. */
 export function flushLink() {
-  if (pending !== null) history.replaceState(null, "", pending);
+  // The Back button changes the address some time before the page is told.
+  const here = readLink().tab;
+  const same = pending !== null && (here === "" || here === pending.tab);
+  if (same) history.replaceState(null, "", pending.address);
   dropLink();
 }
 
