@@ -118,3 +118,9 @@ def test_spans_that_give_no_prior_are_refused(with_unloading, more, said):
     found = fit_of_steps(with_unloading, *more)
     assert said in found.output + str(found.exception)
     assert "Traceback" not in found.output
+
+
+def test_a_slope_by_a_gauge_of_unknown_gain_is_refused(with_unloading):
+    more = ["--stiffness-from", "-10:-0.05", "--window", "0:140", "--prior", "gain=1+-0.02"]
+    found = fit_of_steps(with_unloading, *more)
+    assert "must be without a prior of gain" in found.output + str(found.exception)

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 from scipy.special import ndtri
 
 from asperity.errors import InputError
-from asperity.inference import RunOptions, fit
+from asperity.inference import Prior, RunOptions, fit
 from asperity.inference.posterior import sample_posterior
 from asperity.inference.posterior.coordinates import Coordinates
 from asperity.inference.posterior.nuts import WARM_UP, first_state, run_block, warmed_up
@@ -153,8 +153,9 @@ def steps():
     return run
 
 
-def fit_of_steps(run, options=None):
-    return fit(run, "rice-ruina", ["A", "B", "D0"], start=TRUE, starts=1, runs=options)
+def fit_of_steps(run, options=None, prior=None):
+    free = ["A", "B", "D0"]
+    return fit(run, "rice-ruina", free, start=TRUE, starts=1, runs=options, prior=prior)
 
 
 def test_blocks_of_a_recording_are_the_same_after_another_fit(steps):
@@ -191,7 +192,7 @@ def test_the_likelihood_of_means_is_that_of_their_fit(steps):
 
 
 def test_the_density_of_a_recording_is_that_of_its_fit(steps):
-    found = fit_of_steps(steps)
+    found = fit_of_steps(steps, prior={"gain": Prior(1.0, 0.02, "calibration")})
     whitened = whitened_posterior(found)
     density, data = whitened.compiled()
     both = jax.jit(jax.value_and_grad(density))

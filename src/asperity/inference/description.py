@@ -98,7 +98,11 @@ def described_fit(
     gradient = J.T @ r
     # The minimum that the parabola would have without the bounds.
     unbounded = u - covariance @ gradient
-    informed = inverse_information(np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0))[0]
+    of_data = np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0)
+    # What is known of the instrument belongs to the data.
+    priors = objective.prior_residuals(u)[1]
+    nuisance = [k.nuisance for k in objective.unknowns if k.prior is not None]
+    informed = inverse_information(of_data + priors[nuisance].T @ priors[nuisance])[0]
     undetermined = tuple(
         unknown.name
         for i, unknown in enumerate(objective.unknowns)

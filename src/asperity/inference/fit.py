@@ -40,6 +40,7 @@ from asperity.inference.runs.assembly import (
 )
 from asperity.inference.runs.blocks import coarser, reduced
 from asperity.inference.runs.copies import require_own_samples
+from asperity.inference.runs.gain import GAIN, require_calibrated
 from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.table import LockInTable, joined
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
@@ -79,6 +80,7 @@ def fit(
     free : sequence of str
         Free parameters: the law's, K, W0, M, eta, and eps_ratio = eps_eff/eps. The stiffness of a
         recording is free whether it is named or not, for each run by itself unless it is named.
+        The gain of its gauge, ``gain``, is free where it has a prior.
     fixed : mapping, optional
         Values of other parameters, in SI or as texts with units; before columns of the data, which
         come before the material.
@@ -227,6 +229,17 @@ def _objective(
     priors = material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
     begun = start_values(law, free, start, material, runs=recordings)
     constants = fixed_values(law, table, free, fixed, material, runs=recordings)
+    if recordings:
+        published = material is not None and "mu0" in material and material["mu0"].value is not None
+        require_calibrated(
+            recordings,
+            free,
+            priors,
+            mu0_given=published or "mu0" in (*free, *fixed) or table is not None,
+            beside_table=table is not None,
+        )
+        # It is freed by its prior.
+        named = [name for name in named if name.partition("[")[0] != GAIN]
     largest = 0.0 if table is None else float(table.points["epsilon"].max())
     unknowns = list(
         unknowns_of(

@@ -301,3 +301,46 @@ def test_a_stiffness_in_another_unit_than_the_readings_is_refused(found, free, f
     given = {"mu0": 0.6, "V0": 1e-6, "W0": 1000.0, **fixed}
     with pytest.raises(InputError, match=r"K must be in Pa/m for .*, got that of a table in N/m"):
         fit([readings(), term.run], "rice-ruina", free, fixed=given)
+
+
+def test_a_gain_with_a_prior_widens_the_intervals(found):
+    run = found.objective.terms[0].run
+    gain, sd = 1.05, 0.02
+    amplified = replace(run, friction=gain * run.friction)
+    # Of its two minima in the times of the steps, the same.
+    begin = {name: found.values[name] for name in (*FREE, "K")}
+    given = {"gain": Prior(1.04, sd, "calibration")}
+    wide = fit(amplified, "rice-ruina", FREE, prior=given, start=begin, starts=1)
+    # The recording says nothing about it.
+    assert wide.parameters["gain"].value == pytest.approx(1.04, rel=1e-3)
+    assert wide.parameters["gain"].se == pytest.approx(sd, rel=1e-2)
+    assert wide.undetermined == ()
+    for name in ("A", "B", "K"):
+        p, q = wide.parameters[name], found.parameters[name]
+        # A, B and K over the gain give the same friction, and relative variances add.
+        assert p.value == pytest.approx(gain / 1.04 * q.value, rel=3e-3)
+        assert (p.se / p.value) ** 2 == pytest.approx(
+            (q.se / q.value) ** 2 + (sd / 1.04) ** 2, rel=2e-2
+        )
+        assert abs(p.value - TRUE[name]) < 4 * p.se
+    assert wide.values["D0"] == pytest.approx(found.values["D0"], rel=3e-3)
+    assert wide.parameters["D0"].se == pytest.approx(found.parameters["D0"].se, rel=2e-2)
+
+
+@pytest.mark.parametrize(
+    ("free", "given", "said"),
+    [
+        ([*FREE, "gain"], {}, "gain must have a prior, got none: A, B, mu0 and K scale with it"),
+        (FREE, {"gain[other]": Prior(1.0, 0.02, "given")}, r"must name gain, got 'gain\[other\]'"),
+    ],
+)
+def test_a_gain_that_nothing_tells_is_refused(found, free, given, said):
+    with pytest.raises(InputError, match=said):
+        fit(found.objective.terms[0].run, "rice-ruina", free, prior=given)
+
+
+def test_a_gain_under_a_changing_load_wants_the_friction(found):
+    (run,) = runs_of(CASES["loads"], 1)
+    given = {"gain": Prior(1.0, 0.02, "calibration")}
+    with pytest.raises(InputError, match="mu0 must be free or given with a gain under a load"):
+        fit(run, "linker-dieterich", [*FREE, "alpha"], prior=given)

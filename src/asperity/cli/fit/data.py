@@ -108,6 +108,11 @@ class FitData:
             raise InputError(
                 f"{label} must go with one recording, got {len(paths)} files; give one recording"
             )
+        if any(name.partition("[")[0] == "gain" for name in priors):
+            raise InputError(
+                f"{label} must be without a prior of gain, got both: the slope is measured by the "
+                "same gauge, and scales with it; give the prior of K from another source"
+            )
         low, high = span_of(self.stiffness_from, label)
         texts = [self.window] if windows is None else windows.split(",")
         for text in texts:
@@ -245,12 +250,13 @@ def priors_of(texts: Sequence[str], free: Sequence[str]) -> dict[str, Prior]:
         If a text is neither, or a name is given twice.
     """
     from asperity import materials
+    from asperity.inference.runs.gain import GAIN, PARAMETER
     from asperity.inference.unknowns import Prior, material_priors
     from asperity.laws import registered
     from asperity.parameters import all_parameters
 
     found: dict[str, Prior] = {}
-    known = all_parameters(registered().values())
+    known = {**all_parameters(registered().values()), GAIN: PARAMETER}
     for text in texts:
         name, equals, rest = (part.strip() for part in text.partition("="))
         if not equals:

@@ -18,6 +18,7 @@ import numpy as np
 from jax import Array
 
 from asperity.errors import InputError
+from asperity.inference.runs.gain import GAIN
 from asperity.inference.runs.motion import Drive, through
 from asperity.inference.runs.term import RunTerm
 
@@ -82,6 +83,7 @@ class RunLikelihood:
 
         def both(x: Array) -> tuple[Array, Array]:
             moving = {inner: x[i] for i, (_, inner) in enumerate(self.own)}
+            gain = moving.pop(GAIN, 1.0)
             friction, slopes, _, done = through(
                 motion,
                 moving,
@@ -91,10 +93,11 @@ class RunLikelihood:
                 room=self.room,
                 means=self.means,
             )
-            white = _whitened(data.taps, friction[data.taken] - data.recorded)
+            white = _whitened(data.taps, gain * friction[data.taken] - data.recorded)
             white = white - data.basis @ (data.basis.T @ white)
             value = jnp.where(done, -0.5 * jnp.sum(white**2), jnp.nan)
             back = _transposed(data.taps, white)
+            slopes = {inner: gain * slope for inner, slope in slopes.items()} | {GAIN: friction}
             return value, -jnp.stack([slopes[inner][data.taken] @ back for _, inner in self.own])
 
         @jax.custom_vjp
@@ -138,7 +141,7 @@ def likelihood_of_run(term: RunTerm, names: tuple[str, ...]) -> tuple[RunLikelih
     fixed = {n: np.float64(v) for n, v in {**term.fixed, "W0": term.run.W0}.items()}
     # Any numbers serve for the template: those of the parameters take their place.
     motion, drive, times, taken = term.motion.prepared(
-        {**fixed, **{inner: np.float64(1.0) for _, inner in own if inner not in fixed}},
+        {**fixed, **{inner: np.float64(1.0) for _, inner in own if inner not in {*fixed, GAIN}}},
         term.run.drive,
         term.run.at,
     )

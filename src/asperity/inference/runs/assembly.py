@@ -11,6 +11,7 @@ import numpy as np
 from asperity.errors import InputError, closest
 from asperity.inference.result import Fit
 from asperity.inference.runs.blocks import checked_rate
+from asperity.inference.runs.gain import GAIN, gain_of
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm, cut_delays
 from asperity.inference.unknowns import Prior, Unknown, unknown_of
@@ -183,6 +184,9 @@ def run_terms(
             K = free_stiffness(run, f"K{suffix}", start, priors)
             nuisances += (K,)
             own[K.name] = "K"
+        if (gain := gain_of(suffix, priors)) is not None:
+            nuisances += (gain,)
+            own[gain.name] = GAIN
         if options.initial == "free":
             begin, names = _initial(run, law, suffix)
             nuisances += begin

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from asperity.inference.residuals import Residuals
+from asperity.inference.runs.gain import GAIN
 from asperity.inference.runs.misfit import departures_of_jumps, misfit_after_changes
 from asperity.inference.runs.motion import RunMotion
 from asperity.inference.runs.noise import Autoregression, fitted, strongest_peak, whiteness
@@ -79,7 +80,7 @@ class RunTerm:
         Linear nuisances: "offset", "trend" (over slip), "bend" (over the square of the slip),
         "drift" (over time).
     nuisances : tuple of Unknown
-        Delays of the velocity changes, and departures of the initial states.
+        Delays of the velocity changes, the gain of the gauge, and departures of the initial states.
     gauge : (int, float), optional
         Order and corner frequency (Hz) of the low-pass of the force gauge.
     inertia, radiation_damping : bool
@@ -211,7 +212,8 @@ class RunTerm:
             if inner is not None:
                 given[inner] = values[name]
                 free.append(name)
-        inner_names = tuple(str(self.inner(name)) for name in free)
+        gain = given.pop(GAIN, 1.0)
+        inner_names = tuple(n for name in free if (n := str(self.inner(name))) != GAIN)
         at = self.run.at
         if self.gauge is not None:
             at, rate = self._filter_times()
@@ -224,11 +226,13 @@ class RunTerm:
             whole = np.column_stack(
                 [self._as_recorded(filtered(c, rate, *poles), rate) for c in whole.T]
             )
+        slopes = dict(zip(inner_names, gain * whole[:, 1:].T, strict=True))
+        slopes[GAIN] = whole[:, 0]
         jacobian = np.zeros((self.run.time.size, len(values)))
         for j, name in enumerate(values):
             if name in free:
-                jacobian[:, j] = whole[:, 1 + free.index(name)]
-        return whole[:, 0] - self.run.friction, jacobian
+                jacobian[:, j] = slopes[str(self.inner(name))]
+        return gain * whole[:, 0] - self.run.friction, jacobian
 
     def update_noise(self, values: Mapping[str, float]) -> bool:
         """Estimate the noise from the residual at `values`; False if there is no motion."""
