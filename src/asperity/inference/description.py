@@ -101,7 +101,7 @@ def described_fit(
     of_data = np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0)
     # What is known of the instrument belongs to the data.
     priors = objective.prior_residuals(u)[1]
-    nuisance = [k.nuisance for k in objective.unknowns if k.prior is not None]
+    nuisance = [v.nuisance for v in objective.unknowns if v.prior is not None]
     informed = inverse_information(of_data + priors[nuisance].T @ priors[nuisance])[0]
     undetermined = tuple(
         unknown.name
