@@ -100,9 +100,9 @@ def described_fit(
     unbounded = u - covariance @ gradient
     of_data = np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0)
     # What is known of the instrument belongs to the data.
-    priors = objective.prior_residuals(u)[1]
+    prior_slopes = objective.prior_residuals(u)[1]
     nuisance = [v.nuisance for v in objective.unknowns if v.prior is not None]
-    informed = inverse_information(of_data + priors[nuisance].T @ priors[nuisance])[0]
+    informed = inverse_information(of_data + prior_slopes[nuisance].T @ prior_slopes[nuisance])[0]
     undetermined = tuple(
         unknown.name
         for i, unknown in enumerate(objective.unknowns)
