@@ -31,6 +31,7 @@ from asperity.inference.runs.assembly import (
     contradicted_sharing,
     contradicted_stiffness,
     require_newtons,
+    require_no_layer,
     require_seen,
     run_terms,
     shared_stiffness,
@@ -219,6 +220,8 @@ def _objective(
 ) -> Objective:
     """The function to minimise, with everything that can be refused before computing refused."""
     require_motion(free, motion)
+    if recordings:
+        require_no_layer(free)
     if recordings and table is None:
         require_seen(recordings, free)
     # The stiffness of a recording is free, shared by all data if it is named.

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from benchmarks.coverage import LOAD, TRUE, Case, friction
-from scipy.signal import lfilter
+from scipy.signal import lfilter, lsim
 
 from asperity.errors import InputError
 from asperity.inference import RunOptions, fit, recorded_run
@@ -157,3 +157,21 @@ def test_a_rate_that_is_none_is_refused(rate):
 def test_too_low_a_rate_is_refused(clean):
     with pytest.raises(InputError, match=r"fit_rate must leave 16 means or more of run, got 0.5"):
         reduced(recorded(clean), 0.5)
+
+
+def test_blocks_of_a_recording_through_a_gauge_give_the_truth(clean):
+    # 8 ms behind, by SciPy; the first samples are steady.
+    corner = 2 * np.pi * 20.0
+    time = np.arange(24_000) / CASE.rate
+    behind = clean[0] + lsim(([corner], [1.0, corner]), clean - clean[0], time)[1]
+    run = recorded(behind + 1e-7 * np.random.default_rng(0).normal(size=24_000))
+
+    options = RunOptions(fit_rate="100 Hz", gauge=(1, 20.0))
+    found = fit(run, "rice-ruina", FREE, start=TRUE, starts=1, runs=options)
+    for name, truth in TRUE.items():
+        assert found.values[name] == pytest.approx(truth, rel=2e-3)
+    (term,) = found.objective.terms
+    through = term.departures(found.values)[0].std()
+    # Means of the motion itself are not those of the recording.
+    term.gauge = None
+    assert through < 0.05 * term.departures(found.values)[0].std()

@@ -344,3 +344,9 @@ def test_a_gain_under_a_changing_load_wants_the_friction(found):
     given = {"gain": Prior(1.0, 0.02, "calibration")}
     with pytest.raises(InputError, match="mu0 must be free or given with a gain under a load"):
         fit(run, "linker-dieterich", [*FREE, "alpha"], prior=given)
+
+
+@pytest.mark.parametrize("name", ["gap", "R"])
+def test_an_air_layer_of_a_recording_is_refused(found, name):
+    with pytest.raises(InputError, match=f"got '{name}' of an air layer: a layer has one share"):
+        fit(found.objective.terms[0].run, "rice-ruina", [*FREE, name])

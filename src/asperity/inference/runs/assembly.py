@@ -30,6 +30,8 @@ _FAR_STIFFNESS = (1e2, 1e6)
 _SAMPLES_PER_PARAMETER = 8
 #: Decrease of AICc with the stiffness of each run free that contradicts a fixed or shared one.
 _CONTRADICTED_AICC = 6.0
+#: Of an air layer: its gap, the radius of the patch and the pressure, as users call them.
+_LAYER = ("gap", "h0", "R", "radius", "patch_radius", "P0", "pressure")
 LINEAR = ("offset", "trend", "bend", "drift")
 #: Standard deviations of the departures of the initial friction and states from steady sliding.
 _START_FORCE, _START_STATE = 0.05, 2.0
@@ -132,6 +134,23 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
             raise InputError(
                 f"{run.name} must have at least {needed} samples for {len(free)} free parameters, "
                 f"got {run.time.size}; free fewer or give a longer window"
+            )
+
+
+def require_no_layer(free: Sequence[str]) -> None:
+    """Refuse an air layer's numbers as free parameters of recordings.
+
+    Raises
+    ------
+    InputError
+    """
+    for name in free:
+        if name in _LAYER:
+            raise InputError(
+                f"free must be parameters of the motion in a recording, got '{name}' of an air "
+                "layer: a layer has one share of the load at one frequency of modulation, and a "
+                "step of the load passes it within a relaxation time; free eps_ratio, and take the "
+                "gap or the radius from it (asperity.air)"
             )
 
 
