@@ -502,8 +502,10 @@ class RunTerm:
         time = self.run.time
         inside = 1 if self.run.blocks is None else _BLOCK_SAMPLES
         rate = max(inside / float(np.median(np.diff(time))), _FILTER_SAMPLES * self.gauge[1])
-        count = math.ceil(time[-1] * rate) + 1
-        return np.minimum(np.arange(count) / rate, time[-1]), rate
+        # The last block ends after its middle.
+        end = float(self.run.at.flat[-1])
+        count = math.ceil(end * rate) + 1
+        return np.minimum(np.arange(count) / rate, end), rate
 
 
 def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
