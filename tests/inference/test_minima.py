@@ -157,3 +157,24 @@ def test_minima_of_recordings_are_compared_with_the_noise_of_each():
     # The noise is that of the best.
     np.testing.assert_allclose(term.sizes, [1, 2], atol=0.01)
     assert chi2 == pytest.approx(2 * term.half, rel=0.01)
+
+
+def test_a_wrong_minimum_that_few_starts_of_the_fast_method_reach_is_left():
+    shallow, deep = math.log(1.1e-7), math.log(3e-6)
+
+    def values(x):
+        # chi-squared of 1e4 and more in the fast method's range, of 99 at `deep`.
+        r, slope = np.ones(100), np.zeros(100)
+        gap = deep - shallow
+        phase = math.pi * (x - shallow) / gap
+        r[0] = 60 * (1 + math.cos(phase)) + 5 * (x - deep)
+        slope[0] = -60 * math.sin(phase) * math.pi / gap + 5
+        return r, slope
+
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={}, priors={})
+    # Two of 64 starts between 1e-7 and 2e-5 m.
+    edge = math.log(1e-7) + math.log(200) * 2 / 64
+    objective = Objective((Formula(values, edge),), LAW, unknowns, {})
+    u, chi2 = minima_of(objective, 0)[0]
+    assert u[0] == pytest.approx(deep, abs=0.2)
+    assert chi2 == pytest.approx(99, abs=0.01)

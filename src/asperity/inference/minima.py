@@ -25,6 +25,12 @@ _ROUNDS, _STILL = 8, 0.03
 #: Minima nearer than this in every coordinate are one.
 _SAME = 1e-3
 
+#: Share of starts below which orbits are searched for at once: the fast method does not reach a
+#: modulation slower than sliding over the memory length, and would see only wrong minima; starts
+#: that are evaluated then.
+_RARE, _WITH_SEARCH = 1 / 16, 32
+#: So many of them are followed while no minimum describes the data.
+_FOLLOWED_FAR_OFF = 10
 #: Minimisations that have stopped short and go on with the slower method.
 _SEARCHED = 2
 #: Decrease of chi-squared that is worth that method: a tenth of a standard error.
@@ -59,10 +65,13 @@ def minima_of(
     shares = Sobol(len(unknowns), seed=seed).random(drawn)
     candidates = [middle, *(low + (high - low) * shares)]
     chi2 = np.array([objective.chi2(u) for u in candidates])
-    searched = not np.isfinite(chi2).any()
+    at = np.flatnonzero(np.isfinite(chi2))
+    searched = at.size < (_RARE * chi2.size if _has_table(objective) else 1)
     if searched:
         objective.search_from_now_on()
-        candidates = candidates[:8]
+        candidates = [
+            candidates[i] for i in dict.fromkeys([*range(min(_WITH_SEARCH, chi2.size)), *at])
+        ]
         chi2 = np.array([objective.chi2(u) for u in candidates])
     order = [i for i in np.argsort(chi2) if math.isfinite(chi2[i])]
     starts = [candidates[i] for i in dict.fromkeys([*(i for i in order if i == 0), *order])]
@@ -72,6 +81,11 @@ def minima_of(
     for start in followed:
         found.append(objective.minimise(start))
         advance(1)
+    if searched:
+        for start in starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF]:
+            if found and not _far_off(objective, min(found, key=lambda pair: pair[1])):
+                break
+            found.append(objective.minimise(start))
     found.sort(key=lambda pair: pair[1])
     if found and not searched and _blocked(objective, *found[0]):
         best = found[0][1]
@@ -178,13 +192,23 @@ def _blocked(objective: Objective, u: Float, value: float) -> bool:
     It does where the fast method has no solution farther on. Without this question the fit would
     report a wrong minimum, with a law that describes the data as its victim.
     """
-    tables = any(isinstance(term, LockInTerm) for term in objective.terms)
-    if not tables or not math.isfinite(value):
+    if not _has_table(objective) or not math.isfinite(value):
         return False
     decrease = objective.expected_decrease(u)
+    return decrease > (_LARGE_GAIN * value if _far_off(objective, (u, value)) else _GAIN)
+
+
+def _far_off(objective: Objective, minimum: tuple[Float, float]) -> bool:
+    """Whether the law does not describe the data there."""
+    u, value = minimum
+    if not math.isfinite(value):
+        return True
     r, _ = objective.residuals(u)
-    far_off = chi_squared.sf(value, max(r.size - u.size, 1)) < _FAR_OFF
-    return decrease > (_LARGE_GAIN * value if far_off else _GAIN)
+    return bool(chi_squared.sf(value, max(r.size - u.size, 1)) < _FAR_OFF)
+
+
+def _has_table(objective: Objective) -> bool:
+    return any(isinstance(term, LockInTerm) for term in objective.terms)
 
 
 def _search_no_more(objective: Objective) -> None:
