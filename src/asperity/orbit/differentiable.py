@@ -247,6 +247,9 @@ def response_function(
 
     Where the search is needed within `jax.jit`, a process of its own does it, which takes some
     seconds to start. Multipliers with inertia or radiation damping need it at every point.
+    Derivatives at its orbits are those of collocation on 144 intervals: within some 1e-8 of the
+    largest derivative of an output as a rule, 1e-5 where slip is so sharp that the values
+    themselves are from a finer mesh.
     """
     law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
     inertia = switch(inertia, "inertia")
