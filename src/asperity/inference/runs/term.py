@@ -382,18 +382,6 @@ class RunTerm:
                 return True
         return False
 
-    def linear_estimates(self, values: Mapping[str, float]) -> dict[str, tuple[float, float]]:
-        """Linear nuisances with the standard uncertainties that they have beside fixed others."""
-        raw = self.departures(values)
-        if raw is None:
-            return {}
-        found = self._coefficients(raw[0])
-        inverse = np.linalg.inv(self._triangle.T @ self._triangle)
-        return {
-            name: (float(found[i]), float(np.sqrt(inverse[i, i])))
-            for i, name in enumerate(self.linear)
-        }
-
     def fitted_friction(self, values: Mapping[str, float]) -> Float:
         """Friction at the samples by the law with linear nuisances and lines; NaN without motion.
 

@@ -114,7 +114,8 @@ def measured_stiffness(
     variance over that of the displacement: that is put back, and added to the uncertainty. So is
     the bend, or what noise hides of it: the slope without creep lies anywhere between that of the
     line and that of the steeper end, half a bend away. A contact that creeps along with the drive
-    at a constant rate cannot be told from a softer machine.
+    at a constant rate cannot be told from a softer machine, nor can elastic asperities: the
+    compliance that is measured is 1/K + lambda/W, machine and contact in series.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
     low, high = span
