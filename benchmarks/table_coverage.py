@@ -20,7 +20,7 @@ from scipy.stats import norm
 
 import asperity as asp
 from asperity.inference import fit, sample_posterior, table_of
-from asperity.inference.description import described_fit
+from asperity.inference.fitting.description import described_fit
 
 TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 7e-7, "eps_ratio": 0.48}
 V = np.repeat([1e-6, 1e-5], 8)
@@ -161,9 +161,9 @@ def main():
 
 def fit_problem(table, material):
     """The objective of a fit, without its search for minima."""
-    from asperity.inference.forward import Forward, LockInTerm
-    from asperity.inference.inputs import fixed_values
+    from asperity.inference.fitting.inputs import fixed_values
     from asperity.inference.objective import Objective
+    from asperity.inference.tables.term import Forward, LockInTerm
     from asperity.inference.unknowns import unknowns_of
     from asperity.laws import get_law
 

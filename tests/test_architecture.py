@@ -61,6 +61,17 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__init__": {"_version"},
 }
 
+#: The order of the rooms of `inference`: each imports those before it.
+INFERENCE = (
+    ("unknowns",),
+    ("objective",),
+    ("tables", "runs"),
+    ("fitting",),
+    ("posterior",),
+    ("comparison",),
+    ("design",),
+)
+
 # Put together here, so that this file does not hold what it looks for.
 _HOSTS = ["pypi" + ".org", "files.python" + "hosted", "test.pypi" + ".org"]
 _FORBIDDEN = re.compile(
@@ -123,6 +134,18 @@ def wrong_imports(package: Path) -> list[str]:
     return found
 
 
+def imports_within(room: Path) -> Iterator[tuple[str, str]]:
+    """Pairs of the parts of a room of which the first imports the second."""
+    inside = f"asperity.{room.name}."
+    for module in sorted(room.rglob("*.py")):
+        part = room_of(module, room)
+        for node in _running(ast.parse(module.read_text(encoding="utf-8"))):
+            if part != "__init__" and isinstance(node, ast.ImportFrom) and node.module:
+                target = node.module.removeprefix(inside).split(".")[0]
+                if node.module.startswith(inside) and target != part:
+                    yield part, target
+
+
 def repository_files() -> list[Path]:
     """Text files that are, or would be, part of the repository."""
     if shutil.which("git") and (ROOT / ".git").exists():
@@ -160,6 +183,13 @@ def test_the_order_has_no_cycle() -> None:
         assert leaves, f"a cycle among {sorted(rest)}"
         for room in leaves:
             del rest[room]
+
+
+def test_inference_goes_from_data_to_fits_to_verdicts() -> None:
+    place = {part: i for i, parts in enumerate(INFERENCE) for part in parts}
+    pairs = set(imports_within(PACKAGE / "inference"))
+    assert ("comparison", "fitting") in pairs
+    assert [pair for pair in pairs if place[pair[1]] >= place[pair[0]]] == []
 
 
 @pytest.mark.parametrize(

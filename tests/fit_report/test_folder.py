@@ -12,7 +12,7 @@ from asperity import Slider, materials, periodic_response
 from asperity.errors import InputError
 from asperity.fit_report import write_comparison, write_report
 from asperity.inference import fit, table_of
-from asperity.inference.comparison import judge
+from asperity.inference.comparison.compare import judge
 
 
 @pytest.fixture(scope="module")

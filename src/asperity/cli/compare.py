@@ -43,7 +43,7 @@ def compare(
     """Fit several laws to the same readings and say which the data exclude."""
     from asperity import inference
     from asperity.cli.report import aligned, to_json
-    from asperity.inference.record import comparison_record
+    from asperity.inference.comparison.record import comparison_record
 
     if windows is not None:
         raise InputError(

@@ -55,7 +55,7 @@ def recipe(
     from asperity import inference
     from asperity.cli.progress import bar
     from asperity.cli.report import to_json
-    from asperity.inference.table import joined
+    from asperity.inference.tables.table import joined
     from asperity.papers import find_paper
 
     package = find_paper(paper).package

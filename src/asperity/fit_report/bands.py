@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference import Fit, LockInTable, Posterior
-from asperity.inference.forward import Forward, LockInTerm
+from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.orbit import Outcome
 
 Float = NDArray[np.float64]

@@ -13,10 +13,10 @@ from asperity.fit_report.folder import RUN_CAPTION, data_tables, material_text, 
 from asperity.fit_report.page import document, figure, table
 from asperity.fit_report.pictures import laws_figure, run_figure
 from asperity.inference import Fit
-from asperity.inference.comparison import Comparison
-from asperity.inference.forward import LockInTerm
-from asperity.inference.record import comparison_record
+from asperity.inference.comparison.compare import Comparison
+from asperity.inference.comparison.record import comparison_record
 from asperity.inference.runs.term import RunTerm
+from asperity.inference.tables.term import LockInTerm
 from asperity.outputs.folder import written_folder
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from asperity.figures.style import new_figure, style
 from asperity.fit_report.bands import Band
 from asperity.inference import LockInTable
-from asperity.inference.residuals import Residuals
+from asperity.inference.objective import Residuals
 from asperity.inference.runs.run import RecordedRun
 
 Float = NDArray[np.float64]

@@ -1,17 +1,17 @@
 """From data to verdict: which law, which numbers, and how sure."""
 
-from asperity.inference.comparison import Comparison, Judged, compare
+from asperity.inference.comparison.compare import Comparison, Judged, compare
 from asperity.inference.design import Design, DesignPlan, design, plan_of, read_plan
-from asperity.inference.fit import fit
+from asperity.inference.fitting.fit import fit
+from asperity.inference.fitting.result import Estimate, Fit, Optimum
+from asperity.inference.fitting.windows import WindowedFit, WindowEstimate, fit_windows
 from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.posterior import Posterior, sample_posterior
-from asperity.inference.result import Estimate, Fit, Optimum
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import MeasuredStiffness, measured_stiffness
-from asperity.inference.table import LockInTable, read_table, table_of
+from asperity.inference.tables.table import LockInTable, read_table, table_of
 from asperity.inference.unknowns import Prior
-from asperity.inference.windows import WindowedFit, WindowEstimate, fit_windows
 
 __all__ = [
     "Comparison",

@@ -10,13 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from asperity.inference.residuals import Residuals
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
 
@@ -24,6 +23,28 @@ Float = NDArray[np.float64]
 
 #: A coordinate nearer to its bound is there.
 _AT_BOUND = 1e-6
+
+
+class Residuals(NamedTuple):
+    """Residuals with what each belongs to.
+
+    Attributes
+    ----------
+    values : array, shape (n,)
+        (model - data) / standard uncertainty, whitened where observables are correlated.
+    jacobian : array, shape (n, parameters)
+    observable : array of str, shape (n,)
+    row : array of int, shape (n,)
+    log_scale : float
+        Sum of the logarithms of the standard uncertainties, half the log determinant of the
+        covariance.
+    """
+
+    values: Float
+    jacobian: Float
+    observable: NDArray[np.str_]
+    row: NDArray[np.intp]
+    log_scale: float
 
 
 class DataTerm(Protocol):

@@ -164,7 +164,8 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     folder as a ZIP file in base64.
     """
     from asperity import inference
-    from asperity.inference.record import comparison_record, fit_record
+    from asperity.inference.comparison.record import comparison_record
+    from asperity.inference.fitting.record import fit_record
 
     asked = Fitted.model_validate(argument["asked"])
     files = argument["files"]
@@ -305,7 +306,7 @@ def _histograms(posterior: Any) -> dict[str, dict[str, list[float]]]:
 def _bands(found: Any, posterior: Any) -> list[dict[str, Any]]:
     """Readings of each table, and what the law predicts between them at each velocity."""
     from asperity.fit_report.bands import bands_of
-    from asperity.inference.forward import LockInTerm
+    from asperity.inference.tables.term import LockInTerm
 
     pictures = []
     for term in found.objective.terms:

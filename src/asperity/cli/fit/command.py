@@ -147,7 +147,7 @@ def fit(
     """
     from asperity import inference
     from asperity.cli.report import to_json
-    from asperity.inference.record import fit_record
+    from asperity.inference.fitting.record import fit_record
 
     sampling.check()
     if report is not None:

@@ -200,7 +200,7 @@ class FitData:
 
 def is_table(path: Path) -> bool:
     """Whether a file holds readings rather than a recording: it has a column of an observable."""
-    from asperity.inference.table import OBSERVABLES
+    from asperity.inference.tables.table import OBSERVABLES
 
     if path.suffix.lower() == ".json":
         return True

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.comparison import LARGEST_AICC_DIFFERENCE
+from asperity.inference.comparison.compare import LARGEST_AICC_DIFFERENCE
 from asperity.inference.design.criteria import Misfit
 
 Float = NDArray[np.float64]

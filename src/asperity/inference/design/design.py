@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.inference.description import inverse_information
 from asperity.inference.design.candidates import (
     Candidates,
     Progress,
@@ -29,7 +28,8 @@ from asperity.inference.design.result import Design, DesignedPoint, ExpectedErro
 from asperity.inference.design.rival import RivalFit, Separation, separation
 from asperity.inference.design.simulation import Simulated, simulated
 from asperity.inference.design.weights import Shares, optimal_shares, whole_readings
-from asperity.inference.table import LockInTable
+from asperity.inference.fitting.description import inverse_information
+from asperity.inference.tables.table import LockInTable
 
 Float = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference.design.plan import DesignPlan, Hypothesis
-from asperity.inference.forward import Forward
-from asperity.inference.residuals import Prediction, residuals_of, weights_of
-from asperity.inference.table import LockInTable
+from asperity.inference.tables.residuals import Prediction, residuals_of, weights_of
+from asperity.inference.tables.table import LockInTable
+from asperity.inference.tables.term import Forward
 from asperity.orbit import Outcome
 
 Float = NDArray[np.float64]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.inference.design.plan import Hypothesis
 from asperity.inference.design.predictions import PointModel, Whitened, rows_of
-from asperity.inference.table import LockInTable
+from asperity.inference.tables.table import LockInTable
 
 Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]

@@ -20,7 +20,7 @@ from asperity.inference.design.plan import DesignPlan, Hypothesis
 from asperity.inference.design.predictions import PointModel, Whitened, repeated
 from asperity.inference.design.refit import Refitted, prior_terms, refit
 from asperity.inference.design.weights import Shares, optimal_shares, whole_readings
-from asperity.inference.table import LockInTable
+from asperity.inference.tables.table import LockInTable
 from asperity.orbit import Outcome, response_function
 
 Float = NDArray[np.float64]

@@ -13,11 +13,11 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.comparison import LARGEST_AICC_DIFFERENCE
+from asperity.inference.comparison.compare import LARGEST_AICC_DIFFERENCE
 from asperity.inference.design.plan import Hypothesis
 from asperity.inference.design.predictions import PointModel, repeated
 from asperity.inference.design.refit import refit
-from asperity.inference.table import LockInTable
+from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import Prior
 
 Float = NDArray[np.float64]

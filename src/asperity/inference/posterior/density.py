@@ -15,13 +15,13 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from asperity.inference.forward import LockInTerm
 from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.posterior.coordinates import Coordinates
+from asperity.inference.posterior.prior_density import PriorDensity
 from asperity.inference.posterior.recordings import RunLikelihood, likelihood_of_run
 from asperity.inference.posterior.tables import LockInLikelihood, likelihood_of_table
-from asperity.inference.prior_density import PriorDensity
 from asperity.inference.runs.term import RunTerm
+from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 

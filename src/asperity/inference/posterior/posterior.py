@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity._version import __version__
-from asperity.inference.forward import LockInTerm
-from asperity.inference.intervals import Interval
+from asperity.inference.fitting.intervals import Interval
+from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.nuts import Transitions
-from asperity.inference.result import Fit
 from asperity.inference.runs.term import RunTerm
+from asperity.inference.tables.term import LockInTerm
 from asperity.outputs.json import plain
 
 Float = NDArray[np.float64]

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
+from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import DensityData, Whitened
 from asperity.inference.posterior.nuts import (
     BLOCK,
@@ -33,8 +34,7 @@ from asperity.inference.posterior.nuts import (
     warmed_up,
 )
 from asperity.inference.posterior.posterior import Posterior, posterior_of
-from asperity.inference.prior_density import PriorDensity
-from asperity.inference.result import Fit
+from asperity.inference.posterior.prior_density import PriorDensity
 from asperity.orbit.processes import available_cores
 from asperity.outputs import Interrupted, UnfinishedText
 

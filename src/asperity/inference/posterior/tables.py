@@ -11,8 +11,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.inference.forward import LockInTerm
-from asperity.inference.residuals import Prediction, columns_of
+from asperity.inference.tables.residuals import Prediction, columns_of
+from asperity.inference.tables.term import LockInTerm
 from asperity.laws import Law
 from asperity.orbit import response_function
 from asperity.parameters import law_parameters

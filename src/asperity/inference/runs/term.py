@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from asperity.inference.residuals import Residuals
+from asperity.inference.objective import Residuals
 from asperity.inference.runs.gain import GAIN
 from asperity.inference.runs.misfit import departures_of_jumps, misfit_after_changes
 from asperity.inference.runs.motion import RunMotion

@@ -28,8 +28,8 @@ from scipy.stats import chi2 as chi_squared
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.inference import Fit, LockInTable, fit
-from asperity.inference.forward import Forward, LockInTerm
-from asperity.inference.intervals import bounded_interval
+from asperity.inference.fitting.intervals import bounded_interval
+from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.materials import load as load_material
 
 Float = NDArray[np.float64]

@@ -367,7 +367,7 @@ def _disturbed(
     table: LockInTable, exact: Mapping[str, np.ndarray], normal: np.ndarray
 ) -> LockInTable:
     """Exact observables with errors `normal` times the uncertainties, where the table has some."""
-    from asperity.inference.table import OBSERVABLES
+    from asperity.inference.tables.table import OBSERVABLES
 
     values = {n: np.where(np.isfinite(table.values[n]), exact[n], np.nan) for n in table.values}
     errors = dict(table.errors)

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
 from asperity.inference.design.plan.record import Axis, Budget, Hypothesis, NoiseLevel
-from asperity.inference.inputs import fixed_values, start_values
-from asperity.inference.table import OBSERVABLES, LockInTable
+from asperity.inference.fitting.inputs import fixed_values, start_values
+from asperity.inference.tables.table import OBSERVABLES, LockInTable
 from asperity.inference.unknowns import EPS_RATIO, Prior, material_priors, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.laws.registry import known_law

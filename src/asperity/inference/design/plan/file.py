@@ -11,8 +11,8 @@ import numpy as np
 from asperity.errors import InputError, closest
 from asperity.inference.design.plan.fields import PlanFields
 from asperity.inference.design.plan.record import Axis, DesignPlan
-from asperity.inference.inputs import require_motion
-from asperity.inference.table import LockInTable
+from asperity.inference.fitting.inputs import require_motion
+from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import EPS_RATIO
 from asperity.parameters import MODULATION, point_parameters
 from asperity.parameters.toml_file import toml_content

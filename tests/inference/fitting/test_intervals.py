@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from asperity.inference.intervals import bounded_interval
+from asperity.inference.fitting.intervals import bounded_interval
 
 #: Feldman and Cousins (1998), Table X: estimate in standard deviations from the bound, and the
 #: intervals of 68.27, 90 and 95 %.

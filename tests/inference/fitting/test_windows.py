@@ -6,8 +6,8 @@ from benchmarks.coverage import CASES, TRUE, runs_of
 
 from asperity.errors import InputError
 from asperity.inference import WindowEstimate, fit_windows
+from asperity.inference.fitting.windows import disagreeing
 from asperity.inference.unknowns import unknown_of
-from asperity.inference.windows import disagreeing
 from asperity.laws import RiceRuina
 from asperity.parameters import law_parameters
 from asperity.recording import Channel, Trace

@@ -19,7 +19,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.table import OBSERVABLES, LockInTable
+from asperity.inference.objective import Residuals
+from asperity.inference.tables.table import OBSERVABLES, LockInTable
 
 Float = NDArray[np.float64]
 
@@ -42,28 +43,6 @@ class Prediction(NamedTuple):
     mean_friction: Any
     mu_ss: Any
     harmonics: Any
-
-
-class Residuals(NamedTuple):
-    """Residuals with what each belongs to.
-
-    Attributes
-    ----------
-    values : array, shape (n,)
-        (model - data) / standard uncertainty, whitened where observables are correlated.
-    jacobian : array, shape (n, parameters)
-    observable : array of str, shape (n,)
-    row : array of int, shape (n,)
-    log_scale : float
-        Sum of the logarithms of the standard uncertainties, half the log determinant of the
-        covariance.
-    """
-
-    values: Float
-    jacobian: Float
-    observable: NDArray[np.str_]
-    row: NDArray[np.intp]
-    log_scale: float
 
 
 class Weights(NamedTuple):

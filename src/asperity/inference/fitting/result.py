@@ -8,9 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.intervals import Interval
-from asperity.inference.objective import Objective
-from asperity.inference.residuals import Residuals
+from asperity.inference.fitting.intervals import Interval
+from asperity.inference.objective import Objective, Residuals
 from asperity.inference.unknowns import Prior
 from asperity.parameters.display import Displayed, SummaryLine
 

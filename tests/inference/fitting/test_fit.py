@@ -7,7 +7,7 @@ from scipy.stats import chi2
 from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
 from asperity.inference.objective import Objective
-from asperity.inference.table import LockInTable, joined
+from asperity.inference.tables.table import LockInTable, joined
 
 TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 7e-7, "eps_ratio": 0.48}
 FREE = ("lambda", "eps_ratio", "A")

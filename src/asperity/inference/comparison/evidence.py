@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import multivariate_t
 
-from asperity.inference.forward import LockInTerm, all_converged
+from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import Objective
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.sampling import whitened_posterior
-from asperity.inference.residuals import columns_of
-from asperity.inference.result import Fit
+from asperity.inference.tables.residuals import columns_of
+from asperity.inference.tables.term import LockInTerm, all_converged
 
 Float = NDArray[np.float64]
 

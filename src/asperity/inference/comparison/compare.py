@@ -10,15 +10,15 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.inference.cross_validation import CrossValidation, leave_one_run_out
-from asperity.inference.evidence import Evidence, evidence_of
-from asperity.inference.fit import Data, fit, listed_data
-from asperity.inference.forward import Forward, LockInTerm, all_converged
-from asperity.inference.outliers import outlying_rows
-from asperity.inference.residuals import residuals_of, weights_of
-from asperity.inference.result import Fit
+from asperity.inference.comparison.cross_validation import CrossValidation, leave_one_run_out
+from asperity.inference.comparison.evidence import Evidence, evidence_of
+from asperity.inference.fitting.fit import Data, fit, listed_data
+from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
-from asperity.inference.table import LockInTable, joined
+from asperity.inference.tables.outliers import outlying_rows
+from asperity.inference.tables.residuals import residuals_of, weights_of
+from asperity.inference.tables.table import LockInTable, joined
+from asperity.inference.tables.term import Forward, LockInTerm, all_converged
 from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law
 from asperity.parameters import law_parameters

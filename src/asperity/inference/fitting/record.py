@@ -1,14 +1,11 @@
-"""Fits and comparisons as plain numbers and texts, for JSON."""
+"""A fit as plain numbers and texts, for JSON."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from asperity._version import __version__
-from asperity.inference.comparison import Comparison
-from asperity.inference.cross_validation import CrossValidation
-from asperity.inference.evidence import Evidence
-from asperity.inference.result import Estimate, Fit
+from asperity.inference.fitting.result import Estimate, Fit
 from asperity.outputs.json import plain
 
 
@@ -41,28 +38,6 @@ def fit_record(found: Fit) -> dict[str, Any]:
     }
 
 
-def comparison_record(found: Comparison) -> dict[str, Any]:
-    """Everything that a comparison says."""
-    return {
-        "laws": {
-            name: {
-                **fit_record(judged.fit),
-                "excluded": judged.excluded,
-                "why": judged.why,
-                "weight": plain(judged.weight),
-                "evidence": _evidence(judged.evidence),
-                "leave_one_run_out": _cross_validation(judged.cross_validation),
-            }
-            for name, judged in found.laws.items()
-        },
-        "left_out": list(found.left_out),
-        "not_compared": dict(found.not_compared),
-        "decided": found.decided,
-        "best": found.best,
-        "verdict": found.verdict,
-    }
-
-
 def _estimate(found: Estimate) -> dict[str, Any]:
     prior = found.prior
     return {
@@ -88,27 +63,4 @@ def _noise(found: Fit) -> dict[str, Any]:
         "model": "; ".join(models),
         "effective_samples": sum(part["effective_samples"] for part in parts.values()),
         "data": parts,
-    }
-
-
-def _evidence(found: Evidence | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {
-        "log": plain(found.log),
-        "standard_error": plain(found.standard_error),
-        "effective_samples": plain(found.effective_samples),
-        "laplace": plain(found.laplace),
-        "failed": found.failed,
-        "prior": found.prior,
-    }
-
-
-def _cross_validation(found: CrossValidation | None) -> dict[str, Any] | None:
-    if found is None:
-        return None
-    return {
-        "log_density": plain(found.log_density),
-        "runs": {name: plain(value) for name, value in found.runs.items()},
-        "message": found.message,
     }

@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.inference.runs.run import RecordedRun
-from asperity.inference.table import LockInTable
+from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import EPS_RATIO, MissingNumberError, Prior, Unknown
 from asperity.laws import Law
 from asperity.materials import Material

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi_squared
 from scipy.stats.qmc import Sobol
 
-from asperity.inference.forward import LockInTerm
 from asperity.inference.objective import Objective
 from asperity.inference.runs.term import NoiseState, RunTerm
+from asperity.inference.tables.term import LockInTerm
 from asperity.parameters.arguments import counted
 
 Float = NDArray[np.float64]

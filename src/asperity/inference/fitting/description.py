@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi_squared
 
-from asperity.inference.forward import LockInTerm
-from asperity.inference.intervals import LEVELS, bounded_interval
-from asperity.inference.objective import Objective, log_density
-from asperity.inference.profile import Profile
-from asperity.inference.residuals import Residuals
-from asperity.inference.result import Estimate, Fit, Optimum
+from asperity.inference.fitting.intervals import LEVELS, bounded_interval
+from asperity.inference.fitting.profile import Profile
+from asperity.inference.fitting.result import Estimate, Fit, Optimum
+from asperity.inference.objective import Objective, Residuals, log_density
+from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.forward import LockInTerm
-from asperity.inference.result import Fit
+from asperity.inference.fitting.result import Fit
+from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 

@@ -13,9 +13,10 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.stats import norm
 
-from asperity.inference.outliers import outlying_rows, standardised
-from asperity.inference.residuals import Prediction, Residuals, Weights, residuals_of, weights_of
-from asperity.inference.table import LockInTable
+from asperity.inference.objective import Residuals
+from asperity.inference.tables.outliers import outlying_rows, standardised
+from asperity.inference.tables.residuals import Prediction, Weights, residuals_of, weights_of
+from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
 from asperity.orbit import Outcome, response_function

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from asperity.inference.residuals import Residuals
+from asperity.inference.objective import Residuals
 
 Float = NDArray[np.float64]
 

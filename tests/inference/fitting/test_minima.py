@@ -5,13 +5,12 @@ import math
 import numpy as np
 import pytest
 
-from asperity.inference.description import described_fit
-from asperity.inference.forward import LockInTerm
-from asperity.inference.minima import minima_of, with_noise
-from asperity.inference.objective import Objective
-from asperity.inference.profile import Profile
-from asperity.inference.residuals import Residuals
+from asperity.inference.fitting.description import described_fit
+from asperity.inference.fitting.minima import minima_of, with_noise
+from asperity.inference.fitting.profile import Profile
+from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm
+from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import unknowns_of
 from asperity.laws import get_law
 

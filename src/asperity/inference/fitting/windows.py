@@ -11,9 +11,9 @@ import numpy as np
 from scipy.stats import norm
 
 from asperity.errors import InputError
-from asperity.inference.fit import fit
-from asperity.inference.intervals import LEVELS, Interval
-from asperity.inference.result import Fit
+from asperity.inference.fitting.fit import fit
+from asperity.inference.fitting.intervals import LEVELS, Interval
+from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law
 from asperity.outputs.json import plain

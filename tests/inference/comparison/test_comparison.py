@@ -10,10 +10,10 @@ from scipy.integrate import quad
 from asperity import Slider, periodic_response
 from asperity.errors import InputError
 from asperity.inference import compare, fit, table_of
-from asperity.inference.comparison import judge
-from asperity.inference.cross_validation import leave_one_run_out
-from asperity.inference.evidence import evidence_of
-from asperity.inference.outliers import outlying_rows
+from asperity.inference.comparison.compare import judge
+from asperity.inference.comparison.cross_validation import leave_one_run_out
+from asperity.inference.comparison.evidence import evidence_of
+from asperity.inference.tables.outliers import outlying_rows
 
 V = np.repeat([1e-6, 1e-5], 8)
 EPSILON = np.tile(np.linspace(0.05, 0.5, 8), 2)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from asperity.inference.intervals import Interval, bounded_threshold
+from asperity.inference.fitting.intervals import Interval, bounded_threshold
 from asperity.inference.objective import Objective
 
 Float = NDArray[np.float64]

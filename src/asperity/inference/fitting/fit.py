@@ -14,36 +14,38 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.inference.description import described_fit, failed_fit
-from asperity.inference.forward import Forward, LockInTerm
-from asperity.inference.inputs import (
+from asperity.inference.fitting.description import described_fit, failed_fit
+from asperity.inference.fitting.inputs import (
     fixed_values,
     require_enough,
     require_free,
     require_motion,
     start_values,
 )
-from asperity.inference.minima import minima_of, with_noise
-from asperity.inference.objective import DataTerm, Objective
-from asperity.inference.result import Fit
-from asperity.inference.runs.assembly import (
-    RunOptions,
+from asperity.inference.fitting.minima import minima_of, with_noise
+from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,
+    unusual_numbers,
+)
+from asperity.inference.fitting.result import Fit
+from asperity.inference.objective import DataTerm, Objective
+from asperity.inference.runs.assembly import (
+    RunOptions,
     require_newtons,
     require_no_layer,
     require_seen,
     run_terms,
     shared_stiffness,
     stiffness_in,
-    unusual_numbers,
     usual_ranges,
 )
 from asperity.inference.runs.blocks import coarser, reduced
 from asperity.inference.runs.copies import require_own_samples
 from asperity.inference.runs.gain import GAIN, require_calibrated
 from asperity.inference.runs.run import RecordedRun, run_of
-from asperity.inference.table import LockInTable, joined
+from asperity.inference.tables.table import LockInTable, joined
+from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.materials import Material

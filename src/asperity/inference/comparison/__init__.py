@@ -1,0 +1,1 @@
+"""Which laws the data exclude: evidence, cross-validation and the verdict."""

@@ -1,0 +1,1 @@
+"""Maximum likelihood: starts, minima, intervals and what a fit says of itself."""

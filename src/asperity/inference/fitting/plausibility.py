@@ -1,0 +1,118 @@
+"""Fits of recordings held against given stiffnesses, each other and usual contacts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from asperity.inference.fitting.result import Fit
+from asperity.inference.runs.assembly import stiffness_in
+from asperity.inference.runs.run import RecordedRun
+
+#: Decrease of AICc with the stiffness of each run free that contradicts a fixed or shared one.
+_CONTRADICTED_AICC = 6.0
+#: Estimates outside are named: of A, of D0 (m), and of the stiffness over the load (1/m).
+_FAR: Mapping[str, tuple[float, float]] = {"A": (5e-4, 0.2), "D0": (1e-8, 2e-3)}
+_FAR_STIFFNESS = (1e2, 1e6)
+
+
+def contradicted_stiffness(
+    found: Fit, freed: Fit, runs: Sequence[RecordedRun], given: Any
+) -> list[str]:
+    """Sentences on a fixed stiffness that recordings contradict.
+
+    Parameters
+    ----------
+    found, freed : Fit
+        With the stiffness fixed, and the same with it free.
+    runs : sequence of RecordedRun
+    given : str or float
+        The fixed stiffness.
+    """
+    if not freed.converged or found.aicc - freed.aicc < _CONTRADICTED_AICC:
+        return []
+    said = []
+    for run in runs:
+        estimate = freed.parameters.get("K" if len(runs) == 1 else f"K[{run.name}]")
+        if estimate is None:
+            continue
+        fixed = stiffness_in(run, given)
+        low, high = estimate.interval_95
+        if low <= fixed <= high:
+            continue
+        said.append(
+            f"the fixed K of {fixed:.4g} {estimate.unit} is contradicted by {run.name}, which has "
+            f"{estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %): AICc falls by "
+            f"{found.aicc - freed.aicc:.3g} with K free"
+            + _moved(found, freed)
+            + "; leave K free, or give it a prior"
+        )
+    return said
+
+
+def contradicted_sharing(found: Fit, freed: Fit, runs: Sequence[RecordedRun]) -> list[str]:
+    """A sentence on a stiffness that is one for several recordings while theirs differ.
+
+    Parameters
+    ----------
+    found, freed : Fit
+        With one stiffness for all, and the same with one for each.
+    runs : sequence of RecordedRun
+    """
+    if not freed.converged or found.aicc - freed.aicc < _CONTRADICTED_AICC:
+        return []
+    shared = found.parameters["K"]
+    own = []
+    for run in runs:
+        estimate = freed.parameters[f"K[{run.name}]"]
+        low, high = estimate.interval_95
+        own.append(
+            f"{run.name} has {estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %), "
+            f"{estimate.value / shared.value:.3g} times it"
+        )
+    return [
+        f"the K of {shared.value:.4g} {shared.unit} that the recordings share is contradicted: "
+        + ", ".join(own)
+        + f"; AICc falls by {found.aicc - freed.aicc:.3g} with a K for each"
+        + _moved(found, freed)
+        + "; leave K out of the free parameters, so that each has its own"
+    ]
+
+
+def _moved(found: Fit, freed: Fit) -> str:
+    """What the law's parameters are with the stiffness free, and what they were."""
+    moved = ", ".join(
+        f"{n} {freed.values[n]:.4g} instead of {found.values[n]:.4g}"
+        for n in ("A", "B", "D0")
+        if n in found.values and n in freed.values
+    )
+    return f", which gives {moved}" if moved else ""
+
+
+def unusual_numbers(found: Fit, runs: Sequence[RecordedRun]) -> list[str]:
+    """Sentences on estimates far from those of any contact: units are wrong, or the law is.
+
+    Parameters
+    ----------
+    found : Fit
+        Converged.
+    runs : sequence of RecordedRun
+    """
+    numbers = [(n, found.values[n], found.parameters[n].unit) for n in _FAR if n in found.values]
+    ranges = dict(_FAR)
+    for run in runs:
+        name = next((n for n in (f"K[{run.name}]", "K") if n in found.values), None)
+        if name is not None:
+            numbers.append((f"{name}/W0", found.values[name] / run.W0, "1/m"))
+            ranges[f"{name}/W0"] = _FAR_STIFFNESS
+    said = []
+    for name, value, unit in numbers:
+        low, high = ranges[name]
+        if not low <= value <= high:
+            said.append(
+                f"{name} of {value:.3g} {unit}".rstrip()
+                + f" is outside {low:.3g} to {high:.3g}, where those of contacts lie: check the "
+                "units and signs of displacement, force and load, and look at the recording with "
+                "the motion (--report)"
+            )
+    return said
