@@ -9,7 +9,7 @@ from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
 
 from asperity.errors import InputError
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
-from asperity.inference.runs.assembly import unusual_numbers
+from asperity.inference.fitting.plausibility import unusual_numbers
 from asperity.inference.runs.copies import require_own_samples
 from asperity.laws import RiceRuina
 from asperity.orbit import periodic_response
