@@ -61,17 +61,6 @@ MAY_IMPORT: dict[str, set[str]] = {
     "__init__": {"_version"},
 }
 
-#: The order of the rooms of `inference`: each imports those before it.
-INFERENCE = (
-    ("unknowns",),
-    ("objective",),
-    ("tables", "runs"),
-    ("fitting",),
-    ("posterior",),
-    ("comparison",),
-    ("design",),
-)
-
 # Put together here, so that this file does not hold what it looks for.
 _HOSTS = ["pypi" + ".org", "files.python" + "hosted", "test.pypi" + ".org"]
 _FORBIDDEN = re.compile(
@@ -134,16 +123,29 @@ def wrong_imports(package: Path) -> list[str]:
     return found
 
 
-def imports_within(room: Path) -> Iterator[tuple[str, str]]:
-    """Pairs of the parts of a room of which the first imports the second."""
-    inside = f"asperity.{room.name}."
+def imports_within(room: Path, package: Path = PACKAGE) -> dict[str, set[str]]:
+    """What each part of a room imports from its other parts."""
+    inside = ".".join(("asperity", *room.relative_to(package).parts, ""))
+    found: dict[str, set[str]] = {}
     for module in sorted(room.rglob("*.py")):
         part = room_of(module, room)
+        if part == "__init__":
+            continue
+        parts = found.setdefault(part, set())
         for node in _running(ast.parse(module.read_text(encoding="utf-8"))):
-            if part != "__init__" and isinstance(node, ast.ImportFrom) and node.module:
-                target = node.module.removeprefix(inside).split(".")[0]
-                if node.module.startswith(inside) and target != part:
-                    yield part, target
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith(inside):
+                target = (node.module or "").removeprefix(inside).split(".")[0]
+                parts |= {target} - {part}
+    return found
+
+
+def rooms_in_a_cycle(allowed: dict[str, set[str]]) -> set[str]:
+    """Rooms that cannot be put into an order in which each comes after what it imports."""
+    rest = dict(allowed)
+    while leaves := [room for room, others in rest.items() if not others & set(rest)]:
+        for room in leaves:
+            del rest[room]
+    return set(rest)
 
 
 def repository_files() -> list[Path]:
@@ -177,19 +179,25 @@ def test_every_room_has_its_place_in_the_order() -> None:
 
 
 def test_the_order_has_no_cycle() -> None:
-    rest = {room: set(allowed) for room, allowed in MAY_IMPORT.items()}
-    while rest:
-        leaves = [room for room, allowed in rest.items() if not allowed & set(rest)]
-        assert leaves, f"a cycle among {sorted(rest)}"
-        for room in leaves:
-            del rest[room]
+    assert rooms_in_a_cycle(MAY_IMPORT) == set()
 
 
-def test_inference_goes_from_data_to_fits_to_verdicts() -> None:
-    place = {part: i for i, parts in enumerate(INFERENCE) for part in parts}
-    pairs = set(imports_within(PACKAGE / "inference"))
-    assert ("comparison", "fitting") in pairs
-    assert [pair for pair in pairs if place[pair[1]] >= place[pair[0]]] == []
+def test_the_parts_of_no_room_import_in_a_cycle() -> None:
+    rooms = [d for d in sorted(PACKAGE.rglob("*")) if d.is_dir() and d.name != "__pycache__"]
+    assert "fitting" in imports_within(PACKAGE / "inference")["comparison"]
+    assert {str(r): c for r in rooms if (c := rooms_in_a_cycle(imports_within(r)))} == {}
+
+
+def test_a_planted_cycle_is_caught(tmp_path: Path) -> None:
+    (tmp_path / "orbit" / "methods").mkdir(parents=True)
+    for place, line in (
+        ("mesh.py", "from asperity.orbit.methods.newton import x"),
+        ("methods/newton.py", "from asperity.orbit.mesh import y"),
+        ("period.py", "from asperity.orbit.mesh import z"),
+    ):
+        (tmp_path / "orbit" / place).write_text(line, encoding="utf-8")
+    found = rooms_in_a_cycle(imports_within(tmp_path / "orbit", tmp_path))
+    assert found == {"mesh", "methods", "period"}
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from asperity.figures.style import style
 from asperity.papers.bureau2000 import numbers
 from asperity.papers.bureau2000.figures import DRAWN
 from asperity.papers.bureau2000.figures.observables import OBSERVABLES
-from asperity.papers.report.points import (
+from asperity.papers.measured_points import (
     COLUMNS,
     check_names,
     comparisons,

@@ -23,6 +23,8 @@ from asperity.branches.recorder import INTERVALS, BranchRecorder
 from asperity.branches.steps import BranchFollower, BranchOrbit
 from asperity.errors import InputError
 from asperity.loads import Excitation, Modulation
+from asperity.orbit.mesh.condensation import condense, localise, transfer_maps
+from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
     Tangent,
@@ -30,8 +32,6 @@ from asperity.orbit.methods.branch_following.arclength import (
     weighted_row,
 )
 from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
-from asperity.orbit.methods.collocation.condensation import condense, localise, transfer_maps
-from asperity.orbit.methods.collocation.mesh import Orbit
 from asperity.parameters.arguments import counted, function, instance, whole_number
 from asperity.slider.problem import Problem
 

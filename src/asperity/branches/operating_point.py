@@ -10,7 +10,7 @@ import numpy as np
 from asperity.branches.parameters import continued_name, pair_of
 from asperity.errors import InputError
 from asperity.loads import Modulation
-from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.methods.starting_orbits import starting_orbits
 from asperity.slider import Slider
 from asperity.slider.named import equation_parameters, value_of

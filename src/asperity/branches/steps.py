@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from asperity._jax import spare_mappings
 from asperity.orbit.floquet import log_multipliers
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import refined
 from asperity.orbit.methods.branch_following.arclength import (
     ArclengthStep,
     ContinuationPoint,
@@ -20,8 +22,6 @@ from asperity.orbit.methods.branch_following.arclength import (
     read_orbit,
 )
 from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
-from asperity.orbit.methods.collocation.mesh import Orbit
-from asperity.orbit.methods.collocation.newton import refined
 
 Float = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from asperity.orbit.batches import run_chunks
-from asperity.orbit.compiled import stiffness_of_steady_sliding
 from asperity.orbit.periodic import periodic_response
 from asperity.orbit.response import PeriodicResponse
+from asperity.orbit.stiffness import stiffness_of_steady_sliding
 from asperity.parameters import DRIVE
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import Problem, checked_slider, flatten

@@ -18,6 +18,17 @@ from asperity._jax import spare_mappings
 
 Indices = NDArray[np.intp]
 
+#: Points in a block of the fast method; no power of two, at which arrays share cache lines.
+FAST_BLOCK = 240
+
+#: Samples of waveforms in a call.
+_SAMPLES = 2**17
+
+
+def points_of(tree: Any) -> int:
+    """How many points a pytree holds whose arrays carry the points along the last axis."""
+    return int(jax.tree.leaves(tree)[0].shape[-1])
+
 
 def take(tree: Any, index: Indices) -> Any:
     """The points `index` of a pytree whose arrays carry the points along the last axis."""
@@ -63,3 +74,8 @@ def run_chunks(
     for start in range(0, len(index), chunk):
         spare_mappings()
         yield work(index[start : start + chunk])
+
+
+def samples_chunk(phases: int) -> int:
+    """Points in a call that samples waveforms at so many phases."""
+    return min(max(_SAMPLES // phases, 1), FAST_BLOCK)

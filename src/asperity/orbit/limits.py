@@ -11,13 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.orbit.batches import run_chunks
-from asperity.orbit.compiled import (
-    STIFFNESS_CHUNK,
-    deepest_unloading,
-    stiffness_of_steady_sliding,
-)
 from asperity.orbit.outcome import LARGEST_RATE, LARGEST_UNLOADING, SMALLEST_RATE, Outcome
 from asperity.orbit.solution import Solution
+from asperity.orbit.stiffness import STIFFNESS_CHUNK, deepest_unloading, stiffness_of_steady_sliding
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 

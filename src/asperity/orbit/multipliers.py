@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from asperity.algebra.small_systems import scaled_product
 from asperity.orbit.batches import Indices, run_chunks
-from asperity.orbit.compiled import piece_map, read_orbit, split_observables
 from asperity.orbit.floquet import LARGEST_LOG, from_logs, log_multipliers
-from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.programs import piece_map, read_orbit, split_observables
 from asperity.orbit.observables import Observables
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.solution import Solution

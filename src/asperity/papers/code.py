@@ -14,7 +14,7 @@ from asperity.papers.ledger.checks import CheckResult
 from asperity.parameters.arguments import instance
 
 if TYPE_CHECKING:
-    from asperity.papers.report.sections import PaperFigure, Section
+    from asperity.papers.sections import PaperFigure, Section
 
 
 @contextmanager
@@ -66,7 +66,7 @@ def guarded_check(check: Callable[[Any], Any], what: str) -> Callable[[Any], Che
 
 def guarded_section(section: Any, package: str) -> Section:
     """A section of a paper, whose figures are computed and drawn with their errors as sentences."""
-    from asperity.papers.report.sections import Section
+    from asperity.papers.sections import Section
 
     own: Section = instance(section, Section, f"{package}.figures", "yield Sections")
     figures = tuple(_guarded_figure(f, f"{package}.figures") for f in own.figures)
@@ -77,7 +77,7 @@ def _guarded_figure(compute: Callable[[], Any], what: str) -> Callable[[], Paper
     name = f"{what}.{getattr(compute, '__name__', 'figure')}"
 
     def run() -> PaperFigure:
-        from asperity.papers.report.sections import PaperFigure
+        from asperity.papers.sections import PaperFigure
 
         with running(name):
             made = compute()

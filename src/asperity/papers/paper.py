@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from types import ModuleType
 
     from asperity.materials import Material
-    from asperity.papers.report.sections import Section
+    from asperity.papers.sections import Section
 
 GROUP = "asperity.papers"
 _WORDS = "claims.toml"
@@ -115,7 +115,7 @@ class Paper:
     @contextmanager
     def _sections(self, module: ModuleType) -> Iterator[Sequence[Section]]:
         """The sections of a paper from outside the package."""
-        from asperity.papers.report.sections import Section
+        from asperity.papers.sections import Section
 
         where = f"{self.package}.figures"
         if hasattr(module, "sections"):

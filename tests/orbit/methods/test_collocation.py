@@ -15,15 +15,15 @@ from scipy.linalg import expm
 from asperity.algebra import cyclic, small_systems
 from asperity.laws import RiceRuina, get_law
 from asperity.loads import Harmonic
-from asperity.orbit.methods.collocation import condensation
-from asperity.orbit.methods.collocation import mesh as meshes
-from asperity.orbit.methods.collocation.mesh import Orbit
-from asperity.orbit.methods.collocation.newton import (
+from asperity.orbit.mesh import condensation
+from asperity.orbit.mesh import mesh as meshes
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import (
     averaged_orbit,
     collocation_observables,
     newton_orbit,
 )
-from asperity.orbit.methods.collocation.scheme import GAUSS, STAGES
+from asperity.orbit.mesh.scheme import GAUSS, STAGES
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import checked_problem, flatten
 from asperity.theory.adiabatic import adiabatic_growth

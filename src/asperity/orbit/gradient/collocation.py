@@ -15,9 +15,9 @@ import jax.numpy as jnp
 from jax import Array
 
 from asperity.algebra.cyclic import CyclicFactors, factorise_cyclic, solve_factorised
-from asperity.orbit.methods.collocation.condensation import condense, localise, transfer_maps
-from asperity.orbit.methods.collocation.mesh import Orbit
-from asperity.orbit.methods.collocation.scheme import STAGES
+from asperity.orbit.mesh.condensation import condense, localise, transfer_maps
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.scheme import STAGES
 from asperity.slider.problem import Problem
 
 

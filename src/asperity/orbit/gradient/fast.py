@@ -10,11 +10,6 @@ import jax.numpy as jnp
 from jax import Array
 
 from asperity._jax import jit_large
-from asperity.orbit.compiled import (
-    deepest_unloading,
-    sharpness_of_slip,
-    stiffness_of_steady_sliding,
-)
 from asperity.orbit.gradient.fourier import (
     FloquetEquations,
     FourierEquations,
@@ -29,6 +24,11 @@ from asperity.orbit.methods.fourier.balance import BalanceEquations, balanced_or
 from asperity.orbit.methods.fourier.observables import force_spectrum, orbit_error
 from asperity.orbit.methods.fourier.orbit import fourier_orbit, load_cycle
 from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
+from asperity.orbit.stiffness import (
+    deepest_unloading,
+    sharpness_of_slip,
+    stiffness_of_steady_sliding,
+)
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 

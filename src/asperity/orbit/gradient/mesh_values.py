@@ -18,9 +18,9 @@ from asperity.orbit.gradient.search import (
     mesh_orbit_shapes,
     search_in_another_process,
 )
-from asperity.orbit.methods.collocation.mesh import Orbit
-from asperity.orbit.methods.collocation.newton import collocation_observables
-from asperity.orbit.methods.collocation.scheme import scheme_for
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import collocation_observables
+from asperity.orbit.mesh.scheme import scheme_for
 from asperity.orbit.outcome import Outcome
 
 #: Largest difference of multipliers on the mesh from those of the search, relative.

@@ -11,9 +11,9 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.orbit.batches import put, run_chunks, take
-from asperity.orbit.compiled import ACCEPTED, refine_orbit
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.methods.collocation.scheme import STAGES
+from asperity.orbit.mesh.programs import ACCEPTED, refine_orbit
+from asperity.orbit.mesh.scheme import STAGES
 from asperity.orbit.methods.registry import METHODS
 from asperity.orbit.methods.starting_orbits import starting_orbits
 from asperity.orbit.multipliers import chunk_size

@@ -27,17 +27,13 @@ from numpy.typing import NDArray
 from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.algebra.small_systems import jacobian_columns
 from asperity.orbit.batches import Indices, put, run_chunks, take
-from asperity.orbit.compiled import (
-    STIFFNESS_CHUNK,
-    sharpness_of_slip,
-    stiffness_of_steady_sliding,
-)
-from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.scheme import scheme_for
 from asperity.orbit.methods.collocation.refinement import accept
-from asperity.orbit.methods.collocation.scheme import scheme_for
 from asperity.orbit.methods.method import Method
 from asperity.orbit.newton_step import exponent_change
 from asperity.orbit.solution import SearchOptions, Solution
+from asperity.orbit.stiffness import STIFFNESS_CHUNK, sharpness_of_slip, stiffness_of_steady_sliding
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import adiabatic_states, even_phases

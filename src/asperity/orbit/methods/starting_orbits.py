@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from asperity.orbit.batches import put, run_chunks, take
-from asperity.orbit.compiled import remeshed
+from asperity.orbit.mesh.programs import remeshed
 from asperity.orbit.methods.branch_following.from_steady_sliding import MESHES
 from asperity.orbit.methods.branch_following.method import orbits_along_branches
 from asperity.orbit.methods.collocation.frequency_path import orbits_from_high_frequency

@@ -11,7 +11,7 @@ import pandas as pd
 from matplotlib.figure import Figure
 
 from asperity.figures.files import save_table
-from asperity.papers.report.points import (
+from asperity.papers.measured_points import (
     POINT_COLUMNS,
     RULE,
     CurveComparison,
@@ -23,7 +23,7 @@ from asperity.papers.report.points import (
     read_points,
     with_curves,
 )
-from asperity.papers.report.sections import PaperFigure
+from asperity.papers.sections import PaperFigure
 
 
 @dataclass

@@ -14,11 +14,11 @@ from asperity._version import __version__
 from asperity.materials import citation
 from asperity.papers.ledger.claim import Claim
 from asperity.papers.ledger.headline import Headline
+from asperity.papers.measured_points import RULE, CurveComparison
 from asperity.papers.report import ledger
 from asperity.papers.report.brief import brief
 from asperity.papers.report.markup import cell, embedded_png, rich
 from asperity.papers.report.parameters import table as parameter_table
-from asperity.papers.report.points import RULE, CurveComparison
 
 if TYPE_CHECKING:
     from asperity.papers.ledger.contents import About

@@ -11,13 +11,13 @@ from asperity.figures.files import save_picture, save_table
 from asperity.figures.style import style
 from asperity.outputs import written_folder
 from asperity.papers.ledger.claim import VERDICTS, Claim
+from asperity.papers.measured_points import CurveComparison
 from asperity.papers.paper import Paper
 from asperity.papers.report import ledger
 from asperity.papers.report.measured import MeasuredPoints
 from asperity.papers.report.page import Plate, PlateGroup, build_page
-from asperity.papers.report.points import CurveComparison
-from asperity.papers.report.sections import PaperFigure, Section
 from asperity.papers.report.summary import ReproductionSummary
+from asperity.papers.sections import PaperFigure, Section
 
 #: Called with the steps done, all steps, and what is being done.
 Progress = Callable[[int, int, str], None]
@@ -56,7 +56,7 @@ def reproduce(
     progress : callable, optional
         Called before each step with the steps done, all steps, and a label of the step.
     data : Path, optional
-        CSV of measured or digitised points (`asperity.papers.report.points.read_points`), which
+        CSV of measured or digitised points (`asperity.papers.measured_points.read_points`), which
         are drawn on the figures and compared with their curves; data/points.csv and
         agreement.json are written too.
 

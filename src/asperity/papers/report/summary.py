@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from asperity._version import __version__
-from asperity.papers.report.points import CurveComparison
+from asperity.papers.measured_points import CurveComparison
 from asperity.parameters.display import count_text
 
 

@@ -28,20 +28,20 @@ from jax import Array
 from asperity._jax import jit_large
 from asperity.algebra.cyclic import Border, solve_bordered
 from asperity.algebra.small_systems import jacobian_columns
-from asperity.orbit.compiled import ACCEPTED
-from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
-from asperity.orbit.methods.collocation.condensation import (
+from asperity.orbit.mesh.condensation import (
     LinearisedEquations,
     condense,
     localise,
     transfer_maps,
 )
-from asperity.orbit.methods.collocation.mesh import Orbit
-from asperity.orbit.methods.collocation.newton import (
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import (
     collocation_observables,
     refined,
     swing_change,
 )
+from asperity.orbit.mesh.programs import ACCEPTED
+from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
 from asperity.orbit.newton_step import exponent_change
 from asperity.orbit.observables import Observables
 from asperity.slider import Motion

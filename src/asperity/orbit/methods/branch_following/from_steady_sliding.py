@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from asperity.orbit.batches import Indices, put, run_chunks, take
 from asperity.orbit.instability import CHUNK, LARGEST_GROWTH
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.scheme import scheme_for
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
     Tangent,
@@ -24,8 +26,6 @@ from asperity.orbit.methods.branch_following.moving_mesh import (
     straight,
 )
 from asperity.orbit.methods.branch_following.parameter_line import ParameterLine, amplitude_line
-from asperity.orbit.methods.collocation.mesh import Orbit
-from asperity.orbit.methods.collocation.scheme import scheme_for
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import adiabatic_growth
 

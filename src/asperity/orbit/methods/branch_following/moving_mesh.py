@@ -18,6 +18,9 @@ from jax import Array
 
 from asperity._jax import jit_large
 from asperity.algebra.small_systems import spectral_abscissa
+from asperity.orbit.mesh.condensation import localise
+from asperity.orbit.mesh.mesh import Orbit, on_mesh
+from asperity.orbit.mesh.scheme import STAGES
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
     along,
@@ -28,9 +31,6 @@ from asperity.orbit.methods.branch_following.arclength import (
     weighted_row,
 )
 from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
-from asperity.orbit.methods.collocation.condensation import localise
-from asperity.orbit.methods.collocation.mesh import Orbit, on_mesh
-from asperity.orbit.methods.collocation.scheme import STAGES
 
 #: Change at which Newton's method ends and a step is accepted: the error is about its square.
 ACCEPTED = 1e-5

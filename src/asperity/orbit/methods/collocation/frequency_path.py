@@ -5,22 +5,28 @@ Each point takes its own steps along its path: longer after a success, shorter a
 
 from __future__ import annotations
 
+from functools import partial
+
 import equinox as eqx
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
+from asperity._jax import jit_large
 from asperity.orbit.batches import Indices, put, run_chunks, take
-from asperity.orbit.compiled import STIFFNESS_CHUNK, follow_orbit, stiffness_of_steady_sliding
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import refined
+from asperity.orbit.mesh.programs import solve_on_mesh
 from asperity.orbit.methods.collocation.initial_guess import (
     InitialGuess,
     orbits_from_averaged_limit,
 )
-from asperity.orbit.methods.collocation.mesh import Orbit
 from asperity.orbit.methods.collocation.method import solve_from
 from asperity.orbit.methods.collocation.refinement import FIRST_MESH
 from asperity.orbit.methods.method import Method
 from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
 from asperity.orbit.solution import SearchOptions, Solution
+from asperity.orbit.stiffness import STIFFNESS_CHUNK, stiffness_of_steady_sliding
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
@@ -115,3 +121,13 @@ def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool
             step[part] *= np.where(good, _GROWTH, _SHRINKAGE)
         active = active[(reached[active] < 1) & (step[active] > _SHORTEST_STEP)]
     found[:] = reached >= 1
+
+
+@partial(jit_large, static_argnames=("intervals", "max_steps"))
+def follow_orbit(
+    problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, max_steps: int
+) -> tuple[Orbit, Array]:
+    """Collocation from a neighbouring orbit; the result lies on a mesh made for it."""
+    problem, guess = problem_and_orbit
+    result = solve_on_mesh(problem, guess, max_steps)
+    return refined(*problem, result.orbit, intervals), result.error

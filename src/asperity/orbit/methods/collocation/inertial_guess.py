@@ -7,8 +7,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from asperity.loads import Modulation
-from asperity.orbit.methods.collocation.mesh import Orbit, evaluate
-from asperity.orbit.methods.collocation.scheme import scheme_for
+from asperity.orbit.mesh.mesh import Orbit, evaluate
+from asperity.orbit.mesh.scheme import scheme_for
 from asperity.slider import Motion, QuasiStatic
 
 

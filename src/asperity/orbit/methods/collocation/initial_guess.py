@@ -6,15 +6,20 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
-from asperity.orbit.batches import Indices, put, run_chunks, take
-from asperity.orbit.compiled import ACCEPTED, first_orbit
-from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity._jax import jit_large
+from asperity.orbit.batches import Indices, points_of, put, run_chunks, take
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import averaged_orbit
+from asperity.orbit.mesh.programs import ACCEPTED, solve_on_mesh
+from asperity.orbit.mesh.scheme import scheme_for
+from asperity.orbit.methods.collocation.inertial_guess import inertial_guess
 from asperity.orbit.methods.collocation.refinement import FIRST_MESH
-from asperity.orbit.methods.collocation.scheme import scheme_for
 from asperity.orbit.multipliers import chunk_size
 from asperity.orbit.outcome import Outcome
+from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
@@ -74,3 +79,17 @@ def orbits_from_averaged_limit(
         put(guess.orbit, part[good], take(first, np.flatnonzero(good)))
         guess.found[part] = good
     return guess
+
+
+@partial(jit_large, static_argnames=("intervals",))
+def first_orbit(problem: Problem, *, intervals: int) -> tuple[Orbit, Array]:
+    """Collocation from the averaged limit, of which only the quasi-static equations are sure."""
+    system, load = problem
+    quasi_static = QuasiStatic(system.slider, system.V, system.omega)
+    guess = averaged_orbit(quasi_static, load, points_of(problem), intervals=intervals, grading=0.5)
+    result = solve_on_mesh(Problem(quasi_static, load), guess, 30)
+    if not isinstance(system, QuasiStatic):
+        result = solve_on_mesh(
+            problem, inertial_guess(quasi_static, system, load, result.orbit), 30
+        )
+    return result.orbit, result.error

@@ -8,16 +8,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.orbit.batches import Indices, put, run_chunks, take
-from asperity.orbit.compiled import (
-    ACCEPTED,
-    read_orbit,
-    refine_orbit,
-    remeshed,
-    sample_orbit,
-    samples_chunk,
-)
-from asperity.orbit.methods.collocation.mesh import Orbit
+from asperity.orbit.batches import Indices, put, run_chunks, samples_chunk, take
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.programs import ACCEPTED, read_orbit, refine_orbit, remeshed, sample_orbit
 from asperity.orbit.multipliers import (
     AGREEMENT,
     chunk_size,

@@ -6,18 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from asperity.orbit.batches import run_chunks, take
-from asperity.orbit.compiled import (
-    FAST_BLOCK,
-    STIFFNESS_CHUNK,
-    fast_solve,
-    sample_fourier_orbit,
-    samples_chunk,
-    sharpness_of_slip,
-    stiffness_of_steady_sliding,
-)
+from asperity.orbit.batches import FAST_BLOCK, run_chunks, samples_chunk, take
+from asperity.orbit.methods.fourier.programs import fast_solve, sample_fourier_orbit
 from asperity.orbit.methods.method import Method
 from asperity.orbit.solution import SearchOptions, Solution
+from asperity.orbit.stiffness import STIFFNESS_CHUNK, sharpness_of_slip, stiffness_of_steady_sliding
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from asperity.papers.bureau2000.figures.elements import APPLIED, BORNE
-from asperity.papers.report.points import Observable
+from asperity.papers.measured_points import Observable
 
 
 def _harmonics(x: str, first: int, scale: float) -> tuple[Observable, ...]:

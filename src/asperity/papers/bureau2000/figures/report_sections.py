@@ -20,7 +20,7 @@ from asperity.papers.bureau2000.virtual import (
 )
 from asperity.papers.paper import find_paper
 from asperity.papers.report.parameters import provenance_lines
-from asperity.papers.report.sections import FigureTable, PaperFigure, Section
+from asperity.papers.sections import FigureTable, PaperFigure, Section
 
 
 @contextmanager

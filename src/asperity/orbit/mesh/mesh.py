@@ -14,7 +14,7 @@ import numpy as np
 from jax import Array
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.methods.collocation.scheme import STAGES
+from asperity.orbit.mesh.scheme import STAGES
 
 #: Share of a mesh that is spread evenly whatever the error estimate says.
 _EVEN_SHARE = 0.3

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from asperity.papers.report.points import Observable
+from asperity.papers.measured_points import Observable
 
 if TYPE_CHECKING:
     import pandas as pd

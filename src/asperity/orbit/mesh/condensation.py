@@ -16,8 +16,8 @@ from jax import Array
 from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.algebra.small_systems import inverse_points, jacobian_columns, product
 from asperity.loads import Excitation, Modulation
-from asperity.orbit.methods.collocation.mesh import Orbit
-from asperity.orbit.methods.collocation.scheme import STAGES
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.scheme import STAGES
 from asperity.slider import Motion
 
 #: Entries of small matrices that are eliminated at a time: they fit into a core's cache.

@@ -25,18 +25,18 @@ from asperity.algebra.small_systems import (
     spectral_radius,
 )
 from asperity.loads import Modulation
-from asperity.orbit.methods.collocation.condensation import (
+from asperity.orbit.mesh.condensation import (
     LinearisedEquations,
     condense,
     localise,
     transfer_maps,
 )
-from asperity.orbit.methods.collocation.mesh import (
+from asperity.orbit.mesh.mesh import (
     Orbit,
     equidistributed,
     graded_mesh,
 )
-from asperity.orbit.methods.collocation.scheme import STAGES, scheme_for
+from asperity.orbit.mesh.scheme import STAGES, scheme_for
 from asperity.orbit.newton_step import exponent_change
 from asperity.orbit.observables import Observables
 from asperity.slider import Motion, QuasiStatic
