@@ -172,10 +172,18 @@ def test_blocks_of_a_recording_are_the_same_after_another_fit(steps):
     )
 
 
-def test_the_likelihood_of_means_is_that_of_their_fit(steps):
-    found = fit_of_steps(steps, RunOptions(fit_rate=2.5))
+@pytest.mark.parametrize(
+    ("options", "samples"),
+    [
+        (RunOptions(fit_rate=2.5), 350),
+        (RunOptions(fit_rate=2.5, gauge=(2, 1.0)), 350),
+        (RunOptions(gauge=(1, 2.0)), 1400),
+    ],
+)
+def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, options, samples):
+    found = fit_of_steps(steps, options)
     (term,) = found.objective.terms
-    assert found.observables["friction"][1] == 350
+    assert found.observables["friction"][1] == samples
     likelihood, data = likelihood_of_run(term, found.objective.names)
 
     def both(factor):
@@ -188,7 +196,10 @@ def test_the_likelihood_of_means_is_that_of_their_fit(steps):
     one, other = both(1.0), both(1.01)
     assert float(one[0][0] - other[0][0]) == pytest.approx(one[1][0] - other[1][0], abs=1e-6)
     for (_, gradient), (_, r, j) in (one, other):
-        assert float(gradient) == pytest.approx(-r.values @ r.jacobian[:, j], rel=1e-6)
+        # Near the minimum the sum is far smaller than its terms.
+        slope = r.jacobian[:, j]
+        least = 1e-9 * np.linalg.norm(r.values) * np.linalg.norm(slope)
+        assert float(gradient) == pytest.approx(-r.values @ slope, rel=1e-6, abs=least)
 
 
 def test_the_density_of_a_recording_is_that_of_its_fit(steps):
@@ -202,7 +213,3 @@ def test_the_density_of_a_recording_is_that_of_its_fit(steps):
     assert float(first[0][0] - second[0][0]) == pytest.approx(first[1][0] - second[1][0], abs=1e-6)
     for (_, gradient), (_, expected) in (first, second):
         np.testing.assert_allclose(gradient, expected, atol=1e-5)
-    # The compiled motion does not pass through a gauge, and says so.
-    found.objective.terms[0].gauge = (1, 2.0)
-    with pytest.raises(InputError, match="gauge must be left out for a posterior"):
-        whitened.compiled()

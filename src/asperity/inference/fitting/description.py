@@ -9,11 +9,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2 as chi_squared
+from scipy.stats import norm
+from scipy.stats import t as student
 
 from asperity.inference.fitting.intervals import LEVELS, bounded_interval
 from asperity.inference.fitting.profile import Profile
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
@@ -94,6 +97,8 @@ def described_fit(
     information = J.T @ J
     covariance, missing = inverse_information(information)
     sd = np.sqrt(np.diag(covariance))
+    total, freedom = _with_estimated_noise(objective, u, covariance, missing)
+    se = np.sqrt(np.diag(total))
     gradient = J.T @ r
     # The minimum that the parabola would have without the bounds.
     unbounded = u - covariance @ gradient
@@ -122,8 +127,11 @@ def described_fit(
             Profile(objective, i, u, chi2, covariance, search=searching) if i in profiled else None
         )
         for level in LEVELS:
+            # By how much estimated noise widens an interval under known noise.
+            wider = float(student.ppf((1 + level) / 2, freedom[i]) / norm.ppf((1 + level) / 2))
+            wider *= float(se[i] / sd[i])
             if along is not None:
-                ends.append(along.interval(level))
+                ends.append(along.interval(level, wider))
                 if along.lowest[1] < chi2 - _LOWER:
                     # The search has missed a minimum: begin again there.
                     missed = objective.minimise(along.lowest[0])
@@ -131,7 +139,7 @@ def described_fit(
             elif missing[i] or stopped:
                 ends.append((low, high))
             else:
-                ends.append(bounded_interval(unbounded[i], float(sd[i]), level, low, high))
+                ends.append(bounded_interval(unbounded[i], wider * float(sd[i]), level, low, high))
         ends = [
             _hull(objective, i, interval, [(v, value - chi2) for v, value in rivals], level)
             for interval, level in zip(ends, LEVELS, strict=True)
@@ -142,7 +150,7 @@ def described_fit(
             unknown.name,
             unknown.parameter.unit,
             value,
-            math.inf if missing[i] else abs(unknown.slope(value)) * float(sd[i]),
+            math.inf if missing[i] else abs(unknown.slope(value)) * float(se[i]),
             narrow,
             wide,
             bool(at_bound),
@@ -159,7 +167,7 @@ def described_fit(
         converged=True,
         message="converged",
         parameters=estimates,
-        correlation=covariance / np.outer(sd, sd),
+        correlation=total / np.outer(se, se),
         undetermined=undetermined,
         chi2=chi2,
         dof=dof,
@@ -193,6 +201,23 @@ def described_fit(
             )
         )
     return _with_warnings(found, said)
+
+
+def _with_estimated_noise(
+    objective: Objective, u: Float, covariance: Float, missing: NDArray[np.bool_]
+) -> tuple[Float, Float]:
+    """The covariance with what estimated noise adds, and degrees of freedom of its diagonal."""
+    known = np.where(missing[:, None] | missing, 0.0, covariance)
+    values = objective.named(u)
+    slopes = np.array([float(k.slope(values[k.name])) for k in objective.unknowns])
+    total, variance = covariance.copy(), np.zeros(u.size)
+    for term in objective.terms:
+        if isinstance(term, RunTerm):
+            added, spread = term.uncertainty_of_noise(values, slopes, known)
+            total += added
+            variance += spread
+    freedom = 2 * np.diag(known) ** 2 / np.where(variance > 0, variance, 1.0)
+    return total, np.where(variance > 0, np.maximum(freedom, 1.0), np.inf)
 
 
 def _is_of_tables(objective: Objective) -> bool:

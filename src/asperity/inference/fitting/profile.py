@@ -64,22 +64,29 @@ class Profile:
         """Lowest point on the way; below the minimum where that was not the lowest one."""
         return min(self.path.values(), key=lambda point: point[1])
 
-    def interval(self, level: float) -> Interval:
+    def interval(self, level: float, wider: float = 1.0) -> Interval:
         """Ends of the confidence interval of a coverage.
 
         An end is infinite, or the bound, where the profile stays below the threshold.
+
+        Parameters
+        ----------
+        level : float
+            Coverage.
+        wider : float
+            Factor of the interval, for uncertainties that are estimated themselves.
         """
         low, high = self.objective.unknowns[self.i].bounds
-        return self._end(level, -1, low), self._end(level, 1, high)
+        return self._end(level, wider, -1, low), self._end(level, wider, 1, high)
 
-    def _end(self, level: float, sign: int, bound: float) -> float:
+    def _end(self, level: float, wider: float, sign: int, bound: float) -> float:
         """Where the profile passes the threshold on one side."""
 
         def excess(x: float) -> float:
-            return self._excess(x, level)
+            return self._excess(x, level, wider)
 
         inner = float(self.u[self.i])
-        width = 1.05 * self.sd * math.sqrt(bounded_threshold(math.inf, level))
+        width = 1.05 * wider * self.sd * math.sqrt(bounded_threshold(math.inf, level))
         for _ in range(_STEPS):
             outer = inner + sign * width
             if sign * (outer - bound) >= 0:
@@ -95,12 +102,12 @@ class Profile:
                     if not self.search:
                         return sign * math.inf
                     self.objective.search_from_now_on()
-                    return self._end(level, sign, bound)
+                    return self._end(level, wider, sign, bound)
                 return end
             inner, width = outer, 2 * width
         return sign * math.inf
 
-    def _excess(self, x: float, level: float) -> float:
+    def _excess(self, x: float, level: float, wider: float) -> float:
         """Root of the rise of chi-squared less that of its threshold: nearly linear in x."""
         if x not in self.path:
             nearest = min(self.path, key=lambda known: abs(known - x))
@@ -112,7 +119,8 @@ class Profile:
                 return math.sqrt(_NO_ORBIT)
             self.path[x] = found, value
         low, high = self.objective.unknowns[self.i].bounds
-        limit = bounded_threshold(min(x - low, high - x) / self.sd, level)
+        distance = min(x - low, high - x) / (wider * self.sd)
+        limit = wider**2 * bounded_threshold(distance, level)
         rise = max(self.path[x][1] - self.chi2, 0.0)
         return math.sqrt(rise) - math.sqrt(limit)
 

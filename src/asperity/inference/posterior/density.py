@@ -161,13 +161,7 @@ class Whitened:
         return q, information
 
     def compiled(self) -> tuple[PosteriorDensity, DensityData]:
-        """The density as a compiled program evaluates it, and its data.
-
-        Raises
-        ------
-        InputError
-            If a recording is compared through a gauge, which the program does not know.
-        """
+        """The density as a compiled program evaluates it, and its data."""
         parts = [_compiled(term, self.objective.names) for term in self.objective.terms]
         unknowns = self.objective.unknowns
         data = DensityData(

@@ -17,7 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.errors import InputError
+from asperity.inference.posterior.gauge import GaugeArrays, gauge_arrays
 from asperity.inference.runs.gain import GAIN
 from asperity.inference.runs.motion import Drive, through
 from asperity.inference.runs.term import RunTerm
@@ -38,7 +38,9 @@ class RunArrays(NamedTuple):
     times : array, shape (m,)
         Of the samples, or edges of blocks.
     taken : array of int, shape (n,)
-        Which of the times, or of the blocks between them, each sample is.
+        Which of the times, or of the blocks between them, each sample is; without a gauge.
+    gauge : GaugeArrays or None
+        Through which the motion at the times is recorded.
     recorded : array, shape (n,)
     taps : array, shape (n, order + 1)
         Whitening: w_t = sum_k taps[t, k] x_(t-k).
@@ -51,9 +53,15 @@ class RunArrays(NamedTuple):
     drive: Drive
     times: Any
     taken: Any
+    gauge: GaugeArrays | None
     recorded: Any
     taps: Any
     basis: Any
+
+    def as_recorded(self, friction: Array) -> Array:
+        """Recorded samples of friction at the times, filled up; linear in it."""
+        shown = friction[self.taken] if self.gauge is None else self.gauge.recorded(friction)
+        return jnp.append(shown, jnp.zeros(self.recorded.size - shown.size))
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ class RunLikelihood:
     room : int
         Steps of the integrator at most.
     means : bool
-        Whether samples are means over blocks.
+        Whether the motion is averaged over blocks.
     """
 
     equation: Any
@@ -93,12 +101,13 @@ class RunLikelihood:
                 room=self.room,
                 means=self.means,
             )
-            white = _whitened(data.taps, gain * friction[data.taken] - data.recorded)
+            shown, back_to_motion = jax.vjp(data.as_recorded, gain * friction)
+            white = _whitened(data.taps, shown - data.recorded)
             white = white - data.basis @ (data.basis.T @ white)
             value = jnp.where(done, -0.5 * jnp.sum(white**2), jnp.nan)
-            back = _transposed(data.taps, white)
+            (back,) = back_to_motion(_transposed(data.taps, white))
             slopes = {inner: gain * slope for inner, slope in slopes.items()} | {GAIN: friction}
-            return value, -jnp.stack([slopes[inner][data.taken] @ back for _, inner in self.own])
+            return value, -jnp.stack([slopes[inner] @ back for _, inner in self.own])
 
         @jax.custom_vjp
         def likelihood(x: Array) -> Array:
@@ -125,39 +134,34 @@ def _transposed(taps: Array, x: Array) -> Array:
 
 
 def likelihood_of_run(term: RunTerm, names: tuple[str, ...]) -> tuple[RunLikelihood, RunArrays]:
-    """The likelihood of a recording, and its arrays.
-
-    Raises
-    ------
-    InputError
-        If the recording is compared through a gauge.
-    """
-    if term.gauge is not None:
-        raise InputError(
-            f"gauge must be left out for a posterior, got one for {term.name}: the compiled "
-            "motion does not pass through it; leave it out, or take intervals by profile likelihood"
-        )
+    """The likelihood of a recording, and its arrays."""
     own = tuple((n, inner) for n in names if (inner := term.inner(n)) is not None)
     fixed = {n: np.float64(v) for n, v in {**term.fixed, "W0": term.run.W0}.items()}
+    at, rate = (term.run.at, 0.0) if term.gauge is None else term.filter_times()
     # Any numbers serve for the template: those of the parameters take their place.
     motion, drive, times, taken = term.motion.prepared(
         {**fixed, **{inner: np.float64(1.0) for _, inner in own if inner not in {*fixed, GAIN}}},
         term.run.drive,
-        term.run.at,
+        at,
     )
-    n, size = term.run.time.size, times.size
+    n = term.run.time.size
+    size = 1024 * int(np.ceil(n / 1024))
     taps = np.zeros((size, max(m.order for m in term.models) + 1))
     for model, (a, b) in zip(term.models, term.run.stretches, strict=True):
         taps[a:b, : model.order + 1] = model.taps(b - a)
     arrays, equation = eqx.partition(motion, eqx.is_array_like)
     more = (0, size - n)
-    means = term.run.blocks is not None
+    gauge = None
+    if term.gauge is not None:
+        gauge = gauge_arrays(term.gauge, rate, at.size, term.run.at, times.size)
+    means = term.run.blocks is not None and gauge is None
     return RunLikelihood(equation, own, term.motion.room, means), RunArrays(
         jax.tree.map(np.asarray, arrays),
         fixed,
         drive,
         times,
-        np.pad(taken, more),
+        taken,
+        gauge,
         np.pad(term.run.friction, more),
         taps,
         np.pad(term.basis, (more, (0, 0))),

@@ -62,6 +62,18 @@ class Autoregression:
             orders.append(np.append(a - k * a[::-1], k))
         return orders
 
+    def autocovariances(self, n: int) -> Float:
+        """Of the first n lags, from 0 on; n is at most the order (Levinson's recursion)."""
+        found = np.zeros(n)
+        found[:1] = self.variance
+        rest = self.variance
+        for k, (a, partial) in enumerate(zip(self.coefficients(), self.reflection, strict=False)):
+            if k + 1 >= n:
+                break
+            found[k + 1] = partial * rest + a @ found[k:0:-1]
+            rest *= 1 - partial**2
+        return found
+
     def whiten(self, columns: Float) -> Float:
         """Innovations of unit variance of samples along the first axis."""
         x = np.asarray(columns, float)

@@ -15,6 +15,7 @@ from asperity.inference.runs.gain import GAIN
 from asperity.inference.runs.misfit import departures_of_jumps, misfit_after_changes
 from asperity.inference.runs.motion import RunMotion
 from asperity.inference.runs.noise import Autoregression, fitted, strongest_peak, whiteness
+from asperity.inference.runs.noise_uncertainty import added_by_noise
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law
@@ -216,7 +217,7 @@ class RunTerm:
         inner_names = tuple(n for name in free if (n := str(self.inner(name))) != GAIN)
         at = self.run.at
         if self.gauge is not None:
-            at, rate = self._filter_times()
+            at, rate = self.filter_times()
         computed = self.motion(given, inner_names, self.run.drive, at)
         if computed is None:
             return None
@@ -382,6 +383,36 @@ class RunTerm:
                 return True
         return False
 
+    def uncertainty_of_noise(
+        self, values: Mapping[str, float], slopes: Float, covariance: Float
+    ) -> tuple[Float, Float]:
+        """What estimating the noise adds to a covariance, and the variance of its diagonal.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Free parameters and nuisances of the fit, in SI, at the estimate.
+        slopes : array, shape (parameters,)
+            Derivatives of the values to the coordinates of the covariance.
+        covariance : array, shape (parameters, parameters)
+            Under known noise.
+
+        Returns
+        -------
+        array, shape (parameters, parameters), and array, shape (parameters,)
+        """
+        raw = self.departures(values)
+        assert raw is not None  # there is a motion at the estimate
+        curves = raw[1] * slopes
+        share = np.linalg.solve(self._triangle, self.basis.T @ self._whitened(curves))
+        curves = curves - self._columns @ share
+        added, variance = np.zeros_like(covariance), np.zeros(slopes.size)
+        for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
+            more, spread = added_by_noise(model, curves[a:b], self.basis[a:b], covariance)
+            added += more
+            variance += spread
+        return added, variance
+
     def fitted_friction(self, values: Mapping[str, float]) -> Float:
         """Friction at the samples by the law with linear nuisances and lines; NaN without motion.
 
@@ -485,7 +516,8 @@ class RunTerm:
         beyond = share * (values[k] + 0.5 * share * (values[k + 1] - values[k])) / rate
         return np.asarray(np.diff(rises[k] + beyond, axis=1)[:, 0] / np.diff(edges, axis=1)[:, 0])
 
-    def _filter_times(self) -> tuple[Float, float]:
+    def filter_times(self) -> tuple[Float, float]:
+        """Times (s) at which the gauge needs the motion, and their rate (Hz)."""
         assert self.gauge is not None  # asked for by the caller
         time = self.run.time
         inside = 1 if self.run.blocks is None else _BLOCK_SAMPLES

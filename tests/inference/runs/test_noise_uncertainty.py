@@ -1,0 +1,92 @@
+"""What estimated noise adds to uncertainties: by brute force, in closed form, and by coverage."""
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+from scipy.stats import norm, t
+
+from asperity.inference.runs.noise import Autoregression, fitted
+from asperity.inference.runs.noise_uncertainty import added_by_noise
+
+
+def autocovariances(a, n):
+    """Of an AR(2) of innovations of unit variance, by its spectrum."""
+    angle = 2 * np.pi * np.arange(8192) / 8192
+    transfer = 1 - a[0] * np.exp(-1j * angle) - a[1] * np.exp(-2j * angle)
+    return np.fft.ifft(1 / np.abs(transfer) ** 2).real[:n]
+
+
+def model_of(a):
+    """The same process by its partial correlations."""
+    return Autoregression(np.array([a[0] / (1 - a[1]), a[1]]), autocovariances(a, 1)[0])
+
+
+def test_autocovariances_are_those_of_the_spectrum():
+    a = (1.2, -0.5)
+    np.testing.assert_allclose(model_of(a).autocovariances(3), autocovariances(a, 3), rtol=1e-10)
+
+
+def test_the_added_covariance_is_that_of_estimates_that_follow_the_coefficients():
+    a, n = np.array([1.2, -0.5]), 400
+    s = np.arange(n) / n
+    # A decay after a change, a slow wave; and an offset that is eliminated.
+    X = np.stack([np.where(s > 0.4, np.exp(-8 * (s - 0.4)), 0), np.sin(7 * s), np.ones(n)], axis=1)
+
+    def estimator(a):
+        inverse = np.linalg.inv(toeplitz(autocovariances(a, n)))
+        return np.linalg.solve(X.T @ inverse @ X, X.T @ inverse)
+
+    step = 1e-5
+    slopes = [(estimator(a + step * e) - estimator(a - step * e)) / (2 * step) for e in np.eye(2)]
+    noise = toeplitz(autocovariances(a, n))
+    of_coefficients = np.linalg.inv(toeplitz(autocovariances(a, 2))) / n
+    expected = sum(
+        of_coefficients[k, m] * slopes[k] @ noise @ slopes[m].T for k in range(2) for m in range(2)
+    )
+    model = model_of(a)
+    white = model.whiten(X)
+    covariance = np.linalg.inv(white.T @ white)[:2, :2]
+    basis, triangle = np.linalg.qr(white[:, 2:])
+    curves = X[:, :2] - X[:, 2:] @ np.linalg.solve(triangle, basis.T @ white[:, :2])
+    added, _ = added_by_noise(model, curves, basis, covariance)
+    # The ends of the stretch, some 2 of 400 samples.
+    np.testing.assert_allclose(added, expected[:2, :2], rtol=0.03, atol=0.01 * expected[0, 0])
+
+
+def test_degrees_of_freedom_of_a_mean_in_closed_form():
+    # s^2/(n (1 - a)^2), with the variances (1 - a^2)/n of a and 2/n of ln s^2.
+    a, n = 0.9, 200_000
+    model = Autoregression(np.array([a]), 1 / (1 - a * a))
+    covariance = np.array([[1 / (n * (1 - a) ** 2)]])
+    _, variance = added_by_noise(model, np.ones((n, 1)), np.zeros((n, 0)), covariance)
+    expected = (4 * (1 + a) / (1 - a) + 2) / n
+    assert variance[0] / covariance[0, 0] ** 2 == pytest.approx(expected, rel=2e-3)
+
+
+def test_intervals_cover_where_those_under_known_noise_do_not():
+    n, order, sets = 120, 12, 600
+    s = np.arange(n) / n
+    X = np.stack([np.where(s > 0.5, np.exp(-6 * (s - 0.5)), 0), np.ones(n)], axis=1)
+    inside = np.zeros((2, 2))
+    for seed in range(sets):
+        steps = np.random.default_rng(seed).normal(size=n + 200)
+        y = lfilter([1.0], [1.0, -1.2, 0.4], steps)[200:]
+        b, root = np.linalg.lstsq(X, y, rcond=None)[0], np.zeros((0, n))
+        for _ in range(8):
+            model = fitted([y - X @ b], order=order, parameters=2, uncertain=[root])
+            white = model.whiten(X)
+            information = white.T @ white
+            b = np.linalg.solve(information, white.T @ model.whiten(y[:, None])[:, 0])
+            root = np.linalg.solve(np.linalg.cholesky(information), X.T)
+        covariance = np.linalg.inv(information)
+        added, variance = added_by_noise(model, X, np.zeros((n, 0)), covariance)
+        freedom = 2 * covariance[0, 0] ** 2 / variance[0]
+        sd = np.sqrt([covariance[0, 0], covariance[0, 0] + added[0, 0]])
+        for i, level in enumerate((0.6827, 0.95)):
+            reach = [norm.ppf((1 + level) / 2), t.ppf((1 + level) / 2, freedom)]
+            inside[:, i] += abs(b[0]) <= sd * reach
+    known, estimated = inside / sets
+    spread = np.sqrt(np.array([0.68 * 0.32, 0.95 * 0.05]) / sets)
+    assert (np.abs(estimated - [0.6827, 0.95]) < 3 * spread).all(), estimated
+    assert (known < [0.6827, 0.95] - 3 * spread).all(), known
