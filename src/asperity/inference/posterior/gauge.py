@@ -26,8 +26,8 @@ class GaugeArrays(NamedTuple):
 
     Attributes
     ----------
-    transfer : complex array, shape (size/2 + 1,)
-        Of the response to one sample, which begins two samples before it.
+    response : array, shape (size,)
+        To one sample, from two samples before it on; filled up by zeros.
     index : array of int, shape (n, 4) or (n, 2)
         Filtered samples that each recorded one is read from; for means, those before the edges.
     weight : array, of the same shape
@@ -36,7 +36,7 @@ class GaugeArrays(NamedTuple):
         1 over the length of each block, in intervals; empty where there are no means.
     """
 
-    transfer: Any
+    response: Any
     index: Any
     weight: Any
     per_length: Any
@@ -49,9 +49,10 @@ class GaugeArrays(NamedTuple):
         motion : array, shape (m,)
             Steady before the first, and as the last afterwards.
         """
-        m, size = motion.size, 2 * (self.transfer.size - 1)
+        m, size = motion.size, self.response.size
         moved = jnp.append(motion - motion[0], jnp.full(_AHEAD, motion[-1] - motion[0]))
-        whole = jnp.fft.irfft(jnp.fft.rfft(moved, size) * self.transfer, size)
+        transfer = jnp.fft.rfft(self.response)
+        whole = jnp.fft.irfft(jnp.fft.rfft(moved, size) * transfer, size)
         shown = whole[_AHEAD : _AHEAD + m]
         if not self.per_length.size:
             return motion[0] + jnp.sum(self.weight * shown[self.index], axis=1)
@@ -83,7 +84,8 @@ def gauge_arrays(
     impulse = np.zeros(size + 3 * _AHEAD)
     impulse[2 * _AHEAD] = 1.0
     response = filtered(impulse, rate, *low_pass(*gauge))[_AHEAD:]
-    transfer = np.fft.rfft(response, 2 * size + 4 * _AHEAD)
+    # Longer than the two together, so that the end does not reach the beginning.
+    response = np.append(response, np.zeros(size))
     if times.ndim == 1:
         # The cubic through four samples is linear in each of them.
         last = count - 1
@@ -91,7 +93,7 @@ def gauge_arrays(
         index = np.clip(k[:, None] + np.arange(-1, 3), 0, last)
         u = np.clip(times * rate, 0, last) - k
         cubic = [between(row, 1.0, 1.0 + u) for row in np.eye(4)]
-        return GaugeArrays(transfer, index, np.stack(cubic, axis=1), np.zeros(0))
+        return GaugeArrays(response, index, np.stack(cubic, axis=1), np.zeros(0))
     position = np.clip(times * rate, 0, count - 1)
     index = np.minimum(position.astype(np.intp), count - 2)
-    return GaugeArrays(transfer, index, position - index, 1 / (np.diff(times)[:, 0] * rate))
+    return GaugeArrays(response, index, position - index, 1 / (np.diff(times)[:, 0] * rate))
