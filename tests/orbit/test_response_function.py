@@ -11,7 +11,8 @@ from asperity import Slider, periodic_response, perturbation_response, response_
 from asperity.errors import InputError
 from asperity.laws import ElastoPlastic, RiceRuina, get_law, law_parameters, registered
 from asperity.loads import modulated
-from asperity.orbit import Outcome
+from asperity.orbit import Outcome, differentiable
+from asperity.orbit.gradient.search import search_mesh_orbits
 
 #: Richardson's extrapolation of central differences over 0.2 % and 0.1 %, relative to the
 #: largest derivative by the logarithm of a parameter: what it leaves is of the fourth order.
@@ -339,3 +340,29 @@ def test_second_derivatives_at_orbits_of_the_search():
     coarse, fine = (gradient[0] - gradient[1]) / (2 * STEP), (gradient[2] - gradient[3]) / STEP
     middle = (4 * (second[2] + second[3]) - (second[0] + second[1])) / 6
     assert middle == pytest.approx((4 * fine - coarse) / 3, rel=SEARCHED)
+
+
+def test_each_orbit_of_the_search_is_differentiated_on_a_mesh_that_resolves_it(monkeypatch):
+    # Slow modulation from faint to sharp: some orbits need more than the coarser mesh.
+    own = {n: BASE[n] for n in law_parameters(RiceRuina)} | MACHINE
+    drive = {"V": 1e-6, "frequency": 0.4, "epsilon": np.array([0.01, 0.05, 0.2, 0.6])}
+    parameters = own | drive | {"K": 1e6}
+    searched = []
+
+    def search(*arguments):
+        searched.extend(search_mesh_orbits(*arguments, meshes=(16, 48)))
+        return tuple(searched)
+
+    monkeypatch.setattr(differentiable, "search_mesh_orbits", search)
+    model = response_function("rice-ruina", harmonics=1, search="direct")
+    values, jacobian = model.value_and_jacobian(parameters)
+    assert (values.outcome == Outcome.CONVERGED).all()
+    served = np.array([orbits.outcome == Outcome.CONVERGED for orbits in searched])
+    assert served.any(axis=1).tolist() == [True, True]
+    assert (served.sum(axis=0) == 1).all()
+    # Only ratios count: of K to W0, of V and V0 to the frequency.
+    by_logarithm = {n: columns(jacobian[n]) * np.reshape(parameters[n], (-1, 1)) for n in jacobian}
+    for group in (("K", "W0"), ("V", "V0", "frequency")):
+        total = sum(by_logarithm[n] for n in group)
+        largest = np.max([np.abs(by_logarithm[n]) for n in group], axis=0)
+        assert (np.abs(total) < SEARCHED * largest).all()

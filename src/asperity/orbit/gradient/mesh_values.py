@@ -14,6 +14,7 @@ from asperity.orbit.gradient.implicit import implicit_solution
 from asperity.orbit.gradient.multipliers import log_multipliers, sorted_logs
 from asperity.orbit.gradient.program import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.gradient.search import (
+    TRACED_MESH,
     MeshOrbits,
     mesh_orbit_shapes,
     search_in_another_process,
@@ -34,7 +35,7 @@ def mesh_orbits(program: Program, parameters: Parameters, wanted: Array) -> Mesh
     """Orbits by the search, which a compiled program calls if any point is wanted."""
     equations = program.equations
     (points,) = wanted.shape
-    shapes = mesh_orbit_shapes(equations, program.states, points, program.harmonics)
+    shapes = mesh_orbit_shapes(program.states, points, program.harmonics, TRACED_MESH)
 
     def search(parameters: Any, wanted: Any) -> MeshOrbits:
         values = {n: np.asarray(v) for n, v in parameters.items()}
