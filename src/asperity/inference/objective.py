@@ -241,7 +241,12 @@ class Objective:
         self.forget()
 
     def minimise(
-        self, u: Float, kept: Mapping[int, float] | None = None, *, tolerance: float | None = None
+        self,
+        u: Float,
+        kept: Mapping[int, float] | None = None,
+        *,
+        tolerance: float | None = None,
+        evaluations: int = 100,
     ) -> tuple[Float, float]:
         """Coordinates of the minimum that is reached from u, and its chi-squared.
 
@@ -252,6 +257,8 @@ class Objective:
             Coordinates that stay at the given values.
         tolerance : float, optional
             Relative change of the coordinates that ends it, if not that of the objective.
+        evaluations : int
+            Largest number of evaluations of the residuals.
         """
         tolerance = self.tolerance if tolerance is None else tolerance
         kept = dict(kept or {})
@@ -282,7 +289,7 @@ class Objective:
             xtol=tolerance,
             ftol=1e-2 * tolerance,
             gtol=tolerance,
-            max_nfev=100,
+            max_nfev=evaluations,
         )
         found = whole(result.x)
         return found, self.chi2(found)

@@ -10,6 +10,7 @@ from asperity.inference.fitting.minima import minima_of, with_noise
 from asperity.inference.fitting.profile import Profile
 from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm
+from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import unknowns_of
 from asperity.laws import get_law
@@ -177,3 +178,55 @@ def test_a_wrong_minimum_that_few_starts_of_the_fast_method_reach_is_left():
     u, chi2 = minima_of(objective, 0)[0]
     assert u[0] == pytest.approx(deep, abs=0.2)
     assert chi2 == pytest.approx(99, abs=0.01)
+
+
+class Rows(Formula):
+    """As `Formula` with a residual for each row of a table; counts the rows that are computed.
+
+    The residual of row i is `values(x)[i]`; no orbit is found by the fast method.
+    """
+
+    def __init__(self, values, count, kept=None, computed=None):
+        super().__init__(values, edge=-math.inf)
+        self.kept = np.arange(count) if kept is None else kept
+        self.computed = [] if computed is None else computed
+        points = {n: np.arange(1.0, 1 + self.kept.size) for n in ("V", "epsilon", "frequency")}
+        column = {"mu1": np.ones(self.kept.size)}
+        self.table = LockInTable("rows", points, column, column)
+
+    def with_rows(self, kept):
+        part = Rows(self.values, 0, self.kept[kept], self.computed)
+        part.searching = True
+        return part
+
+    def residuals(self, values, *, search=None):
+        if not self.searching:
+            return None
+        r, slope = (v[self.kept] for v in self.values(math.log(values["D0"])))
+        self.computed.append(r.size)
+        names, rows = np.full(r.size, "mu1"), np.arange(r.size)
+        return Residuals(r, (slope / values["D0"])[:, None], names, rows, log_scale=0.0)
+
+    def chi2_of_many(self, unknowns, u):
+        return np.array([np.sum(self.residuals({"D0": math.exp(x)}).values ** 2) for (x,) in u])
+
+
+def test_few_rows_lead_to_the_minimum_of_all():
+    rows = 128
+    scatter = np.random.default_rng(1).normal(size=rows)
+    phase = 0.4 * np.arange(rows)
+
+    def values(x):
+        # Every row sees x through a sine of its own phase: several minima, one of them low.
+        r = 30 * (np.sin(2 * (x - FIRST) + phase) - np.sin(phase)) + scatter
+        return r, 60 * np.cos(2 * (x - FIRST) + phase)
+
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={}, priors={})
+    term = Rows(values, rows)
+    objective = Objective((term,), LAW, unknowns, {})
+    u, chi2 = minima_of(objective, 0)[0]
+    exact = objective.minimise(np.array([FIRST]))
+    assert (u[0] - FIRST) % math.pi == pytest.approx((exact[0][0] - FIRST) % math.pi, abs=1e-7)
+    assert chi2 == pytest.approx(exact[1], rel=1e-9)
+    # All rows at the end alone.
+    assert sum(n == rows for n in term.computed) < 0.2 * len(term.computed)

@@ -11,7 +11,7 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.inference.comparison.cross_validation import CrossValidation, leave_one_run_out
-from asperity.inference.comparison.evidence import Evidence, evidence_of
+from asperity.inference.comparison.evidence import Evidence, evidence_of, searches
 from asperity.inference.fitting.fit import Data, fit, listed_data
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
@@ -205,13 +205,18 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
 
 
 def _examined(found: Comparison) -> Comparison:
-    """The comparison with evidence and cross-validation of every law."""
-    judged = {
-        name: replace(j, evidence=evidence_of(j.fit), cross_validation=leave_one_run_out(j.fit))
-        if j.fit.converged
-        else j
-        for name, j in found.laws.items()
-    }
+    """The comparison with evidence and cross-validation of every law.
+
+    Orbits that are searched for take minutes for it: of an excluded law, only the normal
+    approximation of the evidence.
+    """
+    judged = {}
+    for name, j in found.laws.items():
+        if j.fit.converged and j.excluded and searches(j.fit):
+            j = replace(j, evidence=evidence_of(j.fit, samples=0))
+        elif j.fit.converged:
+            j = replace(j, evidence=evidence_of(j.fit), cross_validation=leave_one_run_out(j.fit))
+        judged[name] = j
     return replace(found, laws=judged, verdict=found.verdict + _second_opinion(judged, found.best))
 
 

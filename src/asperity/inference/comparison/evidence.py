@@ -18,13 +18,13 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import Objective
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.sampling import whitened_posterior
-from asperity.inference.tables.residuals import columns_of
-from asperity.inference.tables.term import LockInTerm, all_converged
+from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 
-#: Samples, and the degrees of freedom of the distribution that they come from.
-_SAMPLES, _TAILS = 1024, 5.0
+#: Samples, those of a law whose orbits are searched for, which takes a hundred times as long, and
+#: the degrees of freedom of the distribution that they come from.
+_SAMPLES, _SEARCHED, _TAILS = 1024, 128, 5.0
 #: Effective samples below which the number is no more than a guess.
 _ENOUGH = 50.0
 
@@ -62,14 +62,16 @@ class Evidence:
         return self.effective_samples >= _ENOUGH
 
 
-def evidence_of(found: Fit, *, samples: int = _SAMPLES, seed: int = 0) -> Evidence:
+def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evidence:
     """Evidence of a fitted law.
 
     Parameters
     ----------
     found : Fit
         Converged.
-    samples : int
+    samples : int, optional
+        By default 1024, and 128 where the orbits of a table are searched for; 0 for the normal
+        approximation alone.
     seed : int
 
     Notes
@@ -77,12 +79,18 @@ def evidence_of(found: Fit, *, samples: int = _SAMPLES, seed: int = 0) -> Eviden
     The prior is `PriorDensity`. A range k times as wide of a parameter that these data determine
     lowers the logarithm by ln k.
     """
+    if samples is None:
+        samples = _SEARCHED if searches(found) else _SAMPLES
     if not found.objective.unknowns:
         # Nothing to average over.
         density = found.log_likelihood
         return Evidence(density, 0.0, float(samples), density, 0, {})
     whitened = whitened_posterior(found)
     n = whitened.mode.size
+    at_mode = float(_log_target(whitened, np.zeros((1, n)))[0])
+    laplace = at_mode + 0.5 * n * math.log(2 * math.pi)
+    if samples == 0:
+        return Evidence(laplace, math.nan, 0.0, laplace, 0, whitened.prior.record())
     proposal = multivariate_t(np.zeros(n), np.eye(n), df=_TAILS, seed=seed)
     z = np.asarray(proposal.rvs(samples)).reshape(samples, n)
     log_weights = _log_target(whitened, z) - proposal.logpdf(z).reshape(samples)
@@ -91,15 +99,19 @@ def evidence_of(found: Fit, *, samples: int = _SAMPLES, seed: int = 0) -> Eviden
     top = log_weights.max()
     weights = np.exp(log_weights - top)
     mean = weights.mean()
-    at_mode = float(_log_target(whitened, np.zeros((1, n)))[0])
     return Evidence(
         float(top + math.log(mean)),
         float(weights.std(ddof=1) / (mean * math.sqrt(samples))),
         float(weights.sum() ** 2 / (weights**2).sum()),
-        at_mode + 0.5 * n * math.log(2 * math.pi),
+        laplace,
         failed,
         whitened.prior.record(),
     )
+
+
+def searches(found: Fit) -> bool:
+    """Whether orbits of a table of the fit are searched for at every call."""
+    return any(isinstance(t, LockInTerm) and t.searches for t in found.objective.terms)
 
 
 def _log_target(whitened: Whitened, z: Float) -> Float:
@@ -115,23 +127,10 @@ def log_likelihoods(objective: Objective, u: Float) -> Float:
     """Logarithms of the likelihood at many coordinates, shapes (samples, n) to (samples,)."""
     total = np.zeros(len(u))
     for term in objective.terms:
-        if isinstance(term, LockInTerm) and not term.forward.uses_search:
-            total += _of_table(objective, term, u)
+        if isinstance(term, LockInTerm):
+            constant = 2 * term.weights.log_scale
+            constant += int(term.weights.reported.sum()) * math.log(2 * math.pi)
+            total -= 0.5 * (term.chi2_of_many(objective.unknowns, u) + constant)
         else:
             return np.array([objective.log_likelihood(x) for x in u])
     return total
-
-
-def _of_table(objective: Objective, term: LockInTerm, u: Float) -> Float:
-    weights, rows = term.weights, term.table.rows
-    values = {
-        k.name: np.repeat(np.asarray(k.to_value(u[:, i])), rows)
-        for i, k in enumerate(objective.unknowns)
-    }
-    predicted, outcome = term.forward.predicted(values, repeats=len(u))
-    columns = columns_of(predicted).reshape(len(u), rows, -1)
-    residuals = np.einsum("rsc,nrc->nrs", weights.matrix, columns) - weights.target
-    good = np.array([all_converged(o) for o in outcome.reshape(len(u), rows)])
-    count = int(weights.reported.sum())
-    found = -0.5 * np.sum(residuals**2, axis=(1, 2)) - weights.log_scale
-    return np.where(good, found - 0.5 * count * math.log(2 * math.pi), -np.inf)

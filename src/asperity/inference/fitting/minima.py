@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,19 @@ _SAME = 1e-3
 _RARE, _WITH_SEARCH = 1 / 16, 32
 #: So many of them are followed while no minimum describes the data.
 _FOLLOWED_FAR_OFF = 10
+#: Rows of a table on which minima are looked for first where orbits are searched for, which takes
+#: ten milliseconds a row; data for each free parameter that they must hold.
+_FEW_ROWS, _DATA_EACH = 16, 3
+#: Relative change of the coordinates that ends the way to a minimum there.
+_NEARBY = 1e-3
+#: Rows on which starts are tried before; evaluations after which a way is compared with the others;
+#: how many times the lowest chi-squared is hopeless then.
+_ROWS_FIRST, _SOME_WAY, _HOPELESS = 4, 10, 1e3
+#: Ends there are one minimum if they differ by less in every coordinate, and are followed on all
+#: rows if their chi-squared is not more than so many times the lowest.
+_SAME_FEW, _AS_GOOD_FEW = 0.02, 3.0
+#: Minima on all rows within this of the lowest chi-squared are followed to their end.
+_WORTH = 50.0
 #: Minimisations that have stopped short and go on with the slower method.
 _SEARCHED = 2
 #: Decrease of chi-squared that is worth that method: a tenth of a standard error.
@@ -67,22 +81,26 @@ def minima_of(
     chi2 = np.array([objective.chi2(u) for u in candidates])
     at = np.flatnonzero(np.isfinite(chi2))
     searched = at.size < (_RARE * chi2.size if _has_table(objective) else 1)
+    few: Objective | None = None
     if searched:
         objective.search_from_now_on()
+        few = _few_rows(objective)
         candidates = [
             candidates[i] for i in dict.fromkeys([*range(min(_WITH_SEARCH, chi2.size)), *at])
         ]
-        chi2 = np.array([objective.chi2(u) for u in candidates])
+        chi2 = _chi2_of_many(few or objective, candidates)
     order = [i for i in np.argsort(chi2) if math.isfinite(chi2[i])]
     starts = [candidates[i] for i in dict.fromkeys([*(i for i in order if i == 0), *order])]
     found: list[tuple[Float, float]] = []
-    followed = [*starts[: _FOLLOWED + 1], *_special_cases(objective, starts)]
+    followed = [*starts[: _FOLLOWED + 1], *_special_cases(few or objective, starts)]
     advance = counted(progress, len(followed))
-    for start in followed:
-        found.append(objective.minimise(start))
-        advance(1)
-    if searched:
-        for start in starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF]:
+    if few is not None:
+        found = _of_all_rows(objective, _ends_on_few_rows(few, followed, starts, advance))
+    else:
+        for start in followed:
+            found.append(objective.minimise(start))
+            advance(1)
+        for start in starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF] if searched else ():
             if found and not _far_off(objective, min(found, key=lambda pair: pair[1])):
                 break
             found.append(objective.minimise(start))
@@ -91,7 +109,7 @@ def minima_of(
         best = found[0][1]
         objective.search_from_now_on()
         stopped = _distinct(found)
-        beyond = [objective.minimise(u) for u, _ in stopped[:_SEARCHED]]
+        beyond = [_onwards(objective, end) for end in stopped[:_SEARCHED]]
         if min(value for _, value in beyond) > best - _GAIN:
             _search_no_more(objective)
         else:
@@ -99,6 +117,103 @@ def minima_of(
             rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
             found = [*beyond, *rest]
     return sorted(found, key=lambda pair: pair[1])
+
+
+def _few_rows(objective: Objective) -> Objective | None:
+    """The objective of a few rows of its table, spread over it; None for other data, or few rows.
+
+    What a law predicts at them places the minimum well enough to begin there with all rows.
+    """
+    (term, *others) = objective.terms
+    if others or not isinstance(term, LockInTerm) or not hasattr(term, "table"):
+        return None
+    table = term.table
+    reported = np.sum([np.isfinite(v) for v in table.values.values()], axis=0)
+    # Points that lie close together repeat each other.
+    order = np.lexsort([table.points[name] for name in ("epsilon", "frequency", "V")])
+    rows = max(
+        _FEW_ROWS, math.ceil(_DATA_EACH * len(objective.unknowns) / max(reported.mean(), 1e-9))
+    )
+    if table.rows < 2 * rows:
+        return None
+    kept = order[np.linspace(0, table.rows - 1, rows).round().astype(int)]
+    return replace(objective, terms=(term.with_rows(np.isin(np.arange(table.rows), kept)),))
+
+
+def _chi2_of_many(objective: Objective, candidates: list[Float]) -> Float:
+    """chi-squared of many starts, infinite where the law has no solution."""
+    (term, *others) = objective.terms
+    if others or not isinstance(term, LockInTerm) or not hasattr(term, "table"):
+        return np.array([objective.chi2(u) for u in candidates])
+    u = np.array(candidates)
+    first = np.zeros(term.table.rows, bool)
+    first[:: max(1, term.table.rows // _ROWS_FIRST)] = True
+    found = np.full(len(u), math.inf)
+    # Most starts far from the data have no orbit at some row, which takes longest to find out.
+    left = np.flatnonzero(np.isfinite(term.with_rows(first).chi2_of_many(objective.unknowns, u)))
+    if left.size:
+        priors = [float(np.sum(objective.prior_residuals(u[i])[0] ** 2)) for i in left]
+        found[left] = term.chi2_of_many(objective.unknowns, u[left]) + priors
+    return found
+
+
+def _ends_on_few_rows(
+    few: Objective,
+    followed: list[Float],
+    starts: list[Float],
+    advance: Callable[[int], None],
+) -> list[tuple[Float, float]]:
+    """Minima on few rows, which are where the whole table is begun with.
+
+    Each start is followed some way; those that are hopeless beside a minimum that describes the
+    data are left there, and while none does, more starts are tried.
+    """
+    ways = []
+    for start in followed:
+        ways.append(few.minimise(start, tolerance=_NEARBY, evaluations=_SOME_WAY))
+        advance(1)
+    for start in starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF]:
+        if not all(_far_off(few, way) for way in ways):
+            break
+        ways.append(few.minimise(start, tolerance=_NEARBY, evaluations=_SOME_WAY))
+    ends: list[tuple[Float, float]] = []
+    for u, value in sorted(ways, key=lambda way: way[1])[: _FOLLOWED + 1]:
+        best = min(ends, key=lambda end: end[1], default=None)
+        hopeless = best is not None and value > _HOPELESS * (best[1] + _FEW_ROWS)
+        if math.isfinite(value) and not (hopeless and best and not _far_off(few, best)):
+            ends.append(few.minimise(u, tolerance=_NEARBY))
+    return ends
+
+
+def _of_all_rows(
+    objective: Objective, ends: list[tuple[Float, float]]
+) -> list[tuple[Float, float]]:
+    """Minima on all rows from the ends on few: the best, and those that may be as good."""
+    ends = [end for end in sorted(ends, key=lambda end: end[1]) if math.isfinite(end[1])]
+    if not ends:
+        return []
+    largest = _AS_GOOD_FEW * (ends[0][1] + len(objective.unknowns) + _FEW_ROWS)
+    distinct = [end for end in _distinct(ends, _SAME_FEW) if end[1] <= largest][:_FOLLOWED]
+    found: list[tuple[Float, float]] = []
+    for u, _ in distinct:
+        if math.isfinite(objective.chi2(u)):
+            found.append(objective.minimise(u, tolerance=_NEARBY))
+    found.sort(key=lambda pair: pair[1])
+    return [
+        objective.minimise(u) if value < found[0][1] + _WORTH else (u, value)
+        for u, value in _distinct(found, _SAME_FEW)
+    ]
+
+
+def _onwards(objective: Objective, end: tuple[Float, float]) -> tuple[Float, float]:
+    """From where the fast method ended, by way of few rows where the law is far off."""
+    u, value = end
+    few = _few_rows(objective) if _far_off(objective, end) else None
+    if few is not None:
+        nearer = few.minimise(u, tolerance=_NEARBY)[0]
+        if objective.chi2(nearer) < value:
+            u = nearer
+    return objective.minimise(u)
 
 
 def _as_it_stands(objective: Objective) -> list[tuple[Float, float]]:
@@ -111,11 +226,11 @@ def _as_it_stands(objective: Objective) -> list[tuple[Float, float]]:
     return [(nowhere, chi2)] if math.isfinite(chi2) else []
 
 
-def _distinct(minima: list[tuple[Float, float]]) -> list[tuple[Float, float]]:
+def _distinct(minima: list[tuple[Float, float]], same: float = _SAME) -> list[tuple[Float, float]]:
     """Minima without those that repeat an earlier one."""
     kept: list[tuple[Float, float]] = []
     for u, value in minima:
-        if all(np.abs(u - other).max() > _SAME for other, _ in kept):
+        if all(np.abs(u - other).max() > same for other, _ in kept):
             kept.append((u, value))
     return kept
 

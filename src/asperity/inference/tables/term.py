@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from copy import copy
 from functools import partial
 from typing import Any
 
@@ -15,7 +16,13 @@ from scipy.stats import norm
 
 from asperity.inference.objective import Residuals
 from asperity.inference.tables.outliers import outlying_rows, standardised
-from asperity.inference.tables.residuals import Prediction, Weights, residuals_of, weights_of
+from asperity.inference.tables.residuals import (
+    Prediction,
+    Weights,
+    columns_of,
+    residuals_of,
+    weights_of,
+)
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
@@ -86,6 +93,28 @@ class LockInTerm:
         # Derivatives may overflow far from all data, where an orbit still converges.
         finite = np.isfinite(found.values).all() and np.isfinite(found.jacobian).all()
         return found if finite else None
+
+    def with_rows(self, kept: NDArray[np.bool_]) -> LockInTerm:
+        """The same for some of the rows."""
+        forward = copy(self.forward)
+        forward.table = self.table.without(~kept)
+        forward.fixed = {n: v[kept] for n, v in self.forward.fixed.items()}
+        return LockInTerm(forward.table, forward)
+
+    def chi2_of_many(self, unknowns: Sequence[Unknown], u: Float) -> Float:
+        """chi-squared at many coordinates of the unknowns, shapes (samples, n) to (samples,).
+
+        Infinite where a row has no periodic orbit.
+        """
+        weights, rows = self.weights, self.table.rows
+        values = {
+            k.name: np.repeat(np.asarray(k.to_value(u[:, i])), rows) for i, k in enumerate(unknowns)
+        }
+        predicted, outcome = self.forward.predicted(values, repeats=len(u))
+        columns = columns_of(predicted).reshape(len(u), rows, -1)
+        residuals = np.einsum("rsc,nrc->nrs", weights.matrix, columns) - weights.target
+        good = np.array([all_converged(o) for o in outcome.reshape(len(u), rows)])
+        return np.where(good, np.nan_to_num(np.sum(residuals**2, (1, 2)), nan=np.inf), np.inf)
 
     @property
     def searches(self) -> bool:
@@ -219,7 +248,7 @@ class Forward:
     def predicted(
         self, free: Mapping[str, Float], repeats: int
     ) -> tuple[Prediction, NDArray[np.int64]]:
-        """Predictions of many sets of parameters, without derivatives or search.
+        """Predictions of many sets of parameters, without derivatives.
 
         Parameters
         ----------
@@ -231,11 +260,12 @@ class Forward:
         fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
         given = {n: v for n, v in (fixed | dict(free)).items() if n != "eps_ratio"}
         given["epsilon"] = fixed["epsilon"] * (fixed | dict(free)).get("eps_ratio", 1.0)
-        given = {n: v for n, v in given.items() if n in self._quick.parameters}
+        function = self._whole if self.uses_search else self._quick
+        given = {n: v for n, v in given.items() if n in function.parameters}
         parts = []
         for start in range(0, repeats * self.table.rows, _BATCH):
             part = {n: v[start : start + _BATCH] for n, v in given.items()}
-            values, mu_ss = self._quick(part), _steady(self.law, part)[0]
+            values, mu_ss = function(part), _steady(self.law, part)[0]
             parts.append((values.mean_friction, mu_ss, values.harmonics, values.outcome))
         mean, steady, harmonics, outcome = (
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
