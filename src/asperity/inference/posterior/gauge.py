@@ -12,6 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len
 
 from asperity.tribometer.filters import between, filtered, low_pass
 
@@ -85,7 +86,8 @@ def gauge_arrays(
     impulse[2 * _AHEAD] = 1.0
     response = filtered(impulse, rate, *low_pass(*gauge))[_AHEAD:]
     # Longer than the two together, so that the end does not reach the beginning.
-    response = np.append(response, np.zeros(size))
+    length = next_fast_len(2 * size + 2 * _AHEAD, real=True)
+    response = np.append(response, np.zeros(length - response.size))
     if times.ndim == 1:
         # The cubic through four samples is linear in each of them.
         last = count - 1

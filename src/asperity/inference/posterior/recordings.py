@@ -7,6 +7,7 @@ linear nuisances are integrated out under flat priors.
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -42,8 +43,8 @@ class RunArrays(NamedTuple):
     gauge : GaugeArrays or None
         Through which the motion at the times is recorded.
     recorded : array, shape (n,)
-    taps : array, shape (n, order + 1)
-        Whitening: w_t = sum_k taps[t, k] x_(t-k).
+    taps : array, shape (order + 1, n)
+        Whitening: w_t = sum_k taps[k, t] x_(t-k).
     basis : array, shape (n, columns)
         Whitened linear nuisances, orthonormal.
     """
@@ -118,19 +119,17 @@ class RunLikelihood:
 
 
 def _whitened(taps: Array, x: Array) -> Array:
-    def add(total: Array, part: tuple[Array, Array]) -> tuple[Array, None]:
-        k, weights = part
-        return total + weights * jnp.roll(x, k), None
-
-    return jax.lax.scan(add, jnp.zeros_like(x), (jnp.arange(taps.shape[1]), taps.T))[0]
+    # Written out: one loop over the samples, where a scan would pass over them for every tap.
+    lags, n = taps.shape
+    before = jnp.append(jnp.zeros(lags - 1), x)
+    parts = [taps[k] * before[lags - 1 - k : lags - 1 - k + n] for k in range(lags)]
+    return functools.reduce(jnp.add, parts)
 
 
 def _transposed(taps: Array, x: Array) -> Array:
-    def add(total: Array, part: tuple[Array, Array]) -> tuple[Array, None]:
-        k, weights = part
-        return total + jnp.roll(weights * x, -k), None
-
-    return jax.lax.scan(add, jnp.zeros_like(x), (jnp.arange(taps.shape[1]), taps.T))[0]
+    lags, n = taps.shape
+    after = jnp.pad(taps * x, ((0, 0), (0, lags - 1)))
+    return functools.reduce(jnp.add, [after[k, k : k + n] for k in range(lags)])
 
 
 def likelihood_of_run(term: RunTerm, names: tuple[str, ...]) -> tuple[RunLikelihood, RunArrays]:
@@ -146,9 +145,9 @@ def likelihood_of_run(term: RunTerm, names: tuple[str, ...]) -> tuple[RunLikelih
     )
     n = term.run.time.size
     size = 1024 * int(np.ceil(n / 1024))
-    taps = np.zeros((size, max(m.order for m in term.models) + 1))
+    taps = np.zeros((max(m.order for m in term.models) + 1, size))
     for model, (a, b) in zip(term.models, term.run.stretches, strict=True):
-        taps[a:b, : model.order + 1] = model.taps(b - a)
+        taps[: model.order + 1, a:b] = model.taps(b - a).T
     arrays, equation = eqx.partition(motion, eqx.is_array_like)
     more = (0, size - n)
     gauge = None

@@ -468,11 +468,16 @@ def _friction(
     times: Array,
 ) -> Array:
     """F/W at times, each a share of the length of a step after its beginning."""
-    x = share[:, None]
-    c = dense.coefficients[step]
-    y = c[:, 0] + x * (c[:, 1] + (1 - x) * (c[:, 2] + x * (c[:, 3] + (1 - x) * c[:, 4])))
+    x = share
+
+    def state(i: int) -> Array:
+        # Each state by itself: those that the force does not depend on are not computed.
+        c = [dense.coefficients[:, j, i][step] for j in range(5)]
+        return c[0] + x * (c[1] + (1 - x) * (c[2] + x * (c[3] + (1 - x) * c[4])))
+
+    y = [state(i) for i in range(dense.coefficients.shape[2])]
     piece = jnp.searchsorted(jax.lax.stop_gradient(drive.edges), times, side="right") - 1
     piece = jnp.clip(piece, 0, drive.pull.shape[0] - 1)
     at = _excitation(drive, values, piece, times)
     load = drive.load[piece] + drive.load_slope[piece] * (times - drive.edges[piece])
-    return motion.force(y.T, at) / load
+    return motion.force(jnp.stack(y), at) / load
