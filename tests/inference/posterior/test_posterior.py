@@ -1,6 +1,7 @@
 """Posteriors: the sampler on known densities, and a posterior against its integral."""
 
 import math
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -170,6 +171,12 @@ def test_blocks_of_a_recording_are_the_same_after_another_fit(steps):
     np.testing.assert_array_equal(
         gradient(z, data)[1], jax.jit(jax.value_and_grad(again))(z, same)[1]
     )
+
+
+def test_a_posterior_of_nothing_is_refused(steps):
+    found = replace(fit_of_steps(steps), parameters={})
+    with pytest.raises(InputError, match="posterior must be of free parameters, got none"):
+        sample_posterior(found)
 
 
 @pytest.mark.parametrize(

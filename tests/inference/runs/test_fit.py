@@ -9,6 +9,7 @@ from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
 
 from asperity.errors import InputError
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
+from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.plausibility import unusual_numbers
 from asperity.inference.runs.copies import require_own_samples
 from asperity.laws import RiceRuina
@@ -44,6 +45,31 @@ def test_the_truth_is_recovered_from_starts_of_the_programs_own(found):
         assert p.se < 0.2 * truth
     assert found.parameters["K"].unit == "Pa/m"
     assert found.undetermined == ()
+
+
+def test_priors_of_what_no_run_has_are_refused(found):
+    (run,) = runs_of(CASE, 1)
+    prior = Prior(8e10, 1e9, "")
+    with pytest.raises(InputError, match=r"prior must be of free parameters .*, got 'K\[typo\]'"):
+        fit(run, "rice-ruina", FREE, prior={"K[typo]": prior})
+    with pytest.raises(InputError, match=r"got 'K'; free it"):
+        fit(run, "rice-ruina", FREE, prior={"K": prior}, fixed={"K": 8e10})
+
+
+def test_minima_that_differ_in_the_times_of_steps_alone_are_one_answer(found):
+    objective = found.objective
+    u = objective.coordinates(found.values)
+    sd = np.array(
+        [
+            abs(p.se / k.slope(p.value))
+            for p, k in zip(found.parameters.values(), objective.unknowns, strict=True)
+        ]
+    )
+    elsewhere = u + np.where([k.name == "D0" for k in objective.unknowns], 3 * sd, 0.0)
+    later = elsewhere + np.where([k.nuisance for k in objective.unknowns], 3 * sd, 0.0)
+    minima = [(u, found.chi2), (elsewhere, found.chi2 + 1), (later, found.chi2 + 2)]
+    described = described_fit(objective, minima, profile=False)
+    assert [round(other.chi2 - found.chi2, 6) for other in described.optima] == [1.0]
 
 
 def test_noise_is_reported(found):

@@ -21,8 +21,6 @@ from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 
-#: Minima are the same if their chi-squared differs by less and no coordinate by more.
-_SAME_CHI2, _SAME_COORDINATE = 1e-3, 1e-2
 #: Other minima this close in chi-squared are reported: 3 standard deviations.
 _RIVAL = 9.0
 #: Where chi-squared is compared with its parabola, in standard deviations, and the rises there
@@ -344,13 +342,9 @@ def _rivals(
     for u, chi2 in minima[1:]:
         if chi2 - minima[0][1] > _RIVAL:
             continue
-        away = np.abs(u - minima[0][0])[asked] / sd[asked]
-        if away.max(initial=0.0) < _NEAR:
-            continue
-        if all(
-            abs(chi2 - other) > _SAME_CHI2 or np.abs(u - v).max() > _SAME_COORDINATE
-            for v, other in kept
-        ):
+        # Those that differ in nuisances alone, such as the times of steps, are one answer.
+        away = [(np.abs(u - v)[asked] / sd[asked]).max(initial=0.0) for v, _ in kept]
+        if min(away) >= _NEAR:
             kept.append((u, chi2))
     return kept[1:]
 

@@ -34,6 +34,7 @@ from asperity.inference.runs.assembly import (
     RunOptions,
     require_newtons,
     require_no_layer,
+    require_own_priors,
     require_seen,
     run_terms,
     shared_stiffness,
@@ -281,6 +282,7 @@ def _objective(
         )
         terms += own
         unknowns += nuisances
+        require_own_priors(unknowns, priors)
     return Objective(
         tuple(terms), law, tuple(unknowns), constants, tolerance=1e-6 if recordings else 1e-10
     )

@@ -100,6 +100,8 @@ def sample_posterior(
             f"fit must have converged, got '{found.message}'; a posterior is sampled from its "
             "maximum on"
         )
+    if not found.parameters:
+        raise InputError("posterior must be of free parameters, got none; free one, such as A")
     for name, value, least in (("chains", chains, 2), ("draws", draws, 100)):
         if value < least:
             raise InputError(f"{name} must be at least {least}, got {value}; ask for more")

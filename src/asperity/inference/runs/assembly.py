@@ -131,6 +131,24 @@ def require_seen(runs: Sequence[RecordedRun], free: Sequence[str]) -> None:
             )
 
 
+def require_own_priors(unknowns: Sequence[Unknown], priors: Mapping[str, Prior]) -> None:
+    """Refuse priors of what is not free, under the name of no run, or of a misspelt one.
+
+    Raises
+    ------
+    InputError
+    """
+    known = [unknown.name for unknown in unknowns]
+    # Of every run by itself.
+    shared = {name.partition("[")[0] for name in known}
+    for name in priors:
+        if name not in known and name not in shared:
+            raise InputError(
+                f"prior must be of free parameters ({', '.join(known)}), got '{name}'; free it, "
+                "correct the name, or leave the prior out"
+            )
+
+
 def require_no_layer(free: Sequence[str]) -> None:
     """Refuse an air layer's numbers as free parameters of recordings.
 
