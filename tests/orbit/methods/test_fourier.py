@@ -26,7 +26,6 @@ def test_load_shear_and_pull_even_or_not():
             velocity=[[1e-6], [1e-5]],
             modulation=LOADS,
             frequency=120.0,
-            harmonics=4,
             methods=(method,),
             waveform=16,
         )
