@@ -10,6 +10,8 @@ from asperity.app.jobs.limits import limited
 from asperity.app.jobs.processes import Jobs
 
 JOB = "asperity.app.api.recordings:"
+#: A law outside the package.
+COMPOSITE = Path(__file__).parents[2] / "examples" / "composite_law.py"
 
 
 @pytest.fixture
@@ -19,7 +21,7 @@ def with_jobs(monkeypatch):
 
     def run(work):
         async def whole():
-            jobs = Jobs(preload="unruly_jobs")
+            jobs = Jobs(preload="unruly_jobs", laws=(f"{COMPOSITE}:Composite",))
             try:
                 return await work(jobs)
             finally:
@@ -34,6 +36,14 @@ def with_jobs(monkeypatch):
 
 async def messages(jobs, job, client="a", **options):
     return [m async for m in jobs.run(client, JOB + job, {"x": 1}, **options)]
+
+
+def test_workers_know_the_laws_that_the_server_was_given(with_jobs):
+    async def work(jobs):
+        return await messages(jobs, "laws")
+
+    (*_, last) = with_jobs(work)
+    assert {"rice-ruina", "composite"} <= set(last["result"])
 
 
 def test_a_job_that_takes_too_much_is_ended(with_jobs):

@@ -1,6 +1,7 @@
 """Jobs that do not listen, for the processes that have to end them; see `test_jobs`."""
 
 from asperity.app.api import recordings
+from asperity.laws import registered
 
 
 def spin(argument, report):
@@ -22,6 +23,11 @@ def answer(argument, report):
     return argument
 
 
+def laws(argument, report):
+    """Names of the laws that the worker knows."""
+    return list(registered())
+
+
 # Workers run what is in the rooms of the page only.
-for job in (spin, hoard, answer):
+for job in (spin, hoard, answer, laws):
     setattr(recordings, job.__name__, job)

@@ -149,3 +149,20 @@ def test_a_law_of_ones_own_by_its_place(asperity) -> None:
     wrong = asperity("response", "--law", f"{place}:Compsite", *point)
     assert wrong.exit_code == 2
     assert "did you mean 'Composite'?" in wrong.stderr
+
+
+def test_a_law_of_ones_own_is_fitted_compared_and_served(asperity, tmp_path: Path) -> None:
+    place = Path(__file__).parents[2] / "examples" / "composite_law.py"
+    data = tmp_path / "readings.csv"
+    data.write_text("V,epsilon,frequency,mean_friction,mean_friction_err\n1e-6,0.1,120,0.45,1e-3\n")
+    common = (data, *MATERIAL, "--free", "A")
+    for laws, others in (("fit", "--law"), ""), (("compare", "--laws"), "rice-ruina,"):
+        shown = asperity(laws[0], *common, laws[1], f"{others}{place}:Composite")
+        assert shown.exit_code == 2
+        assert "composite must have all its numbers, got none for Vc" in shown.stderr
+        wrong = asperity(laws[0], *common, laws[1], f"{others}{place}:Compsite")
+        assert wrong.exit_code == 2
+        assert "did you mean 'Composite'?" in wrong.stderr
+    wrong = asperity("serve", "--law", f"{place}:Compsite")
+    assert wrong.exit_code == 2
+    assert "did you mean 'Composite'?" in wrong.stderr

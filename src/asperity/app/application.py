@@ -8,7 +8,7 @@ import importlib
 import logging
 import os
 import re
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Sequence
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote
@@ -39,7 +39,9 @@ _BUSY = "too many computations wait; try again in a while"
 _log = logging.getLogger("asperity.app")
 
 
-def build(port: int, *, in_notebook: bool = False, prepare: bool = True) -> Guard:
+def build(
+    port: int, *, in_notebook: bool = False, prepare: bool = True, laws: Sequence[str] = ()
+) -> Guard:
     """The application behind its guard.
 
     Parameters
@@ -50,6 +52,8 @@ def build(port: int, *, in_notebook: bool = False, prepare: bool = True) -> Guar
         Whether pages of this machine may show it in a frame.
     prepare : bool
         Whether to compile what the first tab needs as soon as the server starts.
+    laws : sequence of str
+        Places of laws outside the package, which worker processes import too.
     """
     modules = [importlib.import_module(f"asperity.app.api.{tab}") for tab in TABS]
     lane = Lane(threads=min(2, os.cpu_count() or 1))
@@ -69,7 +73,7 @@ def build(port: int, *, in_notebook: bool = False, prepare: bool = True) -> Guar
             elif isinstance(endpoint, Job):
                 # A job with limits has a process for itself, which need not know any orbits.
                 own = endpoint.job.partition(":")[0] if endpoint.limits else "asperity.orbit"
-                jobs = lanes.setdefault(endpoint.lane, Jobs(preload=own))
+                jobs = lanes.setdefault(endpoint.lane, Jobs(preload=own, laws=laws))
                 warm[endpoint.lane] = warm.get(endpoint.lane) or endpoint.warm
                 handler = _job(endpoint, jobs, uploads)
                 limits[path] = endpoint.largest or BODY_LIMIT

@@ -6,7 +6,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from asperity.app.dependencies import require_extra
@@ -16,24 +16,35 @@ from asperity.parameters.arguments import shown
 ADDRESS = "127.0.0.1"
 
 
-def serve(port: int = 8765, *, started: Callable[[str], Any] | None = None) -> None:
+def serve(
+    port: int = 8765,
+    *,
+    laws: Sequence[str] = (),
+    started: Callable[[str], Any] | None = None,
+) -> None:
     """Serve the page until the process is asked to end.
 
     Parameters
     ----------
     port : int
         0 for any that is free.
+    laws : sequence of str
+        Laws outside the package, as `asperity.laws.known_law` takes them.
     started : callable, optional
         Called with the page's address when it can be opened.
 
     Raises
     ------
     InputError
-        If the extra ``app`` is not installed or the port cannot be used.
+        If the extra ``app`` is not installed, a law is not found or the port cannot be used.
     """
     require_extra()
+    from asperity.laws import known_law
+
+    for law in laws:
+        known_law(law)
     listening = listen(port)
-    server = server_on(listening)
+    server = server_on(listening, laws=laws)
     if started is not None:
         _call_when_started(server, started, address_of(listening))
     # uvicorn ends in order on both signals, and raises them again when it is done: an end that was
@@ -92,14 +103,20 @@ def address_of(listening: socket.socket) -> str:
     return f"http://{ADDRESS}:{listening.getsockname()[1]}/"
 
 
-def server_on(listening: socket.socket, *, in_notebook: bool = False, prepare: bool = True) -> Any:
+def server_on(
+    listening: socket.socket,
+    *,
+    in_notebook: bool = False,
+    prepare: bool = True,
+    laws: Sequence[str] = (),
+) -> Any:
     """A uvicorn server for a socket; parameters as of `asperity.app.application.build`."""
     import uvicorn
 
     from asperity.app.application import build
 
     config = uvicorn.Config(
-        build(listening.getsockname()[1], in_notebook=in_notebook, prepare=prepare),
+        build(listening.getsockname()[1], in_notebook=in_notebook, prepare=prepare, laws=laws),
         # uvicorn's own configuration would close every logging handler of the process, and with
         # them, through absl's, the streams of a notebook.
         log_config=None,

@@ -26,7 +26,12 @@ if its AICc exceeds the lowest by 10 or more.
 
 
 @click.command(epilog=_EPILOG)
-@click.option("--laws", default="all", metavar="NAMES", help="Laws to compare: a,b,c or all.")
+@click.option(
+    "--laws",
+    default="all",
+    metavar="NAMES",
+    help="Laws to compare: a,b,c or all; of your own as module:Name or file.py:Name.",
+)
 @click.option("--windows", hidden=True, metavar="SPANS")
 @fit_options
 @click.option("--report", type=Path, metavar="DIR", help="Folder for a page and materials.")

@@ -66,12 +66,14 @@ def point_options(command: Command) -> Command:
     for parameter in reversed(named):
         found = _option(parameter)(found)
     found = material_option()(found)
-    return law_option(
+    return law_option()(found)
+
+
+def law_option(
+    help_text: str = (
         "Friction law, such as elasto-plastic, or one of your own as module:Name or file.py:Name."
-    )(found)
-
-
-def law_option(help_text: str) -> Decorator:
+    ),
+) -> Decorator:
     """``--law``; a law given by its place is imported and registered, and its name passed on."""
     return click.option("--law", metavar="NAME", callback=_named_law, help=help_text)
 

@@ -11,6 +11,7 @@ _EPILOG = """\b
 Examples:
   asperity serve --open
   asperity serve --port 9000
+  asperity serve --law friction.py:MyLaw
 
 \b
 The page listens on this machine only and fetches nothing from elsewhere. Ctrl-C
@@ -27,8 +28,15 @@ ends it. It needs the extra: pip install 'asperity[app]'
     metavar="NUMBER",
     help="Port to listen on; 0 for any that is free.",
 )
+@click.option(
+    "--law",
+    "laws",
+    multiple=True,
+    metavar="PLACE",
+    help="A law of your own on the page, as module:Name or file.py:Name; repeatable.",
+)
 @click.option("--open", "opened", is_flag=True, help="Open the page in the browser.")
-def serve(port: int, opened: bool) -> None:
+def serve(port: int, laws: tuple[str, ...], opened: bool) -> None:
     """Serve the page: explore, map, and look at recordings in a browser."""
     from asperity.app.server import serve as run
 
@@ -39,7 +47,7 @@ def serve(port: int, opened: bool) -> None:
 
             webbrowser.open(address)
 
-    run(port, started=started)
+    run(port, laws=laws, started=started)
     # Without waiting for a program that is just being compiled.
     sys.stderr.flush()
     os._exit(0)

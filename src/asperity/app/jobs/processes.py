@@ -6,7 +6,7 @@ import asyncio
 import contextlib
 import json
 import sys
-from collections.abc import AsyncGenerator, Mapping
+from collections.abc import AsyncGenerator, Mapping, Sequence
 from typing import Any
 
 #: Longest message of a worker (bytes).
@@ -32,11 +32,19 @@ class Jobs:
         Jobs that may wait.
     preload : str
         Module that a worker imports before its first job comes.
+    laws : sequence of str
+        Places of laws outside the package, which it registers.
     """
 
-    def __init__(self, workers: int = 1, most: int = 20, preload: str = "asperity.orbit") -> None:
+    def __init__(
+        self,
+        workers: int = 1,
+        most: int = 20,
+        preload: str = "asperity.orbit",
+        laws: Sequence[str] = (),
+    ) -> None:
         self._most = most
-        self._preload = preload
+        self._preload = (preload, *laws)
         self._free = asyncio.Semaphore(workers)
         self._waiting = 0
         self._idle: list[_Worker] = []
@@ -206,14 +214,14 @@ class _Worker:
         self._reader = asyncio.get_running_loop().create_task(self._read_lines())
 
     @classmethod
-    async def start(cls, preload: str) -> _Worker:
-        """Start a process that imports a module before its first job."""
+    async def start(cls, preload: Sequence[str]) -> _Worker:
+        """Start a process that imports a module, and laws, before its first job."""
         return cls(
             await asyncio.create_subprocess_exec(
                 sys.executable,
                 "-m",
                 "asperity.app.jobs.worker",
-                preload,
+                *preload,
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 limit=_LONGEST,

@@ -1,9 +1,10 @@
 """The process that runs a job: one line of JSON in a request, lines of JSON as it goes on.
 
-Started as ``python -m asperity.app.jobs.worker MODULE``, which it imports. A request is ``{"job":
-"module:function", "argument": ..., "limits": ...}``; the function is called with the argument and
-with a function that sends a message, and its result is the last message. ``{"cancel": true}`` on
-the input makes the next report of progress raise `Cancelled`.
+Started as ``python -m asperity.app.jobs.worker MODULE [LAW...]``: it imports the module and
+registers the laws, given by their places. A request is ``{"job": "module:function", "argument":
+..., "limits": ...}``; the function is called with the argument and with a function that sends a
+message, and its result is the last message. ``{"cancel": true}`` on the input makes the next report
+of progress raise `Cancelled`.
 """
 
 from __future__ import annotations
@@ -56,13 +57,21 @@ def main() -> None:
         os._exit(0)  # the server is gone
 
     threading.Thread(target=listen, daemon=True).start()
-    for module in sys.argv[1:]:  # what jobs need, before the first one comes
-        importlib.import_module(module)
+    _import(*sys.argv[1:])  # what jobs need, before the first one comes
     while True:
         arrived.acquire()
         request = requests.pop(0)
         cancelled.clear()
         _answer(request, channel, cancelled)
+
+
+def _import(module: str, *laws: str) -> None:
+    importlib.import_module(module)
+    if laws:
+        from asperity.laws import known_law
+
+        for law in laws:
+            known_law(law)
 
 
 def _answer(request: dict[str, Any], channel: IO[str], cancelled: threading.Event) -> None:

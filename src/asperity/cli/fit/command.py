@@ -12,7 +12,7 @@ import click
 from asperity.cli.fit.data import RUN_OPTIONS, FitData, priors_of, run_options
 from asperity.cli.fit.posterior import PosteriorOptions, posterior_options, posterior_text
 from asperity.cli.measure.source import RecordingSource, source_options
-from asperity.cli.options import json_option, law_named, material_named, settings_of
+from asperity.cli.options import json_option, law_named, law_option, material_named, settings_of
 from asperity.errors import InputError
 from asperity.outputs import require_folder
 
@@ -120,7 +120,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
 
 
 @click.command(epilog=_EPILOG)
-@click.option("--law", metavar="NAME", help="Friction law, such as elasto-plastic.")
+@law_option()
 @click.option(
     "--windows",
     metavar="SPANS|auto",
@@ -266,18 +266,18 @@ def _runs(found: Fit) -> list[str]:
 
 
 def checked_laws(text: str) -> list[str]:
-    """Names of laws from ``all`` or a list.
+    """Names of laws from ``all`` or a list of names and places.
 
     Raises
     ------
     InputError
         If a name is unknown.
     """
-    from asperity.laws import get_law, registered
+    from asperity.laws import get_law, known_law, registered
 
     if text.strip() == "all":
         return [name for name, law in registered().items() if law.rate_dependent]
-    names = [name.strip() for name in text.split(",") if name.strip()]
+    names = [known_law(name.strip()) for name in text.split(",") if name.strip()]
     if not names:
         raise InputError(f"--laws must name laws, got '{text}'; write 'all' or a,b,c")
     for name in names:
