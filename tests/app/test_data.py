@@ -414,11 +414,19 @@ def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps):
     assert run.velocities == pytest.approx([1e-6, 1e-5], rel=1e-3)
 
 
+def test_the_means_a_second_go_into_the_fit_and_its_command(steps):
+    asked = fits.Fitted.model_validate(steps["asked"] | {"fit_rate": "2 Hz"})
+    assert fits._run_options(asked) == asp.inference.RunOptions(fit_rate="2 Hz")
+    assert "--fit-rate '2 Hz'" in fits._run_arguments(asked)
+
+
 @pytest.mark.parametrize(
     ("asked", "run", "word"),
     [
         ({"gauge": "-1 Hz"}, {}, "gauge"),
         ({"gauge": "1 kg"}, {}, "gauge"),
+        ({"fit_rate": "0 Hz"}, {}, "fit_rate"),
+        ({"fit_rate": "many"}, {}, "fit_rate"),
         ({"free": ["alpha"], "laws": ["linker-dieterich"]}, {}, "alpha"),
         ({}, {"velocities": ["1 um/s"]}, "velocities"),
         ({}, {"velocities": ["fast", "slow"]}, "velocities"),
@@ -450,6 +458,7 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
         form.get_by_label(label, exact=True).set_checked(on)
     for label in ("eps_ratio", "A", "B", "D0"):
         form.get_by_label(label, exact=True).set_checked(label != "eps_ratio")
+    form.get_by_label("Means a second of long recordings").fill("full")
     form.get_by_label("Intervals by profile likelihood").check()
     fit = page.locator("section.fit")
     fit.get_by_role("button", name="Fit", exact=True).click()

@@ -83,7 +83,7 @@ class Fitted(Question):
     rows : list of dict
         What measuring has given, see `asperity.measurement.campaign`.
     runs : list of Run
-    trend, drift, initial, gauge, gauge_order
+    trend, drift, initial, gauge, gauge_order, fit_rate
         How recordings are compared with the motion.
     posterior, chains, draws, seed
         Whether to sample the posterior of the one law, and how.
@@ -104,6 +104,7 @@ class Fitted(Question):
     initial: Literal["steady", "free"] = "steady"
     gauge: Name | None = None
     gauge_order: Annotated[int, Field(ge=1, le=8)] = 1
+    fit_rate: Name | None = None
     fixed: Annotated[dict[Name, Name], Field(max_length=30, default_factory=dict)]
     start: Annotated[dict[Name, Name], Field(max_length=30, default_factory=dict)]
     material: Name | None = None
@@ -278,7 +279,8 @@ def _run_options(asked: Fitted) -> Any:
             raise InputError(f"gauge must be positive, got '{asked.gauge}'; give its low-pass")
         gauge = asked.gauge_order, corner
     linear = ("offset", *trends[asked.trend], *(("drift",) if asked.drift else ()))
-    return RunOptions(linear=linear, initial=asked.initial, gauge=gauge)
+    rate = asked.fit_rate or None
+    return RunOptions(linear=linear, initial=asked.initial, gauge=gauge, fit_rate=rate)
 
 
 def _sampled(found: Any, asked: Fitted, report: Callable[..., None]) -> Any:
@@ -443,4 +445,6 @@ def _run_arguments(asked: Fitted) -> list[str]:
         parts.append(f"--initial {asked.initial}")
     if asked.gauge:
         parts.append(f"--gauge {shlex.quote(asked.gauge)} --gauge-order {asked.gauge_order}")
+    if asked.fit_rate:
+        parts.append(f"--fit-rate {shlex.quote(asked.fit_rate)}")
     return parts

@@ -10,10 +10,10 @@ import { digits, quantity } from "../../lib/units.js";
 const SETTINGS = {
   laws: ["elasto-plastic"], material: "bureau2000", free: ["eps_ratio", "lambda"], fixed: "",
   prior: false, profile: false, inertia: false, report: false, posterior: false, draws: "1000", chains: "4",
-  trend: "linear", drift: false, initial: "steady", gauge: "", velocities: "",
+  trend: "linear", drift: false, initial: "steady", gauge: "", fit_rate: "", velocities: "",
 };
 const FLAGS = ["prior", "profile", "inertia", "report", "drift", "posterior"];
-const TEXTS = ["material", "fixed", "trend", "initial", "gauge", "velocities", "draws", "chains"];
+const TEXTS = ["material", "fixed", "trend", "initial", "gauge", "fit_rate", "velocities", "draws", "chains"];
 const LABELS = { mean_friction: "mean F/W₀", delta_mu: "Δμ̄", mu1: "μ₁", mu2: "μ₂" };
 
 export class FitPanel {
@@ -94,6 +94,7 @@ export class FitPanel {
         choice("Trend of the friction over slip", ["none", "linear", "quadratic"].map((n) => [n, n]), settings.trend, set("trend")).element,
         choice("State at the beginning", [["steady", "of steady sliding"], ["free", "free"]], settings.initial, set("initial")).element,
         text("Low-pass of the force gauge", "gauge", "none, or 50 Hz"),
+        text("Means a second of long recordings", "fit_rate", "chosen, or 100 Hz, or full"),
         text("Velocities between the steps", "velocities", "measured, or 1 um/s, 10 um/s"),
         tick("A drift over time besides", settings.drift, set("drift")).element));
     fill(this.form,
@@ -149,6 +150,7 @@ export class FitPanel {
       rows: this.rows(), tables: this.tables(), fixed,
       runs: this.runs().map((r) => r.asked),
       trend: settings.trend, drift: settings.drift, initial: settings.initial, gauge: settings.gauge || null,
+      fit_rate: settings.fit_rate || null,
       report: settings.report,
       material: settings.material || null, prior: settings.prior ? settings.material || null : null,
       profile: settings.profile, inertia: settings.inertia,
@@ -322,11 +324,12 @@ export class FitPanel {
   }
 
   #runOptions() {
-    const { trend, drift, initial, gauge } = this.settings;
-    if (!this.runs().length || (trend === "linear" && !drift && initial === "steady" && !gauge)) return "";
+    const { trend, drift, initial, gauge, fit_rate } = this.settings;
+    if (!this.runs().length || (trend === "linear" && !drift && initial === "steady" && !gauge && !fit_rate)) return "";
     const linear = ["offset", ...{ none: [], linear: ["trend"], quadratic: ["trend", "bend"] }[trend], ...(drift ? ["drift"] : [])];
     const corner = gauge ? `, gauge=(1, asp.units.to_si(${JSON.stringify(gauge)}, "frequency", "gauge"))` : "";
-    return `    runs=inference.RunOptions(linear=${JSON.stringify(linear).replace("[", "(").replace("]", ",)")}, initial="${initial}"${corner}),\n`;
+    const rate = fit_rate ? `, fit_rate=${JSON.stringify(fit_rate)}` : "";
+    return `    runs=inference.RunOptions(linear=${JSON.stringify(linear).replace("[", "(").replace("]", ",)")}, initial="${initial}"${corner}${rate}),\n`;
   }
 
   #python() {
