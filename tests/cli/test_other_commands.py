@@ -156,11 +156,14 @@ def test_a_law_of_ones_own_is_fitted_compared_and_served(asperity, tmp_path: Pat
     data = tmp_path / "readings.csv"
     data.write_text("V,epsilon,frequency,mean_friction,mean_friction_err\n1e-6,0.1,120,0.45,1e-3\n")
     common = (data, *MATERIAL, "--free", "A")
-    for laws, others in (("fit", "--law"), ""), (("compare", "--laws"), "rice-ruina,"):
-        shown = asperity(laws[0], *common, laws[1], f"{others}{place}:Composite")
+    for command, option, message in (
+        ("fit", "--law", "composite must have all its numbers, got none for Vc"),
+        ("compare", "--laws", "laws must be two or more, got composite;"),
+    ):
+        shown = asperity(command, *common, option, f"{place}:Composite")
         assert shown.exit_code == 2
-        assert "composite must have all its numbers, got none for Vc" in shown.stderr
-        wrong = asperity(laws[0], *common, laws[1], f"{others}{place}:Compsite")
+        assert message in shown.stderr
+        wrong = asperity(command, *common, option, f"{place}:Compsite")
         assert wrong.exit_code == 2
         assert "did you mean 'Composite'?" in wrong.stderr
     wrong = asperity("serve", "--law", f"{place}:Compsite")
