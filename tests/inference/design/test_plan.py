@@ -65,6 +65,8 @@ def test_time_is_spent_on_settling_and_reading():
         ({"rival": "rice-ruina"}, "one aim, measure or rival, got both"),
         ({"measure": "A"}, "name free parameters, got 'A'"),
         ({"measure": None, "rival": "rice-ruina", "draws": 4}, "draws must be 0 with a rival"),
+        ({"measure": None, "rival": "elasto-plastic"}, "rival must differ from the law"),
+        ({"points": 1, "noise": {"mu1": 2e-5}}, "at least as many data as free parameters, got 1"),
         ({"rival_free": ["A"]}, "rival_free must go with a rival"),
         ({"free": []}, "must name parameters, got none"),
         ({"free": ["V"]}, "free must not have what ranges has, got 'V'"),

@@ -38,6 +38,8 @@ _RUN, _KIND, _REASON, _UNIT = ("run", "file"), "kind", "reason", "unit"
 _TEXTS = (*_RUN, _KIND, _REASON, _UNIT)
 #: Smallest eigenvalue of the correlations of a row.
 _SMALLEST_EIGENVALUE = 1e-9
+#: Forces over the load beyond this are in per cent or not divided by the load.
+_LARGEST_FRICTION = 10.0
 #: Probability below which mean_friction and delta_mu are too alike to have errors of their own.
 _SAME_NOISE = 1e-4
 
@@ -322,6 +324,11 @@ def table_of(
             points[parameter] = _checked(name, parameter, column)
         elif pair is not None:
             covariances[pair] = column
+        elif key.endswith("_cov") and key.startswith(OBSERVABLES):
+            raise InputError(
+                f"{name}.{key} must name two observables as <name>_<name>_cov, of "
+                f"{', '.join(OBSERVABLES)}; correct the name: it would be left out"
+            )
         elif (plain := _observable_of(key)) is not None:
             if plain in observed:
                 raise InputError(
@@ -432,8 +439,10 @@ def _observables(
 
 
 def _refuse_impossible_values(table: str, name: str, column: Float) -> None:
-    """Refuse infinite values, negative amplitudes, and phases that are in degrees."""
+    """Refuse infinite values, wrong signs, and phases or forces in other units."""
     rules = [(np.isinf(column), "be finite", "leave the cell empty")]
+    if name == "mean_friction":
+        rules.append((column <= 0, "be positive", "reverse the sign of the force"))
     if name in ("mu1", "mu2"):
         rules.append(
             (column < 0, "be an amplitude, at least 0", f"put the sign into phase{name[-1]}")
@@ -442,6 +451,10 @@ def _refuse_impossible_values(table: str, name: str, column: Float) -> None:
         rules.append(
             (np.abs(column) > 2 * math.pi, "be in rad, from -2 pi to 2 pi", "convert degrees")
         )
+    else:
+        limit = f"be a force over W0, below {_LARGEST_FRICTION:g}"
+        beyond = np.abs(column) >= _LARGEST_FRICTION
+        rules.append((beyond, limit, "divide by the load, or convert per cent"))
     for bad, rule, advice in rules:
         if bad.any():
             row = int(np.flatnonzero(bad)[0])

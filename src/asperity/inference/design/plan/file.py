@@ -94,6 +94,11 @@ def plan_of(
         own = {*point_parameters(rival_law), EPS_RATIO.name}
         free = reader.names("rival_free") or tuple(n for n in truth.names if n in own)
         rival = reader.hypothesis(rival_law, free, material, table)
+        if rival_law is law and set(truth.names) <= set(rival.names):
+            raise InputError(
+                f"{name}.rival must differ from the law, got {law.name} with the same free "
+                "parameters; name another law, or leave one out in rival_free"
+            )
     elif "rival_free" in content:
         raise InputError(f"{name}.rival_free must go with a rival, got no rival; leave it out")
     motion = {name: reader.switch(name) for name in ("inertia", "radiation_damping")}
@@ -121,11 +126,19 @@ def plan_of(
                 f"{name}.ranges.epsilon times eps_ratio must be below 1, got "
                 f"{carried * largest:g}; contact would be lost"
             )
+    noise, budget = reader.noise(), reader.budget()
+    unknown = sum(1 for u in truth.unknowns if u.prior is None)
+    if budget.readings is not None and budget.readings * len(noise) < unknown:
+        raise InputError(
+            f"{name}.points must give at least as many data as free parameters, got "
+            f"{budget.readings * len(noise)} for {unknown} without a prior; plan more, or free "
+            "fewer"
+        )
     return DesignPlan(
         name=name,
         axes=axes,
-        noise=reader.noise(),
-        budget=reader.budget(),
+        noise=noise,
+        budget=budget,
         truth=truth,
         rival=rival,
         measured=measured,
