@@ -130,7 +130,7 @@ class Branch(Displayed):
     fixed : dict
         Parameters of the operating point that were kept fixed, SI.
     origin : BranchOrigin
-        Origin, from which other branches are switched to.
+        Line and operating point that other branches are switched to from.
     last : ContinuationPoint
         The last orbit, on its mesh.
     """

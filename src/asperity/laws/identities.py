@@ -238,7 +238,7 @@ def units(law: Law) -> None:
 
 
 def slope_of_steady_friction(law: Law, slope: Slope) -> None:
-    """D mu_ss / d ln v is what the publication says."""
+    """Derivative of mu_ss to ln v is what the publication says."""
     for v in SPEEDS:
         found = jax.grad(lambda log_v: law.mu_ss(jnp.exp(log_v)))(jnp.log(v))
         np.testing.assert_allclose(found, slope(v), rtol=1e-10, atol=EXACT)

@@ -31,6 +31,6 @@ class PerrinRiceZheng(RiceRuina):
     )
 
     def ageing(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
-        """D ln(Phi)/dt = 1/Phi - (v / (2 D0))^2 Phi (1/s)."""
+        """Rate d ln(Phi)/dt = 1/Phi - (v / (2 D0))^2 Phi (1/s)."""
         growth = self.V0 * jnp.exp(-self.log_age(state, w))  # 2 D0 / Phi
         return (growth - v**2 / growth) / (2 * self.D0)

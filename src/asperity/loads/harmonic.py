@@ -29,12 +29,12 @@ class Harmonic(Modulation):
 
     @property
     def amplitude(self) -> ArrayLike:
-        """Epsilon."""
+        """Relative amplitude epsilon."""
         return self.epsilon
 
     @property
     def even(self) -> bool:
-        """Always."""
+        """True: there is a cosine only."""
         return True
 
     @property

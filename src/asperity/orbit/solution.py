@@ -92,7 +92,7 @@ class Solution(NamedTuple):
     ) -> None:
         """Write converged points, with logarithms of the multipliers if these are known better.
 
-        Not their waveforms, which are sampled once an orbit is settled.
+        Not their waveforms, which are sampled once an orbit is final.
         """
         self.mean_friction[rows] = observables.mean_friction
         self.harmonics[:, rows] = observables.harmonics

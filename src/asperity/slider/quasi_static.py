@@ -65,7 +65,7 @@ class QuasiStatic(Motion):
     def mechanical_states(
         self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
     ) -> tuple[Array, ...]:
-        """Z."""
+        """Joint elongation z."""
         return (friction * (at.w + self.compliance_ratio) - at.shear,)
 
     def _velocity(self, Y: Array, at: Excitation, slip: Array) -> Array:

@@ -85,7 +85,7 @@ class ReversingInertial(_Damped):
         return jnp.stack([one, steepness, *(one for _ in Y[2:])])
 
     def _steepness(self, friction: Array, state: tuple[Array, ...], w: Array) -> Array:
-        """D(v/V) / d(F_i/W)."""
+        """Derivative of v/V to F_i/W."""
         return _steepness(self.slider.law, friction, state, w) / self.V
 
 

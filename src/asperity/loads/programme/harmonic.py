@@ -87,12 +87,12 @@ class HarmonicSegment(ProgrammeSegment):
         return at.w, at.w_slope
 
     def shear(self, t: ArrayLike) -> tuple[Array, Array]:
-        """S and dS/dt."""
+        """Shear force S and dS/dt."""
         at = self.at(t, 1.0, 1.0)
         return at.shear, at.shear_slope
 
     def pull(self, t: ArrayLike) -> Array:
-        """V."""
+        """Pulling velocity V."""
         return self.at(t, 1.0, 1.0).pull
 
     def position(self, t: ArrayLike) -> Array:

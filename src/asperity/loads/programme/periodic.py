@@ -47,12 +47,12 @@ class PeriodicSegment(ProgrammeSegment):
         return self.load1 * at.w, self.load1 * at.w_slope * self._omega
 
     def shear(self, t: ArrayLike) -> tuple[Array, Array]:
-        """S and dS/dt."""
+        """Shear force S and dS/dt."""
         at = self._excitation(t)
         return self.load1 * at.shear, self.load1 * at.shear_slope * self._omega
 
     def pull(self, t: ArrayLike) -> Array:
-        """V."""
+        """Pulling velocity V."""
         return self.pull1 * self._excitation(t).pull * jnp.ones_like(t)
 
     def position(self, t: ArrayLike) -> Array:

@@ -106,7 +106,7 @@ class Programme:
 
     @property
     def duration(self) -> float:
-        """Seconds."""
+        """Length of the programme (s)."""
         return float(self.starts[-1])
 
     @property

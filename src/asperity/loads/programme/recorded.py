@@ -95,11 +95,11 @@ class RecordedSegment(ProgrammeSegment):
         return self.load_curve.value(t)
 
     def shear(self, t: ArrayLike) -> tuple[float, float]:
-        """None."""
+        """No shear force besides the spring's."""
         return 0.0, 0.0
 
     def pull(self, t: ArrayLike) -> Array:
-        """V."""
+        """Pulling velocity V."""
         return self.pull_curve.value(t)[0]
 
     def position(self, t: ArrayLike) -> Array:

@@ -1,4 +1,4 @@
-"""Collocation on one interval: linearised at its Gauss points, condensed to a transfer map.
+"""Collocation on one interval: linearised at its collocation points, condensed to a transfer map.
 
 The response of the slopes at the collocation points to a change at the left node of an interval
 is a small dense system. Solved interval by interval it leaves equations for the nodes alone.

@@ -1,7 +1,7 @@
-"""The robust method: Gauss-Legendre collocation with Newton's method on the whole orbit.
+"""The robust method: collocation with Newton's method on the whole orbit.
 
-On each interval the states are polynomials that obey the equations at four Gauss points. Newton's
-step is condensed interval by interval to a transfer map, the maps are tied into a cycle by
+On each interval the states are polynomials that obey the equations at four points: those of
+Gauss-Legendre, or of Radau IIA where modes decay within an interval. Newton's step is condensed interval by interval to a transfer map, the maps are tied into a cycle by
 `asperity.algebra.cyclic`, and their product is the monodromy matrix. Stable or not makes no
 difference to it, and neither do fast and slow directions.
 
