@@ -69,5 +69,5 @@ class RiceRuina(Law):
         return state[0]
 
     def ageing(self, v: ArrayLike, state: State, w: ArrayLike) -> Array:
-        """Rate d ln(Phi)/dt = 1/Phi - v/D0 (1/s), for whichever velocity `v` renews the contacts."""
+        """Rate d ln(Phi)/dt = 1/Phi - v/D0 (1/s); `v` is what renews the contacts."""
         return (self.V0 * jnp.exp(-self.log_age(state, w)) - v) / self.D0

@@ -1,9 +1,10 @@
 """The robust method: collocation with Newton's method on the whole orbit.
 
 On each interval the states are polynomials that obey the equations at four points: those of
-Gauss-Legendre, or of Radau IIA where modes decay within an interval. Newton's step is condensed interval by interval to a transfer map, the maps are tied into a cycle by
-`asperity.algebra.cyclic`, and their product is the monodromy matrix. Stable or not makes no
-difference to it, and neither do fast and slow directions.
+Gauss-Legendre, or of Radau IIA where modes decay within an interval. Newton's step is condensed
+interval by interval to a transfer map, the maps are tied into a cycle by `asperity.algebra.cyclic`,
+and their product is the monodromy matrix. Stable or not makes no difference to it, and neither do
+fast and slow directions.
 
 The exponent of the slip rate changes by tens of units within a period, so the step is shortened
 until no exponent and no logarithmic state changes by more than a few units.
