@@ -72,6 +72,21 @@ def test_minima_that_differ_in_the_times_of_steps_alone_are_one_answer(found):
     assert [round(other.chi2 - found.chi2, 6) for other in described.optima] == [1.0]
 
 
+@pytest.mark.parametrize("number", [2, 3])
+def test_a_drift_that_outweighs_the_signal_hides_no_minimum(number):
+    """Under white noise, as under least squares, it passes for slow evolution of the friction."""
+
+    def drift(random, n, rate):
+        walk = np.cumsum(random.normal(size=n)) / np.sqrt(n)
+        return 2e-4 * random.normal(size=n) + 1.2e-2 * walk
+
+    *_, run = runs_of(CASE, number + 1, 0, drift)
+    found = fit(run, "rice-ruina", FREE, start=TRUE, starts=1)
+    for name, truth in TRUE.items():
+        p = found.parameters[name]
+        assert abs(p.value - truth) < 4 * p.se
+
+
 def test_noise_is_reported(found):
     (term,) = found.objective.terms
     # White, half a second and eight seconds, and a line: far fewer samples than 1,400 count.

@@ -22,7 +22,7 @@ from asperity.inference.fitting.inputs import (
     require_motion,
     start_values,
 )
-from asperity.inference.fitting.minima import minima_of, with_noise
+from asperity.inference.fitting.minima import minima_of, under_drift, with_noise
 from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,
@@ -153,7 +153,10 @@ def fit(
     if not minima:
         return failed_fit(objective)
     if recordings:
-        minima, agreed = with_noise(objective, minima)
+        # Under white noise a drift passes for slow evolution, and the true minimum may be none.
+        drifting = under_drift(searched) if options.order != 0 else None
+        besides = minima_of(drifting, seed, drawn=starts) if drifting else []
+        minima, agreed = with_noise(objective, minima, drifting, besides)
         if not math.isfinite(minima[0][1]):
             return failed_fit(objective)
         found = described_fit(objective, minima, profile=profile)

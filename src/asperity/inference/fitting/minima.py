@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -23,6 +24,8 @@ Float = NDArray[np.float64]
 _FOLLOWED = 3
 #: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
 _ROUNDS, _STILL = 8, 0.03
+#: Standard deviations of the parameters within which two starts lead to the same minimum.
+_ALLOWED = 5.0
 #: Minima nearer than this in every coordinate are one.
 _SAME = 1e-3
 
@@ -216,6 +219,15 @@ def _onwards(objective: Objective, end: tuple[Float, float]) -> tuple[Float, flo
     return objective.minimise(u)
 
 
+def under_drift(objective: Objective) -> Objective:
+    """The objective with recordings whose noise is taken for a slow drift."""
+    terms = tuple(copy(term) if isinstance(term, RunTerm) else term for term in objective.terms)
+    for term in terms:
+        if isinstance(term, RunTerm):
+            term.expect_slow_noise()
+    return replace(objective, terms=terms, _last=None)
+
+
 def _as_it_stands(objective: Objective) -> list[tuple[Float, float]]:
     """The one point of an objective without free parameters, if the law has a solution there."""
     nowhere = np.zeros(0)
@@ -236,12 +248,17 @@ def _distinct(minima: list[tuple[Float, float]], same: float = _SAME) -> list[tu
 
 
 def with_noise(
-    objective: Objective, minima: list[tuple[Float, float]]
+    objective: Objective,
+    minima: list[tuple[Float, float]],
+    drifting: Objective | None = None,
+    besides: Sequence[tuple[Float, float]] = (),
 ) -> tuple[list[tuple[Float, float]], bool]:
     """Minima once the noise is that of the residual, and whether the two agree at the best.
 
-    Each minimum has the noise that its own residual shows. They are compared by the likelihood,
-    noise included: under the noise of one, which holds its misfit, another is no minimum.
+    Those of `besides`, minima of `drifting`, are followed too if the ends of the others are none
+    there. Each minimum has the noise that its own residual shows. They are compared by the
+    likelihood, noise included: under the noise of one, which holds its misfit, another is no
+    minimum.
 
     Returns
     -------
@@ -257,6 +274,14 @@ def with_noise(
         for term, state in zip(noisy, first, strict=True):
             term.restore_noise(state)
         ends.append(_with_own_noise(objective, noisy, u))
+    for u, value in _distinct(list(besides)):
+        assert drifting is not None  # whose minima they are
+        # Chi-squared of a drift says how large it is: noise has one a sample.
+        allowed = value * (1 + _ALLOWED**2 / drifting.residuals(u)[0].size)
+        if all(drifting.chi2(end.u) > allowed for end in ends):
+            for term, state in zip(noisy, first, strict=True):
+                term.restore_noise(state)
+            ends.append(_with_own_noise(objective, noisy, u))
     best = min(ends, key=lambda end: end.deviance)
     for term, state in zip(noisy, best.states, strict=True):
         term.restore_noise(state)

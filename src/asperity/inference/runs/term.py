@@ -28,6 +28,8 @@ Float = NDArray[np.float64]
 _NOT_WHITE = 1e-3
 #: A peak of the innovations less probable than this is a line; so many are removed.
 _LINE, _LINES = 1e-4, 6
+#: Correlation of neighbouring samples of a slow drift.
+_SLOW = 0.999
 #: Steps towards the noise at given parameters, and what of the fitted curve counts as seen.
 _NOISE_STEPS, _SEEN = 3, 1e-10
 #: A sample that is farther off than this by chance, over the whole run, is an outlier; the largest
@@ -180,6 +182,13 @@ class RunTerm:
         self._whiteness, self._after_changes = state.whiteness, state.after_changes
         self._lines, self._outliers = list(state.lines), list(state.outliers)
         self._jumps = list(state.jumps)
+        self._prepare()
+
+    def expect_slow_noise(self) -> None:
+        """Take the noise for a slow drift, nearly a random walk."""
+        steps = [self._first_noise(a, b).variance for a, b in self.run.stretches]
+        slow = np.array([_SLOW])
+        self.models = [Autoregression(slow, v / (1 - _SLOW**2)) for v in steps]
         self._prepare()
 
     def search_from_now_on(self) -> None:
