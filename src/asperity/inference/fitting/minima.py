@@ -99,6 +99,9 @@ def minima_of(
     advance = counted(progress, len(followed))
     if few is not None:
         found = _of_all_rows(objective, _ends_on_few_rows(few, followed, starts, advance))
+        # Another row may have no orbit at any of the ends.
+        starts = [] if found else [u for u in starts if math.isfinite(objective.chi2(u))]
+        found += [objective.minimise(u) for u in starts[: _FOLLOWED + 1]]
     else:
         for start in followed:
             found.append(objective.minimise(start))
