@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from asperity.inference.fitting.description import described_fit
-from asperity.inference.fitting.minima import minima_of, with_noise
+from asperity.inference.fitting.minima import extends, minima_of, with_noise
 from asperity.inference.fitting.profile import Profile
 from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm
@@ -230,3 +230,58 @@ def test_few_rows_lead_to_the_minimum_of_all():
     assert chi2 == pytest.approx(exact[1], rel=1e-9)
     # All rows at the end alone.
     assert sum(n == rows for n in term.computed) < 0.2 * len(term.computed)
+
+
+class NarrowRows(Rows):
+    """Rows of which one has an orbit near `FIRST` alone, and few rows lead away from there."""
+
+    lonely = 5
+
+    def with_rows(self, kept):
+        part = NarrowRows(self.values, 0, self.kept[kept], self.computed)
+        part.searching = True
+        return part
+
+    def residuals(self, values, *, search=None):
+        near = abs(math.log(values["D0"]) - FIRST) < 0.05
+        if self.lonely in self.kept and not near:
+            return None
+        return super().residuals(values, search=search)
+
+    def chi2_of_many(self, unknowns, u):
+        found = [self.residuals({"D0": math.exp(x)}) for (x,) in u]
+        return np.array([math.inf if r is None else np.sum(r.values**2) for r in found])
+
+
+def test_fits_of_special_cases_are_starts():
+    def values(x):
+        # Rows that are multiples of 3 alone would like another D0.
+        r = 30 * (x - FIRST) * np.ones(96)
+        r[::3] = 30 * (x - SECOND)
+        return r, np.full(96, 30.0)
+
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={}, priors={})
+
+    def found(**options):
+        objective = Objective((NarrowRows(values, 96),), LAW, unknowns, {})
+        return minima_of(objective, 0, **options)
+
+    assert found() == []
+    known = {"D0": math.exp(FIRST + 0.02), "lambda": 1e-6}
+    ((u, chi2),) = found(simpler=[known])
+    assert abs(u[0] - FIRST) < 0.05
+    assert chi2 <= np.sum(values(FIRST + 0.02)[0] ** 2)
+
+
+@pytest.mark.parametrize(
+    ("law", "other", "whether"),
+    [
+        ("elasto-plastic", "rice-ruina", True),
+        ("linker-dieterich", "rice-ruina", True),
+        ("rice-ruina", "elasto-plastic", False),
+        ("elasto-plastic", "linker-dieterich", False),
+        ("ruina-slip", "rice-ruina", False),
+    ],
+)
+def test_laws_that_extend_others(law, other, whether):
+    assert extends(get_law(law), get_law(other)) is whether

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -146,14 +146,17 @@ def compare(
     not_compared: dict[str, str] = {}
 
     def fits_to(data: Sequence[Any], advance: Callable[[int], None]) -> dict[str, Fit]:
-        done = {}
-        for name, names in own.items():
+        done: dict[str, Fit] = {}
+        # Special cases come before the laws that have them, which begin there.
+        for name, names in sorted(own.items(), key=lambda pair: len(_parameters(pair[0]))):
             mine: dict[str, Any] = {
                 key: {n: values[n] for n in _own(name, list(values), laws)}
                 for key, values in given.items()
             }
             try:
-                done[name] = fit(data, name, names, bare=True, **mine, **options)
+                done[name] = fit(
+                    data, name, names, bare=True, simpler=list(done.values()), **mine, **options
+                )
             except MissingNumberError as error:
                 not_compared[name] = str(error)
             advance(1)
@@ -272,9 +275,13 @@ def judge(fits: Mapping[str, Fit]) -> Comparison:
     return Comparison(judged, decided, best, _verdict(judged, left, best, describes))
 
 
+def _parameters(law: str) -> Collection[str]:
+    return law_parameters(get_law(law))
+
+
 def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
-    others = {p for law in laws for p in law_parameters(get_law(law))}
-    mine = law_parameters(get_law(name))
+    others = {p for law in laws for p in _parameters(law)}
+    mine = _parameters(name)
     return [p for p in free if p in mine or p not in others]
 
 

@@ -22,7 +22,7 @@ from asperity.inference.fitting.inputs import (
     require_motion,
     start_values,
 )
-from asperity.inference.fitting.minima import minima_of, under_drift, with_noise
+from asperity.inference.fitting.minima import extends, minima_of, under_drift, with_noise
 from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,
@@ -71,6 +71,7 @@ def fit(
     bare: bool = False,
     starts: int = 64,
     seed: int = 0,
+    simpler: Sequence[Fit] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
     """Fit a friction law to lock-in readings and recordings.
@@ -106,6 +107,9 @@ def fit(
         Starts that are drawn and evaluated besides the given one; the best are followed.
     seed : int
         Of the starts.
+    simpler : sequence of Fit
+        Fits of other laws to the same data; those of special cases of this law, such as Rice-Ruina
+        of the elasto-plastic one, are starts too.
     progress : callable, optional
         Called with the number of starts followed to their minima so far, and of all of them.
 
@@ -149,7 +153,8 @@ def fit(
     objective = compared(recordings)
     # Minima of a long recording are looked for in fewer, longer blocks.
     searched = compared(coarse) if (coarse := coarser(recordings)) else objective
-    minima = minima_of(searched, seed, progress, drawn=starts)
+    special = [f.values for f in simpler if f.converged and extends(chosen, f.objective.law)]
+    minima = minima_of(searched, seed, progress, drawn=starts, simpler=special)
     if not minima:
         return failed_fit(objective)
     if recordings:

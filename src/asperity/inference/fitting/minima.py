@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
@@ -16,6 +16,8 @@ from scipy.stats.qmc import Sobol
 from asperity.inference.objective import Objective
 from asperity.inference.runs.term import NoiseState, RunTerm
 from asperity.inference.tables.term import LockInTerm
+from asperity.laws import Law
+from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
 
 Float = NDArray[np.float64]
@@ -67,10 +69,21 @@ def minima_of(
     progress: Callable[[int, int], None] | None = None,
     *,
     drawn: int = 64,
+    simpler: Sequence[Mapping[str, float]] = (),
 ) -> list[tuple[Float, float]]:
     """Minima from the given start and from the best of many drawn ones, best first.
 
-    `progress` is called with the number of starts that were followed, and of all to be followed.
+    Parameters
+    ----------
+    objective : Objective
+    seed : int
+        Of the drawn starts.
+    progress : callable, optional
+        Called with the number of starts that were followed, and of all to be followed.
+    drawn : int
+    simpler : sequence of mapping of str to float
+        Values, in SI, that fits of special cases of the law have found. A law never describes data
+        worse than its special cases: no minimum is higher than these starts.
     """
     unknowns = objective.unknowns
     if not unknowns:
@@ -92,13 +105,26 @@ def minima_of(
             candidates[i] for i in dict.fromkeys([*range(min(_WITH_SEARCH, chi2.size)), *at])
         ]
         chi2 = _chi2_of_many(few or objective, candidates)
+    special = [
+        u
+        for u in _of_special_cases(objective, simpler)
+        if math.isfinite((few or objective).chi2(u))
+    ]
     order = [i for i in np.argsort(chi2) if math.isfinite(chi2[i])]
     starts = [candidates[i] for i in dict.fromkeys([*(i for i in order if i == 0), *order])]
     found: list[tuple[Float, float]] = []
-    followed = [*starts[: _FOLLOWED + 1], *_special_cases(few or objective, starts)]
+    followed = [
+        *special,
+        *starts[: _FOLLOWED + 1],
+        *_special_cases(few or objective, starts),
+    ]
     advance = counted(progress, len(followed))
     if few is not None:
         found = _of_all_rows(objective, _ends_on_few_rows(few, followed, starts, advance))
+        for u in special:
+            lowest = min((value for _, value in found), default=math.inf)
+            if objective.chi2(u) < lowest:
+                found.append(objective.minimise(u))
         # Another row may have no orbit at any of the ends.
         starts = [] if found else [u for u in starts if math.isfinite(objective.chi2(u))]
         found += [objective.minimise(u) for u in starts[: _FOLLOWED + 1]]
@@ -360,6 +386,24 @@ def _search_no_more(objective: Objective) -> None:
         if isinstance(term, LockInTerm):
             term.forward.uses_search = False
     objective.forget()
+
+
+def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float]]) -> list[Float]:
+    """Coordinates of special cases of the law, where a parameter that extends it nearly is zero."""
+    found = []
+    for values in simpler:
+        u = np.full(len(objective.unknowns), _NEARLY_ZERO)
+        for i, unknown in enumerate(objective.unknowns):
+            if unknown.name in values:
+                u[i] = np.clip(unknown.to_coordinate(values[unknown.name]), *unknown.bounds)
+        found.append(u)
+    return found
+
+
+def extends(law: type[Law], other: type[Law]) -> bool:
+    """Whether a law has the parameters of another and some that extend it, which may be zero."""
+    mine, others = set(law_parameters(law)), set(law_parameters(other))
+    return others < mine and mine - others <= set(_EXTENSIONS)
 
 
 def _special_cases(objective: Objective, starts: list[Float]) -> list[Float]:
