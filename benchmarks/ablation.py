@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from types import ModuleType
 from typing import Any, NamedTuple
 
+import jax
 import numpy as np
 
 from asperity.orbit import Outcome
@@ -122,7 +123,7 @@ def solve(
             )
         )
     seconds = time.process_time() - begun
-    return Solution(*(np.concatenate(a, axis=-1) for a in zip(*parts, strict=True))), seconds
+    return jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *parts), seconds
 
 
 def _row(stage: Stage, problem: Problem, whole: Solution, most: int) -> str:
