@@ -392,11 +392,13 @@ def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float
     """Coordinates of special cases of the law, where a parameter that extends it nearly is zero."""
     found = []
     for values in simpler:
-        u = np.full(len(objective.unknowns), _NEARLY_ZERO)
-        for i, unknown in enumerate(objective.unknowns):
-            if unknown.name in values:
-                u[i] = np.clip(unknown.to_coordinate(values[unknown.name]), *unknown.bounds)
-        found.append(u)
+        u = []
+        for unknown in objective.unknowns:
+            value = values.get(unknown.name, unknown.middle)
+            extending = unknown.name in _EXTENSIONS and unknown.name not in values
+            near = _NEARLY_ZERO if extending else unknown.to_coordinate(value)
+            u.append(float(np.clip(near, *unknown.bounds)))
+        found.append(np.array(u))
     return found
 
 
