@@ -23,6 +23,11 @@ LONGEST = (
     "transients",
 )
 
+#: Rooms whose programs take longer to be optimised than they run. Others, and the programs that
+#: these rooms' tests start, run what users run.
+BRIEF = ("orbit", "docs", "theory", "transients", "laws")
+_SWITCH = "jax_disable_most_optimizations"
+
 
 def room(nodeid):
     """The folder of a test."""
@@ -63,3 +68,14 @@ def pytest_xdist_make_scheduler(config, log):
         return None
     config.option.loadscopereorder = False
     return ByRoom(config, log)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled_for_few_calls(request):
+    """Programs are compiled in half the time, and run several times as long, in some rooms."""
+    import jax
+
+    brief = room(request.node.nodeid) in BRIEF
+    jax.config.update(_SWITCH, brief)
+    yield
+    jax.config.update(_SWITCH, False)

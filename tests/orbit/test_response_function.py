@@ -12,7 +12,7 @@ from asperity.errors import InputError
 from asperity.laws import ElastoPlastic, RiceRuina, get_law, law_parameters, registered
 from asperity.loads import modulated
 from asperity.orbit import Outcome, differentiable
-from asperity.orbit.gradient.search import search_mesh_orbits
+from asperity.orbit.gradient.search.search import search_orbits
 
 #: Richardson's extrapolation of central differences over 0.2 % and 0.1 %, relative to the
 #: largest derivative by the logarithm of a parameter: what it leaves is of the fourth order.
@@ -366,17 +366,17 @@ def test_each_orbit_of_the_search_is_differentiated_on_a_mesh_that_resolves_it(m
     parameters = own | drive | {"K": 1e6}
     searched = []
 
-    def search(*arguments):
-        searched.extend(search_mesh_orbits(*arguments, meshes=(16, 48)))
-        return tuple(searched)
+    def search(*arguments, **options):
+        found = search_orbits(*arguments, **options, meshes=(16, 48))
+        searched.extend(found.parts)
+        return found
 
-    monkeypatch.setattr(differentiable, "search_mesh_orbits", search)
-    model = response_function("rice-ruina", harmonics=1, search="direct")
+    monkeypatch.setattr(differentiable, "search_orbits", search)
+    model = response_function("rice-ruina", harmonics=1)
     values, jacobian = model.value_and_jacobian(parameters)
     assert (values.outcome == Outcome.CONVERGED).all()
-    served = np.array([orbits.outcome == Outcome.CONVERGED for orbits in searched])
-    assert served.any(axis=1).tolist() == [True, True]
-    assert (served.sum(axis=0) == 1).all()
+    assert {len(orbits.mesh) - 1 for _, orbits in searched} == {16, 48}
+    assert np.sort(np.concatenate([index for index, _ in searched])).tolist() == [0, 1, 2, 3]
     # Only ratios count: of K to W0, of V and V0 to the frequency.
     by_logarithm = {n: columns(jacobian[n]) * np.reshape(parameters[n], (-1, 1)) for n in jacobian}
     for group in (("K", "W0"), ("V", "V0", "frequency")):

@@ -6,6 +6,7 @@ from asperity.orbit.differentiable import (
     response_function,
 )
 from asperity.orbit.gradient.program import ResponseValues
+from asperity.orbit.gradient.search.nearby import KnownOrbits
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.period import Period, over_a_period
 from asperity.orbit.periodic import periodic_response
@@ -13,6 +14,7 @@ from asperity.orbit.response import PeriodicResponse
 from asperity.orbit.sensitivity import Sensitivities, sensitivities
 
 __all__ = [
+    "KnownOrbits",
     "Outcome",
     "Period",
     "PeriodicResponse",

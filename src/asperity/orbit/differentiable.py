@@ -8,7 +8,7 @@ rule at the orbit, whichever method found it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import partial
 from typing import Any, Literal
 
@@ -23,8 +23,9 @@ from asperity.errors import InputError, closest
 from asperity.laws import Law, get_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
+from asperity.orbit.batches import Indices, take
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
-from asperity.orbit.gradient.mesh_values import mesh_orbits, mesh_values
+from asperity.orbit.gradient.mesh_values import found_values, mesh_orbits, mesh_values
 from asperity.orbit.gradient.parametrised import (
     ParametrisedProblem,
     coefficients_of,
@@ -37,7 +38,9 @@ from asperity.orbit.gradient.program import (
     by_point,
     chosen,
 )
-from asperity.orbit.gradient.search import MeshOrbits, search_mesh_orbits
+from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, SearchedOrbits
+from asperity.orbit.gradient.search.nearby import KnownOrbits
+from asperity.orbit.gradient.search.search import search_orbits
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import switch, whole_number
@@ -47,6 +50,8 @@ from asperity.slider.radiating import Radiating
 
 #: Smallest number of points that a program is compiled for; others are powers of two.
 _FEWEST = 4
+#: Orbits of the search that are differentiated in a call.
+_BLOCK = 16
 
 
 class ResponseFunction:
@@ -88,7 +93,9 @@ class ResponseFunction:
     def __repr__(self) -> str:
         return f"response_function of {', '.join(self.parameters)}"
 
-    def __call__(self, parameters: Mapping[str, ArrayLike]) -> ResponseValues:
+    def __call__(
+        self, parameters: Mapping[str, ArrayLike], known: KnownOrbits | None = None
+    ) -> ResponseValues:
         """Response at one or many points.
 
         Parameters
@@ -96,6 +103,10 @@ class ResponseFunction:
         parameters : mapping of str to array
             Every parameter by name, each a number or of shape (points,); in SI, or a text
             with its unit.
+        known : KnownOrbits, optional
+            Of as many points, from earlier calls with other parameters. Orbits that the fast
+            method does not find are begun there, and kept there for the next call. Not for traced
+            parameters, nor where multipliers are asked for.
 
         Returns
         -------
@@ -109,21 +120,23 @@ class ResponseFunction:
             its rule. Where a traced value breaks it, the outcome is `Outcome.INVALID`.
         """
         padded, points = self._padded(parameters)
-        fast, (first, *finer) = _orbits(self._program, jax.lax.stop_gradient(padded))
-        values = _evaluate(padded, fast, first, program=self._program)
-        for meshed in finer:
-            more = _evaluate(padded, None, meshed, program=self._program)
-            values = chosen(_converged(more), more, values)
-        return _cut(values, points)
+        if _traced(padded):
+            fast, meshed = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
+            return _cut(_evaluate(padded, fast, meshed, program=self._program), points)
+        fast, searched = _orbits(self._program, padded, points or 1, known)
+        part = _fast_part(self._program)
+        values = _evaluate(padded, fast, None, program=part)
+        return _cut(_with_searched(values, searched, part), points)
 
     def value_and_jacobian(
-        self, parameters: Mapping[str, ArrayLike]
+        self, parameters: Mapping[str, ArrayLike], known: KnownOrbits | None = None
     ) -> tuple[ResponseValues, dict[str, ResponseValues]]:
         """Response, and its derivative to every parameter at every point.
 
         Parameters
         ----------
         parameters : mapping of str to array
+        known : KnownOrbits, optional
             As for a call.
 
         Returns
@@ -134,15 +147,20 @@ class ResponseFunction:
             derivative to a parameter that all points share is the sum over the points.
         """
         padded, points = self._padded(parameters)
-        fast, (first, *finer) = _orbits(self._program, jax.lax.stop_gradient(padded))
-        whole, table = _differentiate(padded, fast, first, program=self._program)
-        for meshed in finer:
-            more, columns = _differentiate(padded, None, meshed, program=self._program)
-            table = jnp.where(_converged(more)[:, None], columns, table)
-            whole = chosen(_converged(more), more, whole)
+        table: Any
+        if _traced(padded):
+            fast, meshed = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
+            whole, table = _differentiate(padded, fast, meshed, program=self._program)
+        else:
+            fast, searched = _orbits(self._program, padded, points or 1, known)
+            part = _fast_part(self._program)
+            whole, table = _differentiate(padded, fast, None, program=part)
+            table = np.array(table)
+            for index, columns in _mesh_derivatives(padded, searched, part):
+                table[:, index] = columns
+            whole = _with_searched(whole, searched, part)
         values = _cut(whole, points)
-        whole_table: Any = table if isinstance(table, jax.core.Tracer) else np.asarray(table)
-        cut = whole_table[:, 0] if points is None else whole_table[:, :points]
+        cut = table[:, 0] if points is None else table[:, :points]
         names = self._program.equations.names
         return values, {n: _derivative(c, values) for n, c in zip(names, cut, strict=True)}
 
@@ -186,10 +204,6 @@ def _laid_out(value: Any, *, count: int, size: int, module: Any) -> Any:
     """A parameter of `count` points, the last one repeated up to `size`."""
     flat = module.broadcast_to(module.asarray(value, dtype=float), (count,))
     return module.concatenate([flat, module.broadcast_to(flat[-1:], (size - count,))])
-
-
-def _converged(values: ResponseValues) -> Array:
-    return values.outcome == Outcome.CONVERGED
 
 
 def _cut(values: ResponseValues, points: int | None) -> ResponseValues:
@@ -238,8 +252,10 @@ def response_function(
         parameters with the coefficients of `modulation` as defaults.
     search : bool or "direct"
         Whether to search for orbits that the fast method does not find. Without it they are not
-        converged, and programs are smaller. "direct" leaves out what follows branches, which may
-        take a minute for one point; within `jax.jit` it is as True.
+        converged, and programs are smaller. "direct" tries collocation from the averaged limit
+        alone, in some milliseconds a point, and with `KnownOrbits` also what their orbits and
+        those of the other points lead to; it leaves out what follows branches, which may take a
+        minute for one point. Within `jax.jit`, and where multipliers are asked for, it is as True.
 
     Returns
     -------
@@ -263,7 +279,9 @@ def response_function(
     which mean and harmonics agree with those of the search to 1e-10: within some 1e-7 of the
     largest derivative of an output, 1e-5 where the interface sticks (`cut-off`) and slip is sharp.
     Within `jax.jit`, `jax.grad` and the like, where shapes are fixed before orbits are known, the
-    mesh has 432 intervals. Where the finest mesh agrees with the search to less than 1e-8, the
+    mesh has 432 intervals. A direct search takes its values from these meshes too, from the first
+    that agrees with one of half or a third as many intervals so well that its own error is below
+    1e-10. Where the finest mesh agrees with the search to less than 1e-8, the
     outcome is `Outcome.NOT_RESOLVED`.
     """
     law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
@@ -289,30 +307,78 @@ def response_function(
     return ResponseFunction(Program(equations, harmonics, multipliers, search), defaults)
 
 
-def _orbits(
-    program: Program, parameters: Parameters
-) -> tuple[FastOrbits | None, tuple[MeshOrbits | None, ...]]:
-    """Orbits of all points, of no derivative: by the fast method, and by the search.
+def _traced(parameters: Parameters) -> bool:
+    return any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves(parameters))
 
-    Those of the search on each mesh that serves any of them; None where nothing is searched for.
+
+def _traced_orbits(
+    program: Program, parameters: Parameters
+) -> tuple[FastOrbits | None, MeshOrbits | None]:
+    """Orbits of all points, of no derivative, within a program: by the fast method and the search.
+
+    None for a method that the program does not have.
     """
+    fast, wanted = _fast_orbits(program, parameters)
+    return fast, mesh_orbits(program, parameters, wanted) if program.search else None
+
+
+def _orbits(
+    program: Program, parameters: Parameters, points: int, known: KnownOrbits | None
+) -> tuple[FastOrbits | None, SearchedOrbits | None]:
+    """Orbits of the first `points` points by the fast method and, of the others, by the search."""
     spare_mappings()
-    fast = None
-    if has_fast_method(program):
-        fast = fast_orbits(parameters, program=program)
-        wanted = fast.valid & ~fast.converged
-    else:
-        wanted = program.equations.valid(parameters)
-    if not program.search:
-        return fast, (None,)
-    if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((parameters, wanted))):
-        return fast, (mesh_orbits(program, parameters, wanted),)
-    rows = np.asarray(wanted)
-    if fast is not None and not rows.any():
-        return fast, (None,)
+    fast, wanted = _fast_orbits(program, parameters)
+    # The others fill the program up.
+    rows = np.asarray(wanted) & (np.arange(len(wanted)) < points)
+    if not program.search or not rows.any():
+        return fast, None
     values = {n: np.asarray(v) for n, v in parameters.items()}
-    direct = program.search == "direct"
-    return fast, search_mesh_orbits(program.equations, program.harmonics, values, rows, direct)
+    # A direct search does not resolve multipliers.
+    direct = program.search == "direct" and not program.multipliers
+    return fast, search_orbits(
+        program.equations, program.harmonics, values, rows, direct=direct, known=known
+    )
+
+
+def _fast_orbits(program: Program, parameters: Parameters) -> tuple[FastOrbits | None, Array]:
+    """Orbits of the fast method, if there is one, and which points are left to the search."""
+    if not has_fast_method(program):
+        return None, program.equations.valid(parameters)
+    fast = fast_orbits(parameters, program=_fast_part(program))
+    return fast, fast.valid & ~fast.converged
+
+
+def _fast_part(program: Program) -> Program:
+    """What the programs without orbits of the search are compiled for."""
+    return program._replace(search=False)
+
+
+def _with_searched(
+    values: ResponseValues, searched: SearchedOrbits | None, program: Program
+) -> ResponseValues:
+    """Values of the fast method and of the search together, NumPy arrays."""
+    if searched is None:
+        return values
+    whole = ResponseValues(*(np.array(a) for a in values))
+    missing = whole.outcome == Outcome.NO_ORBIT
+    whole.outcome[missing] = searched.outcome[missing]
+    for index, orbits in searched.parts:
+        for target, own in zip(whole, found_values(orbits, program), strict=True):
+            target[index] = own
+    return whole
+
+
+def _mesh_derivatives(
+    parameters: Parameters, searched: SearchedOrbits | None, program: Program
+) -> Iterator[tuple[Indices, Any]]:
+    """Derivatives at the orbits of the search, as by `_differentiate`, with the points of each."""
+    for index, orbits in searched.parts if searched is not None else ():
+        for start in range(0, len(index), _BLOCK):
+            part = np.arange(start, min(start + _BLOCK, len(index)))
+            filled = np.concatenate([part, np.full(_BLOCK - len(part), part[-1])])
+            own = take(parameters, index[filled])
+            _, table = _differentiate(own, None, take(orbits, filled), program=program)
+            yield index[part], np.asarray(table)[:, : len(part)]
 
 
 def _values(

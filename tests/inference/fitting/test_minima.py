@@ -207,7 +207,7 @@ class Rows(Formula):
         names, rows = np.full(r.size, "mu1"), np.arange(r.size)
         return Residuals(r, (slope / values["D0"])[:, None], names, rows, log_scale=0.0)
 
-    def chi2_of_many(self, unknowns, u):
+    def chi2_of_many(self, unknowns, u, *, near=False, least=1.0):
         return np.array([np.sum(self.residuals({"D0": math.exp(x)}).values ** 2) for (x,) in u])
 
 
@@ -248,7 +248,7 @@ class NarrowRows(Rows):
             return None
         return super().residuals(values, search=search)
 
-    def chi2_of_many(self, unknowns, u):
+    def chi2_of_many(self, unknowns, u, *, near=False, least=1.0):
         found = [self.residuals({"D0": math.exp(x)}) for (x,) in u]
         return np.array([math.inf if r is None else np.sum(r.values**2) for r in found])
 

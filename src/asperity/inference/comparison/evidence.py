@@ -130,7 +130,7 @@ def log_likelihoods(objective: Objective, u: Float) -> Float:
         if isinstance(term, LockInTerm):
             constant = 2 * term.weights.log_scale
             constant += int(term.weights.reported.sum()) * math.log(2 * math.pi)
-            total -= 0.5 * (term.chi2_of_many(objective.unknowns, u) + constant)
+            total -= 0.5 * (term.chi2_of_many(objective.unknowns, u, near=True) + constant)
         else:
             return np.array([objective.log_likelihood(x) for x in u])
     return total

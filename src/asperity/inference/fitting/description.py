@@ -40,6 +40,8 @@ _NEAR = 0.5
 _UNDETERMINED = 1.0
 #: Below this probability chi-squared says that the law or the uncertainties are wrong.
 _MISFIT = 0.01
+#: Below this one intervals are by the normal approximation unless profiles are asked for.
+_IMPOSSIBLE = 1e-12
 #: Standard deviations between data and a prior that are worth a warning.
 _CONTRADICTED = 3.0
 #: A bound is reached if the estimate is nearer to it than this share of its standard error.
@@ -91,7 +93,12 @@ def described_fit(
     u, chi2 = minima[0]
     r, J = objective.residuals(u)
     data = objective.data_residuals(u)
-    assert data is not None  # the law has a solution at the minimum
+    if data is None:
+        # Found once on another way, at the edge of the region in which there are orbits.
+        others = minima[1:]
+        return (
+            described_fit(objective, others, profile=profile) if others else failed_fit(objective)
+        )
     information = J.T @ J
     covariance, missing = inverse_information(information)
     sd = np.sqrt(np.diag(covariance))
@@ -112,9 +119,17 @@ def described_fit(
         and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > _UNDETERMINED)
     )
     stopped = _is_of_tables(objective) and objective.expected_decrease(u) > _STOPPED
-    bent = [] if profile else _bent(objective, (u, chi2), covariance, missing)
+    n = sum(d.values.size for d in data)
+    k = len(objective.unknowns) + sum(term.profiled for term in objective.terms)
+    priors = sum(1 for unknown in objective.unknowns if unknown.prior is not None)
+    dof = n + priors - k
+    p_value = float(chi_squared.sf(chi2, dof)) if dof > 0 else math.nan
+    # Intervals under a law that the data contradict say nothing that a search would make better.
+    impossible = p_value < _IMPOSSIBLE and not profile
+    bent = [] if profile or impossible else _bent(objective, (u, chi2), covariance, missing)
     rivals = _rivals(objective, minima, sd)
-    profiled = _profiled(objective, covariance, {*bent, *undetermined}, everything=profile)
+    odd = set() if impossible else {*bent, *undetermined}
+    profiled = _profiled(objective, covariance, odd, everything=profile)
     estimates = {}
     for i, unknown in enumerate(objective.unknowns):
         low, high = unknown.bounds
@@ -154,12 +169,7 @@ def described_fit(
             bool(at_bound),
             unknown.prior,
         )
-    n = sum(d.values.size for d in data)
-    k = len(objective.unknowns) + sum(term.profiled for term in objective.terms)
-    priors = sum(1 for unknown in objective.unknowns if unknown.prior is not None)
-    dof = n + priors - k
     deviance = -2 * float(sum(log_density(d) for d in data))
-    p_value = float(chi_squared.sf(chi2, dof)) if dof > 0 else math.nan
     found = Fit(
         law=objective.law.name,
         converged=True,

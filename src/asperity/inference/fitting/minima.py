@@ -45,6 +45,12 @@ _NEARBY = 1e-3
 #: Rows on which starts are tried before; evaluations after which a way is compared with the others;
 #: how many times the lowest chi-squared is hopeless then.
 _ROWS_FIRST, _SOME_WAY, _HOPELESS = 4, 10, 1e3
+#: Evaluations after which a law that does not describe the data is given up.
+_LONG_WAY = 30
+#: Share that chi-squared must fall to on each part of the way beyond the fast method.
+_WORTHWHILE = 0.3
+#: Share of the rows that must have an orbit for a start to be tried.
+_LEAST = 0.5
 #: Ends there are one minimum if they differ by less in every coordinate, and are followed on all
 #: rows if their chi-squared is not more than so many times the lowest.
 _SAME_FEW, _AS_GOOD_FEW = 0.02, 3.0
@@ -101,6 +107,8 @@ def minima_of(
     if searched:
         objective.search_from_now_on()
         few = _few_rows(objective)
+        if few is None and _is_table(objective):
+            few = objective
         candidates = [
             candidates[i] for i in dict.fromkeys([*range(min(_WITH_SEARCH, chi2.size)), *at])
         ]
@@ -151,14 +159,21 @@ def minima_of(
     return sorted(found, key=lambda pair: pair[1])
 
 
+def _is_table(objective: Objective) -> bool:
+    """Whether the data are one table."""
+    (term, *others) = objective.terms
+    return not others and isinstance(term, LockInTerm) and hasattr(term, "table")
+
+
 def _few_rows(objective: Objective) -> Objective | None:
     """The objective of a few rows of its table, spread over it; None for other data, or few rows.
 
     What a law predicts at them places the minimum well enough to begin there with all rows.
     """
-    (term, *others) = objective.terms
-    if others or not isinstance(term, LockInTerm) or not hasattr(term, "table"):
+    if not _is_table(objective):
         return None
+    term = objective.terms[0]
+    assert isinstance(term, LockInTerm)
     table = term.table
     reported = np.sum([np.isfinite(v) for v in table.values.values()], axis=0)
     # Points that lie close together repeat each other.
@@ -166,7 +181,7 @@ def _few_rows(objective: Objective) -> Objective | None:
     rows = max(
         _FEW_ROWS, math.ceil(_DATA_EACH * len(objective.unknowns) / max(reported.mean(), 1e-9))
     )
-    if table.rows < 2 * rows:
+    if table.rows < 4 * rows:
         return None
     kept = order[np.linspace(0, table.rows - 1, rows).round().astype(int)]
     return replace(objective, terms=(term.with_rows(np.isin(np.arange(table.rows), kept)),))
@@ -174,18 +189,21 @@ def _few_rows(objective: Objective) -> Objective | None:
 
 def _chi2_of_many(objective: Objective, candidates: list[Float]) -> Float:
     """chi-squared of many starts, infinite where the law has no solution."""
-    (term, *others) = objective.terms
-    if others or not isinstance(term, LockInTerm) or not hasattr(term, "table"):
+    if not _is_table(objective):
         return np.array([objective.chi2(u) for u in candidates])
+    term = objective.terms[0]
+    assert isinstance(term, LockInTerm)
     u = np.array(candidates)
     first = np.zeros(term.table.rows, bool)
     first[:: max(1, term.table.rows // _ROWS_FIRST)] = True
     found = np.full(len(u), math.inf)
     # Most starts far from the data have no orbit at some row, which takes longest to find out.
-    left = np.flatnonzero(np.isfinite(term.with_rows(first).chi2_of_many(objective.unknowns, u)))
+    few = term.with_rows(first).chi2_of_many(objective.unknowns, u, least=_LEAST)
+    left = np.flatnonzero(np.isfinite(few))
     if left.size:
         priors = [float(np.sum(objective.prior_residuals(u[i])[0] ** 2)) for i in left]
-        found[left] = term.chi2_of_many(objective.unknowns, u[left]) + priors
+        # An orbit that is not found at once may be reached from that of another row.
+        found[left] = term.chi2_of_many(objective.unknowns, u[left], least=_LEAST) + priors
     return found
 
 
@@ -213,7 +231,7 @@ def _ends_on_few_rows(
         best = min(ends, key=lambda end: end[1], default=None)
         hopeless = best is not None and value > _HOPELESS * (best[1] + _FEW_ROWS)
         if math.isfinite(value) and not (hopeless and best and not _far_off(few, best)):
-            ends.append(few.minimise(u, tolerance=_NEARBY))
+            ends.append(few.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY))
     return ends
 
 
@@ -229,8 +247,10 @@ def _of_all_rows(
     found: list[tuple[Float, float]] = []
     for u, _ in distinct:
         if math.isfinite(objective.chi2(u)):
-            found.append(objective.minimise(u, tolerance=_NEARBY))
+            found.append(objective.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY))
     found.sort(key=lambda pair: pair[1])
+    if not found or _far_off(objective, found[0]):
+        return found
     return [
         objective.minimise(u) if value < found[0][1] + _WORTH else (u, value)
         for u, value in _distinct(found, _SAME_FEW)
@@ -239,12 +259,19 @@ def _of_all_rows(
 
 def _onwards(objective: Objective, end: tuple[Float, float]) -> tuple[Float, float]:
     """From where the fast method ended, by way of few rows where the law is far off."""
+    if not _far_off(objective, end):
+        return objective.minimise(end[0])
     u, value = end
-    few = _few_rows(objective) if _far_off(objective, end) else None
+    few = _few_rows(objective)
     if few is not None:
-        nearer = few.minimise(u, tolerance=_NEARBY)[0]
+        nearer = few.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY)[0]
         if objective.chi2(nearer) < value:
-            u = nearer
+            u, value = nearer, objective.chi2(nearer)
+    while _far_off(objective, (u, value)):
+        before = value
+        u, value = objective.minimise(u, tolerance=_NEARBY, evaluations=_SOME_WAY)
+        if value > _WORTHWHILE * before:
+            return u, value
     return objective.minimise(u)
 
 

@@ -26,13 +26,15 @@ from asperity.inference.tables.residuals import (
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
-from asperity.orbit import Outcome, response_function
+from asperity.orbit import KnownOrbits, Outcome, response_function
 from asperity.parameters import law_parameters
 
 Float = NDArray[np.float64]
 
 #: Points that are predicted together.
-_BATCH = 4096
+_BATCH = 256
+#: Rows whose orbits are remembered, of some ten kilobytes each.
+_REMEMBERED = 2048
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
 
@@ -98,23 +100,36 @@ class LockInTerm:
         """The same for some of the rows."""
         forward = copy(self.forward)
         forward.table = self.table.without(~kept)
+        forward.forget_orbits()
         forward.fixed = {n: v[kept] for n, v in self.forward.fixed.items()}
         return LockInTerm(forward.table, forward)
 
-    def chi2_of_many(self, unknowns: Sequence[Unknown], u: Float) -> Float:
+    def chi2_of_many(
+        self, unknowns: Sequence[Unknown], u: Float, *, near: bool = False, least: float = 1.0
+    ) -> Float:
         """chi-squared at many coordinates of the unknowns, shapes (samples, n) to (samples,).
 
-        Infinite where a row has no periodic orbit.
+        Parameters
+        ----------
+        unknowns : sequence of Unknown
+        u : array, shape (samples, n)
+        near : bool
+            Whether orbits are like those of the last call of `residuals`, and begun there.
+        least : float
+            Share of the rows that must have a periodic orbit, or else it is infinite; it is that
+            of those rows, scaled to all.
         """
         weights, rows = self.weights, self.table.rows
         values = {
             k.name: np.repeat(np.asarray(k.to_value(u[:, i])), rows) for i, k in enumerate(unknowns)
         }
-        predicted, outcome = self.forward.predicted(values, repeats=len(u))
+        predicted, outcome = self.forward.predicted(values, repeats=len(u), near=near)
         columns = columns_of(predicted).reshape(len(u), rows, -1)
         residuals = np.einsum("rsc,nrc->nrs", weights.matrix, columns) - weights.target
-        good = np.array([all_converged(o) for o in outcome.reshape(len(u), rows)])
-        return np.where(good, np.nan_to_num(np.sum(residuals**2, (1, 2)), nan=np.inf), np.inf)
+        solved = (outcome == Outcome.CONVERGED).reshape(len(u), rows)
+        share = np.maximum(solved.mean(1), 1 / rows)
+        total = np.sum(np.where(solved[..., None], residuals, 0.0) ** 2, (1, 2)) / share
+        return np.where(share >= least, np.nan_to_num(total, nan=np.inf), np.inf)
 
     @property
     def searches(self) -> bool:
@@ -199,6 +214,7 @@ class Forward:
             response_function, law, inertia=inertia, radiation_damping=radiation_damping
         )
         self._quick, self._whole = whole(search=False), whole(search="direct")
+        self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
         self.uses_search = False
 
     def __call__(
@@ -221,7 +237,11 @@ class Forward:
         given["epsilon"] = applied * ratio
         function = self._whole if search else self._quick
         given = {n: v for n, v in given.items() if n in function.parameters}
-        values, slopes = function.value_and_jacobian(given)
+        known = self._nearest(free) if search else None
+        values, slopes = function.value_and_jacobian(given, known)
+        if known is not None and all_converged(np.asarray(values.outcome)):
+            self._visited.append((dict(free), known))
+            del self._visited[: -self._most_visited]
         mu_ss, mu_slopes = _steady(self.law, given)
         predicted = Prediction(
             np.asarray(values.mean_friction), mu_ss, np.asarray(values.harmonics)
@@ -246,7 +266,7 @@ class Forward:
         return predicted, derivatives, np.asarray(values.outcome)
 
     def predicted(
-        self, free: Mapping[str, Float], repeats: int
+        self, free: Mapping[str, Float], repeats: int, *, near: bool = False
     ) -> tuple[Prediction, NDArray[np.int64]]:
         """Predictions of many sets of parameters, without derivatives.
 
@@ -256,16 +276,21 @@ class Forward:
             Each set repeated for all rows.
         repeats : int
             Number of sets.
+        near : bool
+            Whether orbits are like those of the last call with derivatives, and begun there.
         """
         fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
         given = {n: v for n, v in (fixed | dict(free)).items() if n != "eps_ratio"}
         given["epsilon"] = fixed["epsilon"] * (fixed | dict(free)).get("eps_ratio", 1.0)
         function = self._whole if self.uses_search else self._quick
         given = {n: v for n, v in given.items() if n in function.parameters}
+        last = self._visited[-1][1] if self._visited else KnownOrbits(self.table.rows)
         parts = []
         for start in range(0, repeats * self.table.rows, _BATCH):
             part = {n: v[start : start + _BATCH] for n, v in given.items()}
-            values, mu_ss = function(part), _steady(self.law, part)[0]
+            rows = np.arange(start, start + len(part["V"])) % self.table.rows
+            known = last.picked(rows) if near and self.uses_search else None
+            values, mu_ss = function(part, known), _steady(self.law, part)[0]
             parts.append((values.mean_friction, mu_ss, values.harmonics, values.outcome))
         mean, steady, harmonics, outcome = (
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
@@ -275,6 +300,30 @@ class Forward:
     def search_from_now_on(self) -> None:
         """Search for the points that the fast method does not find, at every call."""
         self.uses_search = True
+
+    def forget_orbits(self) -> None:
+        """Search from nothing at the next call."""
+        self._visited = []
+
+    @property
+    def _most_visited(self) -> int:
+        """Calls of which the orbits are remembered."""
+        return max(4, _REMEMBERED // self.table.rows)
+
+    def _nearest(self, free: Mapping[str, float]) -> KnownOrbits:
+        """Orbits of the earlier call with the most similar parameters, to begin with and replace.
+
+        Not simply of the last one: a minimiser that has gone too far comes back.
+        """
+
+        def distance(visited: Mapping[str, float]) -> float:
+            pairs = [(visited.get(n, v), v) for n, v in free.items()]
+            return sum(((a - b) / max(abs(a), abs(b), 1e-300)) ** 2 for a, b in pairs)
+
+        if not self._visited:
+            return KnownOrbits(self.table.rows)
+        nearest = min(self._visited, key=lambda visited: distance(visited[0]))[1]
+        return nearest.picked(np.arange(self.table.rows))
 
 
 def all_converged(outcome: NDArray[np.int64]) -> bool:

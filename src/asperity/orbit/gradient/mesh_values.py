@@ -13,12 +13,8 @@ from asperity.orbit.gradient.collocation import CollocationEquations, unknowns_o
 from asperity.orbit.gradient.implicit import implicit_solution
 from asperity.orbit.gradient.multipliers import log_multipliers, sorted_logs
 from asperity.orbit.gradient.program import Parameters, Program, ResponseValues, only_where
-from asperity.orbit.gradient.search import (
-    TRACED_MESH,
-    MeshOrbits,
-    mesh_orbit_shapes,
-    search_in_another_process,
-)
+from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, mesh_orbit_shapes
+from asperity.orbit.gradient.search.search import TRACED_MESH, search_in_another_process
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import collocation_observables
 from asperity.orbit.mesh.scheme import scheme_for
@@ -52,6 +48,16 @@ def mesh_orbits(program: Program, parameters: Parameters, wanted: Array) -> Mesh
         return empty._replace(mesh=mesh, centre=states + empty.centre, outcome=outcome)
 
     return jax.lax.cond(wanted.any(), call, steady, parameters)
+
+
+def found_values(orbits: MeshOrbits, program: Program) -> ResponseValues:
+    """Values of orbits of the search, without derivatives: NumPy arrays."""
+    logs = np.zeros((0, len(orbits.outcome)), complex)
+    if program.multipliers:
+        logs = np.asarray(orbits.log_multipliers)
+        if len(logs) > 2:
+            logs = np.asarray(sorted_logs(logs))
+    return ResponseValues(orbits.mean_friction, orbits.harmonics.T, logs.T, orbits.outcome)
 
 
 def mesh_values(parameters: Parameters, meshed: MeshOrbits, program: Program) -> ResponseValues:

@@ -1,0 +1,235 @@
+"""Orbits from those of nearby parameters, for calls that follow each other in small steps.
+
+A fit calls again and again with the same points and parameters that change little. From the orbits
+of the call before, Newton's method needs a few steps, where a search from nothing takes ten times
+as long. And where the search fails, the parameters of another point of the call, whose orbit it
+found, can be changed in steps to those of the point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.orbit.gradient.parametrised import ParametrisedProblem
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.programs import ACCEPTED, refine_orbit, remeshed
+from asperity.orbit.multipliers import AGREEMENT, chunk_size
+from asperity.orbit.observables import Observables
+from asperity.slider.problem import Problem
+
+Float = NDArray[np.float64]
+
+#: Intervals of the meshes that known orbits are kept on.
+KEPT = 144
+#: Intervals of the mesh that is compared with the first one on which orbits are differentiated.
+COARSER = 72
+#: Largest relative change of mean and harmonics from a mesh to one with twice the intervals at
+#: which the finer serves: its own error is smaller by 2^8, for a stiff orbit by 2^4. The same for
+#: three times, 3^8 or 3^4, and of the last mesh, as good as the whole search.
+_TWICE_AGREEMENT, _THRICE_AGREEMENT, _LAST_AGREEMENT = 1e-9, 1e-8, AGREEMENT
+#: Shortest share of the way between two points that is tried, and most attempts of a way.
+_SHORTEST, _ATTEMPTS = 1 / 8, 12
+#: Distance that a change of epsilon, which matters most, counts for, of a decade as 2.3.
+_EPSILON_DISTANCE = 5.0
+
+
+@dataclass
+class KnownOrbits:
+    """The last orbits known of some points, with which the next call begins.
+
+    Attributes
+    ----------
+    points : int
+        Number of points; calls must have as many, in the same order.
+    orbit : Orbit or None
+        Points along the last axis; None where no orbit is known.
+    there : bool array, shape (points,)
+        Of which points an orbit is known.
+    """
+
+    points: int
+    orbit: Orbit | None = None
+    there: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.there = np.zeros(self.points, bool)
+
+    def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
+        """Keep the orbits of the points `index` of a problem, on a mesh of any size."""
+        size = problem.system.size
+        if self.orbit is None:
+            self.orbit = Orbit.empty(orbit.scheme, size, KEPT, self.points)
+        self.there[index] = True
+        if len(orbit.mesh) == KEPT + 1:
+            put(self.orbit, index, orbit)
+            return
+        remesh = partial(remeshed, intervals=KEPT)
+        inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
+        for part, kept in run_chunks(remesh, inputs, everyone, chunk_size(KEPT, size)):
+            put(self.orbit, index[part], kept)
+
+    def picked(self, index: Indices) -> KnownOrbits:
+        """The points `index`, which may name one several times."""
+        orbit = None if self.orbit is None else take(self.orbit, index)
+        others = KnownOrbits(len(index), orbit)
+        others.there[:] = self.there[index]
+        return others
+
+
+def followed_orbits(
+    problem: Problem,
+    guess: Orbit,
+    index: Indices,
+    harmonics: int,
+    meshes: tuple[int, ...],
+) -> list[tuple[Indices, Orbit, Observables]]:
+    """Orbits that Newton's method reaches from a guess, checked by a coarser mesh.
+
+    Parameters
+    ----------
+    problem : Problem
+    guess : Orbit
+        Of the points of the problem, of meaning for those of `index`.
+    index : array of int
+    harmonics : int
+        At least 2.
+    meshes : tuple of int
+        Numbers of intervals, rising; an orbit is on the first that agrees with the one before.
+
+    Returns
+    -------
+    list of (array of int, Orbit, Observables)
+        For each mesh on which any was found: the points, their orbits and observables.
+    """
+    found = []
+    size, points = guess.centre.shape
+    before = np.full((1 + harmonics, points), np.nan + 0j)
+    for intervals in (COARSER, *meshes):
+        solve = partial(refine_orbit, intervals=intervals, harmonics=harmonics)
+        finer = Orbit.empty(guess.scheme, size, intervals, points)
+        good, left = [], []
+        chunk = chunk_size(intervals, size)
+        for part, (fine, reading, error) in run_chunks(solve, (problem, guess), index, chunk):
+            put(finer, part, fine)
+            change = largest_change(before[:, part], reading)
+            before[:, part] = np.vstack([reading.mean_friction, reading.harmonics])
+            solved = error < ACCEPTED
+            served = solved & (change < _agreement(intervals, meshes))
+            if served.any():
+                kept = np.flatnonzero(served)
+                good.append((part[kept], take(fine, kept), take(reading, kept)))
+            left.append(part[solved & ~served])
+        if good:
+            found += good
+        index, guess = np.concatenate([np.zeros(0, int), *left]), finer
+        if not len(index):
+            break
+    return found
+
+
+def guesses_from_neighbours(
+    equations: ParametrisedProblem,
+    parameters: Mapping[str, Float],
+    known: KnownOrbits,
+    index: Indices,
+    sources: Indices,
+    harmonics: int,
+) -> tuple[Orbit, Indices]:
+    """Orbits of points without one, by way of parameters between theirs and the nearest point's.
+
+    Parameters
+    ----------
+    equations : ParametrisedProblem
+    parameters : mapping of str to array, shape (points,)
+    known : KnownOrbits
+    index, sources : array of int
+        Points to be reached, and points of which the known orbit is that of these parameters.
+    harmonics : int
+
+    Returns
+    -------
+    orbit : Orbit
+        Of all points, on a coarse mesh.
+    index : array of int
+        Points that were reached.
+    """
+    assert known.orbit is not None
+    nearest = sources[_distances(parameters, index, sources).argmin(1)]
+    begun = {n: v[nearest] for n, v in parameters.items()}
+    aimed = {n: v[index] for n, v in parameters.items()}
+    orbit = take(known.orbit, nearest)
+    size, count = orbit.centre.shape
+    solve = partial(refine_orbit, intervals=COARSER, harmonics=harmonics)
+    remesh = partial(remeshed, intervals=COARSER)
+    coarse = Orbit.empty(orbit.scheme, size, COARSER, count)
+    chunk = chunk_size(COARSER, size)
+    at = jax.tree.map(np.asarray, equations.problem(begun))
+    for part, first in run_chunks(remesh, (at, orbit), np.arange(count), chunk):
+        put(coarse, part, first)
+    share, step = np.zeros(count), np.ones(count)
+    for _ in range(_ATTEMPTS):
+        active = np.flatnonzero((share < 1) & (step >= _SHORTEST))
+        if not len(active):
+            break
+        tried = np.minimum(share + step, 1.0)
+        between = {n: _between(begun[n], aimed[n], tried) for n in begun}
+        problem = jax.tree.map(np.asarray, equations.problem(between))
+        for part, (moved, _, error) in run_chunks(solve, (problem, coarse), active, chunk):
+            good = error < ACCEPTED
+            put(coarse, part[good], take(moved, np.flatnonzero(good)))
+            share[part] = np.where(good, tried[part], share[part])
+            step[part] *= np.where(good, 2.0, 0.5)
+    there = np.flatnonzero(share >= 1)
+    whole = Orbit.empty(orbit.scheme, size, COARSER, len(next(iter(parameters.values()))))
+    put(whole, index[there], take(coarse, there))
+    return whole, index[there]
+
+
+def _distances(parameters: Mapping[str, Float], index: Indices, sources: Indices) -> Float:
+    """Squares of the distances of points, shape (index, sources)."""
+    total = np.zeros((len(index), len(sources)))
+    for name, values in parameters.items():
+        if name == "epsilon":
+            scaled = _EPSILON_DISTANCE * values
+        elif (values > 0).all():
+            scaled = np.log(values)
+        else:
+            scaled = values / max(np.abs(values).max(), 1e-300)
+        total += (scaled[index, None] - scaled[sources]) ** 2
+    return total
+
+
+def _between(begun: Float, aimed: Float, share: Float) -> Float:
+    """Parameters on the way: geometric where both are positive."""
+    positive = (begun > 0) & (aimed > 0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        geometric = np.abs(begun) * (np.abs(aimed) / np.abs(begun)) ** share
+    return np.where(positive, geometric, begun + share * (aimed - begun))
+
+
+def _agreement(intervals: int, meshes: tuple[int, ...]) -> float:
+    if intervals == meshes[0]:
+        return _TWICE_AGREEMENT
+    return _LAST_AGREEMENT if intervals == meshes[-1] else _THRICE_AGREEMENT
+
+
+def largest_change(before: NDArray[np.complex128], reading: Observables) -> Float:
+    """Largest relative difference of mean and first two harmonics from those before, (points,).
+
+    Parameters
+    ----------
+    before : complex array, shape (1 + harmonics, points)
+        The mean, then the harmonics.
+    reading : Observables
+    """
+    mean, first = before[0].real, before[1:3]
+    scale = np.abs(first) + 1e-9 * np.abs(mean)
+    change = np.abs(reading.harmonics[:2] - first) / np.maximum(scale, np.abs(first[:1]))
+    return np.asarray(np.maximum(change.max(0), np.abs(reading.mean_friction / mean - 1)))

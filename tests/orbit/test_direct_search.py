@@ -1,0 +1,106 @@
+"""Direct search: from orbits of an earlier call, and from those of other points of the call."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import fsolve
+
+from asperity.orbit import KnownOrbits, Outcome, response_function
+
+#: Rock-like numbers; the modulation is slow beside sliding over the memory length, so that the fast
+#: method finds none of these orbits.
+NUMBERS = {
+    "mu0": 0.525,
+    "A": 0.0108,
+    "B": 0.0101,
+    "D0": 3.2e-6,
+    "V0": 1e-6,
+    "K": 9.1e6,
+    "W0": 1290.0,
+    "V": 4e-5,
+    "frequency": 0.15,
+}
+EPSILON = np.array([0.1, 0.25, 0.4, 0.51, 0.55])
+
+DIRECT = response_function("rice-ruina", search="direct")
+WHOLE = response_function("rice-ruina")
+
+
+def at(**changes):
+    return {**NUMBERS, "epsilon": EPSILON, **changes}
+
+
+def integrated(epsilon):
+    """Mean and two harmonics by SciPy, from the equations of Rice and Ruina under this load."""
+    p = NUMBERS
+    omega = 2 * np.pi * p["frequency"]
+    steady = p["mu0"] - (p["B"] - p["A"]) * np.log(p["V"] / p["V0"])
+
+    def rates(theta, state):
+        force, phi = state
+        w = 1 + epsilon * np.cos(theta)
+        slip = p["V"] * np.exp((force / w - steady - p["B"] * phi) / p["A"])
+        age = (p["V"] * np.exp(-phi) - slip) / p["D0"]
+        return [p["K"] / p["W0"] * (p["V"] - slip) / omega, age / omega]
+
+    def period(start, samples=None):
+        found = solve_ivp(rates, (0, 2 * np.pi), start, "Radau", samples, rtol=1e-10, atol=1e-12)
+        return found.y
+
+    # Sliding is stable, so that a few periods lead to the orbit.
+    start = np.array([steady * (1 + epsilon), 0.0])
+    for _ in range(3):
+        start = period(start)[:, -1]
+    start = fsolve(lambda y: period(y)[:, -1] - y, start, xtol=1e-11)
+    spectrum = np.fft.rfft(period(start, 2 * np.pi * np.arange(2048) / 2048)[0]) / 2048
+    return spectrum[0].real, 2 * spectrum[1:3]
+
+
+def test_points_out_of_reach_are_reached_from_others():
+    alone = DIRECT(at())
+    # Or else this tests nothing.
+    assert (alone.outcome == Outcome.CONVERGED).any()
+    assert (alone.outcome != Outcome.CONVERGED).any()
+    values = DIRECT(at(), KnownOrbits(EPSILON.size))
+    assert (values.outcome == Outcome.CONVERGED).all()
+    for k in np.flatnonzero(alone.outcome != Outcome.CONVERGED):
+        mean, harmonics = integrated(EPSILON[k])
+        assert values.mean_friction[k] == pytest.approx(mean, rel=1e-8)
+        assert values.harmonics[k] == pytest.approx(harmonics, rel=1e-7)
+
+
+def test_orbits_of_an_earlier_call_lead_to_those_of_the_search():
+    few = EPSILON[:3]
+    known = KnownOrbits(few.size)
+    DIRECT(at(epsilon=few), known)
+    assert known.there.all()
+    moved = at(epsilon=few, A=0.0115, D0=2.9e-6, V=4.2e-5)
+    values, slopes = DIRECT.value_and_jacobian(moved, known)
+    expected, expected_slopes = WHOLE.value_and_jacobian(moved)
+    assert (values.outcome == Outcome.CONVERGED).all()
+    assert values.mean_friction == pytest.approx(expected.mean_friction, rel=1e-10)
+    assert values.harmonics == pytest.approx(expected.harmonics, rel=1e-9)
+    for name in ("A", "D0", "epsilon"):
+        reference = expected_slopes[name].harmonics
+        assert np.abs(slopes[name].harmonics - reference).max() < 1e-7 * np.abs(reference).max()
+
+
+def test_points_that_fail_keep_the_orbits_known_before():
+    few = EPSILON[:2]
+    known = KnownOrbits(2)
+    DIRECT(at(epsilon=few), known)
+    before = known.orbit.centre.copy()
+    # A spring so soft that sliding is far from stable: no orbit follows this load.
+    lost = DIRECT(at(epsilon=few, K=9.1e1, A=1e-4), known)
+    failed = lost.outcome != Outcome.CONVERGED
+    assert failed.any()
+    assert known.there.all()
+    assert np.array_equal(known.orbit.centre[:, failed], before[:, failed])
+    again = DIRECT(at(epsilon=few), known)
+    assert again.harmonics == pytest.approx(WHOLE(at(epsilon=few)).harmonics, rel=1e-9)
+
+
+def test_points_out_of_range_are_named_so():
+    values = DIRECT(at(epsilon=np.array([0.2, 0.9995])), KnownOrbits(2))
+    assert values.outcome.tolist() == [Outcome.CONVERGED, Outcome.OUT_OF_RANGE]
+    assert np.isnan(values.mean_friction[1])
