@@ -35,7 +35,7 @@ COARSER = 72
 #: three times, 3^8 or 3^4, and of the last mesh, as good as the whole search.
 _TWICE_AGREEMENT, _THRICE_AGREEMENT, _LAST_AGREEMENT = 1e-9, 1e-8, AGREEMENT
 #: Shortest share of the way between two points that is tried, and most attempts of a way.
-_SHORTEST, _ATTEMPTS = 1 / 8, 12
+_SHORTEST, _ATTEMPTS = 1 / 8, 10
 #: Distance that a change of epsilon, which matters most, counts for, of a decade as 2.3.
 _EPSILON_DISTANCE = 5.0
 
@@ -164,15 +164,34 @@ def guesses_from_neighbours(
     nearest = sources[_distances(parameters, index, sources).argmin(1)]
     begun = {n: v[nearest] for n, v in parameters.items()}
     aimed = {n: v[index] for n, v in parameters.items()}
-    orbit = take(known.orbit, nearest)
+    coarse = _remeshed(equations, begun, take(known.orbit, nearest))
+    there, orbit = _followed(equations, begun, aimed, coarse, harmonics)
+    return _of_all(orbit, index[there], len(parameters["V"])), index[there]
+
+
+def _remeshed(equations: ParametrisedProblem, parameters: dict[str, Float], orbit: Orbit) -> Orbit:
+    """Orbits of these parameters on the coarse mesh."""
+    size, count = orbit.centre.shape
+    problem = jax.tree.map(np.asarray, equations.problem(parameters))
+    coarse = Orbit.empty(orbit.scheme, size, COARSER, count)
+    remesh = partial(remeshed, intervals=COARSER)
+    chunk = chunk_size(COARSER, size)
+    for part, own in run_chunks(remesh, (problem, orbit), np.arange(count), chunk):
+        put(coarse, part, own)
+    return coarse
+
+
+def _followed(
+    equations: ParametrisedProblem,
+    begun: dict[str, Float],
+    aimed: dict[str, Float],
+    orbit: Orbit,
+    harmonics: int,
+) -> tuple[Indices, Orbit]:
+    """Which points were reached, and their orbits, from parameters whose orbits are given."""
     size, count = orbit.centre.shape
     solve = partial(refine_orbit, intervals=COARSER, harmonics=harmonics)
-    remesh = partial(remeshed, intervals=COARSER)
-    coarse = Orbit.empty(orbit.scheme, size, COARSER, count)
     chunk = chunk_size(COARSER, size)
-    at = jax.tree.map(np.asarray, equations.problem(begun))
-    for part, first in run_chunks(remesh, (at, orbit), np.arange(count), chunk):
-        put(coarse, part, first)
     share, step = np.zeros(count), np.ones(count)
     for _ in range(_ATTEMPTS):
         active = np.flatnonzero((share < 1) & (step >= _SHORTEST))
@@ -181,15 +200,20 @@ def guesses_from_neighbours(
         tried = np.minimum(share + step, 1.0)
         between = {n: _between(begun[n], aimed[n], tried) for n in begun}
         problem = jax.tree.map(np.asarray, equations.problem(between))
-        for part, (moved, _, error) in run_chunks(solve, (problem, coarse), active, chunk):
+        for part, (moved, _, error) in run_chunks(solve, (problem, orbit), active, chunk):
             good = error < ACCEPTED
-            put(coarse, part[good], take(moved, np.flatnonzero(good)))
+            put(orbit, part[good], take(moved, np.flatnonzero(good)))
             share[part] = np.where(good, tried[part], share[part])
             step[part] *= np.where(good, 2.0, 0.5)
     there = np.flatnonzero(share >= 1)
-    whole = Orbit.empty(orbit.scheme, size, COARSER, len(next(iter(parameters.values()))))
-    put(whole, index[there], take(coarse, there))
-    return whole, index[there]
+    return there, take(orbit, there)
+
+
+def _of_all(orbit: Orbit, index: Indices, points: int) -> Orbit:
+    """The orbits of the points `index` among those of all."""
+    whole = Orbit.empty(orbit.scheme, orbit.centre.shape[0], COARSER, points)
+    put(whole, index, orbit)
+    return whole
 
 
 def _distances(parameters: Mapping[str, Float], index: Indices, sources: Indices) -> Float:
