@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
+from asperity.errors import InputError
 from asperity.orbit import KnownOrbits, Outcome, response_function
 
 #: Rock-like numbers; the modulation is slow beside sliding over the memory length, so that the fast
@@ -104,3 +105,17 @@ def test_points_out_of_range_are_named_so():
     values = DIRECT(at(epsilon=np.array([0.2, 0.9995])), KnownOrbits(2))
     assert values.outcome.tolist() == [Outcome.CONVERGED, Outcome.OUT_OF_RANGE]
     assert np.isnan(values.mean_friction[1])
+
+
+@pytest.mark.parametrize(
+    ("model", "known", "message"),
+    [
+        (WHOLE, KnownOrbits(5), "must go with search"),
+        (DIRECT, KnownOrbits(4), "as many points as the parameters, 5, got 4"),
+    ],
+)
+def test_known_orbits_that_do_not_fit_are_refused(model, known, message):
+    with pytest.raises(InputError, match=message):
+        model(at(), known)
+    with pytest.raises(InputError, match=message):
+        model.value_and_jacobian(at(), known)

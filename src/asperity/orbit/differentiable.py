@@ -105,8 +105,8 @@ class ResponseFunction:
             with its unit.
         known : KnownOrbits, optional
             Of as many points, from earlier calls with other parameters. Orbits that the fast
-            method does not find are begun there, and kept there for the next call. Not for traced
-            parameters, nor where multipliers are asked for.
+            method does not find are begun there, and kept there for the next call. For
+            ``search="direct"`` without multipliers, and parameters that are not traced.
 
         Returns
         -------
@@ -116,10 +116,12 @@ class ResponseFunction:
         Raises
         ------
         InputError
-            If a name is unknown or missing, a shape is wrong, or a value that is not traced breaks
-            its rule. Where a traced value breaks it, the outcome is `Outcome.INVALID`.
+            If a name is unknown or missing, a shape is wrong, a value that is not traced breaks
+            its rule, or `known` does not fit. Where a traced value breaks its rule, the outcome is
+            `Outcome.INVALID`.
         """
         padded, points = self._padded(parameters)
+        self._require_fitting(known, points or 1, traced=_traced(padded))
         if _traced(padded):
             fast, meshed = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
             return _cut(_evaluate(padded, fast, meshed, program=self._program), points)
@@ -147,6 +149,7 @@ class ResponseFunction:
             derivative to a parameter that all points share is the sum over the points.
         """
         padded, points = self._padded(parameters)
+        self._require_fitting(known, points or 1, traced=_traced(padded))
         table: Any
         if _traced(padded):
             fast, meshed = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
@@ -163,6 +166,25 @@ class ResponseFunction:
         cut = table[:, 0] if points is None else table[:, :points]
         names = self._program.equations.names
         return values, {n: _derivative(c, values) for n, c in zip(names, cut, strict=True)}
+
+    def _require_fitting(self, known: KnownOrbits | None, points: int, *, traced: bool) -> None:
+        """Refuse known orbits that this call cannot begin with."""
+        if known is None:
+            return
+        if traced or self._program.search != "direct" or self._program.multipliers:
+            raise InputError(
+                'known must go with search="direct", no multipliers and parameters that are not '
+                "traced; leave it out"
+            )
+        if known.points != points:
+            raise InputError(
+                f"known must be of as many points as the parameters, {points}, got {known.points}"
+            )
+        if known.orbit is not None and known.orbit.centre.shape[0] != self._program.states:
+            raise InputError(
+                f"known must be of equations with {self._program.states} states, got "
+                f"{known.orbit.centre.shape[0]}; each law and motion needs its own"
+            )
 
     def _padded(self, parameters: Mapping[str, ArrayLike]) -> tuple[Parameters, int | None]:
         """All parameters with as many points as a program is compiled for, and those asked for."""
