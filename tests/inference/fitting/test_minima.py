@@ -180,6 +180,23 @@ def test_a_wrong_minimum_that_few_starts_of_the_fast_method_reach_is_left():
     assert chi2 == pytest.approx(99, abs=0.01)
 
 
+@pytest.mark.parametrize(
+    ("size", "searched", "doubted"),
+    [(1.15, True, True), (1.15, False, False), (1.0, True, False), (3.0, True, False)],
+)
+def test_a_doubtful_minimum_among_searched_orbits_is_said_to_be_one(size, searched, doubted):
+    # 1.15 has p = 0.02; 3 is excluded, which another warning says.
+    def values(x):
+        r, slope = np.full(100, size), np.zeros(100)
+        r[0], slope[0] = 5 * (x - FIRST), 5.0
+        return r, slope
+
+    objective = objective_of(values, 1e-6)
+    objective.terms[0].searching = searched
+    found = described_fit(objective, [objective.minimise(np.array([FIRST]))], profile=False)
+    assert any("a better minimum may lie" in w for w in found.warnings) == doubted
+
+
 class Rows(Formula):
     """As `Formula` with a residual for each row of a table; counts the rows that are computed.
 

@@ -11,14 +11,19 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.inference.comparison.cross_validation import CrossValidation, leave_one_run_out
-from asperity.inference.comparison.evidence import Evidence, evidence_of, searches
+from asperity.inference.comparison.evidence import Evidence, evidence_of
 from asperity.inference.fitting.fit import Data, fit, listed_data
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.residuals import residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
-from asperity.inference.tables.term import Forward, LockInTerm, all_converged
+from asperity.inference.tables.term import (
+    Forward,
+    LockInTerm,
+    all_converged,
+    any_searched,
+)
 from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law
 from asperity.parameters import law_parameters
@@ -215,7 +220,7 @@ def _examined(found: Comparison) -> Comparison:
     """
     judged = {}
     for name, j in found.laws.items():
-        if j.fit.converged and j.excluded and searches(j.fit):
+        if j.fit.converged and j.excluded and any_searched(j.fit.objective.terms):
             j = replace(j, evidence=evidence_of(j.fit, samples=0))
         elif j.fit.converged:
             j = replace(j, evidence=evidence_of(j.fit), cross_validation=leave_one_run_out(j.fit))

@@ -18,7 +18,7 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import Objective
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.sampling import whitened_posterior
-from asperity.inference.tables.term import LockInTerm
+from asperity.inference.tables.term import LockInTerm, any_searched
 
 Float = NDArray[np.float64]
 
@@ -80,7 +80,7 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     lowers the logarithm by ln k.
     """
     if samples is None:
-        samples = _SEARCHED if searches(found) else _SAMPLES
+        samples = _SEARCHED if any_searched(found.objective.terms) else _SAMPLES
     if not found.objective.unknowns:
         # Nothing to average over.
         density = found.log_likelihood
@@ -107,11 +107,6 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
         failed,
         whitened.prior.record(),
     )
-
-
-def searches(found: Fit) -> bool:
-    """Whether orbits of a table of the fit are searched for at every call."""
-    return any(isinstance(t, LockInTerm) and t.searches for t in found.objective.terms)
 
 
 def _log_target(whitened: Whitened, z: Float) -> Float:

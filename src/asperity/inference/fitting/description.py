@@ -17,7 +17,7 @@ from asperity.inference.fitting.profile import Profile
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
 from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm
+from asperity.inference.tables.term import LockInTerm, any_searched
 
 Float = NDArray[np.float64]
 
@@ -40,6 +40,8 @@ _NEAR = 0.5
 _UNDETERMINED = 1.0
 #: Below this probability chi-squared says that the law or the uncertainties are wrong.
 _MISFIT = 0.01
+#: Below this one a better minimum may lie where an orbit was not found.
+_DOUBTFUL = 0.05
 #: Below this one intervals are by the normal approximation unless profiles are asked for.
 _IMPOSSIBLE = 1e-12
 #: Standard deviations between data and a prior that are worth a warning.
@@ -394,6 +396,16 @@ def _with_warnings(found: Fit, said: list[str]) -> Fit:
             f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom (p = "
             f"{found.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
             f"for {worst}; intervals do not hold then"
+        )
+    if (
+        found.dof > 0
+        and _IMPOSSIBLE < found.p_value < _DOUBTFUL
+        and any_searched(found.objective.terms)
+    ):
+        said.append(
+            f"orbits of this table are searched for, and with p = {found.p_value:.2g} a better "
+            "minimum may lie where the search, which is a short one, found none at some row: fit "
+            "again from other start values, and without the slowest modulations"
         )
     if found.dof > 5 and found.p_value > 1 - _MISFIT / 10:
         said.append(

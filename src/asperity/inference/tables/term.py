@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from copy import copy
 from functools import partial
 from typing import Any
@@ -324,6 +324,11 @@ class Forward:
             return KnownOrbits(self.table.rows)
         nearest = min(self._visited, key=lambda visited: distance(visited[0]))[1]
         return nearest.picked(np.arange(self.table.rows))
+
+
+def any_searched(terms: Iterable[object]) -> bool:
+    """Whether orbits of a table are searched for at every call."""
+    return any(isinstance(term, LockInTerm) and term.searches for term in terms)
 
 
 def all_converged(outcome: NDArray[np.int64]) -> bool:
