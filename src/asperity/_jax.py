@@ -22,8 +22,9 @@ T = TypeVar("T")
 #: third. The collocation programs run as fast with both (662 against 723 us a point), the fast
 #: method takes 10 to 20 % longer, which its compilation makes up for over millions of points; small
 #: programs over long arrays are slower with either (jaxlib 0.10.2).
+_LARGE = {"xla_cpu_use_fusion_emitters": False, "xla_backend_optimization_level": 1}
+#: The same where JAX's own switch sets the level.
 _BRIEF = {"xla_cpu_use_fusion_emitters": False}
-_LARGE = {**_BRIEF, "xla_backend_optimization_level": 1}
 
 #: Programs after whose loading the memory mappings of the process are counted.
 _OFTEN = 8

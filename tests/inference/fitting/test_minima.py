@@ -197,6 +197,17 @@ def test_a_doubtful_minimum_among_searched_orbits_is_said_to_be_one(size, search
     assert any("a better minimum may lie" in w for w in found.warnings) == doubted
 
 
+def test_a_minimum_without_orbits_gives_way_to_the_next_and_says_so():
+    # The fast method ends between the two.
+    objective = objective_of(two_minima, 1e-6, edge=(FIRST + SECOND) / 2)
+    beyond = np.array([SECOND]), 98.0
+    found = described_fit(objective, [beyond, (np.array([FIRST]), 99.0)], profile=False)
+    assert found.converged
+    assert found.values["D0"] == pytest.approx(1e-6)
+    assert "a lower minimum, of chi-squared 98," in found.warnings[0]
+    assert not described_fit(objective, [beyond], profile=False).converged
+
+
 class Rows(Formula):
     """As `Formula` with a residual for each row of a table; counts the rows that are computed.
 

@@ -13,6 +13,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from asperity.inference.fitting.intervals import LEVELS, bounded_interval
+from asperity.inference.fitting.minima import FAR_OFF
 from asperity.inference.fitting.profile import Profile
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
@@ -42,8 +43,6 @@ _UNDETERMINED = 1.0
 _MISFIT = 0.01
 #: Below this one a better minimum may lie where an orbit was not found.
 _DOUBTFUL = 0.05
-#: Below this one intervals are by the normal approximation unless profiles are asked for.
-_IMPOSSIBLE = 1e-12
 #: Standard deviations between data and a prior that are worth a warning.
 _CONTRADICTED = 3.0
 #: A bound is reached if the estimate is nearer to it than this share of its standard error.
@@ -97,10 +96,15 @@ def described_fit(
     data = objective.data_residuals(u)
     if data is None:
         # Found once on another way, at the edge of the region in which there are orbits.
-        others = minima[1:]
-        return (
-            described_fit(objective, others, profile=profile) if others else failed_fit(objective)
+        if not minima[1:]:
+            return failed_fit(objective)
+        next_one = described_fit(objective, minima[1:], profile=profile)
+        lost = (
+            f"a lower minimum, of chi-squared {chi2:.4g}, lies where the law hardly has periodic "
+            "orbits, and was not found again: this is the next one; leave out the rows of the "
+            "slowest modulation and compare"
         )
+        return replace(next_one, warnings=(lost, *next_one.warnings))
     information = J.T @ J
     covariance, missing = inverse_information(information)
     sd = np.sqrt(np.diag(covariance))
@@ -127,10 +131,10 @@ def described_fit(
     dof = n + priors - k
     p_value = float(chi_squared.sf(chi2, dof)) if dof > 0 else math.nan
     # Intervals under a law that the data contradict say nothing that a search would make better.
-    impossible = p_value < _IMPOSSIBLE and not profile
-    bent = [] if profile or impossible else _bent(objective, (u, chi2), covariance, missing)
+    far_off = p_value < FAR_OFF and not profile
+    bent = [] if profile or far_off else _bent(objective, (u, chi2), covariance, missing)
     rivals = _rivals(objective, minima, sd)
-    odd = set() if impossible else {*bent, *undetermined}
+    odd = set() if far_off else {*bent, *undetermined}
     profiled = _profiled(objective, covariance, odd, everything=profile)
     estimates = {}
     for i, unknown in enumerate(objective.unknowns):
@@ -399,7 +403,7 @@ def _with_warnings(found: Fit, said: list[str]) -> Fit:
         )
     if (
         found.dof > 0
-        and _IMPOSSIBLE < found.p_value < _DOUBTFUL
+        and FAR_OFF < found.p_value < _DOUBTFUL
         and any_searched(found.objective.terms)
     ):
         said.append(

@@ -60,9 +60,9 @@ _WORTH = 50.0
 _SEARCHED = 2
 #: Decrease of chi-squared that is worth that method: a tenth of a standard error.
 _GAIN = 0.01
-#: Of a law that is far off, with a probability below this, as a share of chi-squared: less would
-#: change no verdict.
-_FAR_OFF, _LARGE_GAIN = 1e-12, 0.1
+#: Probability of chi-squared below which a law is far off, so that its exact minimum and intervals
+#: change no verdict; and the share of chi-squared whose decrease is worth the slower method there.
+FAR_OFF, _LARGE_GAIN = 1e-12, 0.1
 #: Parameters that laws extend others by: without them they are another law.
 _EXTENSIONS = ("lambda", "alpha")
 #: Their coordinate there, and the starts that are tried with it.
@@ -400,7 +400,7 @@ def _far_off(objective: Objective, minimum: tuple[Float, float]) -> bool:
     if not math.isfinite(value):
         return True
     r, _ = objective.residuals(u)
-    return bool(chi_squared.sf(value, max(r.size - u.size, 1)) < _FAR_OFF)
+    return bool(chi_squared.sf(value, max(r.size - u.size, 1)) < FAR_OFF)
 
 
 def _has_table(objective: Objective) -> bool:

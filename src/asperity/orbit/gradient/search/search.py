@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import jax
 import numpy as np
 from numpy.typing import NDArray
@@ -61,13 +63,8 @@ def search_orbits(
     return found
 
 
-def search_in_another_process(
-    equations: ParametrisedProblem,
-    harmonics: int,
-    parameters: dict[str, NDArray[np.float64]],
-    wanted: NDArray[np.bool_],
-) -> MeshOrbits:
-    """Search on `TRACED_MESH`, for a compiled program that waits for it.
+def search_in_another_process(*arguments: Any) -> MeshOrbits:
+    """`search_on_one_mesh` for a compiled program that waits for it.
 
     XLA's programs for the CPU may wait for each other for ever where one calls another, so that
     the search has a process of its own, which is started at its first use.
@@ -75,17 +72,17 @@ def search_in_another_process(
     from loky import get_reusable_executor
 
     executor = get_reusable_executor(max_workers=1, timeout=_IDLE)
-    found = executor.submit(_on_one_mesh, equations, harmonics, parameters, wanted)
-    orbits: MeshOrbits = found.result()
+    orbits: MeshOrbits = executor.submit(search_on_one_mesh, *arguments).result()
     return orbits
 
 
-def _on_one_mesh(
+def search_on_one_mesh(
     equations: ParametrisedProblem,
     harmonics: int,
     parameters: dict[str, NDArray[np.float64]],
     wanted: NDArray[np.bool_],
 ) -> MeshOrbits:
+    """Search for the orbits of the points `wanted`, all on `TRACED_MESH`."""
     found = search_orbits(equations, harmonics, parameters, wanted, meshes=(TRACED_MESH,))
     problem = jax.tree.map(np.asarray, equations.problem(parameters))
     return found.laid_out(problem, harmonics, TRACED_MESH)
