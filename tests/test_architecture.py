@@ -35,9 +35,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "materials": _BASE | {"laws"},  # knows no solvers
     "slider": _BASE | {"laws", "loads"},  # knows no solvers
     "theory": _EQUATIONS | {"algebra"},
-    "orbit": _EQUATIONS | {"algebra", "theory"},  # knows no instruments, no files
-    "branches": _EQUATIONS | {"algebra", "theory", "orbit"},
     "transients": _EQUATIONS | {"algebra"},
+    "orbit": _EQUATIONS | {"algebra", "theory", "transients"},  # knows no instruments, no files
+    "branches": _EQUATIONS | {"algebra", "theory", "orbit"},
     "recording": _BASE,  # knows no laws, no solvers
     "lock_in": _BASE | {"recording"},
     "measurement": _BASE | {"recording", "lock_in", "outputs"},

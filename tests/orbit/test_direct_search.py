@@ -1,4 +1,4 @@
-"""Direct search: from orbits of an earlier call, and from those of other points of the call."""
+"""Direct search: from orbits of an earlier call, and from motions that settle."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from scipy.optimize import fsolve
 
 from asperity.errors import InputError
 from asperity.orbit import KnownOrbits, Outcome, response_function
+from asperity.orbit.gradient.search import direct
 
 #: Rock-like numbers; the modulation is slow beside sliding over the memory length, so that the fast
 #: method finds none of these orbits.
@@ -57,17 +58,34 @@ def integrated(epsilon):
     return spectrum[0].real, 2 * spectrum[1:3]
 
 
-def test_points_out_of_reach_are_reached_from_others():
-    alone = DIRECT(at())
-    # Or else this tests nothing.
-    assert (alone.outcome == Outcome.CONVERGED).any()
-    assert (alone.outcome != Outcome.CONVERGED).any()
-    values = DIRECT(at(), KnownOrbits(EPSILON.size))
+def test_orbits_with_slip_events_are_those_on_which_motions_settle(monkeypatch):
+    known = KnownOrbits(EPSILON.size)
+    values = DIRECT(at(), known)
     assert (values.outcome == Outcome.CONVERGED).all()
-    for k in np.flatnonzero(alone.outcome != Outcome.CONVERGED):
+    assert known.there.all()
+    monkeypatch.setattr(direct, "settled_orbits", lambda *given, **_: (None, given[3][:0]))
+    left = np.flatnonzero(DIRECT(at()).outcome != Outcome.CONVERGED)
+    # Or else this tests nothing.
+    assert left.size
+    for k in left:
         mean, harmonics = integrated(EPSILON[k])
         assert values.mean_friction[k] == pytest.approx(mean, rel=1e-8)
         assert values.harmonics[k] == pytest.approx(harmonics, rel=1e-7)
+
+
+def test_a_motion_that_runs_away_has_no_orbit_and_ends_a_search_for_every_one():
+    # A spring softer than the critical stiffness at the second point.
+    mixed = at(epsilon=np.array([0.1, 0.1, 0.25]), K=np.array([9.1e6, 9.1e1, 9.1e6]), B=0.02)
+    each, slopes = DIRECT.value_and_jacobian(mixed)
+    assert each.outcome.tolist() == [Outcome.CONVERGED, Outcome.NO_ORBIT, Outcome.CONVERGED]
+    assert np.isfinite(slopes["A"].mean_friction[[0, 2]]).all()
+    every, slopes = DIRECT.value_and_jacobian(mixed, every=True)
+    assert every.outcome[1] == Outcome.NO_ORBIT
+    assert np.isnan(slopes["A"].mean_friction).all()
+    fine = {n: np.broadcast_to(v, 3)[[0, 2]] for n, v in mixed.items()}
+    values, slopes = DIRECT.value_and_jacobian(fine, every=True)
+    assert values.mean_friction == pytest.approx(each.mean_friction[[0, 2]], rel=1e-9)
+    assert np.isfinite(slopes["A"].mean_friction).all()
 
 
 def test_orbits_of_an_earlier_call_lead_to_those_of_the_search():

@@ -23,6 +23,8 @@ Float = NDArray[np.float64]
 
 #: A coordinate nearer to its bound is there.
 _AT_BOUND = 1e-6
+#: Distance from bounds at which a minimisation begins.
+_INSIDE = 2e-10
 
 
 class Residuals(NamedTuple):
@@ -267,7 +269,9 @@ class Objective:
         for i, value in kept.items():
             point[i] = value
         low, high = np.array([self.unknowns[i].bounds for i in moving]).reshape(-1, 2).T
-        point[moving] = inside = np.clip(point[moving], low + 1e-10, high - 1e-10)
+        # So far inside that SciPy does not move the first point.
+        inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
+        point[moving] = inside = np.clip(point[moving], low + inset[0], high - inset[1])
         if not moving or not math.isfinite(self.chi2(point)):
             return point, self.chi2(point)
 

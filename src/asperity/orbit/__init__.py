@@ -6,7 +6,7 @@ from asperity.orbit.differentiable import (
     response_function,
 )
 from asperity.orbit.gradient.program import ResponseValues
-from asperity.orbit.gradient.search.nearby import KnownOrbits
+from asperity.orbit.gradient.search.known import KnownOrbits
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.period import Period, over_a_period
 from asperity.orbit.periodic import periodic_response

@@ -38,8 +38,8 @@ from asperity.orbit.gradient.program import (
     by_point,
     chosen,
 )
+from asperity.orbit.gradient.search.known import KnownOrbits
 from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, SearchedOrbits
-from asperity.orbit.gradient.search.nearby import KnownOrbits
 from asperity.orbit.gradient.search.search import search_orbits
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
@@ -131,7 +131,11 @@ class ResponseFunction:
         return _cut(_with_searched(values, searched, part), points)
 
     def value_and_jacobian(
-        self, parameters: Mapping[str, ArrayLike], known: KnownOrbits | None = None
+        self,
+        parameters: Mapping[str, ArrayLike],
+        known: KnownOrbits | None = None,
+        *,
+        every: bool = False,
     ) -> tuple[ResponseValues, dict[str, ResponseValues]]:
         """Response, and its derivative to every parameter at every point.
 
@@ -140,6 +144,9 @@ class ResponseFunction:
         parameters : mapping of str to array
         known : KnownOrbits, optional
             As for a call.
+        every : bool
+            Whether the answer is of use only where every point has a response, as to a fit. The
+            search may then end at the first point without an orbit, and leaves out derivatives.
 
         Returns
         -------
@@ -155,13 +162,15 @@ class ResponseFunction:
             fast, meshed = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
             whole, table = _differentiate(padded, fast, meshed, program=self._program)
         else:
-            fast, searched = _orbits(self._program, padded, points or 1, known)
+            fast, searched = _orbits(self._program, padded, points or 1, known, every=every)
             part = _fast_part(self._program)
             whole, table = _differentiate(padded, fast, None, program=part)
-            table = np.array(table)
-            for index, columns in _mesh_derivatives(padded, searched, part):
-                table[:, index] = columns
             whole = _with_searched(whole, searched, part)
+            outcome = np.asarray(whole.outcome)[: points or 1]
+            table = np.array(table)
+            if not every or (outcome == Outcome.CONVERGED).all():
+                for index, columns in _mesh_derivatives(padded, searched, part):
+                    table[:, index] = columns
         values = _cut(whole, points)
         cut = table[:, 0] if points is None else table[:, :points]
         names = self._program.equations.names
@@ -274,10 +283,11 @@ def response_function(
         parameters with the coefficients of `modulation` as defaults.
     search : bool or "direct"
         Whether to search for orbits that the fast method does not find. Without it they are not
-        converged, and programs are smaller. "direct" tries collocation from the averaged limit
-        alone, in some milliseconds a point, and with `KnownOrbits` also what their orbits and
-        those of the other points lead to; it leaves out what follows branches, which may take a
-        minute for one point. Within `jax.jit`, and where multipliers are asked for, it is as True.
+        converged, and programs are smaller. "direct" tries collocation from the orbits of
+        `KnownOrbits`, from the averaged limit and, under a harmonic load, from the orbit on which
+        a motion from steady sliding settles, in some milliseconds a point; it leaves out what
+        follows branches, which may take a minute for one point. Within `jax.jit`, and where
+        multipliers are asked for, it is as True.
 
     Returns
     -------
@@ -345,7 +355,12 @@ def _traced_orbits(
 
 
 def _orbits(
-    program: Program, parameters: Parameters, points: int, known: KnownOrbits | None
+    program: Program,
+    parameters: Parameters,
+    points: int,
+    known: KnownOrbits | None,
+    *,
+    every: bool = False,
 ) -> tuple[FastOrbits | None, SearchedOrbits | None]:
     """Orbits of the first `points` points by the fast method and, of the others, by the search."""
     spare_mappings()
@@ -358,7 +373,13 @@ def _orbits(
     # A direct search does not resolve multipliers.
     direct = program.search == "direct" and not program.multipliers
     return fast, search_orbits(
-        program.equations, program.harmonics, values, rows, direct=direct, known=known
+        program.equations,
+        program.harmonics,
+        values,
+        rows,
+        direct=direct,
+        known=known,
+        every=every,
     )
 
 
@@ -394,11 +415,15 @@ def _mesh_derivatives(
     parameters: Parameters, searched: SearchedOrbits | None, program: Program
 ) -> Iterator[tuple[Indices, Any]]:
     """Derivatives at the orbits of the search, as by `_differentiate`, with the points of each."""
-    for index, orbits in searched.parts if searched is not None else ():
+    if searched is None:
+        return
+    # JAX takes a millisecond to index an array.
+    own_values = {n: np.asarray(v) for n, v in parameters.items()}
+    for index, orbits in searched.parts:
         for start in range(0, len(index), _BLOCK):
             part = np.arange(start, min(start + _BLOCK, len(index)))
             filled = np.concatenate([part, np.full(_BLOCK - len(part), part[-1])])
-            own = take(parameters, index[filled])
+            own = take(own_values, index[filled])
             _, table = _differentiate(own, None, take(orbits, filled), program=program)
             yield index[part], np.asarray(table)[:, : len(part)]
 

@@ -180,6 +180,28 @@ def test_a_wrong_minimum_that_few_starts_of_the_fast_method_reach_is_left():
     assert chi2 == pytest.approx(99, abs=0.01)
 
 
+@pytest.mark.parametrize("size", [1.2, 3.0])
+def test_a_narrow_minimum_beside_a_wide_one_that_is_doubtful_is_found(size):
+    deep = FIRST - 0.75
+
+    def values(x):
+        r, slope = np.ones(100), np.zeros(100)
+        if abs(x - deep) < 0.3:
+            # At the nearest of 64 starts chi-squared is higher than at all starts near FIRST.
+            r[0], slope[0] = 1000 * (x - deep), 1000.0
+        else:
+            # p = 0.003, or a law that is far off.
+            r[1:], r[0], slope[0] = size, 5 * (x - FIRST), 5.0
+        return r, slope
+
+    objective = objective_of(values, 1e-6)
+    (u, chi2), *others = minima_of(objective, 0)
+    assert u[0] == pytest.approx(deep, abs=1e-5)
+    assert chi2 == pytest.approx(99, abs=1e-6)
+    # It is this search that finds it.
+    assert min(u[0] for u, _ in others) == pytest.approx(FIRST, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("size", "searched", "doubted"),
     [(1.15, True, True), (1.15, False, False), (1.0, True, False), (3.0, True, False)],

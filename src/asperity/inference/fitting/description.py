@@ -13,7 +13,7 @@ from scipy.stats import norm
 from scipy.stats import t as student
 
 from asperity.inference.fitting.intervals import LEVELS, bounded_interval
-from asperity.inference.fitting.minima import FAR_OFF
+from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.profile import Profile
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
@@ -41,8 +41,6 @@ _NEAR = 0.5
 _UNDETERMINED = 1.0
 #: Below this probability chi-squared says that the law or the uncertainties are wrong.
 _MISFIT = 0.01
-#: Below this one a better minimum may lie where an orbit was not found.
-_DOUBTFUL = 0.05
 #: Standard deviations between data and a prior that are worth a warning.
 _CONTRADICTED = 3.0
 #: A bound is reached if the estimate is nearer to it than this share of its standard error.
@@ -401,11 +399,7 @@ def _with_warnings(found: Fit, said: list[str]) -> Fit:
             f"{found.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
             f"for {worst}; intervals do not hold then"
         )
-    if (
-        found.dof > 0
-        and FAR_OFF < found.p_value < _DOUBTFUL
-        and any_searched(found.objective.terms)
-    ):
+    if found.dof > 0 and FAR_OFF < found.p_value < DOUBTFUL and any_searched(found.objective.terms):
         said.append(
             f"orbits of this table are searched for, and with p = {found.p_value:.2g} a better "
             "minimum may lie where the search, which is a short one, found none at some row: fit "

@@ -63,6 +63,9 @@ _GAIN = 0.01
 #: Probability of chi-squared below which a law is far off, so that its exact minimum and intervals
 #: change no verdict; and the share of chi-squared whose decrease is worth the slower method there.
 FAR_OFF, _LARGE_GAIN = 1e-12, 0.1
+#: Probability of chi-squared below which a better minimum is looked for beside the best; changes
+#: of a logarithm, and of others as a share of their range of starts, that lead there; searches.
+DOUBTFUL, _BESIDE, _SHARE_BESIDE, _ROUNDS_BESIDE = 0.05, math.log(2.0), 0.2, 3
 #: Parameters that laws extend others by: without them they are another law.
 _EXTENSIONS = ("lambda", "alpha")
 #: Their coordinate there, and the starts that are tried with it.
@@ -156,7 +159,52 @@ def minima_of(
             # The others are minima, or only where the fast method ends.
             rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
             found = [*beyond, *rest]
-    return sorted(found, key=lambda pair: pair[1])
+    return _with_those_beside(objective, sorted(found, key=lambda pair: pair[1]))
+
+
+def _with_those_beside(
+    objective: Objective, found: list[tuple[Float, float]]
+) -> list[tuple[Float, float]]:
+    """Minima with those that lie beside the best one where that is doubtful, of tables.
+
+    Under slow modulation, where slip events may come early or late in the period, parameters that
+    are wrong by a factor describe most of the data: minima hide each other from drawn starts.
+    """
+    if not _has_table(objective):
+        return found
+    for _ in range(_ROUNDS_BESIDE):
+        if not found or _p_value(objective, found[0]) > DOUBTFUL:
+            break
+        best, lowest = found[0]
+        beside = []
+        for i, unknown in enumerate(objective.unknowns):
+            low, high = (float(unknown.to_coordinate(v)) for v in unknown.start)
+            step = _BESIDE if unknown.logarithmic else _SHARE_BESIDE * (high - low)
+            for change in (-step, step):
+                u = best.copy()
+                u[i] = float(np.clip(u[i] + change, *unknown.bounds))
+                beside.append(u)
+        enough = lowest - _GAIN
+        if _far_off(objective, found[0]):
+            # Most likely the law is wrong, and no minimum will do.
+            chi2 = _chi2_of_many(objective, beside)
+            beside = [beside[i] for i in np.argsort(chi2)[:_FOLLOWED] if math.isfinite(chi2[i])]
+            enough = _WORTHWHILE * lowest
+        ends = [objective.minimise(u, tolerance=_NEARBY, evaluations=_SOME_WAY) for u in beside]
+        u, value = min(ends, key=lambda end: end[1], default=(best, lowest))
+        if value > enough:
+            break
+        found = [objective.minimise(u), *found]
+    return found
+
+
+def _p_value(objective: Objective, minimum: tuple[Float, float]) -> float:
+    """Probability that chi-squared is as large or larger by chance."""
+    u, value = minimum
+    if not math.isfinite(value):
+        return 0.0
+    r, _ = objective.residuals(u)
+    return float(chi_squared.sf(value, max(r.size - u.size, 1)))
 
 
 def _is_table(objective: Objective) -> bool:
@@ -396,11 +444,7 @@ def _blocked(objective: Objective, u: Float, value: float) -> bool:
 
 def _far_off(objective: Objective, minimum: tuple[Float, float]) -> bool:
     """Whether the law does not describe the data there."""
-    u, value = minimum
-    if not math.isfinite(value):
-        return True
-    r, _ = objective.residuals(u)
-    return bool(chi_squared.sf(value, max(r.size - u.size, 1)) < FAR_OFF)
+    return _p_value(objective, minimum) < FAR_OFF
 
 
 def _has_table(objective: Objective) -> bool:
@@ -445,12 +489,15 @@ def _special_cases(objective: Objective, starts: list[Float]) -> list[Float]:
     for i, unknown in enumerate(objective.unknowns):
         if unknown.logarithmic or unknown.name not in _EXTENSIONS:
             continue
-        trials: list[tuple[float, int, Float]] = []
+        trials = []
         for start in starts[:_TRIED]:
-            trial = start.copy()
-            trial[i] = _NEARLY_ZERO
-            trials.append((objective.chi2(trial), len(trials), trial))
-        chi2, _, best = min(trials, default=(math.inf, 0, starts[0] if starts else None))
-        if math.isfinite(chi2) and best is not None:
-            found.append(best)
+            trials.append(start.copy())
+            trials[-1][i] = _NEARLY_ZERO
+        if not trials:
+            continue
+        chi2 = _chi2_of_many(objective, trials)
+        for at in np.argsort(chi2):
+            if math.isfinite(chi2[at]) and math.isfinite(objective.chi2(trials[at])):
+                found.append(trials[at])
+                break
     return found

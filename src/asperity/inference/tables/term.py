@@ -88,7 +88,7 @@ class LockInTerm:
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:
         """Residuals in standard uncertainties; None if a row has no periodic orbit."""
-        predicted, derivatives, outcome = self.forward(values, search=search)
+        predicted, derivatives, outcome = self.forward(values, search=search, every=True)
         if not all_converged(outcome):
             return None
         found = residuals_of(self.weights, predicted, derivatives)
@@ -218,7 +218,7 @@ class Forward:
         self.uses_search = False
 
     def __call__(
-        self, free: Mapping[str, float], *, search: bool | None = None
+        self, free: Mapping[str, float], *, search: bool | None = None, every: bool = False
     ) -> tuple[Prediction, dict[str, Prediction], NDArray[np.int64]]:
         """Prediction, its derivatives to the free parameters, and the outcome of every row.
 
@@ -228,6 +228,8 @@ class Forward:
         search : bool, optional
             Whether points that the fast method does not find are searched for; by default where
             the fast method alone has failed before.
+        every : bool
+            Whether to give up, and to leave out derivatives, once a row has no orbit.
         """
         search = self.uses_search if search is None else search
         applied = self.fixed["epsilon"]
@@ -238,7 +240,7 @@ class Forward:
         function = self._whole if search else self._quick
         given = {n: v for n, v in given.items() if n in function.parameters}
         known = self._nearest(free) if search else None
-        values, slopes = function.value_and_jacobian(given, known)
+        values, slopes = function.value_and_jacobian(given, known, every=every)
         if known is not None and all_converged(np.asarray(values.outcome)):
             self._visited.append((dict(free), known))
             del self._visited[: -self._most_visited]

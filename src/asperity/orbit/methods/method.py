@@ -25,15 +25,12 @@ class Method(ABC):
         What results call it.
     choice : str
         What a user calls it in the `methods` of `periodic_response`; several may share one.
-    follows : bool
-        Whether it follows a branch from easier points, which takes long.
     block : int
         Points that it is given at a time, which bounds its memory.
     """
 
     name: ClassVar[str]
     choice: ClassVar[str]
-    follows: ClassVar[bool] = False
     block: ClassVar[int] = 2048
 
     @abstractmethod

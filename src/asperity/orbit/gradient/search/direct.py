@@ -1,4 +1,4 @@
-"""Direct search: each point by itself, from orbits known of it or of points near it.
+"""Direct search: each point by itself, from an orbit known of it, or from one that is soon found.
 
 It solves a point in some milliseconds, where the whole search, which follows branches from steady
 sliding, may take a minute. Fits call it at the same points again and again.
@@ -13,29 +13,16 @@ from numpy.typing import NDArray
 
 from asperity.orbit.batches import Indices, take
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.gradient.search.mesh_orbits import (
-    SearchedOrbits,
-    converged_orbits,
-    orbit_of,
-)
-from asperity.orbit.gradient.search.nearby import (
-    KnownOrbits,
-    followed_orbits,
-    guesses_from_neighbours,
-)
-from asperity.orbit.gradient.search.whole import whole_search
+from asperity.orbit.gradient.search.known import COARSER, KnownOrbits, followed_orbits
+from asperity.orbit.gradient.search.mesh_orbits import SearchedOrbits, converged_orbits
+from asperity.orbit.gradient.search.settled import settled_orbits
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.methods.collocation.initial_guess import orbits_from_averaged_limit
-from asperity.orbit.methods.registry import METHODS
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
-
-#: Methods for the case that no point is solved from the averaged limit, so that there is none from
-#: which the others could be reached.
-_SLOWER = tuple(m for m in METHODS if not m.follows)
 
 
 @dataclass(frozen=True)
@@ -54,7 +41,9 @@ class DirectSearch:
     found : SearchedOrbits
         To be filled.
     known : KnownOrbits or None
-        Of the first points; it keeps what is found. Without it no point is tried from another.
+        Of the first points; it keeps what is found.
+    every : bool
+        Whether to give up once a point has no orbit.
     """
 
     equations: ParametrisedProblem
@@ -64,6 +53,7 @@ class DirectSearch:
     meshes: tuple[int, ...]
     found: SearchedOrbits
     known: KnownOrbits | None
+    every: bool
 
     def run(self, wanted: Indices) -> None:
         """Search for the points `wanted`."""
@@ -73,20 +63,9 @@ class DirectSearch:
         left = self._left(wanted)
         if len(left):
             self._from_averaged_limit(left)
-        if known is None:
-            return
-        wanted = wanted[self.found.outcome[wanted] != Outcome.OUT_OF_RANGE]
-        if len(wanted) and len(self._left(wanted)) == len(wanted):
-            self._by_slower_methods(known, wanted)
-        before, left = len(wanted), self._left(wanted)
-        while 0 < len(left) < before:
-            before = len(left)
-            sources = np.setdiff1d(wanted, left)
-            guesses = guesses_from_neighbours(
-                self.equations, self.parameters, known, left, sources, self._counted
-            )
-            self._follow(*guesses)
-            left = self._left(wanted)
+        left = self._left(wanted)
+        if len(left) and not (self.every and (self.found.outcome == Outcome.OUT_OF_RANGE).any()):
+            self._from_motions(left)
 
     @property
     def _counted(self) -> int:
@@ -122,10 +101,11 @@ class DirectSearch:
         guess = orbits_from_averaged_limit(self.problem, len(self.found.outcome), index)
         self._follow(guess.orbit, index[guess.found[index]])
 
-    def _by_slower_methods(self, known: KnownOrbits, index: Indices) -> None:
-        found = whole_search(
-            take(self.problem, index), len(index), self.harmonics, self.meshes, _SLOWER
+    def _from_motions(self, index: Indices) -> None:
+        """Until the first motion that does not settle, where every point must have an orbit."""
+        guess, settled = settled_orbits(
+            self.equations, self.parameters, self.problem, index, COARSER, every=self.every
         )
-        for part, orbits in found.parts:
-            self.found.add(index[part], orbits)
-            known.keep(self.problem, index[part], orbit_of(self.problem, orbits))
+        wanted = len(index) if self.every else 1
+        if len(settled) >= wanted:
+            self._follow(guess, settled)

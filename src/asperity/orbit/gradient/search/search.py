@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from asperity.orbit.batches import take
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.gradient.search.direct import DirectSearch
+from asperity.orbit.gradient.search.known import KnownOrbits
 from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, SearchedOrbits
-from asperity.orbit.gradient.search.nearby import KnownOrbits
 from asperity.orbit.gradient.search.whole import whole_search
 
 #: Intervals of the meshes on which orbits are differentiated: each on the first that serves it.
@@ -32,6 +32,7 @@ def search_orbits(
     *,
     direct: bool = False,
     known: KnownOrbits | None = None,
+    every: bool = False,
     meshes: tuple[int, ...] = MESHES,
 ) -> SearchedOrbits:
     """Search for the orbits of the points `wanted`.
@@ -47,6 +48,8 @@ def search_orbits(
         are then those of the mesh, unchecked.
     known : KnownOrbits, optional
         Of the first points, for a direct search, which begins there and keeps what it finds.
+    every : bool
+        Whether a direct search may end at the first point without an orbit.
     meshes : tuple of int
         Numbers of intervals, rising.
     """
@@ -54,7 +57,9 @@ def search_orbits(
     found = SearchedOrbits.none(len(wanted))
     index = np.flatnonzero(wanted)
     if direct:
-        DirectSearch(equations, parameters, problem, harmonics, meshes, found, known).run(index)
+        DirectSearch(equations, parameters, problem, harmonics, meshes, found, known, every).run(
+            index
+        )
         return found
     own = whole_search(take(problem, index), len(index), harmonics, meshes)
     found.outcome[index] = own.outcome

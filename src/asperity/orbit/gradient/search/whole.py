@@ -7,12 +7,10 @@ from functools import partial
 import numpy as np
 
 from asperity.orbit.batches import put, run_chunks, take
+from asperity.orbit.gradient.search.known import largest_change
 from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, SearchedOrbits
-from asperity.orbit.gradient.search.nearby import largest_change
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.programs import ACCEPTED, refine_orbit
-from asperity.orbit.methods.method import Method
-from asperity.orbit.methods.registry import METHODS
 from asperity.orbit.methods.starting_orbits import starting_orbits
 from asperity.orbit.multipliers import chunk_size
 from asperity.orbit.outcome import Outcome
@@ -32,7 +30,6 @@ def whole_search(
     points: int,
     harmonics: int,
     meshes: tuple[int, ...],
-    methods: tuple[Method, ...] = METHODS,
 ) -> SearchedOrbits:
     """Search for the orbits of all points of `problem`, and solve them again on a mesh.
 
@@ -43,7 +40,6 @@ def whole_search(
     points, harmonics : int
     meshes : tuple of int
         Numbers of intervals, rising; an orbit is on the first that agrees with the search.
-    methods : tuple of Method
     """
     counted, size = max(harmonics, 2), problem.system.size
     result = SearchedOrbits.none(points)
@@ -55,7 +51,6 @@ def whole_search(
         harmonics=counted,
         phases=0,
         progress=lambda _: None,
-        methods=methods,
         intervals=meshes[0],
     )
     orbit = found.orbit

@@ -24,7 +24,6 @@ class BranchFollowing(Method):
 
     name = "branch following"
     choice = "collocation"
-    follows = True
 
     def __init__(self, meshes: tuple[BranchMesh, ...] = MESHES) -> None:
         """`meshes` are tried in turn, each on the points without a definite outcome."""

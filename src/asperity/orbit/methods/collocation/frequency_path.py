@@ -47,7 +47,6 @@ class FrequencyPath(Method):
     """Finds orbits of branches that are not connected with steady sliding."""
 
     name = "frequency path"
-    follows = True
     choice = "collocation"
 
     def suits(self, problem: Problem) -> bool:

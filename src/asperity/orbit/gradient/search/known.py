@@ -2,22 +2,18 @@
 
 A fit calls again and again with the same points and parameters that change little. From the orbits
 of the call before, Newton's method needs a few steps, where a search from nothing takes ten times
-as long. And where the search fails, the parameters of another point of the call, whose orbit it
-found, can be changed in steps to those of the point.
+as long.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import partial
 
-import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.orbit.batches import Indices, put, run_chunks, take
-from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.programs import ACCEPTED, refine_orbit, remeshed
 from asperity.orbit.multipliers import AGREEMENT, chunk_size
@@ -34,10 +30,6 @@ COARSER = 72
 #: which the finer serves: its own error is smaller by 2^8, for a stiff orbit by 2^4. The same for
 #: three times, 3^8 or 3^4, and of the last mesh, as good as the whole search.
 _TWICE_AGREEMENT, _THRICE_AGREEMENT, _LAST_AGREEMENT = 1e-9, 1e-8, AGREEMENT
-#: Shortest share of the way between two points that is tried, and most attempts of a way.
-_SHORTEST, _ATTEMPTS = 1 / 8, 10
-#: Distance that a change of epsilon, which matters most, counts for, of a decade as 2.3.
-_EPSILON_DISTANCE = 5.0
 
 
 @dataclass
@@ -132,110 +124,6 @@ def followed_orbits(
         if not len(index):
             break
     return found
-
-
-def guesses_from_neighbours(
-    equations: ParametrisedProblem,
-    parameters: Mapping[str, Float],
-    known: KnownOrbits,
-    index: Indices,
-    sources: Indices,
-    harmonics: int,
-) -> tuple[Orbit, Indices]:
-    """Orbits of points without one, by way of parameters between theirs and the nearest point's.
-
-    Parameters
-    ----------
-    equations : ParametrisedProblem
-    parameters : mapping of str to array, shape (points,)
-    known : KnownOrbits
-    index, sources : array of int
-        Points to be reached, and points of which the known orbit is that of these parameters.
-    harmonics : int
-
-    Returns
-    -------
-    orbit : Orbit
-        Of all points, on a coarse mesh.
-    index : array of int
-        Points that were reached.
-    """
-    assert known.orbit is not None
-    nearest = sources[_distances(parameters, index, sources).argmin(1)]
-    begun = {n: v[nearest] for n, v in parameters.items()}
-    aimed = {n: v[index] for n, v in parameters.items()}
-    coarse = _remeshed(equations, begun, take(known.orbit, nearest))
-    there, orbit = _followed(equations, begun, aimed, coarse, harmonics)
-    return _of_all(orbit, index[there], len(parameters["V"])), index[there]
-
-
-def _remeshed(equations: ParametrisedProblem, parameters: dict[str, Float], orbit: Orbit) -> Orbit:
-    """Orbits of these parameters on the coarse mesh."""
-    size, count = orbit.centre.shape
-    problem = jax.tree.map(np.asarray, equations.problem(parameters))
-    coarse = Orbit.empty(orbit.scheme, size, COARSER, count)
-    remesh = partial(remeshed, intervals=COARSER)
-    chunk = chunk_size(COARSER, size)
-    for part, own in run_chunks(remesh, (problem, orbit), np.arange(count), chunk):
-        put(coarse, part, own)
-    return coarse
-
-
-def _followed(
-    equations: ParametrisedProblem,
-    begun: dict[str, Float],
-    aimed: dict[str, Float],
-    orbit: Orbit,
-    harmonics: int,
-) -> tuple[Indices, Orbit]:
-    """Which points were reached, and their orbits, from parameters whose orbits are given."""
-    size, count = orbit.centre.shape
-    solve = partial(refine_orbit, intervals=COARSER, harmonics=harmonics)
-    chunk = chunk_size(COARSER, size)
-    share, step = np.zeros(count), np.ones(count)
-    for _ in range(_ATTEMPTS):
-        active = np.flatnonzero((share < 1) & (step >= _SHORTEST))
-        if not len(active):
-            break
-        tried = np.minimum(share + step, 1.0)
-        between = {n: _between(begun[n], aimed[n], tried) for n in begun}
-        problem = jax.tree.map(np.asarray, equations.problem(between))
-        for part, (moved, _, error) in run_chunks(solve, (problem, orbit), active, chunk):
-            good = error < ACCEPTED
-            put(orbit, part[good], take(moved, np.flatnonzero(good)))
-            share[part] = np.where(good, tried[part], share[part])
-            step[part] *= np.where(good, 2.0, 0.5)
-    there = np.flatnonzero(share >= 1)
-    return there, take(orbit, there)
-
-
-def _of_all(orbit: Orbit, index: Indices, points: int) -> Orbit:
-    """The orbits of the points `index` among those of all."""
-    whole = Orbit.empty(orbit.scheme, orbit.centre.shape[0], COARSER, points)
-    put(whole, index, orbit)
-    return whole
-
-
-def _distances(parameters: Mapping[str, Float], index: Indices, sources: Indices) -> Float:
-    """Squares of the distances of points, shape (index, sources)."""
-    total = np.zeros((len(index), len(sources)))
-    for name, values in parameters.items():
-        if name == "epsilon":
-            scaled = _EPSILON_DISTANCE * values
-        elif (values > 0).all():
-            scaled = np.log(values)
-        else:
-            scaled = values / max(np.abs(values).max(), 1e-300)
-        total += (scaled[index, None] - scaled[sources]) ** 2
-    return total
-
-
-def _between(begun: Float, aimed: Float, share: Float) -> Float:
-    """Parameters on the way: geometric where both are positive."""
-    positive = (begun > 0) & (aimed > 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        geometric = np.abs(begun) * (np.abs(aimed) / np.abs(begun)) ** share
-    return np.where(positive, geometric, begun + share * (aimed - begun))
 
 
 def _agreement(intervals: int, meshes: tuple[int, ...]) -> float:
