@@ -185,7 +185,8 @@ class EventDetector:
         """Roots between `left` and `right`, all at once, by the Illinois method."""
         left, right, f_left, f_right = (a.copy() for a in (left, right, f_left, f_right))
         for _ in range(_ROOT_STEPS):
-            middle = right - f_right * (right - left) / (f_right - f_left)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                middle = right - f_right * (right - left) / (f_right - f_left)
             middle = np.where(np.isfinite(middle), middle, 0.5 * (left + right))
             with np.errstate(divide="ignore", invalid="ignore"):
                 value = distance(

@@ -42,9 +42,9 @@ _FOLLOWED_FAR_OFF = 10
 _FEW_ROWS, _DATA_EACH = 16, 3
 #: Relative change of the coordinates that ends the way to a minimum there.
 _NEARBY = 1e-3
-#: Rows on which starts are tried before; evaluations after which a way is compared with the others;
-#: how many times the lowest chi-squared is hopeless then.
-_ROWS_FIRST, _SOME_WAY, _HOPELESS = 4, 10, 1e3
+#: Rows on which starts are tried first, and most starts that are tried on all; evaluations after
+#: which a way is compared with the others; how many times the lowest chi-squared is hopeless then.
+_ROWS_FIRST, _TRIED, _SOME_WAY, _HOPELESS = 4, 12, 10, 1e3
 #: Evaluations after which a law that does not describe the data is given up.
 _LONG_WAY = 30
 #: Share that chi-squared must fall to on each part of the way beyond the fast method.
@@ -68,8 +68,8 @@ FAR_OFF, _LARGE_GAIN = 1e-12, 0.1
 DOUBTFUL, _BESIDE, _SHARE_BESIDE, _ROUNDS_BESIDE = 0.05, math.log(2.0), 0.2, 3
 #: Parameters that laws extend others by: without them they are another law.
 _EXTENSIONS = ("lambda", "alpha")
-#: Their coordinate there, and the starts that are tried with it.
-_NEARLY_ZERO, _TRIED = 1e-4, 16
+#: Their coordinate there.
+_NEARLY_ZERO = 1e-4
 
 
 def minima_of(
@@ -247,10 +247,10 @@ def _chi2_of_many(objective: Objective, candidates: list[Float]) -> Float:
     found = np.full(len(u), math.inf)
     # Most starts far from the data have no orbit at some row, which takes longest to find out.
     few = term.with_rows(first).chi2_of_many(objective.unknowns, u, least=_LEAST)
-    left = np.flatnonzero(np.isfinite(few))
+    left = np.argsort(few)[:_TRIED]
+    left = left[np.isfinite(few[left])]
     if left.size:
         priors = [float(np.sum(objective.prior_residuals(u[i])[0] ** 2)) for i in left]
-        # An orbit that is not found at once may be reached from that of another row.
         found[left] = term.chi2_of_many(objective.unknowns, u[left], least=_LEAST) + priors
     return found
 
