@@ -329,7 +329,7 @@ def test_a_posterior_is_sampled_as_it_was_asked_for(monkeypatch):
     with zipfile.ZipFile(io.BytesIO(base64.b64decode(result["report"]))) as folder:
         assert folder.read("report/a.nc") == b"draws"
     # Hardly modulated, the mean does not depend on the amplitude: the band is mu0's own interval.
-    slow = result["bands"][0]["rows"][0]["velocities"][0]
+    slow = result["bands"][0]["rows"][0]["series"][0]
     assert slow["at"] == [1e-4]
     assert slow["value"] == [0.49]
     half = (slow["high"][-1] - slow["low"][-1]) / 2

@@ -11,8 +11,10 @@ from benchmarks.coverage import CASES, TRUE, runs_of
 from asperity import Slider, materials, periodic_response
 from asperity.errors import InputError
 from asperity.fit_report import write_comparison, write_report
+from asperity.fit_report.bands import bands_of
 from asperity.inference import fit, table_of
 from asperity.inference.comparison.compare import judge
+from asperity.laws import RiceRuina
 
 
 @pytest.fixture(scope="module")
@@ -55,6 +57,33 @@ def test_a_folder_that_cannot_be_written_stays_as_it_was(found, tmp_path):
     with pytest.raises(ValueError, match="folder"):
         write_report(tmp_path / "report", found)
     assert (tmp_path / "report").read_text(encoding="utf-8") == "a file"
+
+
+def test_each_frequency_has_a_curve_that_reaches_its_readings():
+    # So slow that the fast method does not find the orbits, and a faster one.
+    numbers = {"mu0": 0.525, "A": 0.0108, "B": 0.0101, "D0": 3.2e-6, "V0": 1e-6}
+    machine = {"K": 9.1e6, "W0": 1290.0, "eps_ratio": 1.0}
+    frequency = np.repeat([0.15, 3.0], 3)
+    epsilon = np.tile([0.1, 0.25, 0.4], 2)
+    slider = Slider(RiceRuina(**numbers), spring=machine["K"], load=machine["W0"])
+    exact = periodic_response(slider, velocity=4e-5, epsilon=epsilon, frequency=frequency)
+    columns = {"V": 4e-5, "epsilon": epsilon, "frequency": frequency}
+    columns |= {"mean_friction": exact.mean_friction, "mean_friction_err": 1e-3}
+    fixed = {n: v for n, v in (numbers | machine).items() if n != "mu0"}
+    found = fit(
+        table_of(columns), "rice-ruina", ("mu0",), fixed=fixed, start={"mu0": 0.5}, starts=2
+    )
+    slow, fast = bands_of(found, found.objective.terms[0], None)
+    assert [slow.label, fast.label] == ["40 µm/s, 0.15 Hz", "40 µm/s, 3 Hz"]
+    for one, rows in ((slow, slice(0, 3)), (fast, slice(3, 6))):
+        assert np.flatnonzero(one.rows).tolist() == list(range(6))[rows]
+        band = one.bands["mean_friction"]
+        between = np.interp(epsilon[rows], band.epsilon, band.middle)
+        np.testing.assert_allclose(between, exact.mean_friction[rows], atol=2e-3)
+        # Nearly without modulation mean friction follows mu0, with it less.
+        width = np.ptp([band.low, band.high], axis=0) / found.parameters["mu0"].se
+        assert width[0] == pytest.approx(3.92, rel=0.25)
+        assert (np.diff(width) < 0).all()
 
 
 def nothing_is_fetched(page):

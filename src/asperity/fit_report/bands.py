@@ -18,7 +18,7 @@ _AMPLITUDES, _SETS = 24, 100
 
 
 class Band(NamedTuple):
-    """Quantiles of a predicted quantity against the applied amplitude at one velocity.
+    """Quantiles of a predicted quantity against the applied amplitude.
 
     Attributes
     ----------
@@ -33,10 +33,27 @@ class Band(NamedTuple):
     high: Float
 
 
+class Series(NamedTuple):
+    """Rows of a table that differ in their amplitude alone, and what is predicted between them.
+
+    Attributes
+    ----------
+    label : str
+        What tells it from the others, at least the velocity.
+    rows : bool array, shape (rows of the table,)
+    bands : dict of str to Band
+        Of mean_friction, delta_mu, mu1 and mu2.
+    """
+
+    label: str
+    rows: NDArray[np.bool_]
+    bands: dict[str, Band]
+
+
 def bands_of(
     found: Fit, term: LockInTerm, posterior: Posterior | None, *, seed: int = 0
-) -> dict[float, dict[str, Band]]:
-    """Bands of mean_friction, delta_mu, mu1 and mu2 for each velocity of a table.
+) -> list[Series]:
+    """Bands of mean_friction, delta_mu, mu1 and mu2 for each series of a table, slowest first.
 
     Parameters
     ----------
@@ -50,10 +67,10 @@ def bands_of(
     values = _drawn(found, posterior, np.random.default_rng(seed))
     count = len(next(iter(values.values())))
     table = term.table
-    bands = {}
-    for velocity in np.unique(table.points["V"]):
-        row = int(np.flatnonzero(table.points["V"] == velocity)[0])
-        top = table.points["epsilon"][table.points["V"] == velocity].max()
+    series = []
+    for label, rows in _series(table):
+        row = int(np.flatnonzero(rows)[0])
+        top = table.points["epsilon"][rows].max()
         epsilon = np.linspace(top / _AMPLITUDES, top, _AMPLITUDES)
         fixed = {n: np.full(_AMPLITUDES, v[row]) for n, v in term.forward.fixed.items()}
         points = {n: np.full(_AMPLITUDES, v[row]) for n, v in table.points.items()}
@@ -65,8 +82,11 @@ def bands_of(
             inertia=term.forward.inertia,
             radiation_damping=term.forward.radiation_damping,
         )
+        if term.searches:
+            forward.search_from_now_on()
+            forward(found.values)
         free = {n: np.repeat(v, _AMPLITUDES) for n, v in values.items()}
-        predicted, outcome = forward.predicted(free, count)
+        predicted, outcome = forward.predicted(free, count, near=term.searches)
         good = outcome == Outcome.CONVERGED
         quantities = {
             "mean_friction": predicted.mean_friction,
@@ -74,11 +94,30 @@ def bands_of(
             "mu1": np.abs(predicted.harmonics[:, 0]),
             "mu2": np.abs(predicted.harmonics[:, 1]),
         }
-        bands[float(velocity)] = {
+        bands = {
             name: _band(epsilon, np.where(good, q, np.nan).reshape(count, _AMPLITUDES))
             for name, q in quantities.items()
         }
-    return bands
+        series.append(Series(label, rows, bands))
+    return series
+
+
+def _series(table: LockInTable) -> list[tuple[str, NDArray[np.bool_]]]:
+    """Labels and rows of series, by everything but the amplitude."""
+    names = [n for n in ("V", "frequency", *table.points) if n != "epsilon"]
+    names = [n for n in dict.fromkeys(names) if n == "V" or np.unique(table.points[n]).size > 1]
+    columns = np.stack([table.points[n] for n in names])
+    found = []
+    for values in np.unique(columns, axis=1).T:
+        label = ", ".join(_label(n, v) for n, v in zip(names, values, strict=True))
+        found.append((label, (columns == values[:, None]).all(0)))
+    return found
+
+
+def _label(name: str, value: float) -> str:
+    if name == "V":
+        return f"{value * 1e6:.3g} µm/s"
+    return f"{value:.3g} Hz" if name == "frequency" else f"{name} = {value:.3g}"
 
 
 def _band(epsilon: Float, values: Float) -> Band:

@@ -102,16 +102,16 @@ def _figures(fits: Mapping[str, Fit]) -> str:
     parts = []
     for i, term in enumerate(first.objective.terms):
         if isinstance(term, LockInTerm):
-            bands = {}
+            predicted = {}
             for name, own in fits.items():
                 its = own.objective.terms[i]
                 assert isinstance(its, LockInTerm)  # all laws have the same data
-                bands[name] = bands_of(own, its, None)
+                predicted[name] = bands_of(own, its, None)
             caption = (
                 "Readings with standard uncertainties; medians and 95 % bands of the prediction of "
                 "each law, by the normal approximation."
             )
-            parts.append(figure(laws_figure(term.table, bands), caption))
+            parts.append(figure(laws_figure(term.table, predicted), caption))
         elif isinstance(term, RunTerm):
             curves = {}
             for name, own in fits.items():

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from asperity.figures.style import new_figure, style
-from asperity.fit_report.bands import Band
+from asperity.fit_report.bands import Series
 from asperity.inference import LockInTable
 from asperity.inference.objective import Residuals
 from asperity.inference.runs.run import RecordedRun
@@ -27,19 +27,18 @@ _LABELS = {
 }
 
 
-def data_figure(table: LockInTable, bands: Mapping[float, Mapping[str, Band]]) -> str:
+def data_figure(table: LockInTable, series: Sequence[Series]) -> str:
     """Readings with error bars, and bands of the fit, against the amplitude; as SVG."""
     names = [n for n in _LABELS if n in table.values]
     with style():
         figure = new_figure(6.4, 2.6 * len(names))
         axes = np.atleast_1d(figure.subplots(len(names), 1, sharex=True))
         for axis, name in zip(axes, names, strict=True):
-            for k, (velocity, curves) in enumerate(bands.items()):
+            for k, (label, at, bands) in enumerate(series):
                 color = f"C{k}"
-                band = curves[name]
+                band = bands[name]
                 axis.fill_between(band.epsilon, band.low, band.high, color=color, alpha=0.3, lw=0)
                 axis.plot(band.epsilon, band.middle, color=color, lw=1)
-                at = table.points["V"] == velocity
                 axis.errorbar(
                     table.points["epsilon"][at],
                     table.values[name][at],
@@ -47,7 +46,7 @@ def data_figure(table: LockInTable, bands: Mapping[float, Mapping[str, Band]]) -
                     fmt="o",
                     ms=3,
                     color=color,
-                    label=f"{velocity * 1e6:.3g} µm/s",
+                    label=label,
                 )
             axis.set_ylabel(_LABELS[name])
         axes[0].legend(fontsize=8)
@@ -55,29 +54,29 @@ def data_figure(table: LockInTable, bands: Mapping[float, Mapping[str, Band]]) -
         return _svg(figure)
 
 
-def laws_figure(table: LockInTable, bands: Mapping[str, Mapping[float, Mapping[str, Band]]]) -> str:
-    """Readings, and bands of several laws, a column of panels for each velocity; as SVG.
+def laws_figure(table: LockInTable, predicted: Mapping[str, Sequence[Series]]) -> str:
+    """Readings, and bands of several laws, a column of panels for each series; as SVG.
 
     Parameters
     ----------
     table : LockInTable
-    bands : mapping of str to mapping
-        By law, velocity and observable.
+    predicted : mapping of str to sequence of Series
+        By law.
     """
     names = [n for n in _LABELS if n in table.values]
-    velocities = list(next(iter(bands.values())))
+    count = len(next(iter(predicted.values())))
     with style():
-        figure = new_figure(max(6.4, 3.2 * len(velocities)), 2.6 * len(names))
-        axes = figure.subplots(len(names), len(velocities), sharex=True, squeeze=False)
+        figure = new_figure(max(6.4, 3.2 * count), 2.6 * len(names))
+        axes = figure.subplots(len(names), count, sharex=True, squeeze=False)
         for row, name in zip(axes, names, strict=True):
-            for axis, velocity in zip(row, velocities, strict=True):
-                for k, (law, curves) in enumerate(bands.items()):
-                    band = curves[velocity][name]
+            for i, axis in enumerate(row):
+                for k, (law, series) in enumerate(predicted.items()):
+                    label, at, bands = series[i]
+                    band = bands[name]
                     axis.fill_between(
                         band.epsilon, band.low, band.high, color=f"C{k}", alpha=0.3, lw=0
                     )
                     axis.plot(band.epsilon, band.middle, color=f"C{k}", lw=1, label=law)
-                at = table.points["V"] == velocity
                 axis.errorbar(
                     table.points["epsilon"][at],
                     table.values[name][at],
@@ -86,9 +85,9 @@ def laws_figure(table: LockInTable, bands: Mapping[str, Mapping[float, Mapping[s
                     ms=3,
                     lw=0.8,
                 )
+                if row is axes[0]:
+                    axis.set_title(label, fontsize=9)
             row[0].set_ylabel(_LABELS[name])
-        for axis, velocity in zip(axes[0], velocities, strict=True):
-            axis.set_title(f"{velocity * 1e6:.3g} µm/s", fontsize=9)
         for axis in axes[-1]:
             axis.set_xlabel(r"$\epsilon$ as applied")
         axes[0, 0].legend(fontsize=7)

@@ -306,7 +306,7 @@ def _histograms(posterior: Any) -> dict[str, dict[str, list[float]]]:
 
 
 def _bands(found: Any, posterior: Any) -> list[dict[str, Any]]:
-    """Readings of each table, and what the law predicts between them at each velocity."""
+    """Readings of each table, and what the law predicts between them."""
     from asperity.fit_report.bands import bands_of
     from asperity.inference.tables.term import LockInTerm
 
@@ -318,21 +318,20 @@ def _bands(found: Any, posterior: Any) -> list[dict[str, Any]]:
         predicted = bands_of(found, term, posterior)
         rows = []
         for name in table.values:
-            if name not in next(iter(predicted.values())):
+            if name not in predicted[0].bands:
                 continue
-            velocities = []
-            for velocity, bands in predicted.items():
-                at = table.points["V"] == velocity
-                velocities.append(
+            series = []
+            for label, at, bands in predicted:
+                series.append(
                     {
-                        "V": velocity,
+                        "label": label,
                         **bands[name]._asdict(),
                         "at": table.points["epsilon"][at],
                         "value": table.values[name][at],
                         "error": table.errors[name][at],
                     }
                 )
-            rows.append({"name": name, "velocities": velocities})
+            rows.append({"name": name, "series": series})
         if rows:
             pictures.append({"rows": rows})
     return pictures

@@ -5,7 +5,7 @@ import { choice, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
 import { copyText, csv, saveFile } from "../../lib/save.js";
 import { Refused, run } from "../../lib/server.js";
-import { digits, quantity } from "../../lib/units.js";
+import { digits } from "../../lib/units.js";
 
 const SETTINGS = {
   laws: ["elasto-plastic"], material: "bureau2000", free: ["eps_ratio", "lambda"], fixed: "",
@@ -262,25 +262,25 @@ export class FitPanel {
   #bands(bands) {
     return (bands || []).map(({ rows }, k) => {
       const columns = () => {
-        const all = rows.flatMap(({ name, velocities }) => velocities.flatMap((v) => v.epsilon.map((e, i) => [name, v.V, e, v.low[i], v.middle[i], v.high[i]])));
-        return Object.fromEntries(["observable", "V", "epsilon", "low", "middle", "high"].map((n, j) => [n, all.map((r) => r[j])]));
+        const all = rows.flatMap(({ name, series: curves }) => curves.flatMap((v) => v.epsilon.map((e, i) => [name, v.label, e, v.low[i], v.middle[i], v.high[i]])));
+        return Object.fromEntries(["observable", "series", "epsilon", "low", "middle", "high"].map((n, j) => [n, all.map((r) => r[j])]));
       };
       const figure = new Figure({ name: `bands-${k + 1}`, title: "Readings and the fitted law", height: Math.max(260, 190 * rows.length), columns });
-      const many = rows[0].velocities.length;
+      const many = rows[0].series.length;
       fill(figure.note,
-        rows[0].velocities.slice(0, 12).map(({ V }, i) => el("p", { class: "key" }, el("span", { class: `swatch ${series(i)}` }), quantity(V, "velocity", 3))),
-        many > 12 && el("p", {}, `and ${many - 12} more velocities`),
+        rows[0].series.slice(0, 12).map(({ label }, i) => el("p", { class: "key" }, el("span", { class: `swatch ${series(i)}` }), label)),
+        many > 12 && el("p", {}, `and ${many - 12} more series`),
         el("p", {}, "Points: readings with two standard errors. Lines: the law, with its 95 % band between the thin ones."));
       this.figures.push(() => figure.draw({
         x: { label: "ε as applied" },
-        rows: rows.map(({ name, velocities }) => ({
+        rows: rows.map(({ name, series: curves }) => ({
           y: { label: LABELS[name] || name },
-          lines: velocities.flatMap((v, i) => [
-            ...["low", "high"].map((end) => ({ x: v.epsilon, y: v[end], cls: series(i), name: `${name}, ${quantity(v.V, "velocity", 3)}, ${end} end of the band` })),
-            { x: v.epsilon, y: v.middle, cls: series(i), thick: true, name: `${name}, ${quantity(v.V, "velocity", 3)}, fitted` },
+          lines: curves.flatMap((v, i) => [
+            ...["low", "high"].map((end) => ({ x: v.epsilon, y: v[end], cls: series(i), name: `${name}, ${v.label}, ${end} end of the band` })),
+            { x: v.epsilon, y: v.middle, cls: series(i), thick: true, name: `${name}, ${v.label}, fitted` },
             ...v.at.map((e, j) => ({ x: [e, e], y: [v.value[j] - 2 * v.error[j], v.value[j] + 2 * v.error[j]], cls: series(i), name: "two standard errors" })),
           ]),
-          points: velocities.map((v, i) => ({ x: v.at, y: v.value, cls: series(i), size: 4, title: (j) => `${name} ${digits(v.value[j])} ± ${digits(v.error[j], 2)} at ε ${digits(v.at[j], 3)}` })),
+          points: curves.map((v, i) => ({ x: v.at, y: v.value, cls: series(i), size: 4, title: (j) => `${name} ${digits(v.value[j])} ± ${digits(v.error[j], 2)} at ε ${digits(v.at[j], 3)}` })),
         })),
       }, "Readings and what the fitted law predicts between them."));
       return figure.element;
