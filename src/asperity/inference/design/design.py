@@ -28,15 +28,13 @@ from asperity.inference.design.result import Design, DesignedPoint, ExpectedErro
 from asperity.inference.design.rival import RivalFit, Separation, separation
 from asperity.inference.design.simulation import Simulated, simulated
 from asperity.inference.design.weights import Shares, optimal_shares, whole_readings
-from asperity.inference.fitting.description import inverse_information
+from asperity.inference.fitting.parabola import UNDETERMINED, inverse_information
 from asperity.inference.tables.table import LockInTable
 
 Float = NDArray[np.float64]
 
 #: Points between two reports of progress, of the fast method and of the search.
 _BLOCK, _SLOW_BLOCK = 256, 32
-#: Standard error of a coordinate, in factors of e, beyond which readings say nothing.
-_UNDETERMINED = 1.0
 #: Efficiency below which the shares are not called optimal.
 _TRUSTED = 0.95
 #: Candidates per free parameter below which the ranges decide the design.
@@ -319,7 +317,7 @@ class _Task:
         for unknown in self.plan.truth.unknowns:
             error = errors[unknown.name]
             slope = abs(unknown.slope(error.value))
-            if error.se > _UNDETERMINED * slope and unknown.name in (self.plan.measured or errors):
+            if error.se > UNDETERMINED * slope and unknown.name in (self.plan.measured or errors):
                 said.append(
                     f"{unknown.name} will not be determined by these readings: its standard error "
                     f"will be {error.se:.3g} {error.unit}".rstrip()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -14,11 +14,17 @@ from scipy.stats import t as student
 
 from asperity.inference.fitting.intervals import LEVELS, bounded_interval
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
+from asperity.inference.fitting.parabola import (
+    UNDETERMINED,
+    Parabola,
+    inverse_information,
+    is_of_tables,
+    parabola_of,
+)
 from asperity.inference.fitting.profile import Profile
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
-from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm, any_searched
+from asperity.inference.tables.term import any_searched
 
 Float = NDArray[np.float64]
 
@@ -27,8 +33,6 @@ _RIVAL = 9.0
 #: Where chi-squared is compared with its parabola, in standard deviations, and the rises there
 #: between which intervals of the normal approximation are taken: a quarter too wide or too narrow.
 _TRIED_AT, _LOWEST_RISE, _HIGHEST_RISE = 2.0, 2.4, 6.8
-#: Decrease of chi-squared that must not be left at a minimum: a third of a standard error.
-_STOPPED = 0.1
 #: Correlation from which a parameter's interval follows that of another.
 _TOGETHER = 0.3
 #: Coordinates, in factors of e, that are known better than this are not tried.
@@ -37,8 +41,6 @@ _PRECISE = 0.1
 _LOWER = 0.01
 #: Minima this near, in standard errors of everything but nuisances, give the same answer.
 _NEAR = 0.5
-#: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
-_UNDETERMINED = 1.0
 #: Below this probability chi-squared says that the law or the uncertainties are wrong.
 _MISFIT = 0.01
 #: Standard deviations between data and a prior that are worth a warning.
@@ -89,112 +91,29 @@ def described_fit(
     profile : bool
         Intervals by profile likelihood.
     """
-    u, chi2 = minima[0]
-    r, J = objective.residuals(u)
-    data = objective.data_residuals(u)
-    if data is None:
-        # Found once on another way, at the edge of the region in which there are orbits.
-        if not minima[1:]:
-            return failed_fit(objective)
-        next_one = described_fit(objective, minima[1:], profile=profile)
-        lost = (
-            f"a lower minimum, of chi-squared {chi2:.4g}, lies where the law hardly has periodic "
-            "orbits, and was not found again: this is the next one; leave out the rows of the "
-            "slowest modulation and compare"
-        )
-        return replace(next_one, warnings=(lost, *next_one.warnings))
-    information = J.T @ J
-    covariance, missing = inverse_information(information)
-    sd = np.sqrt(np.diag(covariance))
-    total, freedom = _with_estimated_noise(objective, u, covariance, missing)
-    se = np.sqrt(np.diag(total))
-    gradient = J.T @ r
-    # The minimum that the parabola would have without the bounds.
-    unbounded = u - covariance @ gradient
-    of_data = np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0)
-    # What is known of the instrument belongs to the data.
-    prior_slopes = objective.prior_residuals(u)[1]
-    nuisance = [v.nuisance for v in objective.unknowns if v.prior is not None]
-    informed = inverse_information(of_data + prior_slopes[nuisance].T @ prior_slopes[nuisance])[0]
-    undetermined = tuple(
-        unknown.name
-        for i, unknown in enumerate(objective.unknowns)
-        if not unknown.nuisance
-        and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > _UNDETERMINED)
-    )
-    stopped = _is_of_tables(objective) and objective.expected_decrease(u) > _STOPPED
-    n = sum(d.values.size for d in data)
-    k = len(objective.unknowns) + sum(term.profiled for term in objective.terms)
-    priors = sum(1 for unknown in objective.unknowns if unknown.prior is not None)
-    dof = n + priors - k
-    p_value = float(chi_squared.sf(chi2, dof)) if dof > 0 else math.nan
+    at = parabola_of(objective, *minima[0])
+    if at is None:
+        return _fit_at_the_next(objective, minima, profile=profile)
     # Intervals under a law that the data contradict say nothing that a search would make better.
-    far_off = p_value < FAR_OFF and not profile
-    bent = [] if profile or far_off else _bent(objective, (u, chi2), covariance, missing)
-    rivals = _rivals(objective, minima, sd)
-    odd = set() if far_off else {*bent, *undetermined}
-    profiled = _profiled(objective, covariance, odd, everything=profile)
+    far_off = at.p_value < FAR_OFF and not profile
+    bent = [] if profile or far_off else _bent(objective, at)
+    rivals = _rivals(objective, minima, at.sd)
+    odd = set() if far_off else {*bent, *at.undetermined}
+    profiled = _profiled(objective, at.covariance, odd, everything=profile)
     estimates = {}
     for i, unknown in enumerate(objective.unknowns):
-        low, high = unknown.bounds
-        at_bound = min(u[i] - low, high - u[i]) < _AT_BOUND * max(sd[i], 1e-12)
-        ends = []
-        searching = profile or unknown.name not in undetermined
-        along = (
-            Profile(objective, i, u, chi2, covariance, search=searching) if i in profiled else None
-        )
-        for level in LEVELS:
-            # By how much estimated noise widens an interval under known noise.
-            wider = float(student.ppf((1 + level) / 2, freedom[i]) / norm.ppf((1 + level) / 2))
-            wider *= float(se[i] / sd[i])
-            if along is not None:
-                ends.append(along.interval(level, wider))
-                if along.lowest[1] < chi2 - _LOWER:
-                    # The search has missed a minimum: begin again there.
-                    missed = objective.minimise(along.lowest[0])
-                    return described_fit(objective, [missed, *minima], profile=profile)
-            elif missing[i] or stopped:
-                ends.append((low, high))
-            else:
-                ends.append(bounded_interval(unbounded[i], wider * float(sd[i]), level, low, high))
-        ends = [
-            _hull(objective, i, interval, [(v, value - chi2) for v, value in rivals], level)
-            for interval, level in zip(ends, LEVELS, strict=True)
-        ]
-        narrow, wide = ((unknown.end(a), unknown.end(b)) for a, b in ends)
-        value = float(unknown.to_value(u[i]))
-        estimates[unknown.name] = Estimate(
-            unknown.name,
-            unknown.parameter.unit,
-            value,
-            math.inf if missing[i] else abs(unknown.slope(value)) * float(se[i]),
-            narrow,
-            wide,
-            bool(at_bound),
-            unknown.prior,
-        )
-    deviance = -2 * float(sum(log_density(d) for d in data))
-    found = Fit(
-        law=objective.law.name,
-        converged=True,
-        message="converged",
-        parameters=estimates,
-        correlation=total / np.outer(se, se),
-        undetermined=undetermined,
-        chi2=chi2,
-        dof=dof,
-        p_value=p_value,
-        log_likelihood=-deviance / 2,
-        aicc=deviance + 2 * k + (2 * k * (k + 1) / (n - k - 1) if n > k + 1 else math.inf),
-        bic=deviance + k * math.log(n),
-        observables=_observables(data),
-        residuals=tuple(data),
-        optima=tuple(Optimum(value, objective.named(v)) for v, value in rivals),
-        warnings=(),
-        objective=objective,
-    )
-    said = _contradicted(objective, u, covariance)
-    if stopped:
+        along = None
+        if i in profiled:
+            searching = profile or unknown.name not in at.undetermined
+            along = Profile(objective, i, at.u, at.chi2, at.covariance, search=searching)
+        ends = _ends(objective, at, i, along)
+        if along is not None and along.lowest[1] < at.chi2 - _LOWER:
+            # The search has missed a minimum: begin again there.
+            missed = objective.minimise(along.lowest[0])
+            return described_fit(objective, [missed, *minima], profile=profile)
+        estimates[unknown.name] = _estimate(objective, at, i, ends, rivals)
+    said = _contradicted(objective, at)
+    if at.stopped:
         said.append(
             "chi-squared still falls where the law has no periodic orbit at some operating point: "
             "the estimate is the last before, and intervals are by profile likelihood or the whole "
@@ -212,28 +131,109 @@ def described_fit(
                 "likelihood (--profile) take minutes for a recording"
             )
         )
-    return _with_warnings(found, said)
+    return _with_warnings(_fit_with(objective, at, estimates, rivals), said)
 
 
-def _with_estimated_noise(
-    objective: Objective, u: Float, covariance: Float, missing: NDArray[np.bool_]
-) -> tuple[Float, Float]:
-    """The covariance with what estimated noise adds, and degrees of freedom of its diagonal."""
-    known = np.where(missing[:, None] | missing, 0.0, covariance)
-    values = objective.named(u)
-    slopes = np.array([float(k.slope(values[k.name])) for k in objective.unknowns])
-    total, variance = covariance.copy(), np.zeros(u.size)
-    for term in objective.terms:
-        if isinstance(term, RunTerm):
-            added, spread = term.uncertainty_of_noise(values, slopes, known)
-            total += added
-            variance += spread
-    freedom = 2 * np.diag(known) ** 2 / np.where(variance > 0, variance, 1.0)
-    return total, np.where(variance > 0, np.maximum(freedom, 1.0), np.inf)
+def _fit_at_the_next(
+    objective: Objective, minima: Sequence[tuple[Float, float]], *, profile: bool
+) -> Fit:
+    """The fit at the second minimum.
+
+    The first was found once on another way, at the edge of the region in which there are orbits.
+    """
+    if not minima[1:]:
+        return failed_fit(objective)
+    found = described_fit(objective, minima[1:], profile=profile)
+    lost = (
+        f"a lower minimum, of chi-squared {minima[0][1]:.4g}, lies where the law hardly has "
+        "periodic orbits, and was not found again: this is the next one; leave out the rows of the "
+        "slowest modulation and compare"
+    )
+    return replace(found, warnings=(lost, *found.warnings))
 
 
-def _is_of_tables(objective: Objective) -> bool:
-    return all(isinstance(term, LockInTerm) for term in objective.terms)
+def _ends(
+    objective: Objective, at: Parabola, i: int, along: Profile | None
+) -> list[tuple[float, float]]:
+    """Ends of the intervals of a coordinate, one for each level.
+
+    All there are; of those along a profile only up to the one that has led to a lower minimum.
+    """
+    low, high = objective.unknowns[i].bounds
+    ends = []
+    for level in LEVELS:
+        # By how much estimated noise widens an interval under known noise.
+        wider = float(student.ppf((1 + level) / 2, at.freedom[i]) / norm.ppf((1 + level) / 2))
+        wider *= float(at.se[i] / at.sd[i])
+        if along is not None:
+            ends.append(along.interval(level, wider))
+            if along.lowest[1] < at.chi2 - _LOWER:
+                break
+        elif at.missing[i] or at.stopped:
+            ends.append((low, high))
+        else:
+            sd = wider * float(at.sd[i])
+            ends.append(bounded_interval(at.unbounded[i], sd, level, low, high))
+    return ends
+
+
+def _estimate(
+    objective: Objective,
+    at: Parabola,
+    i: int,
+    ends: Sequence[tuple[float, float]],
+    rivals: Sequence[tuple[Float, float]],
+) -> Estimate:
+    """A parameter with its intervals, which hold what other minima leave."""
+    unknown = objective.unknowns[i]
+    low, high = unknown.bounds
+    above = [(v, value - at.chi2) for v, value in rivals]
+    whole = [
+        _hull(objective, i, interval, above, level)
+        for interval, level in zip(ends, LEVELS, strict=True)
+    ]
+    narrow, wide = ((unknown.end(a), unknown.end(b)) for a, b in whole)
+    value = float(unknown.to_value(at.u[i]))
+    return Estimate(
+        unknown.name,
+        unknown.parameter.unit,
+        value,
+        math.inf if at.missing[i] else abs(unknown.slope(value)) * float(at.se[i]),
+        narrow,
+        wide,
+        bool(min(at.u[i] - low, high - at.u[i]) < _AT_BOUND * max(at.sd[i], 1e-12)),
+        unknown.prior,
+    )
+
+
+def _fit_with(
+    objective: Objective,
+    at: Parabola,
+    estimates: Mapping[str, Estimate],
+    rivals: Sequence[tuple[Float, float]],
+) -> Fit:
+    """The record of a fit, without its warnings."""
+    deviance = -2 * float(sum(log_density(d) for d in at.data))
+    n, k = at.readings, at.fitted
+    return Fit(
+        law=objective.law.name,
+        converged=True,
+        message="converged",
+        parameters=dict(estimates),
+        correlation=at.total / np.outer(at.se, at.se),
+        undetermined=at.undetermined,
+        chi2=at.chi2,
+        dof=at.dof,
+        p_value=at.p_value,
+        log_likelihood=-deviance / 2,
+        aicc=deviance + 2 * k + (2 * k * (k + 1) / (n - k - 1) if n > k + 1 else math.inf),
+        bic=deviance + k * math.log(n),
+        observables=_observables(at.data),
+        residuals=at.data,
+        optima=tuple(Optimum(value, objective.named(v)) for v, value in rivals),
+        warnings=(),
+        objective=objective,
+    )
 
 
 def _profiled(
@@ -246,7 +246,7 @@ def _profiled(
     """
     if everything:
         return set(range(len(objective.unknowns)))
-    if not _is_of_tables(objective):
+    if not is_of_tables(objective):
         return set()
     sd = np.sqrt(np.diag(covariance))
     correlated = np.abs(covariance / np.outer(sd, sd)) > _TOGETHER
@@ -254,19 +254,19 @@ def _profiled(
     return {i for i in range(len(sd)) if i in strange or correlated[i, strange].any()}
 
 
-def _contradicted(objective: Objective, u: Float, covariance: Float) -> list[str]:
+def _contradicted(objective: Objective, at: Parabola) -> list[str]:
     """Sentences on priors that the data contradict.
 
     A prior's residual r at the maximum has the variance 1 - j C j^T, with its derivative j and
     the covariance C of the coordinates.
     """
-    values, slopes = objective.prior_residuals(u)
+    values, slopes = objective.prior_residuals(at.u)
     with_prior = [k for k in objective.unknowns if k.prior is not None]
     said = []
     for unknown, r, j in zip(with_prior, values, slopes, strict=True):
         prior = unknown.prior
         assert prior is not None  # by the choice of unknowns
-        apart = abs(r) / math.sqrt(max(1 - float(j @ covariance @ j), 1e-6))
+        apart = abs(r) / math.sqrt(max(1 - float(j @ at.covariance @ j), 1e-6))
         if not unknown.nuisance and apart > _CONTRADICTED:
             said.append(
                 f"the prior of {unknown.name}, {prior.mean:.4g} +- {prior.sd:.2g} "
@@ -287,47 +287,26 @@ def _observables(data: Sequence[Residuals]) -> dict[str, tuple[float, int]]:
     }
 
 
-def inverse_information(information: Float) -> tuple[Float, NDArray[np.bool_]]:
-    """Inverse of an information matrix, and which coordinates it leaves without bound."""
-    if not information.size:
-        return information, np.zeros(0, bool)
-    scale = np.sqrt(np.diag(information))
-    blind = ~(scale > 0)
-    scale = np.where(blind, 1.0, scale)
-    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
-    null = values < 1e-13 * max(values.max(), 1.0)
-    loose = (np.abs(vectors[:, null]) > 1e-3).any(1) | blind
-    inverse = (vectors / np.where(null, np.inf, values)) @ vectors.T
-    covariance = inverse / np.outer(scale, scale)
-    return covariance + np.diag(np.where(loose, 1e12, 0.0)), loose
-
-
-def _bent(
-    objective: Objective,
-    minimum: tuple[Float, float],
-    covariance: Float,
-    missing: NDArray[np.bool_],
-) -> list[str]:
+def _bent(objective: Objective, at: Parabola) -> list[str]:
     """Parameters whose interval the normal approximation does not give.
 
     Along each, at two standard deviations and with the others following, chi-squared should have
     risen by four.
     """
-    u, chi2 = minimum
     low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
-    sd = np.sqrt(np.diag(covariance))
+    sd = at.sd
     found = []
     for i, unknown in enumerate(objective.unknowns):
-        if unknown.nuisance or missing[i] or not _PRECISE < sd[i] <= _UNDETERMINED:
+        if unknown.nuisance or at.missing[i] or not _PRECISE < sd[i] <= UNDETERMINED:
             continue
         for sign in (-1, 1):
-            point = u + sign * _TRIED_AT * covariance[:, i] / sd[i]
+            point = at.u + sign * _TRIED_AT * at.covariance[:, i] / sd[i]
             if (point <= low).any() or (point >= high).any():
                 continue  # an interval beside a bound
-            rise = objective.chi2(point) - chi2
+            rise = objective.chi2(point) - at.chi2
             if rise > _HIGHEST_RISE:
                 # The valley may bend, and be as wide as it should be nevertheless.
-                rise = _lowered(objective, point, i) - chi2
+                rise = _lowered(objective, point, i) - at.chi2
             if not _LOWEST_RISE <= rise <= _HIGHEST_RISE:
                 found.append(unknown.name)
                 break

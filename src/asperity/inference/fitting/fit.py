@@ -22,7 +22,8 @@ from asperity.inference.fitting.inputs import (
     require_motion,
     start_values,
 )
-from asperity.inference.fitting.minima import extends, minima_of, under_drift, with_noise
+from asperity.inference.fitting.minima import extends, minima_of
+from asperity.inference.fitting.own_noise import under_drift, with_noise
 from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,

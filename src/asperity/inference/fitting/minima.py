@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -14,7 +13,6 @@ from scipy.stats import chi2 as chi_squared
 from scipy.stats.qmc import Sobol
 
 from asperity.inference.objective import Objective
-from asperity.inference.runs.term import NoiseState, RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.laws import Law
 from asperity.parameters import law_parameters
@@ -24,10 +22,6 @@ Float = NDArray[np.float64]
 
 #: The best of the drawn starts that are followed to their minimum.
 _FOLLOWED = 3
-#: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
-_ROUNDS, _STILL = 8, 0.03
-#: Standard deviations of the parameters within which two starts lead to the same minimum.
-_ALLOWED = 5.0
 #: Minima nearer than this in every coordinate are one.
 _SAME = 1e-3
 
@@ -94,10 +88,57 @@ def minima_of(
         Values, in SI, that fits of special cases of the law have found. A law never describes data
         worse than its special cases: no minimum is higher than these starts.
     """
-    unknowns = objective.unknowns
-    if not unknowns:
+    if not objective.unknowns:
         return _as_it_stands(objective)
-    starts: list[Float] = []
+    begun = _beginnings(objective, seed, drawn, simpler)
+    advance = counted(progress, len(begun.followed))
+    if begun.few is not None:
+        found = _by_way_of_few_rows(objective, begun, begun.few, advance)
+    else:
+        found = _by_the_straight_way(objective, begun, advance)
+    found.sort(key=lambda pair: pair[1])
+    if found and not begun.searched and _blocked(objective, *found[0]):
+        best = found[0][1]
+        objective.search_from_now_on()
+        stopped = distinct(found)
+        beyond = [_onwards(objective, end) for end in stopped[:_SEARCHED]]
+        if min(value for _, value in beyond) > best - _GAIN:
+            _search_no_more(objective)
+        else:
+            # The others are minima, or only where the fast method ends.
+            rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
+            found = [*beyond, *rest]
+    return _with_those_beside(objective, sorted(found, key=lambda pair: pair[1]))
+
+
+class _Beginnings(NamedTuple):
+    """Where minimisations begin.
+
+    Attributes
+    ----------
+    starts : list of array
+        Those at which the law has a solution: the middle if it is one, then best first.
+    special : list of array
+        Minima of special cases of the law.
+    followed : list of array
+        Of these and of starts, what is followed in any case.
+    searched : bool
+        Whether orbits are searched for from the first start on.
+    few : Objective or None
+        Of few rows, on which starts are followed first; None for the straight way.
+    """
+
+    starts: list[Float]
+    special: list[Float]
+    followed: list[Float]
+    searched: bool
+    few: Objective | None
+
+
+def _beginnings(
+    objective: Objective, seed: int, drawn: int, simpler: Sequence[Mapping[str, float]]
+) -> _Beginnings:
+    unknowns = objective.unknowns
     middle = np.array([float(u.to_coordinate(u.middle)) for u in unknowns])
     low = np.array([u.to_coordinate(u.start[0]) for u in unknowns])
     high = np.array([u.to_coordinate(u.start[1]) for u in unknowns])
@@ -116,50 +157,51 @@ def minima_of(
             candidates[i] for i in dict.fromkeys([*range(min(_WITH_SEARCH, chi2.size)), *at])
         ]
         chi2 = _chi2_of_many(few or objective, candidates)
+    order = [i for i in np.argsort(chi2) if math.isfinite(chi2[i])]
+    starts = [candidates[i] for i in dict.fromkeys([*(i for i in order if i == 0), *order])]
     special = [
         u
         for u in _of_special_cases(objective, simpler)
         if math.isfinite((few or objective).chi2(u))
     ]
-    order = [i for i in np.argsort(chi2) if math.isfinite(chi2[i])]
-    starts = [candidates[i] for i in dict.fromkeys([*(i for i in order if i == 0), *order])]
-    found: list[tuple[Float, float]] = []
     followed = [
         *special,
         *starts[: _FOLLOWED + 1],
         *_special_cases(few or objective, starts),
     ]
-    advance = counted(progress, len(followed))
-    if few is not None:
-        found = _of_all_rows(objective, _ends_on_few_rows(few, followed, starts, advance))
-        for u in special:
-            lowest = min((value for _, value in found), default=math.inf)
-            if objective.chi2(u) < lowest:
-                found.append(objective.minimise(u))
+    return _Beginnings(starts, special, followed, searched, few)
+
+
+def _by_the_straight_way(
+    objective: Objective, begun: _Beginnings, advance: Callable[[int], None]
+) -> list[tuple[Float, float]]:
+    """Minima that lie at the ends of the ways from the starts."""
+    found = []
+    for start in begun.followed:
+        found.append(objective.minimise(start))
+        advance(1)
+    for start in begun.starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF] if begun.searched else ():
+        if found and not _far_off(objective, min(found, key=lambda pair: pair[1])):
+            break
+        found.append(objective.minimise(start))
+    return found
+
+
+def _by_way_of_few_rows(
+    objective: Objective, begun: _Beginnings, few: Objective, advance: Callable[[int], None]
+) -> list[tuple[Float, float]]:
+    """Minima that are looked for on few rows, and from there on all."""
+    ends = _ends_on_few_rows(few, begun.followed, begun.starts, advance)
+    found = _of_all_rows(objective, ends)
+    for u in begun.special:
+        lowest = min((value for _, value in found), default=math.inf)
+        if objective.chi2(u) < lowest:
+            found.append(objective.minimise(u))
+    if not found:
         # Another row may have no orbit at any of the ends.
-        starts = [] if found else [u for u in starts if math.isfinite(objective.chi2(u))]
-        found += [objective.minimise(u) for u in starts[: _FOLLOWED + 1]]
-    else:
-        for start in followed:
-            found.append(objective.minimise(start))
-            advance(1)
-        for start in starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF] if searched else ():
-            if found and not _far_off(objective, min(found, key=lambda pair: pair[1])):
-                break
-            found.append(objective.minimise(start))
-    found.sort(key=lambda pair: pair[1])
-    if found and not searched and _blocked(objective, *found[0]):
-        best = found[0][1]
-        objective.search_from_now_on()
-        stopped = _distinct(found)
-        beyond = [_onwards(objective, end) for end in stopped[:_SEARCHED]]
-        if min(value for _, value in beyond) > best - _GAIN:
-            _search_no_more(objective)
-        else:
-            # The others are minima, or only where the fast method ends.
-            rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
-            found = [*beyond, *rest]
-    return _with_those_beside(objective, sorted(found, key=lambda pair: pair[1]))
+        starts = [u for u in begun.starts if math.isfinite(objective.chi2(u))]
+        found = [objective.minimise(u) for u in starts[: _FOLLOWED + 1]]
+    return found
 
 
 def _with_those_beside(
@@ -291,9 +333,9 @@ def _of_all_rows(
     if not ends:
         return []
     largest = _AS_GOOD_FEW * (ends[0][1] + len(objective.unknowns) + _FEW_ROWS)
-    distinct = [end for end in _distinct(ends, _SAME_FEW) if end[1] <= largest][:_FOLLOWED]
+    worth = [end for end in distinct(ends, _SAME_FEW) if end[1] <= largest][:_FOLLOWED]
     found: list[tuple[Float, float]] = []
-    for u, _ in distinct:
+    for u, _ in worth:
         if math.isfinite(objective.chi2(u)):
             found.append(objective.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY))
     found.sort(key=lambda pair: pair[1])
@@ -301,7 +343,7 @@ def _of_all_rows(
         return found
     return [
         objective.minimise(u) if value < found[0][1] + _WORTH else (u, value)
-        for u, value in _distinct(found, _SAME_FEW)
+        for u, value in distinct(found, _SAME_FEW)
     ]
 
 
@@ -323,15 +365,6 @@ def _onwards(objective: Objective, end: tuple[Float, float]) -> tuple[Float, flo
     return objective.minimise(u)
 
 
-def under_drift(objective: Objective) -> Objective:
-    """The objective with recordings whose noise is taken for a slow drift."""
-    terms = tuple(copy(term) if isinstance(term, RunTerm) else term for term in objective.terms)
-    for term in terms:
-        if isinstance(term, RunTerm):
-            term.expect_slow_noise()
-    return replace(objective, terms=terms, _last=None)
-
-
 def _as_it_stands(objective: Objective) -> list[tuple[Float, float]]:
     """The one point of an objective without free parameters, if the law has a solution there."""
     nowhere = np.zeros(0)
@@ -342,92 +375,13 @@ def _as_it_stands(objective: Objective) -> list[tuple[Float, float]]:
     return [(nowhere, chi2)] if math.isfinite(chi2) else []
 
 
-def _distinct(minima: list[tuple[Float, float]], same: float = _SAME) -> list[tuple[Float, float]]:
+def distinct(minima: list[tuple[Float, float]], same: float = _SAME) -> list[tuple[Float, float]]:
     """Minima without those that repeat an earlier one."""
     kept: list[tuple[Float, float]] = []
     for u, value in minima:
         if all(np.abs(u - other).max() > same for other, _ in kept):
             kept.append((u, value))
     return kept
-
-
-def with_noise(
-    objective: Objective,
-    minima: list[tuple[Float, float]],
-    drifting: Objective | None = None,
-    besides: Sequence[tuple[Float, float]] = (),
-) -> tuple[list[tuple[Float, float]], bool]:
-    """Minima once the noise is that of the residual, and whether the two agree at the best.
-
-    Those of `besides`, minima of `drifting`, are followed too if the ends of the others are none
-    there. Each minimum has the noise that its own residual shows. They are compared by the
-    likelihood, noise included: under the noise of one, which holds its misfit, another is no
-    minimum.
-
-    Returns
-    -------
-    list of (array, float)
-        Best first, with the chi-squared of the best under its noise; that of the others is as much
-        higher as twice the logarithm of their likelihood is lower.
-    bool
-    """
-    noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
-    first = [term.noise_state() for term in noisy]
-    ends = []
-    for u, _ in _distinct(minima):
-        for term, state in zip(noisy, first, strict=True):
-            term.restore_noise(state)
-        ends.append(_with_own_noise(objective, noisy, u))
-    for u, value in _distinct(list(besides)):
-        assert drifting is not None  # whose minima they are
-        # Chi-squared of a drift says how large it is: noise has one a sample.
-        allowed = value * (1 + _ALLOWED**2 / drifting.residuals(u)[0].size)
-        if all(drifting.chi2(end.u) > allowed for end in ends):
-            for term, state in zip(noisy, first, strict=True):
-                term.restore_noise(state)
-            ends.append(_with_own_noise(objective, noisy, u))
-    best = min(ends, key=lambda end: end.deviance)
-    for term, state in zip(noisy, best.states, strict=True):
-        term.restore_noise(state)
-    objective.forget()
-    chi2 = objective.chi2(best.u)
-    found = [(best.u, chi2)]
-    for end in sorted(ends, key=lambda end: end.deviance):
-        if end is not best and math.isfinite(end.deviance):
-            found.append((end.u, chi2 + end.deviance - best.deviance))
-    return found, best.agreed
-
-
-class _End(NamedTuple):
-    """A minimum under its own noise."""
-
-    u: Float
-    #: Twice the negative logarithm of likelihood and priors, and twice the parameters of the noise.
-    deviance: float
-    states: list[NoiseState]
-    agreed: bool
-
-
-def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _End:
-    """Noise and parameters in turn, until the parameters stay where they are."""
-    agreed = False
-    for _ in range(_ROUNDS):
-        begin = u
-        for term in noisy:
-            term.update_noise(objective.named(begin))
-        objective.forget()
-        u, value = objective.minimise(begin)
-        if not math.isfinite(value):
-            break
-        _, jacobian = objective.residuals(u)
-        away = jacobian @ (u - begin)
-        # chi-squared of the change, under the noise as it is now.
-        if agreed := float(away @ away) < _STILL**2:
-            break
-    priors = objective.prior_residuals(u)[0]
-    deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
-    deviance += 2 * sum(term.profiled for term in noisy)
-    return _End(u, deviance, [term.noise_state() for term in noisy], agreed)
 
 
 def _blocked(objective: Objective, u: Float, value: float) -> bool:

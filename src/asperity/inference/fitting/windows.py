@@ -13,6 +13,7 @@ from scipy.stats import norm
 from asperity.errors import InputError
 from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.intervals import LEVELS, Interval
+from asperity.inference.fitting.parabola import UNDETERMINED
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law
@@ -26,8 +27,6 @@ _LEFT_OUT = 1 / 3
 _STARTS = 8
 #: Standard errors over all windows that a window is far off by.
 _FAR_OFF = 3.0
-#: Standard error of the logarithm of a parameter that says nothing about it.
-_UNDETERMINED = 1.0
 
 
 @dataclass(frozen=True)
@@ -244,4 +243,4 @@ def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
         interval(LEVELS[1]),
         tuple(f.parameters[unknown.name].value if f.converged else np.nan for f in fits),
     )
-    return estimate, not (unknown.logarithmic and total > _UNDETERMINED)
+    return estimate, not (unknown.logarithmic and total > UNDETERMINED)

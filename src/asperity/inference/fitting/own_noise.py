@@ -1,0 +1,111 @@
+"""Minima of recordings under the noise that their own residuals show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.inference.fitting.minima import distinct
+from asperity.inference.objective import Objective
+from asperity.inference.runs.term import NoiseState, RunTerm
+
+Float = NDArray[np.float64]
+
+#: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
+_ROUNDS, _STILL = 8, 0.03
+#: Standard deviations of the parameters within which two starts lead to the same minimum.
+_ALLOWED = 5.0
+
+
+def under_drift(objective: Objective) -> Objective:
+    """The objective with recordings whose noise is taken for a slow drift."""
+    terms = tuple(copy(term) if isinstance(term, RunTerm) else term for term in objective.terms)
+    for term in terms:
+        if isinstance(term, RunTerm):
+            term.expect_slow_noise()
+    return replace(objective, terms=terms, _last=None)
+
+
+def with_noise(
+    objective: Objective,
+    minima: list[tuple[Float, float]],
+    drifting: Objective | None = None,
+    besides: Sequence[tuple[Float, float]] = (),
+) -> tuple[list[tuple[Float, float]], bool]:
+    """Minima once the noise is that of the residual, and whether the two agree at the best.
+
+    Those of `besides`, minima of `drifting`, are followed too if the ends of the others are none
+    there. Each minimum has the noise that its own residual shows. They are compared by the
+    likelihood, noise included: under the noise of one, which holds its misfit, another is no
+    minimum.
+
+    Returns
+    -------
+    list of (array, float)
+        Best first, with the chi-squared of the best under its noise; that of the others is as much
+        higher as twice the logarithm of their likelihood is lower.
+    bool
+    """
+    noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
+    first = [term.noise_state() for term in noisy]
+    ends = []
+    for u, _ in distinct(minima):
+        for term, state in zip(noisy, first, strict=True):
+            term.restore_noise(state)
+        ends.append(_with_own_noise(objective, noisy, u))
+    for u, value in distinct(list(besides)):
+        assert drifting is not None  # whose minima they are
+        # Chi-squared of a drift says how large it is: noise has one a sample.
+        allowed = value * (1 + _ALLOWED**2 / drifting.residuals(u)[0].size)
+        if all(drifting.chi2(end.u) > allowed for end in ends):
+            for term, state in zip(noisy, first, strict=True):
+                term.restore_noise(state)
+            ends.append(_with_own_noise(objective, noisy, u))
+    best = min(ends, key=lambda end: end.deviance)
+    for term, state in zip(noisy, best.states, strict=True):
+        term.restore_noise(state)
+    objective.forget()
+    chi2 = objective.chi2(best.u)
+    found = [(best.u, chi2)]
+    for end in sorted(ends, key=lambda end: end.deviance):
+        if end is not best and math.isfinite(end.deviance):
+            found.append((end.u, chi2 + end.deviance - best.deviance))
+    return found, best.agreed
+
+
+class _End(NamedTuple):
+    """A minimum under its own noise."""
+
+    u: Float
+    #: Twice the negative logarithm of likelihood and priors, and twice the parameters of the noise.
+    deviance: float
+    states: list[NoiseState]
+    agreed: bool
+
+
+def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _End:
+    """Noise and parameters in turn, until the parameters stay where they are."""
+    agreed = False
+    for _ in range(_ROUNDS):
+        begin = u
+        for term in noisy:
+            term.update_noise(objective.named(begin))
+        objective.forget()
+        u, value = objective.minimise(begin)
+        if not math.isfinite(value):
+            break
+        _, jacobian = objective.residuals(u)
+        away = jacobian @ (u - begin)
+        # chi-squared of the change, under the noise as it is now.
+        if agreed := float(away @ away) < _STILL**2:
+            break
+    priors = objective.prior_residuals(u)[0]
+    deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
+    deviance += 2 * sum(term.profiled for term in noisy)
+    return _End(u, deviance, [term.noise_state() for term in noisy], agreed)

@@ -1,0 +1,162 @@
+"""Chi-squared about a minimum, to second order: what data say of each parameter."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2 as chi_squared
+
+from asperity.inference.objective import Objective, Residuals
+from asperity.inference.runs.term import RunTerm
+from asperity.inference.tables.term import LockInTerm
+
+Float = NDArray[np.float64]
+
+#: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
+UNDETERMINED = 1.0
+#: Decrease of chi-squared that must not be left at a minimum: a third of a standard error.
+_STOPPED = 0.1
+
+
+@dataclass(frozen=True)
+class Parabola:
+    """Chi-squared about a minimum.
+
+    Attributes
+    ----------
+    u : array, shape (n,)
+        Coordinates of the minimum.
+    chi2 : float
+    data : tuple of Residuals
+        Of each term.
+    covariance : array, shape (n, n)
+        Of the coordinates, under noise that is known.
+    missing : bool array, shape (n,)
+        Coordinates that nothing bounds.
+    total : array, shape (n, n)
+        The covariance with what noise adds that is estimated from the same data.
+    freedom : array, shape (n,)
+        Degrees of freedom of its diagonal.
+    unbounded : array, shape (n,)
+        Minimum of the parabola without the bounds of the coordinates.
+    undetermined : tuple of str
+        Parameters of which the data say nothing.
+    stopped : bool
+        Whether chi-squared still falls where the law has no orbit.
+    fitted, priors : int
+        Numbers that were fitted, those of the noise included, and of priors.
+    """
+
+    u: Float
+    chi2: float
+    data: tuple[Residuals, ...]
+    covariance: Float
+    missing: NDArray[np.bool_]
+    total: Float
+    freedom: Float
+    unbounded: Float
+    undetermined: tuple[str, ...]
+    stopped: bool
+    fitted: int
+    priors: int
+
+    @property
+    def sd(self) -> Float:
+        """Standard deviations of the coordinates under known noise."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def se(self) -> Float:
+        """Their standard errors, with what estimated noise adds."""
+        return np.asarray(np.sqrt(np.diag(self.total)))
+
+    @property
+    def readings(self) -> int:
+        """Number of data."""
+        return sum(d.values.size for d in self.data)
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom."""
+        return self.readings + self.priors - self.fitted
+
+    @property
+    def p_value(self) -> float:
+        """Probability of as large a chi-squared by chance; NaN without degrees of freedom."""
+        return float(chi_squared.sf(self.chi2, self.dof)) if self.dof > 0 else math.nan
+
+
+def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
+    """The parabola at a minimum; None where the law has no solution after all."""
+    r, J = objective.residuals(u)
+    data = objective.data_residuals(u)
+    if data is None:
+        return None
+    covariance, missing = inverse_information(J.T @ J)
+    total, freedom = _with_estimated_noise(objective, u, covariance, missing)
+    of_data = np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0)
+    # What is known of the instrument belongs to the data.
+    prior_slopes = objective.prior_residuals(u)[1]
+    with_prior = [v for v in objective.unknowns if v.prior is not None]
+    nuisance = [v.nuisance for v in with_prior]
+    informed = inverse_information(of_data + prior_slopes[nuisance].T @ prior_slopes[nuisance])[0]
+    undetermined = tuple(
+        unknown.name
+        for i, unknown in enumerate(objective.unknowns)
+        if not unknown.nuisance
+        and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > UNDETERMINED)
+    )
+    return Parabola(
+        u=u,
+        chi2=chi2,
+        data=tuple(data),
+        covariance=covariance,
+        missing=missing,
+        total=total,
+        freedom=freedom,
+        unbounded=u - covariance @ (J.T @ r),
+        undetermined=undetermined,
+        stopped=is_of_tables(objective) and objective.expected_decrease(u) > _STOPPED,
+        fitted=len(objective.unknowns) + sum(term.profiled for term in objective.terms),
+        priors=len(with_prior),
+    )
+
+
+def _with_estimated_noise(
+    objective: Objective, u: Float, covariance: Float, missing: NDArray[np.bool_]
+) -> tuple[Float, Float]:
+    """The covariance with what estimated noise adds, and degrees of freedom of its diagonal."""
+    known = np.where(missing[:, None] | missing, 0.0, covariance)
+    values = objective.named(u)
+    slopes = np.array([float(k.slope(values[k.name])) for k in objective.unknowns])
+    total, variance = covariance.copy(), np.zeros(u.size)
+    for term in objective.terms:
+        if isinstance(term, RunTerm):
+            added, spread = term.uncertainty_of_noise(values, slopes, known)
+            total += added
+            variance += spread
+    freedom = 2 * np.diag(known) ** 2 / np.where(variance > 0, variance, 1.0)
+    return total, np.where(variance > 0, np.maximum(freedom, 1.0), np.inf)
+
+
+def is_of_tables(objective: Objective) -> bool:
+    """Whether there are no recordings among the data."""
+    return all(isinstance(term, LockInTerm) for term in objective.terms)
+
+
+def inverse_information(information: Float) -> tuple[Float, NDArray[np.bool_]]:
+    """Inverse of an information matrix, and which coordinates it leaves without bound."""
+    if not information.size:
+        return information, np.zeros(0, bool)
+    scale = np.sqrt(np.diag(information))
+    blind = ~(scale > 0)
+    scale = np.where(blind, 1.0, scale)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    null = values < 1e-13 * max(values.max(), 1.0)
+    loose = (np.abs(vectors[:, null]) > 1e-3).any(1) | blind
+    inverse = (vectors / np.where(null, np.inf, values)) @ vectors.T
+    covariance = inverse / np.outer(scale, scale)
+    return covariance + np.diag(np.where(loose, 1e12, 0.0)), loose
