@@ -16,7 +16,8 @@ from scipy.stats import norm
 
 from asperity.errors import InputError
 from asperity.inference.runs.motion import Drive
-from asperity.measurement.sliding.segments import displacement_noise, partition, partition_at
+from asperity.inference.runs.velocities import constant_velocities
+from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.readers import read
@@ -32,19 +33,13 @@ LONGEST = 20_000
 #: Of longer ones: parts into which the load between its quick
 #: changes is averaged, and the chance of a sample that noise puts beyond the limit.
 _LOAD_BLOCKS, _LOAD_BY_CHANCE = 4_000, 1e-3
-#: A segment stands still that moves by less than so many standard deviations of the displacement's
-#: noise, or by less than this share of the fastest velocity.
-_STILL_NOISE, _STILL_SHARE = 6.0, 5e-3
 #: Equal samples in a row at an extreme that may be a clipped gauge, and the chance below which
 #: they are.
 _CLIPPED, _BY_CHANCE = 3, 1e-3
-#: A given velocity that differs by this share from that of the displacement is contradicted.
-_OTHER_VELOCITY = 0.05
 #: Samples of a stretch of one sampling rate, at least, and the change of the interval that ends it.
 _SHORTEST, _OTHER_RATE = 16, 1.5
-
-#: Friction above this is a mistake of units; a share of equal neighbours is coarse rounding.
-#: whose other differences are whole multiples of one step.
+#: Friction above this is a mistake of units. Rounding is coarse where this share of neighbours is
+#: equal and the other differences are whole multiples of one step, to this share of it.
 _LARGEST_FRICTION, _MOSTLY_EQUAL, _WHOLE = 5.0, 0.5, 0.02
 
 
@@ -199,51 +194,9 @@ def recorded_run(
     shown = Path(shown).stem if name is None else name
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
-    if velocities is not None:
-        if steps is None or len(velocities) != len(steps) + 1:
-            raise InputError(
-                f"{shown}.velocities must be one more than the steps, got {len(velocities)} for "
-                f"{len(steps or ())}; give both"
-            )
-        found = partition_at(time, None, np.array(steps))
-        speeds = [float(v) for v in velocities]
-        holds = [v == 0 for v in speeds]
-    elif signals.displacement is None:
-        raise InputError(
-            f"{shown} must have the displacement or velocity of the drive, got none: "
-            f"{signals.no_motion}; name a channel, or give steps and velocities"
-        )
-    else:
-        found = (
-            partition(time, signals.displacement, friction)
-            if steps is None
-            else partition_at(time, signals.displacement, np.array(steps))
-        )
-        speeds, holds = list(found.velocities), list(found.holds)
-        noise = displacement_noise(time, signals.displacement)
-        fastest = max(abs(v) for v in speeds)
-        spans = np.diff([time[0], *(c.time for c in found.cuts), time[-1]])
-        holds = [
-            hold or abs(v) * t < _STILL_NOISE * noise or abs(v) < _STILL_SHARE * fastest
-            for hold, v, t in zip(holds, speeds, spans, strict=True)
-        ]
-    moving = [v for v, hold in zip(speeds, holds, strict=True) if not hold]
-    if not moving or holds[0]:
-        raise InputError(
-            f"{shown} must begin with sliding at a constant velocity, got "
-            f"{'no sliding' if not moving else 'a hold'}; give a window that does"
-        )
-    sign = float(np.sign(moving[0]))
-    if any(sign * v <= 0 for v in moving):
-        raise InputError(
-            f"{shown} must slide in one direction, got a reversal; give a window without"
-        )
-    speeds = [0.0 if hold else sign * v for v, hold in zip(speeds, holds, strict=True)]
+    cuts_found, speeds, doubts = constant_velocities(signals, shown, steps, velocities)
     origin = float(time[0])
-    # A hold that was cut in two is one.
-    kept = [k for k in range(len(found.cuts)) if speeds[k] or speeds[k + 1]]
-    cut_times = [found.cuts[k].time - origin for k in kept]
-    speeds = [speeds[0], *(speeds[k + 1] for k in kept)]
+    cut_times = [cut.time - origin for cut in cuts_found]
     times = time - origin
     W, unit, varies, knots, load_values = _load(trace, load, shown, time, signals.load_unit)
     drive, cuts = _drive(times, cut_times, speeds, knots - origin, load_values / W)
@@ -252,19 +205,8 @@ def recorded_run(
         [0.0, *cut_times, times[-1]],
         np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
     )
-    uncertain = []
-    for k in kept:
-        cut = found.cuts[k]
-        i = int(np.clip(np.searchsorted(time, cut.time), 1, time.size - 1))
-        interval = float(np.median(np.diff(time[max(0, i - 3) : i + 3])))
-        # Found between so many samples, a time is known worse than their interval.
-        uncertain.append(max(interval, cut.doubt / 2) if time.size > LONGEST else interval)
-    doubts = list(found.doubts)
     doubts += clipped(trace, force, window)
     doubts += strange_friction(friction)
-    if velocities is not None and signals.displacement is not None:
-        measured = partition_at(time, signals.displacement, np.array(steps)).velocities
-        doubts += contradicted_velocities(velocities, measured)
     if signals.left_out:
         doubts.append(
             f"{signals.left_out} samples are left out, where a value is no number or time does not "
@@ -277,7 +219,7 @@ def recorded_run(
         slip=slip,
         drive=drive,
         cuts=tuple(cuts),
-        cut_uncertainty=tuple(uncertain),
+        cut_uncertainty=_cut_uncertainty(time, cuts_found),
         velocity=speeds[0],
         velocities=tuple(speeds),
         origin=origin,
@@ -287,6 +229,17 @@ def recorded_run(
         stretches=_stretches(times),
         doubts=tuple(doubts),
     )
+
+
+def _cut_uncertainty(time: Float, cuts: Sequence[Cut]) -> tuple[float, ...]:
+    """Standard uncertainty of the time of each cut (s)."""
+    uncertain = []
+    for cut in cuts:
+        i = int(np.clip(np.searchsorted(time, cut.time), 1, time.size - 1))
+        interval = float(np.median(np.diff(time[max(0, i - 3) : i + 3])))
+        # Found between so many samples, a time is known worse than their interval.
+        uncertain.append(max(interval, cut.doubt / 2) if time.size > LONGEST else interval)
+    return tuple(uncertain)
 
 
 def clipped(trace: Trace, force: str, window: tuple[float, float] | None) -> list[str]:
@@ -363,16 +316,6 @@ def strange_friction(friction: Float) -> list[str]:
             "write more digits"
         )
     return said
-
-
-def contradicted_velocities(given: Sequence[float], measured: Sequence[float]) -> list[str]:
-    """Sentences on given velocities (m/s) that the recorded displacement contradicts."""
-    return [
-        f"velocity {k} is given as {abs(V):.4g} m/s, and the recorded displacement has "
-        f"{abs(v):.4g} m/s; correct one of them"
-        for k, (V, v) in enumerate(zip(given, measured, strict=True), start=1)
-        if V != 0 and np.isfinite(v) and abs(abs(v) - abs(V)) > _OTHER_VELOCITY * abs(V)
-    ]
 
 
 def _load(

@@ -1,0 +1,130 @@
+"""The drive of a recording as segments of constant velocity, measured or as the caller says."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.measurement.sliding.segments import (
+    Cut,
+    Partition,
+    displacement_noise,
+    partition,
+    partition_at,
+)
+from asperity.measurement.sliding.signals import SlidingSignals
+
+Float = NDArray[np.float64]
+
+#: A segment stands still that moves by less than so many standard deviations of the displacement's
+#: noise, or by less than this share of the fastest velocity.
+_STILL_NOISE, _STILL_SHARE = 6.0, 5e-3
+#: A given velocity that differs by this share from that of the displacement is contradicted.
+_OTHER_VELOCITY = 0.05
+
+
+class ConstantVelocities(NamedTuple):
+    """Segments of a recording in which the drive moves steadily, or rests.
+
+    Attributes
+    ----------
+    cuts : list of Cut
+        Between the segments.
+    speeds : list of float
+        m/s, positive, 0 in a hold; one more than cuts.
+    doubts : list of str
+        Sentences on other ways to cut the recording, or on velocities that it contradicts.
+    """
+
+    cuts: list[Cut]
+    speeds: list[float]
+    doubts: list[str]
+
+
+def constant_velocities(
+    signals: SlidingSignals,
+    name: str,
+    steps: Sequence[float] | None,
+    velocities: Sequence[float] | None,
+) -> ConstantVelocities:
+    """Segments of a recording; parameters as in `recorded_run`.
+
+    Raises
+    ------
+    InputError
+        If there are not as many velocities as segments, nothing says how the drive moves, the
+        recording begins with a hold, or the direction turns.
+    """
+    found, speeds, holds = _given_or_measured(signals, name, steps, velocities)
+    moving = [v for v, hold in zip(speeds, holds, strict=True) if not hold]
+    if not moving or holds[0]:
+        raise InputError(
+            f"{name} must begin with sliding at a constant velocity, got "
+            f"{'no sliding' if not moving else 'a hold'}; give a window that does"
+        )
+    sign = float(np.sign(moving[0]))
+    if any(sign * v <= 0 for v in moving):
+        raise InputError(
+            f"{name} must slide in one direction, got a reversal; give a window without"
+        )
+    speeds = [0.0 if hold else sign * v for v, hold in zip(speeds, holds, strict=True)]
+    # A hold that was cut in two is one.
+    kept = [k for k in range(len(found.cuts)) if speeds[k] or speeds[k + 1]]
+    doubts = list(found.doubts)
+    if velocities is not None and signals.displacement is not None:
+        measured = partition_at(signals.time, signals.displacement, np.array(steps)).velocities
+        doubts += contradicted_velocities(velocities, measured)
+    return ConstantVelocities(
+        [found.cuts[k] for k in kept], [speeds[0], *(speeds[k + 1] for k in kept)], doubts
+    )
+
+
+def _given_or_measured(
+    signals: SlidingSignals,
+    name: str,
+    steps: Sequence[float] | None,
+    velocities: Sequence[float] | None,
+) -> tuple[Partition, list[float], list[bool]]:
+    """The cuts, the signed velocities between them, and which segments are holds."""
+    time, displacement = signals.time, signals.displacement
+    if velocities is not None:
+        if steps is None or len(velocities) != len(steps) + 1:
+            raise InputError(
+                f"{name}.velocities must be one more than the steps, got {len(velocities)} for "
+                f"{len(steps or ())}; give both"
+            )
+        speeds = [float(v) for v in velocities]
+        return partition_at(time, None, np.array(steps)), speeds, [v == 0 for v in speeds]
+    if displacement is None:
+        raise InputError(
+            f"{name} must have the displacement or velocity of the drive, got none: "
+            f"{signals.no_motion}; name a channel, or give steps and velocities"
+        )
+    found = (
+        partition(time, displacement, signals.friction)
+        if steps is None
+        else partition_at(time, displacement, np.array(steps))
+    )
+    speeds = list(found.velocities)
+    noise = displacement_noise(time, displacement)
+    fastest = max(abs(v) for v in speeds)
+    spans = np.diff([time[0], *(c.time for c in found.cuts), time[-1]])
+    holds = [
+        hold or abs(v) * t < _STILL_NOISE * noise or abs(v) < _STILL_SHARE * fastest
+        for hold, v, t in zip(found.holds, speeds, spans, strict=True)
+    ]
+    return found, speeds, holds
+
+
+def contradicted_velocities(given: Sequence[float], measured: Sequence[float]) -> list[str]:
+    """Sentences on given velocities (m/s) that the recorded displacement contradicts."""
+    return [
+        f"velocity {k} is given as {abs(V):.4g} m/s, and the recorded displacement has "
+        f"{abs(v):.4g} m/s; correct one of them"
+        for k, (V, v) in enumerate(zip(given, measured, strict=True), start=1)
+        if V != 0 and np.isfinite(v) and abs(abs(v) - abs(V)) > _OTHER_VELOCITY * abs(V)
+    ]
