@@ -40,6 +40,8 @@ _USUAL = {
     "alpha": (0.01, 0.5),
     "eps_ratio": (0.2, 1.0),
 }
+#: Share of a usual value that is the least scale of a coordinate.
+_LEAST_SCALE = 1e-3
 #: A positive parameter is looked for within this factor of its starts.
 _FARTHEST = 1e6
 #: Never free: only its product with others is seen.
@@ -237,7 +239,9 @@ def unknown_of(
         low, high = max(low, prior.mean - 3 * prior.sd), min(high, prior.mean + 3 * prior.sd)
         low = max(low, prior.mean / 10)
     high = min(high, upper)
-    scale = 1.0 if positive else (middle or math.sqrt(low * high))
+    # A start may be as good as zero, which is no scale.
+    typical = math.sqrt(usual[0] * usual[1]) if usual and usual[0] > 0 else 0.0
+    scale = 1.0 if positive else max(middle or typical, _LEAST_SCALE * typical)
     lower = 0.0 if parameter.rule in ("positive", "not negative") else -math.inf
     return Unknown(parameter, positive, scale, lower, upper, (low, high), given, prior, nuisance)
 

@@ -181,6 +181,14 @@ def test_a_wrong_minimum_that_few_starts_of_the_fast_method_reach_is_left():
     assert chi2 == pytest.approx(99, abs=0.01)
 
 
+def test_a_start_that_is_as_good_as_zero_is_no_scale():
+    law = get_law("linker-dieterich")
+    (alpha,) = unknowns_of(law, ["alpha"], largest_epsilon=0.5, start={"alpha": 1e-300}, priors={})
+    low, high = (float(alpha.to_coordinate(v)) for v in alpha.start)
+    assert 0 <= low < high < 1e6
+    assert alpha.to_value(np.array(high)) == pytest.approx(alpha.start[1])
+
+
 @pytest.mark.parametrize("size", [1.2, 3.0])
 def test_a_narrow_minimum_beside_a_wide_one_that_is_doubtful_is_found(size):
     deep = FIRST - 0.75

@@ -25,10 +25,12 @@ from asperity.inference.tables.term import (
     any_searched,
 )
 from asperity.inference.unknowns import MissingNumberError
-from asperity.laws import get_law
+from asperity.laws import get_law, registered
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
 
+#: Drawn starts of a fit that is repeated without outliers.
+_STARTS_AGAIN = 16
 #: A law is excluded by its own misfit below this probability of chi-squared, if another law is not.
 _IMPOSSIBLE = 1e-3
 #: At or above this probability of chi-squared there are no outliers to look for.
@@ -141,6 +143,13 @@ def compare(
         raise InputError(
             f"laws must be two or more, got {', '.join(laws) or 'none'}; name those to compare"
         )
+    # Those of laws alone; others are of the machine, the runs or unknown, which the fit says.
+    nobodys = [p for p in free if p in _of_any_law() and not any(p in _parameters(n) for n in laws)]
+    if nobodys:
+        raise InputError(
+            f"free must be parameters of the laws that are compared, got '{nobodys[0]}', which "
+            f"none of {', '.join(dict.fromkeys(laws))} has; leave it out, or add a law with it"
+        )
     several = listed_data(data, options.get("runs") or RunOptions())
     own = {name: _own(name, free, laws) for name in dict.fromkeys(laws)}
     given = {
@@ -150,7 +159,9 @@ def compare(
     }
     not_compared: dict[str, str] = {}
 
-    def fits_to(data: Sequence[Any], advance: Callable[[int], None]) -> dict[str, Fit]:
+    def fits_to(
+        data: Sequence[Any], advance: Callable[[int], None], before: Mapping[str, Fit] | None = None
+    ) -> dict[str, Fit]:
         done: dict[str, Fit] = {}
         # Special cases come before the laws that have them, which begin there.
         for name, names in sorted(own.items(), key=lambda pair: len(_parameters(pair[0]))):
@@ -158,9 +169,14 @@ def compare(
                 key: {n: values[n] for n in _own(name, list(values), laws)}
                 for key, values in given.items()
             }
+            chosen = dict(options)
+            if before and name in before and before[name].converged:
+                # Nearly the same data.
+                mine["start"] = {n: before[name].values[n] for n in names}
+                chosen["starts"] = _STARTS_AGAIN
             try:
                 done[name] = fit(
-                    data, name, names, bare=True, simpler=list(done.values()), **mine, **options
+                    data, name, names, bare=True, simpler=list(done.values()), **mine, **chosen
                 )
             except MissingNumberError as error:
                 not_compared[name] = str(error)
@@ -178,7 +194,7 @@ def compare(
     if outliers:
         table = joined([d for d in several if isinstance(d, LockInTable)])[0]
         out = np.isin(np.arange(table.rows), outliers)
-        rest = judge(fits_to([table.without(out)], lambda _: None))
+        rest = judge(fits_to([table.without(out)], lambda _: None, fits))
         found = _without(found, rest, table.row_names[out].tolist())
     found = replace(found, not_compared=not_compared)
     return _examined(found) if evidence else found
@@ -282,6 +298,10 @@ def judge(fits: Mapping[str, Fit]) -> Comparison:
 
 def _parameters(law: str) -> Collection[str]:
     return law_parameters(get_law(law))
+
+
+def _of_any_law() -> set[str]:
+    return {p for law in registered().values() for p in law_parameters(law)}
 
 
 def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
