@@ -74,7 +74,7 @@ def settled_orbits(
     found = []
     for i in index:
         period = _last_period(equations, {n: float(v[i]) for n, v in parameters.items()})
-        if period is not None and len(period.coefficients[0]) == size:
+        if period is not None:
             put(orbit, np.array([i]), _on_mesh(take(problem, np.array([i])), period, intervals))
             found.append(i)
         elif every:
@@ -100,11 +100,14 @@ def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> De
         slider,
         programme,
         inertia=equations.massive,
-        radiation_damping=values["eta"] if equations.damped else None,
+        radiation_damping=values.get("eta") or None,
         rtol=_TOLERANCE,
         method="implicit",
         most_steps=_MOST_STEPS,
     )
+    if type(integration.motion) is not equations.motion:
+        # In other states, for slip that may reverse.
+        return None
     integration.checkpoint = first_checkpoint(integration.motion, programme, "steady")
     parts = []
     for part in integration.segment_parts():
