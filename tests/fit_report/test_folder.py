@@ -14,6 +14,7 @@ from asperity.fit_report import write_comparison, write_report
 from asperity.fit_report.bands import bands_of
 from asperity.inference import fit, table_of
 from asperity.inference.comparison.compare import judge
+from asperity.inference.comparison.evidence import Evidence
 from asperity.orbit import response_function
 
 
@@ -95,6 +96,10 @@ def nothing_is_fetched(page):
 def test_a_comparison_has_a_page_of_all_laws(found, tmp_path):
     worse = replace(found, aicc=found.aicc + 50, law="another law")
     compared = judge({"elasto-plastic": found, "another law": worse})
+    # Not sampled, as of an excluded law.
+    compared.laws["another law"] = replace(
+        compared.laws["another law"], evidence=Evidence(-12.5, np.nan, np.nan, -12.5, 0, {})
+    )
     write_comparison(tmp_path / "report", compared)
     names = sorted(p.name for p in (tmp_path / "report").iterdir())
     assert names == ["another law.toml", "comparison.json", "elasto-plastic.toml", "report.html"]
@@ -103,6 +108,9 @@ def test_a_comparison_has_a_page_of_all_laws(found, tmp_path):
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert compared.verdict[:40] in page
     assert "excluded: its AICc is 50" in page
+    assert "-12.50<" in page
+    # The title of the panels.
+    assert "1 µm/s" in page
     assert nothing_is_fetched(page)
     # A panel for the drop and one for the harmonic.
     assert page.count("<svg") == 1

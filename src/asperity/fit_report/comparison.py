@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
@@ -79,7 +80,10 @@ def _laws(found: Comparison) -> str:
         if not own.converged:
             rows.append((name, "", "", "", "", "", "", own.message))
             continue
-        evidence = f"{j.evidence.log:.2f} +- {j.evidence.standard_error:.2g}" if j.evidence else ""
+        evidence = f"{j.evidence.log:.2f}" if j.evidence else ""
+        # Of excluded laws among searched orbits it is the normal approximation's.
+        if j.evidence and math.isfinite(j.evidence.standard_error):
+            evidence += f" +- {j.evidence.standard_error:.2g}"
         rows.append(
             (
                 name,

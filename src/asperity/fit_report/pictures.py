@@ -71,7 +71,7 @@ def laws_figure(table: LockInTable, predicted: Mapping[str, Sequence[Series]]) -
         for row, name in zip(axes, names, strict=True):
             for i, axis in enumerate(row):
                 for k, (law, series) in enumerate(predicted.items()):
-                    label, at, bands = series[i]
+                    _, at, bands = series[i]
                     band = bands[name]
                     axis.fill_between(
                         band.epsilon, band.low, band.high, color=f"C{k}", alpha=0.3, lw=0
@@ -85,9 +85,9 @@ def laws_figure(table: LockInTable, predicted: Mapping[str, Sequence[Series]]) -
                     ms=3,
                     lw=0.8,
                 )
-                if row is axes[0]:
-                    axis.set_title(label, fontsize=9)
             row[0].set_ylabel(_LABELS[name])
+        for axis, one in zip(axes[0], next(iter(predicted.values())), strict=True):
+            axis.set_title(one.label, fontsize=9)
         for axis in axes[-1]:
             axis.set_xlabel(r"$\epsilon$ as applied")
         axes[0, 0].legend(fontsize=7)
