@@ -20,6 +20,9 @@ from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.outputs.folder import written_folder
 
+#: Columns of panels that are legible in half the width of the page.
+_MOST_NARROW = 2
+
 
 def write_comparison(folder: Path, found: Comparison) -> None:
     """Write everything that a comparison says into a folder, completely or not at all.
@@ -115,7 +118,8 @@ def _figures(fits: Mapping[str, Fit]) -> str:
                 "Readings with standard uncertainties; medians and 95 % bands of the prediction of "
                 "each law, by the normal approximation."
             )
-            parts.append(figure(laws_figure(term.table, predicted), caption))
+            many = len(next(iter(predicted.values()))) > _MOST_NARROW
+            parts.append(figure(laws_figure(term.table, predicted), caption, wide=many))
         elif isinstance(term, RunTerm):
             curves = {}
             for name, own in fits.items():

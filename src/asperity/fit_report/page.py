@@ -31,6 +31,7 @@ def document(title: str, kicker: str, heading: str, sections: Mapping[str, str])
         "table{border-collapse:collapse;display:block;overflow-x:auto}"
         "td,th{padding:.15rem .7rem;text-align:right;white-space:nowrap}"
         "td:first-child,th:first-child{text-align:left}"
+        "figure.wide{grid-template-columns:1fr}"
         "svg{max-width:100%;height:auto;background:#fff}</style>\n"
         f'</head>\n<body>\n<header><p class="kicker">{escape(kicker)}</p>'
         f"<h1>{escape(heading)}</h1></header>\n<main>\n{body}\n</main>\n"
@@ -47,6 +48,7 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     return f"<table>{cells(head, 'th')}{''.join(cells(row, 'td') for row in rows)}</table>"
 
 
-def figure(svg: str, caption: str) -> str:
-    """A figure with its caption, a plain text."""
-    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
+def figure(svg: str, caption: str, *, wide: bool = False) -> str:
+    """A figure with its caption, a plain text, beside it or, of a wide one, below."""
+    shape = ' class="wide"' if wide else ""
+    return f"<figure{shape}>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
