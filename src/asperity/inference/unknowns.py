@@ -241,7 +241,7 @@ def unknown_of(
     high = min(high, upper)
     # A start may be as good as zero, which is no scale.
     typical = math.sqrt(usual[0] * usual[1]) if usual and usual[0] > 0 else 0.0
-    scale = 1.0 if positive else max(middle or typical, _LEAST_SCALE * typical)
+    scale = 1.0 if positive else max(abs(middle or typical), _LEAST_SCALE * typical)
     lower = 0.0 if parameter.rule in ("positive", "not negative") else -math.inf
     return Unknown(parameter, positive, scale, lower, upper, (low, high), given, prior, nuisance)
 

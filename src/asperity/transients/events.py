@@ -187,8 +187,7 @@ class EventDetector:
         for _ in range(_ROOT_STEPS):
             with np.errstate(divide="ignore", invalid="ignore"):
                 middle = right - f_right * (right - left) / (f_right - f_left)
-            middle = np.where(np.isfinite(middle), middle, 0.5 * (left + right))
-            with np.errstate(divide="ignore", invalid="ignore"):
+                middle = np.where(np.isfinite(middle), middle, 0.5 * (left + right))
                 value = distance(
                     motion_samples(self._system, middle, dense_output.evaluate(middle))
                 )

@@ -291,6 +291,26 @@ def test_few_rows_lead_to_the_minimum_of_all():
     assert sum(n == rows for n in term.computed) < 0.2 * len(term.computed)
 
 
+def test_the_given_start_is_followed_whatever_four_rows_say_of_it():
+    rows, given = 32, math.log(7e-7)
+    four = np.arange(rows) % 8 == 0
+
+    def values(x):
+        if abs(x - given) < 0.05:
+            # Four rows are farther off than anywhere else, all rows together nearer.
+            r, slope = np.where(four, 100.0, 0.0), np.zeros(rows)
+            r[1], slope[1] = 5 * (x - given), 5.0
+        else:
+            r, slope = np.where(four, 10.0, 60.0), np.zeros(rows)
+            r[1], slope[1] = 5 * (x - FIRST), 5.0
+        return r, slope
+
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 7e-7}, priors={})
+    u, chi2 = minima_of(Objective((Rows(values, rows),), LAW, unknowns, {}), 0)[0]
+    assert u[0] == pytest.approx(given, abs=1e-3)
+    assert chi2 == pytest.approx(4 * 100.0**2)
+
+
 class NarrowRows(Rows):
     """Rows of which one has an orbit near `FIRST` alone, and few rows lead away from there."""
 

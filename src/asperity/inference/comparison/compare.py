@@ -173,7 +173,7 @@ def compare(
             if before and name in before and before[name].converged:
                 # Nearly the same data.
                 mine["start"] = {n: before[name].values[n] for n in names}
-                chosen["starts"] = _STARTS_AGAIN
+                chosen["starts"] = min(_STARTS_AGAIN, options.get("starts", _STARTS_AGAIN))
             try:
                 done[name] = fit(
                     data, name, names, bare=True, simpler=list(done.values()), **mine, **chosen

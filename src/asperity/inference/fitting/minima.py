@@ -289,7 +289,8 @@ def _chi2_of_many(objective: Objective, candidates: list[Float]) -> Float:
     found = np.full(len(u), math.inf)
     # Most starts far from the data have no orbit at some row, which takes longest to find out.
     few = term.with_rows(first).chi2_of_many(objective.unknowns, u, least=_LEAST)
-    left = np.argsort(few)[:_TRIED]
+    # The first is the given start, which is tried whatever four rows say of it.
+    left = np.array(list(dict.fromkeys([0, *np.argsort(few)[:_TRIED]])))
     left = left[np.isfinite(few[left])]
     if left.size:
         priors = [float(np.sum(objective.prior_residuals(u[i])[0] ** 2)) for i in left]
