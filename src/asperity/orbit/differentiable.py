@@ -25,7 +25,13 @@ from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.orbit.batches import Indices, take
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
-from asperity.orbit.gradient.mesh_values import found_values, mesh_orbits, mesh_values
+from asperity.orbit.gradient.mesh_values import (
+    found_values,
+    in_chunks,
+    mesh_chunk_values,
+    mesh_orbits,
+    mesh_values,
+)
 from asperity.orbit.gradient.parametrised import (
     ParametrisedProblem,
     coefficients_of,
@@ -424,8 +430,37 @@ def _mesh_derivatives(
             part = np.arange(start, min(start + _BLOCK, len(index)))
             filled = np.concatenate([part, np.full(_BLOCK - len(part), part[-1])])
             own = take(own_values, index[filled])
-            _, table = _differentiate(own, None, take(orbits, filled), program=program)
+            table = _mesh_table(own, take(orbits, filled), program=program)
             yield index[part], np.asarray(table)[:, : len(part)]
+
+
+@partial(jit_large, static_argnames=("program",))
+def _mesh_table(parameters: Parameters, orbits: MeshOrbits, *, program: Program) -> Array:
+    """Derivatives at converged orbits, (parameters, points, columns) as by `_differentiate`.
+
+    Forward mode within each chunk: a program for all points, which `mesh_values` makes, takes
+    several times as long to trace, to differentiate and to compile.
+    """
+    names = program.equations.names
+
+    def chunk(inputs: tuple[Parameters, MeshOrbits]) -> Array:
+        parameters, orbits = inputs
+
+        def evaluate(parameters: Parameters) -> Array:
+            values = mesh_chunk_values(parameters, orbits, program)
+            return jnp.concatenate([_real(a) for a in values[:3]], axis=1)
+
+        def along(direction: Array) -> Array:
+            moved = {
+                n: d * jnp.ones_like(parameters[n]) for n, d in zip(names, direction, strict=True)
+            }
+            return jax.jvp(evaluate, (parameters,), (moved,))[1]
+
+        return jax.vmap(along)(jnp.eye(len(names)))
+
+    chunked = in_chunks(parameters), in_chunks(orbits)
+    tables = jax.lax.map(chunk, chunked)
+    return jnp.moveaxis(tables, 0, 1).reshape(len(names), -1, tables.shape[-1])
 
 
 def _values(

@@ -68,14 +68,9 @@ def mesh_values(parameters: Parameters, meshed: MeshOrbits, program: Program) ->
     # Points with an orbit first: chunks without one take no time.
     order = jnp.argsort(~converged, stable=True)
     back = jnp.argsort(order)
-    chunks = converged.shape[0] // min(_CHUNK, converged.shape[0])
-
-    def cut(a: Array) -> Array:
-        ordered = a[..., order]
-        return jnp.moveaxis(ordered.reshape(*a.shape[:-1], chunks, -1), -2, 0)
 
     def solve(inputs: tuple[Parameters, MeshOrbits]) -> ResponseValues:
-        return _mesh_chunk(inputs[0], inputs[1], program)
+        return mesh_chunk_values(inputs[0], inputs[1], program)
 
     def skip(inputs: tuple) -> ResponseValues:
         shapes = jax.eval_shape(solve, inputs)
@@ -84,12 +79,26 @@ def mesh_values(parameters: Parameters, meshed: MeshOrbits, program: Program) ->
     def one(inputs: tuple) -> ResponseValues:
         return jax.lax.cond((inputs[1].outcome == Outcome.CONVERGED).any(), solve, skip, inputs)
 
-    values = jax.lax.map(one, jax.tree.map(cut, (parameters, meshed)))
+    ordered = jax.tree.map(lambda a: a[..., order], (parameters, meshed))
+    values = jax.lax.map(one, in_chunks(ordered))
     values = jax.tree.map(lambda a: a.reshape(len(order), *a.shape[2:])[back], values)
     return values._replace(outcome=jnp.where(converged, values.outcome, meshed.outcome))
 
 
-def _mesh_chunk(parameters: Parameters, meshed: MeshOrbits, program: Program) -> ResponseValues:
+def in_chunks(tree: Any) -> Any:
+    """Arrays with the points along the last axis, cut into chunks along a new first axis."""
+
+    def cut(a: Array) -> Array:
+        chunks = a.shape[-1] // min(_CHUNK, a.shape[-1])
+        return jnp.moveaxis(a.reshape(*a.shape[:-1], chunks, -1), -2, 0)
+
+    return jax.tree.map(cut, tree)
+
+
+def mesh_chunk_values(
+    parameters: Parameters, meshed: MeshOrbits, program: Program
+) -> ResponseValues:
+    """Values of the search at some points, with the derivatives of the orbits on their meshes."""
     problem = program.equations.problem(parameters)
     found = Orbit(*meshed[:4], scheme_for(problem.system))
     equations = CollocationEquations()
