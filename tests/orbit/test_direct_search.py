@@ -1,5 +1,8 @@
 """Direct search: from orbits of an earlier call, and from motions that settle."""
 
+import cmath
+import math
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -38,24 +41,29 @@ def integrated(epsilon):
     omega = 2 * np.pi * p["frequency"]
     steady = p["mu0"] - (p["B"] - p["A"]) * np.log(p["V"] / p["V0"])
 
+    # Beside the states, the integrals of the force times 1, cos, -sin, ... over the period.
     def rates(theta, state):
-        force, phi = state
-        w = 1 + epsilon * np.cos(theta)
-        slip = p["V"] * np.exp((force / w - steady - p["B"] * phi) / p["A"])
-        age = (p["V"] * np.exp(-phi) - slip) / p["D0"]
-        return [p["K"] / p["W0"] * (p["V"] - slip) / omega, age / omega]
+        force, phi = state[:2]
+        w = 1 + epsilon * math.cos(theta)
+        slip = p["V"] * math.exp((force / w - steady - p["B"] * phi) / p["A"])
+        age = (p["V"] * math.exp(-phi) - slip) / p["D0"]
+        stretch = p["K"] / p["W0"] * (p["V"] - slip) / omega
+        waves = (cmath.exp(-1j * n * theta) * force for n in range(3))
+        return [stretch, age / omega, *(part for c in waves for part in (c.real, c.imag))]
 
-    def period(start, samples=None):
-        found = solve_ivp(rates, (0, 2 * np.pi), start, "Radau", samples, rtol=1e-10, atol=1e-12)
-        return found.y
+    def period(start):
+        first = [*start, *np.zeros(6)]
+        found = solve_ivp(rates, (0, 2 * np.pi), first, "LSODA", rtol=1e-11, atol=1e-13)
+        return found.y[:, -1]
 
     # Sliding is stable, so that a few periods lead to the orbit.
     start = np.array([steady * (1 + epsilon), 0.0])
     for _ in range(3):
-        start = period(start)[:, -1]
-    start = fsolve(lambda y: period(y)[:, -1] - y, start, xtol=1e-11)
-    spectrum = np.fft.rfft(period(start, 2 * np.pi * np.arange(2048) / 2048)[0]) / 2048
-    return spectrum[0].real, 2 * spectrum[1:3]
+        start = period(start)[:2]
+    start = fsolve(lambda y: period(y)[:2] - y, start, xtol=1e-11)
+    real, imaginary = period(start)[2:].reshape(3, 2).T / (2 * np.pi)
+    spectrum = real + 1j * imaginary
+    return spectrum[0].real, 2 * spectrum[1:]
 
 
 def test_orbits_with_slip_events_are_those_on_which_motions_settle(monkeypatch):
