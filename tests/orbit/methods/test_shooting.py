@@ -50,10 +50,10 @@ def respond(name, points, **options):
 
 
 def test_agrees_with_collocation():
-    points = random_points(20, seed=5)
+    points = random_points(12, seed=5)
     fast = respond("elasto-plastic", points, methods=("fourier",))
     solved = np.flatnonzero(fast.converged)
-    assert len(solved) >= 12
+    assert len(solved) >= 7
     law, M, drive = points
     law, drive = (
         {name: a[solved] if np.ndim(a) else a for name, a in numbers.items()}
