@@ -7,7 +7,7 @@ import pytest
 from benchmarks.residual import LAWS, answer, draw, faults, faults_marched
 
 SAMPLES = 4096
-POINTS = 75
+POINTS = 50
 
 
 @dataclasses.dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Batch:
 
 @pytest.fixture(scope="module", params=LAWS)
 def batch(request):
-    numbers = draw(request.param, POINTS, 41)
+    numbers = {name: a[:POINTS] for name, a in draw(request.param, 75, 41).items()}
     return Batch(numbers, answer(request.param, numbers, SAMPLES))
 
 
@@ -106,23 +106,19 @@ def test_planted_wrong_answers_are_caught(batch, planted):
     assert caught == 1.0
 
 
-def marched(batch, rows, waveform, mean, harmonics):
-    return faults_marched(batch.part(rows), waveform, mean, harmonics)
-
-
 def test_integration_from_sample_to_sample_agrees(batch):
     rows, waveform, mean, harmonics = answers(batch)
     n = batch.part(rows)
     # Slow modulation takes steps by the thousand.
-    few = np.flatnonzero(n["V"] / (n["D0"] * n["f"]) < 50)[:4]
-    rows, waveform, mean, harmonics = rows[few], waveform[:, few], mean[few], harmonics[few]
-    assert not marched(batch, rows, waveform, mean, harmonics).any()
+    few = np.flatnonzero(n["V"] / (n["D0"] * n["f"]) < 50)[:5]
+    numbers = batch.part(rows[few])
+    waveform, mean, harmonics = waveform[:, few], mean[few], harmonics[few]
+    assert not faults_marched(numbers, waveform, mean, harmonics).any()
+    # At each point another mistake.
     swing = np.ptp(waveform[0], axis=1)
-    for wrong in (
-        (waveform, mean + 1e-4 * swing, harmonics),
-        (waveform, mean, harmonics + 1e-4 * swing[:, None]),
-        (np.stack([waveform[0], waveform[1] + 0.1]), mean, harmonics),
-        (np.stack([waveform[0], waveform[1] + 1e-5]), mean, harmonics),
-        (waveform, mean * np.nan, harmonics),
-    ):
-        assert marched(batch, rows, *wrong).all()
+    mean[0] += 1e-4 * swing[0]
+    harmonics[1] += 1e-4 * swing[1]
+    waveform[1, 2] += 0.1
+    waveform[1, 3] += 1e-5
+    mean[4] = np.nan
+    assert faults_marched(numbers, waveform, mean, harmonics).all()
