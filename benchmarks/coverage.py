@@ -2,7 +2,7 @@
 
 ``python -m benchmarks.coverage [--sets 200] [--case steps|holds|loads] [--residual FILE]``
 
-Recordings are computed by SciPy (Radau, relative tolerance 1e-10) from the printed equations, and
+Recordings are computed by SciPy (LSODA, relative tolerance 1e-11) from the printed equations, and
 get noise as real recordings have it: white, correlated over half a second and over eight, and a
 line. Each is fitted twice: by `asperity.inference.fit`, and by the same fit under white noise of
 the residual's size, which is what least squares and its covariance amount to. The share of 68 and
@@ -101,7 +101,7 @@ def friction(case: Case, time: np.ndarray) -> np.ndarray:
         V = case.velocities[np.searchsorted(case.changes, (a + b) / 2)]
         here = (time >= a) & ((time < b) | (b == case.end))
         solution = solve_ivp(
-            rhs, (a, b), y, method="Radau", rtol=1e-10, atol=1e-12, dense_output=True, args=(V,)
+            rhs, (a, b), y, method="LSODA", rtol=1e-11, atol=1e-13, dense_output=True, args=(V,)
         )
         out[here] = solution.sol(time[here])[0] / case.load(time[here])
         y = solution.y[:, -1]

@@ -1,6 +1,7 @@
 """Several minima, and minima beyond the edge of the fast method, of residuals in closed form."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -104,6 +105,36 @@ def test_a_profile_goes_on_where_the_fast_method_ends():
     assert open_end[1] == math.inf
     closed = Profile(objective, 0, u, chi2, covariance, search=True).interval(0.95)
     np.testing.assert_allclose(closed, FIRST + 1.96 / SLOPE * np.array([-1, 1]), atol=0.003)
+
+
+class Ending(Formula):
+    """Residuals that no method finds beyond the edge."""
+
+    def residuals(self, values, *, search=None):
+        return None if math.log(values["D0"]) > self.edge else super().residuals(values)
+
+
+@pytest.mark.parametrize(("slope", "profiled"), [(SLOPE, True), (12.0, False)])
+def test_no_interval_leaves_its_estimate_out_where_chi_squared_ends(slope, profiled):
+    """Where the law has no orbit beyond the estimate, the parabola's minimum lies there too."""
+
+    def values(x):
+        r, slopes = np.ones(100), np.zeros(100)
+        r[0], slopes[0] = slope * (x - FIRST), slope
+        return r, slopes
+
+    objective = objective_of(values, 3e-7)
+    # Four standard errors before the minimum, whose intervals would not reach back to the end.
+    end = FIRST - 4 / slope
+    objective = replace(objective, terms=(Ending(values, end),))
+    stopped = objective.minimise(np.array([math.log(3e-7)]))
+    found = described_fit(objective, [stopped], profile=False)
+    assert any("still falls where the law has no periodic orbit" in w for w in found.warnings)
+    (p,) = found.parameters.values()
+    assert math.log(p.value) == pytest.approx(end, abs=1e-3)
+    assert p.interval_95[0] <= p.interval_68[0] < p.value <= p.interval_68[1] <= p.interval_95[1]
+    # Too precise to be tried, it has the whole range; a profile stays where there are orbits.
+    assert (p.interval_68 == (0.0, math.inf)) != profiled
 
 
 def test_progress_counts_the_starts_that_are_followed():
