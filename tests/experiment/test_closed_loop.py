@@ -37,7 +37,7 @@ FREQUENCY = 120.0
 #: The contacts bear less than is applied, and later.
 TRANSFER = 0.45 * np.exp(-0.3j)
 #: Velocity: commanded amplitudes, seconds of sliding and of modulation, and recordings.
-RUNS = {1e-5: ((0.2, 0.5), 1.5, 2.0, 20), 1e-6: ((0.5,), 5.0, 8.0, 8)}
+RUNS = {1e-5: ((0.2, 0.5), 1.5, 2.0, 12), 1e-6: ((0.5,), 5.0, 8.0, 4)}
 #: More than two, as what is not fitted counts as noise.
 HARMONICS = 4
 #: Of the first recordings; text takes longer, so that the last one serves for all others.
@@ -213,15 +213,26 @@ def tables(tmp_path_factory):
     return {law: list(recorded(law, tmp_path_factory.mktemp(law))) for law in LAWS}
 
 
+def held_as_stated(held) -> bool:
+    """Whether so many 95 % intervals hold the truth as chance allows, at 5e-5 on either side.
+
+    Of the 224 of a law that is 89 to 99 %, of all 672 together 92 to 98 %: noise of half the true
+    power would give 83 %, of twice the power 99.4 %.
+    """
+    low, high = binom.ppf([5e-5, 1 - 5e-5], len(held), 0.95)
+    return low <= sum(held) <= high
+
+
 def test_intervals_hold_the_response(tables) -> None:
     covering = {law: hits(tables[law], law) for law in LAWS}
     for law in LAWS:
-        assert 0.92 < covered(covering[law]) < 0.98, law
+        assert held_as_stated([hit for name in NAMES for hit in covering[law][name]]), law
         # What F(0) drifts between before and after is in the uncertainty of the drop, so that its
         # interval may be wider than noise asks for, and not narrower.
-        assert np.mean(covering[law]["delta_mu"]) > 0.92, law
+        drop = covering[law]["delta_mu"]
+        assert sum(drop) >= binom.ppf(1e-4, len(drop), 0.95), law
     together = {name: [h for law in LAWS for h in covering[law][name]] for name in NAMES}
-    assert 0.92 < covered(together) < 0.98
+    assert held_as_stated([hit for held in together.values() for hit in held])
     # None of them hides behind the others: what so many recordings can tell, at 1e-3, of 92 %.
     for name, held in together.items():
         assert sum(held) >= binom.ppf(1e-3, len(held), 0.92), name
@@ -274,10 +285,12 @@ def test_white_noise_is_not_what_the_gauge_has(tables, monkeypatch, tmp_path) ->
         found = local(*given)
         return replace(found, spectra=np.broadcast_to(variances, found.spectra.shape))
 
-    stated = covered(hits([t for t in tables[law] if t[0] == 1e-5], law), slow)
+    # Of all laws, since it costs nothing: 216 intervals, 88 % at 1e-5.
+    own = [hits([t for t in tables[name] if t[0] == 1e-5], name) for name in LAWS]
+    stated = np.mean([covered(covering, slow) for covering in own])
     monkeypatch.setattr(lock_in, "local_noise", white)
     textbook = covered(hits(recorded(law, tmp_path, [1e-5]), law), slow)
-    assert textbook < 0.9 < stated
+    assert textbook < 0.88 < stated
 
 
 #: Commanded amplitudes whose effect on the contacts is about the same.
