@@ -183,6 +183,7 @@ def covered(
     options: RunOptions,
     seed: int = 0,
     noise: Callable[[np.random.Generator, int, float], np.ndarray] | None = None,
+    starts: int = 4,
 ) -> dict[str, Any]:
     """Shares of intervals that hold the truth, by parameter, with means of their widths."""
     true = case.true
@@ -198,7 +199,7 @@ def covered(
             [n for n in true if n != "K"],
             start=true,
             runs=options,
-            starts=4,
+            starts=starts,
         )
         if not found.converged:
             failed += 1

@@ -7,7 +7,7 @@ from scipy.stats import binom
 from asperity.lock_in.demodulation import lock_in
 from asperity.lock_in.phasor import Phasor
 
-SEEDS = 300
+SEEDS = 200
 NAMES = ("W0", "epsilon", "frequency", "mean_friction", "mu1", "phase1", "mu2", "phase2")
 
 #: Samples, seconds between them, frequency, correlation of neighbours (AR1), noise of the load and
@@ -41,7 +41,7 @@ def test_intervals_cover_the_truth(truth, red_noise, case) -> None:
             value, true = _value(reading, name), _value(truth, name)
             hits[name] += abs(value - true) < reading.half_width(name)
     covered = np.array([hits[name] for name in NAMES]) / SEEDS
-    # All together as required; each within what 300 seeds can tell, at 1e-3, of 92 to 98 %.
+    # All together as required; each within what 200 seeds can tell, at 1e-3, of 92 to 98 %.
     assert 0.92 < covered.mean() < 0.98, hits
     assert covered.min() >= binom.ppf(1e-3, SEEDS, 0.92) / SEEDS, hits
     assert covered.max() <= binom.ppf(1 - 1e-3, SEEDS, 0.98) / SEEDS, hits
