@@ -91,8 +91,16 @@ def found(readings, pmma):
     return fit(readings(11), "elasto-plastic", ("lambda", "eps_ratio"), material=pmma)
 
 
-def test_a_posterior_is_the_normalised_likelihood(found, tmp_path):
-    posterior = sample_posterior(found, chains=2, draws=500, jobs=1)
+#: Of the run that is sampled once, and interrupted and resumed.
+SAMPLED = {"chains": 2, "draws": 250, "seed": 3, "jobs": 1}
+
+
+@pytest.fixture(scope="module")
+def posterior(found):
+    return sample_posterior(found, **SAMPLED)
+
+
+def test_a_posterior_is_the_normalised_likelihood(found, posterior, tmp_path):
     assert not posterior.failed.any()
     # By quadrature over a grid, in the coordinates in which the prior is flat.
     values = found.values
@@ -124,21 +132,18 @@ def test_a_posterior_is_the_normalised_likelihood(found, tmp_path):
     tree.close()
 
 
-def test_an_interrupted_run_goes_on_to_the_same_draws(found, tmp_path):
-    options = {"chains": 2, "draws": 100, "seed": 3, "jobs": 1}
-    whole = sample_posterior(found, **options)
-
+def test_an_interrupted_run_goes_on_to_the_same_draws(found, posterior, tmp_path):
     def stop(done, total):
         if done > 0.4 * total:
             raise KeyboardInterrupt
 
     path = tmp_path / "draws.nc"
     with pytest.raises(Interrupted, match="--resume"):
-        sample_posterior(found, **options, unfinished=path, progress=stop)
+        sample_posterior(found, **SAMPLED, unfinished=path, progress=stop)
     with pytest.raises(InputError, match="same inputs"):
-        sample_posterior(found, **{**options, "seed": 4}, unfinished=path, resume=True)
-    resumed = sample_posterior(found, **options, unfinished=path, resume=True)
-    for name, draws in whole.draws.items():
+        sample_posterior(found, **{**SAMPLED, "seed": 4}, unfinished=path, resume=True)
+    resumed = sample_posterior(found, **SAMPLED, unfinished=path, resume=True)
+    for name, draws in posterior.draws.items():
         np.testing.assert_array_equal(resumed.draws[name], draws)
     assert list(tmp_path.iterdir()) == []
 
@@ -193,9 +198,14 @@ def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, o
     assert found.observables["friction"][1] == samples
     likelihood, data = likelihood_of_run(term, found.objective.names)
 
+    @jax.jit
+    @jax.value_and_grad
+    def compiled_of(A):
+        return likelihood({**found.values, "A": A}, data)
+
     def both(factor):
         values = found.values | {"A": factor * found.values["A"]}
-        compiled = jax.value_and_grad(lambda x: likelihood({**values, "A": x}, data))(values["A"])
+        compiled = compiled_of(values["A"])
         expected = term.residuals(values)
         j = list(values).index("A")
         return compiled, (-0.5 * expected.values @ expected.values, expected, j)
