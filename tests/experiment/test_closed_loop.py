@@ -216,7 +216,7 @@ def tables(tmp_path_factory):
 def held_as_stated(held) -> bool:
     """Whether so many 95 % intervals hold the truth as chance allows, at 5e-5 on either side.
 
-    Of the 224 of a law that is 89 to 99 %, of all 672 together 92 to 98 %: noise of half the true
+    Of the 224 of a law that is 88 to 99.6 %, of all 672 together 91 to 98 %: noise of half the true
     power would give 83 %, of twice the power 99.4 %.
     """
     low, high = binom.ppf([5e-5, 1 - 5e-5], len(held), 0.95)

@@ -14,11 +14,6 @@ from asperity.fit_report import bands, write_comparison, write_report
 from asperity.inference import fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.evidence import Evidence
-from asperity.inference.fitting.description import described_fit
-from asperity.inference.objective import Objective
-from asperity.inference.tables.term import Forward, LockInTerm
-from asperity.inference.unknowns import unknowns_of
-from asperity.laws import get_law
 from asperity.orbit import response_function
 
 
@@ -79,14 +74,13 @@ def test_each_frequency_has_a_curve_that_reaches_its_readings(monkeypatch):
         {n: np.broadcast_to(v, 2 * each) for n, v in (numbers | machine | columns).items()}
     )
     columns |= {"mean_friction": exact.mean_friction, "mean_friction_err": 1e-3}
-    table, law = table_of(columns), get_law("rice-ruina")
     fixed = {n: v for n, v in (numbers | machine).items() if n != "mu0"}
-    term = LockInTerm(table, Forward(law, table, fixed | table.points | {"eps_ratio": 1.0}))
-    term.search_from_now_on()
-    unknowns = unknowns_of(law, ["mu0"], largest_epsilon=0.4, start={}, priors={})
-    objective = Objective((term,), law, unknowns, fixed)
-    minimum = objective.minimise(objective.coordinates({"mu0": 0.52}))
-    found = described_fit(objective, [minimum], profile=False)
+    # A fit that turns to the search by itself, from the given start.
+    found = fit(
+        table_of(columns), "rice-ruina", ("mu0",), fixed=fixed, start={"mu0": 0.52}, starts=0
+    )
+    term = found.objective.terms[0]
+    assert term.searches
     slow, fast = bands.bands_of(found, term, None)
     assert [slow.label, fast.label] == ["40 µm/s, 0.3 Hz", "40 µm/s, 3 Hz"]
     for one, rows in ((slow, slice(0, each)), (fast, slice(each, 2 * each))):
