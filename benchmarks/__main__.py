@@ -17,7 +17,9 @@ def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument("--points", type=int, default=100_000, help="points of the batch")
     parser.add_argument("--repeats", type=int, default=5, help="the median of so many is shown")
-    parser.add_argument("--million", type=int, default=1_000_000, help="points of the largest call")
+    parser.add_argument(
+        "--million", type=int, default=1_000_000, help="points of the largest call; 0 for none"
+    )
     parser.add_argument("--out", type=Path, help="also write the rows to this JSON file")
     parser.add_argument("--law", choices=LAWS, help="this one only")
     return parser.parse_args()
@@ -45,7 +47,8 @@ def _rows(
         yield from ours.gradient_rows(law, at_most(60), 20 * repeats)
         yield ours.sensitivities_row(law, at_most(64))
         yield from processes.whole_batch_rows(law, points, repeats, cores)
-    yield from processes.whole_batch_rows(laws[-1], million, 0, cores)
+    if million:
+        yield from processes.whole_batch_rows(laws[-1], million, 0, cores)
     yield from processes.start_up_rows(repeats)
     yield from transient.transient_rows(min(8.0, max(0.05, points / 1000)), repeats)
 

@@ -25,13 +25,13 @@ class Marching:
 
         self.period = jax.jit(jax.vmap(_period))
 
-    def solve(self, batch: Batch) -> Answer:
-        """March until the last point repeats itself."""
+    def solve(self, batch: Batch, most_periods: int = _MOST_PERIODS) -> Answer:
+        """March until the last point repeats itself, or for so many periods."""
         numbers = {k: np.array(v) for k, v in batch.numbers().items()}
         z0, chi = averaged_limit(numbers)
         state = np.stack([np.zeros_like(chi), chi], axis=-1)
         changes = deque([np.inf], LAST)
-        for _ in range(_MOST_PERIODS):
+        for _ in range(most_periods):
             path = np.asarray(self.period(state, numbers, z0))
             scale = np.stack([numbers["kappa"], np.ones_like(chi)], axis=-1)
             changes.append(np.max(np.abs(path[:, -1] - state) * scale))

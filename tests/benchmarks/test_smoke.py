@@ -1,6 +1,7 @@
 """The benchmark runs from end to end; no time is asserted, the errors are."""
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -27,29 +28,23 @@ WORST = {
 
 
 @pytest.mark.slow
-def test_eight_points(tmp_path):
+def test_two_points(tmp_path):
     out = tmp_path / "rows.json"
-    options = [
-        "--law",
-        "elasto-plastic",
-        "--points",
-        "8",
-        "--repeats",
-        "1",
-        "--million",
-        "16",
-        "--out",
-        str(out),
-    ]
+    options = ["--law", "elasto-plastic", "--points", "2", "--repeats", "1", "--million", "0"]
     done = subprocess.run(
-        [sys.executable, "-m", "benchmarks", *options],
+        [sys.executable, "-m", "benchmarks", *options, "--out", str(out)],
         cwd=ROOT,
+        # Most programs are run once or twice: less time goes into compiling them.
+        env=os.environ | {"JAX_DISABLE_MOST_OPTIMIZATIONS": "1"},
         capture_output=True,
         text=True,
     )
     assert done.returncode == 0, done.stderr
     rows = json.loads(out.read_text())
     assert done.stdout.count("\n|") == len(rows) + 1
+    found = {row["what"].rpartition(", ")[0] for row in rows}
+    # These peers need not be installed.
+    assert set(WORST) - {"heyoka shooting", "diffrax marching"} <= found
     for row in rows:
         assert row["seconds"] > 0
         method = row["what"].rpartition(", ")[0]

@@ -9,7 +9,6 @@ from scipy.stats import chi2
 
 from asperity.errors import InputError
 from asperity.figures.style import style
-from asperity.papers.bureau2000 import numbers
 from asperity.papers.bureau2000.figures import DRAWN
 from asperity.papers.bureau2000.figures.observables import OBSERVABLES
 from asperity.papers.measured_points import (
@@ -34,9 +33,9 @@ ROW = {
 
 
 @pytest.fixture(scope="module")
-def figures():
-    made = (numbers.figure_2, numbers.figure_3, numbers.figure_4)
-    return {figure.name: figure for figure in (compute() for compute in made)}
+def figures(figures):
+    """Those that the artificial points are of."""
+    return {name: figures[name] for name in ("figure-02", "figure-03", "figure-04")}
 
 
 def compared(points, figures):

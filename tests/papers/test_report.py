@@ -6,6 +6,8 @@ import os
 import re
 import subprocess
 import sys
+from contextlib import contextmanager
+from functools import partial
 from html.parser import HTMLParser
 from importlib.resources import files
 
@@ -18,7 +20,7 @@ from asperity.figures.style import style
 from asperity.outputs import written_folder
 from asperity.papers.bureau2000 import numbers as study
 from asperity.papers.bureau2000 import virtual
-from asperity.papers.bureau2000.figures import SCHEMATICS
+from asperity.papers.bureau2000.figures import SCHEMATICS, report_sections
 from asperity.papers.bureau2000.numbers.period import PERIOD_COLUMNS
 from asperity.papers.ledger import Claim, Headline, Sensitivity
 from asperity.papers.ledger.contents import SummaryWords
@@ -79,11 +81,20 @@ def points_file(folder):
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory):
-    """A report with a short ledger; the ledger itself has its own tests."""
+def report(tmp_path_factory, figures, experiment):
+    """A report with a short ledger, of numbers that are there: both have their own tests."""
     out = tmp_path_factory.mktemp("reproduced") / "report"
     steps = []
+
+    @contextmanager
+    def beside():
+        yield lambda: experiment
+
     with pytest.MonkeyPatch.context() as patch:
+        # In the order of `numbers.FIGURES`, by which the report finds what draws each.
+        computed = [partial(figures.get, name) for name in figures]
+        patch.setattr(report_sections, "FIGURES", computed)
+        patch.setattr(report_sections, "experiment_beside", beside)
         patch.setattr(Paper, "ledger", lambda *_, **__: CLAIMS)
         patch.setattr(Paper, "headlines", lambda *_: HEADLINES)
         paper = find_paper("bureau2000")

@@ -10,11 +10,6 @@ from asperity.papers.bureau2000.numbers.harmonics import late_over_early_slope, 
 SLOW, FAST = "1 um/s", "10 um/s"
 
 
-@pytest.fixture(scope="module")
-def figures():
-    return {figure.name: figure for figure in (compute() for compute in study.FIGURES)}
-
-
 def end(figure, curve, column):
     return figure.curve(curve)[column].iloc[-1]
 

@@ -21,12 +21,7 @@ SLIDER = asp.Slider(PMMA.law("elasto-plastic", B=B), spring=PMMA.K, load=PMMA.W0
 
 
 @pytest.fixture(scope="module")
-def experiment():
-    return study.experiment()
-
-
-@pytest.fixture(scope="module")
-def figures(experiment):
+def simulated(experiment):
     return {figure.name: figure for figure in (compute(experiment) for compute in study.VIRTUAL)}
 
 
@@ -72,9 +67,9 @@ def test_the_load_is_read_as_commanded(experiment):
         np.testing.assert_allclose(rows["epsilon"], rows["epsilon_set"], rtol=1e-3)
 
 
-def test_bars_hold_the_orbits(experiment, figures):
+def test_bars_hold_the_orbits(experiment, simulated):
     """The orbits are solved without a recording; no bar is wide enough to hold anything."""
-    points = pd.concat([figure.points for figure in figures.values()])
+    points = pd.concat([figure.points for figure in simulated.values()])
     points = points[points["epsilon_set"] > 0].drop_duplicates(["series", "epsilon_set"])
     assert len(points) == sum(map(len, experiment.values()))
     for name in QUANTITIES:
@@ -101,8 +96,8 @@ def test_runs_scatter_as_their_noise_asks(experiment):
     assert (stated < 1.6).all()
 
 
-def test_the_table_of_points(figures):
-    for figure in figures.values():
+def test_the_table_of_points(simulated):
+    for figure in simulated.values():
         assert list(figure.points.columns) == list(study.POINT_COLUMNS)
         assert "SIMULATED" in figure.caption
         assert figure.alt.startswith("Simulated")
@@ -111,14 +106,14 @@ def test_the_table_of_points(figures):
         np.testing.assert_array_equal(figure.points["mean_friction_uncertainty"], uncertainty)
 
 
-def test_the_model_beside_a_point_is_that_of_its_operating_point(figures):
-    for figure in figures.values():
+def test_the_model_beside_a_point_is_that_of_its_operating_point(simulated):
+    for figure in simulated.values():
         for _, row in figure.points.iterrows():
             if row["epsilon_set"] == 0:
                 assert row["mean_friction_model"] == pytest.approx(
                     0.5 - (B - 0.013) * np.log(row["V"] / 1e-6), rel=1e-12
                 )
-    row = figures["virtual-05"].of("1 mbar").iloc[-1]
+    row = simulated["virtual-05"].of("1 mbar").iloc[-1]
     orbit = asp.periodic_response(
         SLIDER, velocity=1e-5, epsilon=0.5 * borne(200.0, vacuum=True), frequency=200.0
     )
@@ -126,34 +121,34 @@ def test_the_model_beside_a_point_is_that_of_its_operating_point(figures):
         assert row[f"{name}_model"] == pytest.approx(float(getattr(orbit, name)), rel=1e-7)
 
 
-def test_a_point_without_a_line_is_an_error(figures):
-    figure = figures["virtual-02"]
+def test_a_point_without_a_line_is_an_error(simulated):
+    figure = simulated["virtual-02"]
     off = figure.points.assign(V=2e-6)
     with pytest.raises(KeyError, match="no operating point at 2e-06 m/s"):
         with_model(off, figure.data)
 
 
-def test_what_the_recordings_say_is_what_the_machine_has(figures):
-    recovered = [quantity for figure in figures.values() for quantity in figure.recovered]
+def test_what_the_recordings_say_is_what_the_machine_has(simulated):
+    recovered = [quantity for figure in simulated.values() for quantity in figure.recovered]
     assert len(recovered) == 13
     # Of thirteen 95 % intervals one may miss; none by far.
     assert sum(not quantity.agrees for quantity in recovered) <= 2
     assert all(abs(f.value - f.true_value) < 4 * f.uncertainty for f in recovered)
 
 
-def test_the_statements_of_the_paper_on_the_simulated_points(figures):
-    share = {f.what: f.value for f in figures["virtual-02"].recovered}
+def test_the_statements_of_the_paper_on_the_simulated_points(simulated):
+    share = {f.what: f.value for f in simulated["virtual-02"].recovered}
     assert share[f"Share of the mean that ε = 0.5 takes, {SLOW}"] == pytest.approx(0.2, abs=0.01)
-    slopes = figures["virtual-03"].scalars
+    slopes = simulated["virtual-03"].scalars
     assert slopes["slope_0"] == pytest.approx(0.013 - B, rel=0.02)
-    second = [figures["virtual-04"].last_point(name, "mu2")[0] for name in (SLOW, FAST)]
-    first = [figures["virtual-04"].last_point(name, "mu1")[0] for name in (SLOW, FAST)]
+    second = [simulated["virtual-04"].last_point(name, "mu2")[0] for name in (SLOW, FAST)]
+    first = [simulated["virtual-04"].last_point(name, "mu1")[0] for name in (SLOW, FAST)]
     assert second[0] < second[1]
     assert all(0.1 < b / a < 0.2 for a, b in zip(first, second, strict=True))
 
 
-def test_the_factor_between_air_and_vacuum(figures):
-    (quantity,) = figures["virtual-05"].recovered
+def test_the_factor_between_air_and_vacuum(simulated):
+    (quantity,) = simulated["virtual-05"].recovered
     assert quantity.true_value == pytest.approx(borne(200.0) / borne(200.0, vacuum=True), rel=1e-9)
     assert quantity.uncertainty < 0.01 * quantity.value
     assert abs(quantity.value - quantity.true_value) < 3 * quantity.uncertainty
@@ -175,9 +170,9 @@ def test_collapse_finds_a_factor_that_is_known():
     assert 0 < sigma < 0.01
 
 
-def test_a_wrong_share_is_not_agreed_to(figures):
+def test_a_wrong_share_is_not_agreed_to(simulated):
     """As if the full disc of the appendix lay under the slider: 0.20 instead of 0.40."""
-    (quantity,) = figures["virtual-05"].recovered
+    (quantity,) = simulated["virtual-05"].recovered
     assert not RecoveredQuantity("", quantity.value, quantity.uncertainty, 0.20, "").agrees
 
 
