@@ -17,6 +17,10 @@ _ONE_MODULE = "--xla_cpu_parallel_codegen_split_count=1"
 if _ONE_MODULE not in os.environ.get("XLA_FLAGS", ""):
     os.environ["XLA_FLAGS"] = f"{os.environ.get('XLA_FLAGS', '')} {_ONE_MODULE}".strip()
 
+# The threads of a BLAS wait for each other actively, which takes the other process its core. Read
+# when NumPy is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 #: Rooms that take longest from an empty compilation cache; they come first.
 LONGEST = (
     *("orbit", "app", "benchmarks", "inference", "papers", "branches", "docs", "cli", "sweep"),

@@ -208,10 +208,8 @@ def test_derivative_with_respect_to_a_parameter():
     np.testing.assert_allclose(found, exact, rtol=1e-10)
 
 
-@pytest.mark.parametrize(
-    ("name", "equations"),
-    [("rice-ruina", {"inertia": True}), ("elasto-plastic", {"radiation_damping": 2e3})],
-)
+@pytest.mark.parametrize("name", ["rice-ruina", "elasto-plastic"])
+@pytest.mark.parametrize("equations", [{"inertia": True}, {"radiation_damping": 2e3}])
 def test_equals_the_periodic_response_at_small_amplitudes(name, equations):
     slider = Slider(LAWS[name][0], spring=K, load=W0, mass=1.6)
     point = {"velocity": 1e-5, "frequency": 120.0, **equations}
