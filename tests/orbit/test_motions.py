@@ -67,7 +67,7 @@ CASES = {
     "inertial, fast and strong": Case(True, 1e-4, 60.0, 0.5, inertia=True),
     "inertial and radiating": Case(True, 1e-6, 120.0, inertia=True, eta=500.0),
     "stiff inertial": Case(False, 1e-6, 120.0, inertia=True),
-    "stiff inertial, fast": Case(False, 2e-5, 120.0, 0.2, inertia=True),
+    "stiff inertial, fast": Case(False, 2e-5, 120.0, 0.4, inertia=True),
     "radiating": Case(False, 1e-5, 60.0, 0.3, eta=2000.0),
     "radiating asperities": Case(True, 1e-6, 120.0, eta=500.0),
     "two tones, tilted exciter, modulated pull": Case(

@@ -77,13 +77,13 @@ def test_in_the_limit_friction_follows_the_steady_state():
     np.testing.assert_allclose(response.waveform[0, :: SAMPLES // 64], f, rtol=1e-10)
 
 
-# Not so slow, and not with such pulses, that collocation needs its finest meshes.
+# Pulses need the finest meshes, which one law tries.
 @pytest.mark.parametrize(
-    ("law", "softest", "largest"), [(RiceRuina, 0.0, 0.7), (ElastoPlastic, 0.5, 0.6)]
+    ("law", "softest", "largest"), [(RiceRuina, -1, 0.9), (ElastoPlastic, 0.5, 0.6)]
 )
 def test_collocation_finds_the_same(law, softest, largest):
     random = np.random.default_rng(2)
-    ageing, stiffness = 10 ** random.uniform(-1, 2.5, 40), 10 ** random.uniform(softest, 2, 40)
+    ageing, stiffness = 10 ** random.uniform(-1, 4, 40), 10 ** random.uniform(softest, 2, 40)
     epsilon = random.uniform(0.01, largest, 40)
     smooth = respond(ageing, stiffness, epsilon, law)
     rows = np.flatnonzero(smooth.converged)[:12]
