@@ -1,9 +1,12 @@
 """The claims ledger: complete, decided by its rules, and right where it is checked from outside."""
 
+import importlib.util
 import json
 import math
 import re
+import sys
 from dataclasses import fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +25,7 @@ from asperity.papers.ledger.claim import Entry, RuleWords, formula_verdict, judg
 from asperity.papers.ledger.contents import HeadlineWords
 from asperity.papers.ledger.headline import headlines
 from asperity.papers.ledger.ledger import altered, judge_claims
+from asperity.papers.paper import Paper
 
 #: What is not reproduced. A verdict that turns has to be looked at, and its `why` rewritten.
 MISPRINTS = {
@@ -57,6 +61,12 @@ DIFFERENT_ARITHMETIC = {
 RESIDUALS = {"linear-system", "pressure-profile", "pressure-force", "viscous-limit"}
 TEXTS = [f.name for f in fields(Claim) if f.type == "str"]
 PAPER = find_paper("bureau2000")
+
+ROOT = Path(__file__).resolve().parents[2]
+_spec = importlib.util.spec_from_file_location("snippets", ROOT / "tests" / "docs" / "snippets.py")
+pages = importlib.util.module_from_spec(_spec)
+sys.modules["snippets"] = pages
+_spec.loader.exec_module(pages)
 
 
 @pytest.fixture(scope="module")
@@ -136,6 +146,27 @@ def test_entries_go_into_json(claims):
     assert len(json.loads(text)) == len(claims)
     broken = replace(claims["mu1-order"], numbers={"1 um/s": math.nan})
     assert broken.as_dict()["numbers"] == {"1 um/s": None}
+
+
+def test_the_page_on_claims_runs_as_it_says(claims, monkeypatch, capsys):
+    monkeypatch.setattr(Paper, "ledger", lambda _: list(claims.values()))
+    (snippet,) = pages.snippets(ROOT / "docs" / "claims.md")
+    capsys.readouterr()
+    exec(compile(snippet.text, f"docs/claims.md:{snippet.line}", "exec"), {"__name__": "page"})
+    assert snippet.prints
+    assert pages.difference(snippet.prints, capsys.readouterr().out) == ""
+
+
+def test_counts_of_the_readme_are_those_of_the_ledger(claims):
+    tests = [claim for claim in claims.values() if claim.is_test]
+    counts = [len(claims), len(tests), *(sum(c.verdict == v for c in tests) for v in VERDICTS)]
+    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+    stated = re.search(
+        r"(\d+) statements of the paper .*?(\d+) of them are tests .*?: (\d+) are reproduced, "
+        r"(\d+) are misprints, (\d+) differ",
+        text,
+    )
+    assert [int(n) for n in stated.groups()] == counts
 
 
 def test_a_misprint_shows_printed_derived_and_independent_numbers(claims):

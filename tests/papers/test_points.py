@@ -83,12 +83,15 @@ def test_errors_too_wide_to_decide(figures, tmp_path, factor):
 def test_the_test_fails_true_points_as_often_as_it_says(figures):
     """Many draws of noise on one curve: 5 % are beyond the quantile."""
     curve = figures["figure-02"].curve("1 um/s").iloc[20::8]
-    rng, draws, beyond = np.random.default_rng(1), 2000, 0
-    rows = pd.DataFrame({"figure": "f", "observable": "delta_mu", "law": "elasto-plastic",
-                         "model": curve["delta_mu"], "y_err": 0.002})  # fmt: skip
-    for _ in range(draws):
-        one = comparisons(rows.assign(residual=rng.standard_normal(len(rows))))[0]
-        beyond += one.verdict == "disagrees"
+    rng, draws = np.random.default_rng(1), 2000
+    n = len(curve)
+    # Each draw is a figure of its own: all are judged in one call.
+    rows = pd.DataFrame({"figure": np.repeat(np.arange(draws), n), "observable": "delta_mu",
+                         "law": "elasto-plastic", "model": np.tile(curve["delta_mu"], draws),
+                         "y_err": 0.002, "residual": rng.standard_normal(n * draws)})  # fmt: skip
+    found = comparisons(rows)[:draws]
+    assert all(one.points == n for one in found)
+    beyond = sum(one.verdict == "disagrees" for one in found)
     assert beyond / draws == pytest.approx(0.05, abs=0.02)
 
 
