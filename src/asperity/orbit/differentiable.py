@@ -438,8 +438,8 @@ def _mesh_derivatives(
 def _mesh_table(parameters: Parameters, orbits: MeshOrbits, *, program: Program) -> Array:
     """Derivatives at converged orbits, (parameters, points, columns) as by `_differentiate`.
 
-    Forward mode within each chunk: a program for all points, which `mesh_values` makes, takes
-    several times as long to trace, to differentiate and to compile.
+    Forward mode within each chunk: a linear program of `mesh_values` for all points takes half as
+    long again, and more, to trace and to compile.
     """
     names = program.equations.names
 
