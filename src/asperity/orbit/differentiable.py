@@ -69,9 +69,12 @@ class ResponseFunction:
         Names of the parameters.
     """
 
-    def __init__(self, program: Program, defaults: Mapping[str, Any]) -> None:
+    def __init__(
+        self, program: Program, defaults: Mapping[str, Any], least_points: int = _FEWEST
+    ) -> None:
         self._program = program
         self._defaults = dict(defaults)
+        self._least_points = least_points
 
     @classmethod
     def of(
@@ -98,6 +101,10 @@ class ResponseFunction:
 
     def __repr__(self) -> str:
         return f"response_function of {', '.join(self.parameters)}"
+
+    def compiled_points(self, points: int) -> int:
+        """Number of points of the program that a call with so many uses."""
+        return 1 << (max(points, self._least_points, _FEWEST) - 1).bit_length()
 
     def __call__(
         self, parameters: Mapping[str, ArrayLike], known: KnownOrbits | None = None
@@ -231,7 +238,7 @@ class ResponseFunction:
                 "flatten grids first"
             )
         (count,) = next(iter(long), (1,))
-        size = max(_FEWEST, 1 << (count - 1).bit_length())
+        size = self.compiled_points(count)
         lay_out = partial(_laid_out, count=count, size=size, module=jnp if traced else np)
         padded = {n: lay_out(v) for n, v in given.items()}
         return padded, count if long else None
@@ -262,6 +269,7 @@ def response_function(
     multipliers: bool = False,
     modulation: Modulation | None = None,
     search: bool | Literal["direct"] = True,
+    least_points: int = _FEWEST,
 ) -> ResponseFunction:
     """The periodic response as a function of named parameters, for fits, samplers and designs.
 
@@ -294,6 +302,9 @@ def response_function(
         a motion from steady sliding settles, in some milliseconds a point; it leaves out what
         follows branches, which may take a minute for one point. Within `jax.jit`, and where
         multipliers are asked for, it is as True.
+    least_points : int
+        Calls with fewer points are filled up to so many, for callers whose number of points varies:
+        they share one compiled program.
 
     Returns
     -------
@@ -328,6 +339,7 @@ def response_function(
     multipliers = switch(multipliers, "multipliers")
     search = search if search == "direct" else switch(search, "search")
     harmonics = whole_number(harmonics, "harmonics", least=1)
+    least_points = whole_number(least_points, "least_points", least=1)
     if modulation is not None:
         modulation = checked_modulation(modulation)
     if not law_type.rate_dependent:
@@ -342,7 +354,8 @@ def response_function(
     coefficients = None if modulation is None else coefficients_of(modulation)
     equations = ParametrisedProblem(law_type, motion, radiation_damping, coefficients)
     defaults = {} if modulation is None or coefficients is None else load_values(modulation)
-    return ResponseFunction(Program(equations, harmonics, multipliers, search), defaults)
+    program = Program(equations, harmonics, multipliers, search)
+    return ResponseFunction(program, defaults, least_points)
 
 
 def _traced(parameters: Parameters) -> bool:

@@ -31,8 +31,6 @@ from asperity.parameters import law_parameters
 
 Float = NDArray[np.float64]
 
-#: Points that are predicted together.
-_BATCH = 256
 #: Rows whose orbits are remembered, of some ten kilobytes each.
 _REMEMBERED = 2048
 #: Largest share of readings that are named as outliers.
@@ -210,10 +208,15 @@ class Forward:
         self.fixed = {
             n: np.broadcast_to(np.asarray(v, float), (table.rows,)) for n, v in fixed.items()
         }
-        whole = partial(
-            response_function, law, inertia=inertia, radiation_damping=radiation_damping
+        # Whatever rows are asked for, the programs are those of the whole table.
+        function = partial(
+            response_function,
+            law,
+            inertia=inertia,
+            radiation_damping=radiation_damping,
+            least_points=table.rows,
         )
-        self._quick, self._whole = whole(search=False), whole(search="direct")
+        self._quick, self._whole = function(search=False), function(search="direct")
         self._visited: list[tuple[dict[str, float], KnownOrbits]] = []
         self.uses_search = False
 
@@ -244,7 +247,7 @@ class Forward:
         if known is not None and all_converged(np.asarray(values.outcome)):
             self._visited.append((dict(free), known))
             del self._visited[: -self._most_visited]
-        mu_ss, mu_slopes = _steady(self.law, given)
+        mu_ss, mu_slopes = _steady(self.law, given, function.compiled_points(self.table.rows))
         predicted = Prediction(
             np.asarray(values.mean_friction), mu_ss, np.asarray(values.harmonics)
         )
@@ -287,12 +290,12 @@ class Forward:
         function = self._whole if self.uses_search else self._quick
         given = {n: v for n, v in given.items() if n in function.parameters}
         last = self._visited[-1][1] if self._visited else KnownOrbits(self.table.rows)
-        parts = []
-        for start in range(0, repeats * self.table.rows, _BATCH):
-            part = {n: v[start : start + _BATCH] for n, v in given.items()}
+        parts, together = [], function.compiled_points(1)
+        for start in range(0, repeats * self.table.rows, together):
+            part = {n: v[start : start + together] for n, v in given.items()}
             rows = np.arange(start, start + len(part["V"])) % self.table.rows
             known = last.picked(rows) if near and self.uses_search else None
-            values, mu_ss = function(part, known), _steady(self.law, part)[0]
+            values, mu_ss = function(part, known), _steady(self.law, part, together)[0]
             parts.append((values.mean_friction, mu_ss, values.harmonics, values.outcome))
         mean, steady, harmonics, outcome = (
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
@@ -338,11 +341,17 @@ def all_converged(outcome: NDArray[np.int64]) -> bool:
     return bool((outcome == Outcome.CONVERGED).all())
 
 
-def _steady(law: type[Law], given: Mapping[str, Float]) -> tuple[Float, dict[str, Float]]:
-    """mu_ss(V) at each row and its derivatives to the law's parameters."""
-    own = {p: given[p] for p in law_parameters(law)}
-    value, slopes = _steady_friction(own, given["V"], law=law)
-    return np.asarray(value), {n: np.asarray(s) for n, s in slopes.items()}
+def _steady(
+    law: type[Law], given: Mapping[str, Float], compiled: int
+) -> tuple[Float, dict[str, Float]]:
+    """mu_ss(V) at each row and its derivatives to the law's parameters.
+
+    By a program for `compiled` rows.
+    """
+    rows = len(given["V"])
+    own = {p: np.pad(given[p], (0, compiled - rows), "edge") for p in (*law_parameters(law), "V")}
+    value, slopes = _steady_friction(own, own.pop("V"), law=law)
+    return np.asarray(value)[:rows], {n: np.asarray(s)[:rows] for n, s in slopes.items()}
 
 
 @partial(jax.jit, static_argnames=("law",))

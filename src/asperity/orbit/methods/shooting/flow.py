@@ -33,7 +33,7 @@ from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
 
 #: Most steps in a period: the tables of a pass have room for as many, so that one program serves.
-MOST_STEPS = 192
+MOST_STEPS = 512
 
 
 class Steps(NamedTuple):

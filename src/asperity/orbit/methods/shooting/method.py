@@ -48,6 +48,8 @@ _DIVISIONS = (
     _Divisions(2.0, 16, (24, 48, 96), 0.0),
     _Divisions(5.0, 16, (28, 56, 112), 0.2),
     _Divisions(40.0, 24, (40, 80, 160), 0.3),
+    # Sharp pulses of slip at deep modulation.
+    _Divisions(40.0, 32, (64, 128, 256, 512), 0.6),
 )
 
 #: Points in a call, where there are many and where few are left; no powers of two, at which
