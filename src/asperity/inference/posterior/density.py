@@ -26,7 +26,10 @@ from asperity.inference.tables.term import LockInTerm
 Float = NDArray[np.float64]
 
 #: Steps to the mode, and the decrease of the log density at which it counts as reached.
-_STEPS, _REACHED = 60, 1e-6
+_STEPS, _REACHED = 60, 1e-4
+#: Damping of the first step, and the promised gain below which a step that gains nothing ends the
+#: way: that is round-off, or the accuracy of orbits.
+_FIRST_DAMPING, _NOISE = 1e-3, 1e-3
 #: Standard deviations of q are looked for between these.
 _NARROWEST, _WIDEST = 1e-9, 3.0
 
@@ -142,10 +145,13 @@ class Whitened:
     def _climbed(self, q: Float) -> tuple[Float, Float]:
         """The mode reached from q by damped Gauss-Newton steps, and the information there."""
         value, gradient, information = self._evaluated(q)
-        damping = 1e-3
+        damping = _FIRST_DAMPING
         for _ in range(_STEPS):
             lifted = information + damping * np.diag(np.diag(information) + 1e-12)
             step = np.linalg.solve(lifted, gradient)
+            gain = 0.5 * float(step @ gradient)
+            if damping <= _FIRST_DAMPING and gain < _REACHED:
+                break
             longest = np.abs(step).max()
             step *= min(1.0, 2.0 / longest) if longest else 1.0
             trial = self._evaluated(q + step)
@@ -156,7 +162,7 @@ class Whitened:
                     break
             else:
                 damping *= 10
-                if damping > 1e8:
+                if damping > 1e8 or gain < _NOISE:
                     break
         return q, information
 
