@@ -83,6 +83,29 @@ def test_both_minima_are_found_and_intervals_hold_both():
     assert any("another minimum" in w and "D0" in w for w in found.warnings)
 
 
+def test_a_narrow_minimum_at_another_memory_length_is_found():
+    """No drawn start is as good there as those at the wide minimum, which describes the data."""
+    narrow = FIRST + math.log(10.0) + 0.1
+
+    def values(x):
+        r, slope = np.ones(100), np.zeros(100)
+        rise = math.exp(4 * (x - FIRST - 1.3))
+        both = SLOPE * (x - FIRST) * (x - narrow) / (narrow - FIRST)
+        along = SLOPE * (2 * x - FIRST - narrow) / (narrow - FIRST)
+        r[0] = both * (1 + rise)
+        slope[0] = along * (1 + rise) + 4 * both * rise
+        return r, slope
+
+    objective = objective_of(values, 5e-7)
+    found = described_fit(objective, minima_of(objective, 0), profile=False)
+    (other,) = found.optima
+    pair = sorted([found.values["D0"], other.values["D0"]])
+    np.testing.assert_allclose(np.log(pair), [FIRST, narrow], atol=1e-6)
+    low, high = np.log(found.parameters["D0"].interval_95)
+    assert low < FIRST
+    assert high > narrow
+
+
 def one_minimum(x):
     r, slope = np.ones(100), np.zeros(100)
     r[0], slope[0] = SLOPE * (x - FIRST), SLOPE

@@ -60,6 +60,9 @@ FAR_OFF, _LARGE_GAIN = 1e-12, 0.1
 #: Probability of chi-squared below which a better minimum is looked for beside the best; changes
 #: of a logarithm, and of others as a share of their range of starts, that lead there; searches.
 DOUBTFUL, _BESIDE, _SHARE_BESIDE, _ROUNDS_BESIDE = 0.05, math.log(2.0), 0.2, 3
+#: Factors of a memory length at which other minima are looked for; below this one of the lengths
+#: where they end, they are the same.
+_OTHER_LENGTHS, _SAME_LENGTH = (0.1, 1 / 3, 3.0, 10.0), 1.5
 #: Parameters that laws extend others by: without them they are another law.
 _EXTENSIONS = ("lambda", "alpha")
 #: Their coordinate there.
@@ -108,7 +111,8 @@ def minima_of(
             # The others are minima, or only where the fast method ends.
             rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
             found = [*beyond, *rest]
-    return _with_those_beside(objective, sorted(found, key=lambda pair: pair[1]))
+    found = _with_those_beside(objective, sorted(found, key=lambda pair: pair[1]))
+    return _with_other_lengths(objective, found)
 
 
 class _Beginnings(NamedTuple):
@@ -238,6 +242,42 @@ def _with_those_beside(
             break
         found = [objective.minimise(u), *found]
     return found
+
+
+def _with_other_lengths(
+    objective: Objective, found: list[tuple[Float, float]]
+) -> list[tuple[Float, float]]:
+    """Minima with those at other memory lengths, of tables that the law does not contradict.
+
+    Where sliding over D0 takes far longer than a period, or far less, the evolution of friction
+    leaves little but a phase in the readings: values of D0 that differ by a factor of ten, with
+    other A and B, may describe them equally well. Intervals that do not know of it are too short.
+    """
+    if not _has_table(objective) or not found or _far_off(objective, found[0]):
+        return found
+    best = found[0][0]
+    # Where orbits are searched for, few rows show where minima are.
+    rough = (_few_rows(objective) if objective.searches else None) or objective
+    lowest = rough.chi2(best)
+    ends = []
+    for i, unknown in enumerate(objective.unknowns):
+        if not unknown.logarithmic or unknown.nuisance or unknown.parameter.kind != "length":
+            continue
+        shorter, longer = [], []
+        for factor in _OTHER_LENGTHS:
+            x = float(np.clip(best[i] + math.log(factor), *unknown.bounds))
+            u, value = rough.minimise(best, {i: x}, tolerance=_NEARBY, evaluations=_SOME_WAY)
+            if math.isfinite(value):
+                end = rough.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY)
+                apart = end[0][i] - best[i]
+                if end[1] < lowest + _WORTH and abs(apart) > math.log(_SAME_LENGTH):
+                    (shorter if apart < 0 else longer).append(end)
+        # Their valleys may be flat and long: the end of the best on each side will do.
+        for side in (shorter, longer):
+            if side:
+                u, _ = min(side, key=lambda end: end[1])
+                ends.append(objective.minimise(u, evaluations=_LONG_WAY))
+    return sorted([*found, *ends], key=lambda pair: pair[1])
 
 
 def _p_value(objective: Objective, minimum: tuple[Float, float]) -> float:
