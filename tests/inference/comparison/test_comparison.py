@@ -1,6 +1,7 @@
 """Verdicts on synthetic readings of a known law, with errors, outliers and runs of every kind."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -74,7 +75,28 @@ def test_errors_too_small_exclude_no_law_by_their_size(judged):
     found = judged("rice-ruina", 3, claimed=1 / 3)
     assert not found.decided
     assert "too small by a factor of about 3" in found.verdict
+    assert "with K free" not in found.verdict.lower()
     assert not any(j.excluded for j in found.laws.values())
+
+
+def test_a_stiffness_that_is_wrong_for_every_law_is_named(made, pmma):
+    table, wrong = made("rice-ruina", 2), 1.3 * pmma.K
+    found = compare(table, LAWS[:2], FREE[1:], material=pmma, evidence=False, fixed={"K": wrong})
+    assert not found.decided
+    assert "With K free, rice-ruina describes these data" in found.verdict
+    alone = fit(table, "rice-ruina", ["eps_ratio", "A"], material=pmma, fixed={"K": wrong})
+    (said,) = [w for w in alone.warnings if "with K free" in w]
+    low, high = map(float, re.search(r"\((\S+) to (\S+), 95 %\)", said).groups())
+    # Four standard errors, printed to four digits.
+    assert low - (high - low) / 2 < pmma.K < high + (high - low) / 2
+    assert high < wrong
+
+
+def test_no_stiffness_is_named_where_none_would_do(made, pmma):
+    table = made("rice-ruina", 3, claimed=1 / 3)
+    found = fit(table, "rice-ruina", ["eps_ratio", "A"], material=pmma)
+    assert found.p_value < 1e-3
+    assert not any("with K free" in w for w in found.warnings)
 
 
 def test_errors_too_large_leave_what_the_data_show(judged):

@@ -13,6 +13,7 @@ from asperity.errors import InputError
 from asperity.inference.comparison.cross_validation import CrossValidation, leave_one_run_out
 from asperity.inference.comparison.evidence import Evidence, evidence_of
 from asperity.inference.fitting.fit import Data, fit, listed_data
+from asperity.inference.fitting.free_stiffness import stiffness_that_describes
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.tables.outliers import outlying_rows
@@ -137,7 +138,9 @@ def compare(
     while that of another law has not and its AICc is lower by 4 or more, or if its AICc exceeds
     the lowest by 10 or more. If no law describes the data, their uncertainties may be too small:
     chi-squared is divided by that of the best law per degree of freedom before the second
-    comparison. Rows that alone keep every law from describing the data are left out, and named.
+    comparison; and the simplest law that would describe a table with another stiffness than the
+    given one is named with it. Rows that alone keep every law from describing the data are left
+    out, and named.
     """
     if len(set(laws)) < 2:
         raise InputError(
@@ -176,7 +179,14 @@ def compare(
                 chosen["starts"] = min(_STARTS_AGAIN, options.get("starts", _STARTS_AGAIN))
             try:
                 done[name] = fit(
-                    data, name, names, bare=True, simpler=list(done.values()), **mine, **chosen
+                    data,
+                    name,
+                    names,
+                    bare=True,
+                    simpler=list(done.values()),
+                    check_stiffness=False,
+                    **mine,
+                    **chosen,
                 )
             except MissingNumberError as error:
                 not_compared[name] = str(error)
@@ -196,8 +206,21 @@ def compare(
         out = np.isin(np.arange(table.rows), outliers)
         rest = judge(fits_to([table.without(out)], lambda _: None, fits))
         found = _without(found, rest, table.row_names[out].tolist())
-    found = replace(found, not_compared=not_compared)
+    found = replace(found, not_compared=not_compared, verdict=found.verdict + _freed(found))
     return _examined(found) if evidence else found
+
+
+def _freed(found: Comparison) -> str:
+    """What a free stiffness would change, where no law describes the data."""
+    fits = [j.fit for j in found.laws.values() if j.fit.converged]
+    if any(f.dof <= 0 or f.p_value >= _IMPOSSIBLE for f in fits):
+        return ""
+    # The law with the fewest parameters that does: those that extend it do as well.
+    for f in sorted(fits, key=lambda f: len(f.parameters)):
+        said = stiffness_that_describes(f)
+        if said:
+            return f" {said[0].upper()}{said[1:]}."
+    return ""
 
 
 def _common_outliers(fits: Mapping[str, Fit]) -> list[int]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.inference.fitting.description import described_fit, failed_fit
+from asperity.inference.fitting.free_stiffness import stiffness_that_describes
 from asperity.inference.fitting.inputs import (
     fixed_values,
     require_enough,
@@ -73,6 +74,7 @@ def fit(
     starts: int = 64,
     seed: int = 0,
     simpler: Sequence[Fit] = (),
+    check_stiffness: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
     """Fit a friction law to lock-in readings and recordings.
@@ -111,6 +113,9 @@ def fit(
     simpler : sequence of Fit
         Fits of other laws to the same data; those of special cases of this law, such as Rice-Ruina
         of the elasto-plastic one, are starts too.
+    check_stiffness : bool
+        Whether a table that the law does not describe is fitted again with K free, and a warning
+        says where the law describes it then. Recordings always are where K is fixed or shared.
     progress : callable, optional
         Called with the number of starts followed to their minima so far, and of all of them.
 
@@ -190,7 +195,9 @@ def fit(
             else:
                 said += contradicted_stiffness(found, freed, recordings, given)
         return replace(found, warnings=(*said, *found.warnings))
-    return described_fit(objective, minima, profile=profile)
+    found = described_fit(objective, minima, profile=profile)
+    other = stiffness_that_describes(found) if check_stiffness else ""
+    return replace(found, warnings=(*found.warnings, other)) if other else found
 
 
 def _begun(found: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[str, Any]:

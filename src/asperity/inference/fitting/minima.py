@@ -263,7 +263,8 @@ def _with_other_lengths(
     for i, unknown in enumerate(objective.unknowns):
         if not unknown.logarithmic or unknown.nuisance or unknown.parameter.kind != "length":
             continue
-        shorter, longer = [], []
+        shorter: list[tuple[Float, float]] = []
+        longer: list[tuple[Float, float]] = []
         for factor in _OTHER_LENGTHS:
             x = float(np.clip(best[i] + math.log(factor), *unknown.bounds))
             u, value = rough.minimise(best, {i: x}, tolerance=_NEARBY, evaluations=_SOME_WAY)
