@@ -27,9 +27,9 @@ LONGEST = (
     "transients",
 )
 
-#: Rooms whose programs take longer to be optimised than they run. Others, and the programs that
-#: these rooms' tests start, run what users run.
-BRIEF = ("orbit", "docs", "theory", "transients", "laws")
+#: Rooms whose programs take longer to be optimised than they run, in processes that their tests
+#: start too. Others run what users run.
+BRIEF = ("orbit", "docs", "theory", "transients", "laws", "app")
 _SWITCH = "jax_disable_most_optimizations"
 
 
@@ -81,5 +81,8 @@ def compiled_for_few_calls(request):
 
     brief = room(request.node.nodeid) in BRIEF
     jax.config.update(_SWITCH, brief)
-    yield
+    with pytest.MonkeyPatch.context() as patch:
+        if brief:
+            patch.setenv(_SWITCH.upper(), "1")
+        yield
     jax.config.update(_SWITCH, False)
