@@ -7,7 +7,7 @@ import pytest
 from benchmarks.residual import LAWS, answer, draw, faults, faults_marched
 
 SAMPLES = 4096
-POINTS = 28
+POINTS = 50
 
 
 @dataclasses.dataclass(frozen=True)

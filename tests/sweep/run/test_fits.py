@@ -87,7 +87,7 @@ def test_readings_drawn_at_true_values_scatter_as_the_standard_errors_say(tmp_pa
     seeds, true = 40, 0.02
     found_plan = plan(
         tmp_path,
-        fit={"free": ("mu0", "B"), "starts": 4, "data": "a.csv"},
+        fit={"free": ("mu0", "B"), "starts": 1, "data": "a.csv"},
         parameters={"K": "1 N/um", "epsilon": 1e-6, "frequency": "120 Hz", "B": true},
         axes={"noise_seed": {"values": tuple(range(seeds))}, "A": {"values": (0.01, 0.012)}},
         outputs=("B_fit", "B_se", "chi2"),
