@@ -288,6 +288,8 @@ def _fit_point(
         tables, law, free, fixed=fixed, start=truth, prior=priors or None,
         inertia=inertia, radiation_damping=values.get("eta", 0.0) > 0 or "eta" in free,
         profile=settings["profile"], starts=settings["starts"], seed=settings["seed"],
+        # Only the number of warnings is kept, and this one takes another fit.
+        check_stiffness=False,
     )  # fmt: skip
     if not fitted.converged:
         found.fail(np.array([row]), SweepOutcome.FIT_FAILED)
