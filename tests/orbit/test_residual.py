@@ -23,7 +23,9 @@ class Batch:
 
 @pytest.fixture(scope="module", params=LAWS)
 def batch(request):
-    numbers = {name: a[:POINTS] for name, a in draw(request.param, 75, 41).items()}
+    numbers = {name: np.append(a[:POINTS], a[0]) for name, a in draw(request.param, 75, 41).items()}
+    # One that is not searched, for what is said of points that failed.
+    numbers["epsilon"][-1] = 0.9995
     return Batch(numbers, answer(request.param, numbers, SAMPLES))
 
 
@@ -57,6 +59,7 @@ def test_numbers_of_a_point_that_converged_are_given(batch):
 
 def test_numbers_of_a_point_that_failed_are_not_given(batch):
     failed = ~batch.response.converged
+    assert failed[-1]
     assert np.isnan(batch.response.mean_friction[failed]).all()
     assert np.isnan(batch.response.multipliers[failed]).all()
     assert (batch.response.result[failed] != "converged").all()
