@@ -195,6 +195,14 @@ class TestElastoPlastic:
             jax.monitoring.unregister_event_duration_listener(listen)
         assert count == 0
 
+    def test_fewer_points_are_filled_up_and_give_the_same(self):
+        wide = response_function("elasto-plastic", least_points=5)
+        assert [wide.compiled_points(n) for n in (1, 8, 9)] == [8, 8, 16]
+        few = {n: v[:3] if np.ndim(v) else v for n, v in self.parameters.items()}
+        expected, found = self.model(few), wide(few)
+        np.testing.assert_allclose(force(found), force(expected), rtol=ROUND_OFF)
+        assert found.mean_friction.shape == (3,)
+
     def test_point_that_is_not_found_is_not_a_number_and_harms_no_other(self):
         # Slow modulation, which the fast method leaves to the search.
         moved = self.parameters | {"frequency": np.array([120.0, 0.01, 120.0, 120.0])}

@@ -1,7 +1,7 @@
 """A table that a law does not describe at the given stiffness, fitted again with it free.
 
-Readings near the resonance of spring and contact see the stiffness to a per cent: a wrong one makes
-every law fail, or has a wrong law take its place.
+Readings by a lock-in see the stiffness to a few per cent and better: a wrong one makes every law
+fail, or has a wrong law take its place.
 """
 
 from __future__ import annotations

@@ -60,8 +60,8 @@ FAR_OFF, _LARGE_GAIN = 1e-12, 0.1
 #: Probability of chi-squared below which a better minimum is looked for beside the best; changes
 #: of a logarithm, and of others as a share of their range of starts, that lead there; searches.
 DOUBTFUL, _BESIDE, _SHARE_BESIDE, _ROUNDS_BESIDE = 0.05, math.log(2.0), 0.2, 3
-#: Factors of a memory length at which other minima are looked for; below this one of the lengths
-#: where they end, they are the same.
+#: Factors of a memory length at which other minima are looked for, and the factor between two
+#: lengths below which they are one minimum.
 _OTHER_LENGTHS, _SAME_LENGTH = (0.1, 1 / 3, 3.0, 10.0), 1.5
 #: Parameters that laws extend others by: without them they are another law.
 _EXTENSIONS = ("lambda", "alpha")
