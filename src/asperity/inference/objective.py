@@ -137,6 +137,8 @@ class Objective:
         Parameters that are not free, in SI.
     tolerance : float
         Relative change of the coordinates at which a minimum is reached.
+    unsolved : int
+        Evaluations so far at which a term had no solution.
     """
 
     terms: tuple[DataTerm, ...]
@@ -144,6 +146,7 @@ class Objective:
     unknowns: tuple[Unknown, ...]
     fixed: Mapping[str, Any]
     tolerance: float = 1e-10
+    unsolved: int = 0
     _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, repr=False)
 
     @property
@@ -181,6 +184,7 @@ class Objective:
     def _evaluate(self, u: Float) -> tuple[Float, Float]:
         data = self.data_residuals(u)
         if data is None:
+            self.unsolved += 1
             return np.array([np.nan]), np.full((1, len(self.unknowns)), np.nan)
         priors, slopes = self.prior_residuals(u)
         return (

@@ -265,6 +265,64 @@ def test_a_narrow_minimum_beside_a_wide_one_that_is_doubtful_is_found(size):
     assert min(u[0] for u, _ in others) == pytest.approx(FIRST, abs=1e-3)
 
 
+class Edge(Formula):
+    """Residuals of ln D0 and ln A, among searched orbits.
+
+    Where one of the two stays, they exist only within `step` of the other's last value: as along
+    the edge of the orbits, a minimisation tries steps without a solution again and again.
+    """
+
+    def __init__(self, values, step):
+        super().__init__(values)
+        self.searching, self.step, self.last = True, step, (math.nan, math.nan)
+
+    def residuals(self, values, *, search=None):
+        x, y = math.log(values["D0"]), math.log(values["A"])
+        change = abs(x - self.last[0]), abs(y - self.last[1])
+        if min(change) == 0 and max(change) > self.step:
+            return None
+        self.last = x, y
+        r, slopes = self.values(x, y)
+        jacobian = slopes / np.array([values["A"], values["D0"]])
+        names, rows = np.full(r.size, "mu1"), np.arange(r.size)
+        return Residuals(r, jacobian, names, rows, log_scale=0.0)
+
+
+@pytest.mark.parametrize(("step", "profile"), [(math.inf, False), (1e-5, False), (1e-5, True)])
+def test_profiles_along_an_edge_are_given_up_and_said_to_be(step, profile):
+    """ln D0 is bent, and ln A goes with it."""
+
+    def values(x, y):
+        r, slopes = np.ones(100), np.zeros((100, 2))
+        bent = math.expm1(2 * (x - FIRST))
+        r[0], slopes[0, 1] = 2 * bent, 4 * (bent + 1)
+        r[1], slopes[1] = 20 * (y + 5) - 2 * bent, (20, -4 * (bent + 1))
+        return r, slopes
+
+    unknowns = unknowns_of(LAW, ["A", "D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
+    objective = Objective((Edge(values, step),), LAW, unknowns, {})
+    found = described_fit(objective, [(np.array([-5.0, FIRST]), 98.0)], profile=profile)
+    said = [w for w in found.warnings if "hardly has periodic orbits" in w]
+    low, high = found.parameters["D0"].interval_95
+    # 20 (ln A + 5) is the sum of two normal residuals of unit variance.
+    normal = 1.96 * math.sqrt(2) / 20 * np.array([-1, 1])
+    of_A = np.log(found.parameters["A"].interval_95) + 5
+    if step < 1 and not profile:
+        assert (low, high) == (0.0, math.inf)
+        assert "intervals of D0 are the whole range" in said[0]
+        assert "intervals of A are of the normal approximation" in said[0]
+        np.testing.assert_allclose(of_A, normal, rtol=1e-3)
+        return
+    assert not said
+    assert math.isfinite(high)
+    assert low > 0
+    if not profile:
+        # 2 (exp(2 d) - 1) is 1.96 at the upper end and -1.96 at the lower.
+        ends = np.log([low, high]) - FIRST
+        np.testing.assert_allclose(ends, np.log([0.02, 1.98]) / 2, atol=0.02)
+        np.testing.assert_allclose(of_A, normal, rtol=0.02)
+
+
 @pytest.mark.parametrize(
     ("size", "searched", "doubted"),
     [(1.15, True, True), (1.15, False, False), (1.0, True, False), (3.0, True, False)],

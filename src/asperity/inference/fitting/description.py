@@ -21,7 +21,7 @@ from asperity.inference.fitting.parabola import (
     is_of_tables,
     parabola_of,
 )
-from asperity.inference.fitting.profile import Profile
+from asperity.inference.fitting.profile import Profile, ProfileAtEdgeError
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
 from asperity.inference.tables.term import any_searched
@@ -39,6 +39,9 @@ _TOGETHER = 0.3
 _PRECISE = 0.1
 #: Decrease of chi-squared along a profile that is another minimum.
 _LOWER = 0.01
+#: Evaluations without an orbit after which a profile among searched orbits is given up where nobody
+#: has asked for it: an end of an interval at the edge takes ten, a valley along the edge hundreds.
+_MOST_UNSOLVED = 80
 #: Minima this near, in standard errors of everything but nuisances, give the same answer.
 _NEAR = 0.5
 #: Below this probability chi-squared says that the law or the uncertainties are wrong.
@@ -100,13 +103,21 @@ def described_fit(
     rivals = _rivals(objective, minima, at.sd)
     odd = set() if far_off else {*bent, *at.undetermined}
     profiled = _profiled(objective, at.covariance, odd, everything=profile)
-    estimates = {}
+    estimates: dict[str, Estimate] = {}
+    at_edge: list[str] = []
     for i, unknown in enumerate(objective.unknowns):
         along = None
         if i in profiled:
             searching = profile or unknown.name not in at.undetermined
-            along = Profile(objective, i, at.u, at.chi2, at.covariance, search=searching)
-        ends = _ends(objective, at, i, along)
+            # The valley is the same for all.
+            most = math.inf if profile else -1 if at_edge else _MOST_UNSOLVED
+            along = Profile(objective, i, at.u, at.chi2, at.covariance, search=searching, most=most)
+        try:
+            ends = _ends(objective, at, i, along)
+        except ProfileAtEdgeError:
+            at_edge.append(unknown.name)
+            whole = unknown.name in odd
+            ends = [unknown.bounds] * len(LEVELS) if whole else _ends(objective, at, i, None)
         if along is not None and along.lowest[1] < at.chi2 - _LOWER:
             # The search has missed a minimum: begin again there.
             missed = objective.minimise(along.lowest[0])
@@ -119,19 +130,40 @@ def described_fit(
             "the estimate is the last before, and intervals are by profile likelihood or the whole "
             "range; leave those rows out or doubt the law"
         )
+    if at_edge:
+        said.append(_not_profiled(at_edge, odd))
     if bent:
-        also = [n for n in (objective.names[i] for i in sorted(profiled)) if n not in bent]
+        names = [objective.names[i] for i in sorted(profiled)]
+        also = [n for n in names if n not in (*bent, *at_edge)]
         said.append(
             f"chi-squared is no parabola in {' and '.join(bent)}: "
             + (
-                f"intervals of {' and '.join([*bent, *also])} are by profile likelihood; take the "
-                "intervals, not the standard errors"
+                f"intervals of {' and '.join([*bent, *also])} are by profile likelihood"
+                f"{' but for those named before' if at_edge else ''}; take the intervals, not the "
+                "standard errors"
                 if profiled
                 else "intervals of the normal approximation are wrong there, and those by profile "
                 "likelihood (--profile) take minutes for a recording"
             )
         )
     return _with_warnings(_fit_with(objective, at, estimates, rivals), said)
+
+
+def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
+    """A sentence on intervals whose profile likelihood runs along the edge of the orbits."""
+    whole = " and ".join(n for n in names if n in odd)
+    normal = " and ".join(n for n in names if n not in odd)
+    ends = [
+        f"intervals of {whole} are the whole range" if whole else "",
+        f"intervals of {normal} are of the normal approximation, and may be too short"
+        if normal
+        else "",
+    ]
+    return (
+        f"{', '.join(e for e in ends if e)}: their profile likelihood runs where the law hardly "
+        "has periodic orbits, which takes minutes; ask for it (--profile), fix a parameter or give "
+        "a prior"
+    )
 
 
 def _fit_at_the_next(

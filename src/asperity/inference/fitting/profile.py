@@ -25,6 +25,10 @@ _JUMP = 0.1
 _NO_ORBIT = 1e3
 
 
+class ProfileAtEdgeError(Exception):
+    """A profile runs along the edge of the region in which the data have a prediction."""
+
+
 class Profile:
     """chi-squared along one coordinate, minimised over the others; each point is computed once.
 
@@ -40,6 +44,8 @@ class Profile:
     search : bool
         Whether orbits are searched for where the fast method ends; without, an interval that gets
         there is open.
+    most : float
+        Evaluations without a solution, at most, where orbits are searched for.
     """
 
     def __init__(
@@ -51,9 +57,11 @@ class Profile:
         covariance: Float,
         *,
         search: bool,
+        most: float = math.inf,
     ) -> None:
         self.objective, self.i, self.u, self.chi2 = objective, i, u, chi2
         self.search = search
+        self.most = objective.unsolved + most
         # No farther at once than a factor of e, where the approximation may be worth nothing.
         self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
         self.along = covariance[:, i] / covariance[i, i]
@@ -75,6 +83,11 @@ class Profile:
             Coverage.
         wider : float
             Factor of the interval, for uncertainties that are estimated themselves.
+
+        Raises
+        ------
+        ProfileAtEdgeError
+            If more evaluations than `most` had no solution.
         """
         low, high = self.objective.unknowns[self.i].bounds
         return self._end(level, wider, -1, low), self._end(level, wider, 1, high)
@@ -112,6 +125,8 @@ class Profile:
         if x not in self.path:
             nearest = min(self.path, key=lambda known: abs(known - x))
             for begin in (self._start(x), self.path[nearest][0]):
+                if self.objective.searches and self.objective.unsolved > self.most:
+                    raise ProfileAtEdgeError
                 found, value = self.objective.minimise(begin, {self.i: x}, tolerance=_TOLERANCE)
                 if math.isfinite(value):
                     break
