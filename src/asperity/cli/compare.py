@@ -47,6 +47,7 @@ def compare(
 ) -> int:
     """Fit several laws to the same readings and say which the data exclude."""
     from asperity import inference
+    from asperity.cli.progress import bar
     from asperity.cli.report import aligned, to_json
     from asperity.inference.comparison.record import comparison_record
 
@@ -60,7 +61,14 @@ def compare(
         require_folder(report, "--report")
     options = {**options, "prior": reading.stiffness_prior(data, options)}
     read = reading.read(data, options["fixed"])
-    found = inference.compare(read, checked_laws(laws), free, **options)
+    with bar("%", raising=False) as update:
+        found = inference.compare(
+            read,
+            checked_laws(laws),
+            free,
+            progress=lambda done, total: update(round(100 * done / total), 100),
+            **options,
+        )
     without = found.not_compared
     if report is not None and any(j.fit.converged for j in found.laws.values()):
         from asperity.fit_report import write_comparison

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 
 from asperity.cli.interrupt import interruptible
 
@@ -13,10 +13,11 @@ _ON_TERMINAL, _IN_LOG = 0.2, 15.0
 
 
 @contextmanager
-def bar(unit: str) -> Iterator[Callable[[int, int, str], None]]:
+def bar(unit: str, *, raising: bool = True) -> Iterator[Callable[..., None]]:
     """A progress bar, to be called with the work done, all work, and what is being worked on.
 
-    It shows itself after a second: a short job stays silent. Inside, Ctrl-C raises.
+    It shows itself after a second: a short job stays silent. Inside, Ctrl-C raises, or ends the
+    process at once where there are no files to put in order (`raising` False).
     """
     from tqdm import tqdm
 
@@ -24,7 +25,7 @@ def bar(unit: str) -> Iterator[Callable[[int, int, str], None]]:
     shown = tqdm(
         unit=unit, file=sys.stderr, delay=1.0, mininterval=interval, leave=False, dynamic_ncols=True
     )
-    with shown, interruptible() as check:
+    with shown, interruptible() if raising else nullcontext(lambda: None) as check:
 
         def update(done: int, total: int, label: str = "") -> None:
             check()

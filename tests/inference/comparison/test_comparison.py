@@ -178,7 +178,11 @@ def test_one_run_cannot_be_left_out(made, pmma):
 
 def test_second_opinions_stand_beside_the_verdict(made, pmma):
     table = made("rice-ruina", 9)
-    found = compare(table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma)
+    done = []
+    count = {"progress": lambda *steps: done.append(steps)}
+    found = compare(table, LAWS[::2], ("lambda", "eps_ratio"), material=pmma, **count)
+    assert done == sorted(done)
+    assert done[-1] == (400, 400)
     assert "evidence prefers" in found.verdict
     assert all(j.evidence.effective_samples > 50 for j in found.laws.values())
     assert judge({n: j.fit for n, j in found.laws.items()}).decided == found.decided

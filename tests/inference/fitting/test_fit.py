@@ -13,8 +13,12 @@ FREE = ("lambda", "eps_ratio", "A")
 
 
 def test_exact_readings_give_the_truth(readings, pmma):
-    found = fit(readings(None), "elasto-plastic", FREE, material=pmma)
+    done, total = [], []
+    count = {"progress": lambda *steps: (done.append(steps[0]), total.append(steps[1]))}
+    found = fit(readings(None), "elasto-plastic", FREE, material=pmma, **count)
     assert found.converged
+    assert done == list(range(total[0] + 1))
+    assert set(total) == {total[0]}
     for name in FREE:
         # The integration is good to 1e-9, of which the fit makes some 1e-8.
         assert found.values[name] == pytest.approx(TRUTH[name], rel=1e-6)

@@ -158,7 +158,7 @@ def _refuse_law(law: str, known: Mapping[str, Any]) -> None:
 
 
 def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
-    """Fit a law, or compare several; the number of minimisations is reported.
+    """Fit a law, or compare several; the share of the work that is done is reported.
 
     The result has ``fit`` or ``comparison``; of the fit or the best one the pictures ``bands``,
     ``residuals`` and ``runs``; and, where they were asked for, ``posterior`` and ``report``, the
@@ -172,7 +172,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     files = argument["files"]
 
     def on_progress(done: int, total: int) -> None:
-        report(minimisations=done, of=total)
+        report(share=done / total)
 
     materials = known_materials()
     options: dict[str, Any] = {
@@ -186,7 +186,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
         "runs": _run_options(asked),
         "progress": on_progress,
     }
-    report(minimisations=0)
+    report(share=0.0)
     with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
         tables, names = _tables(asked, Path(folder))
     runs = [_run(run, file) for run, file in zip(asked.runs, files, strict=True)]

@@ -146,6 +146,7 @@ def fit(
     describes them.
     """
     from asperity import inference
+    from asperity.cli.progress import bar
     from asperity.cli.report import to_json
     from asperity.inference.fitting.record import fit_record
 
@@ -155,11 +156,14 @@ def fit(
     options = {**options, "prior": reading.stiffness_prior(data, options, windows)}
     over = None
     if windows is not None:
-        over = reading.fit_windows(data, windows, law_named(law), free, options)
+        with bar("window", raising=False) as update:
+            options["progress"] = update
+            over = reading.fit_windows(data, windows, law_named(law), free, options)
         found = over.fits[0]
     else:
         read = reading.read(data, options["fixed"])
-        found = inference.fit(read, law_named(law), free, **options)
+        with bar("step", raising=False) as update:
+            found = inference.fit(read, law_named(law), free, progress=update, **options)
     posterior = sampling.sample(found)
     if report is not None and found.converged:
         from asperity.fit_report import write_report

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -28,8 +29,11 @@ from asperity.inference.tables.term import (
 from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law, registered
 from asperity.parameters import law_parameters
-from asperity.parameters.arguments import counted
 
+#: Called with how many laws are done, parts of one included.
+Report = Callable[[float], None]
+#: Parts that the fit of a law, and what is said beside it, count as in the progress.
+_STEPS = 100
 #: Drawn starts of a fit that is repeated without outliers.
 _STARTS_AGAIN = 16
 #: A law is excluded by its own misfit below this probability of chi-squared, if another law is not.
@@ -119,7 +123,8 @@ def compare(
     evidence : bool
         Whether to compute evidence and leave-one-run-out cross-validation too.
     progress : callable, optional
-        Called with the number of laws fitted to all data so far, and of all laws.
+        Called with the work done so far and all work: a hundred for the fit of each law, and a
+        hundred for its evidence and cross-validation.
     **options
         As of `fit`.
 
@@ -162,12 +167,21 @@ def compare(
     }
     not_compared: dict[str, str] = {}
 
+    work = _STEPS * len(own) * (2 if evidence else 1)
+
+    def report(laws: float) -> None:
+        if progress is not None:
+            progress(round(_STEPS * laws), work)
+
     def fits_to(
-        data: Sequence[Any], advance: Callable[[int], None], before: Mapping[str, Fit] | None = None
+        data: Sequence[Any],
+        report: Report,
+        before: Mapping[str, Fit] | None = None,
     ) -> dict[str, Fit]:
         done: dict[str, Fit] = {}
         # Special cases come before the laws that have them, which begin there.
-        for name, names in sorted(own.items(), key=lambda pair: len(_parameters(pair[0]))):
+        ordered = sorted(own.items(), key=lambda pair: len(_parameters(pair[0])))
+        for k, (name, names) in enumerate(ordered):
             mine: dict[str, Any] = {
                 key: {n: values[n] for n in _own(name, list(values), laws)}
                 for key, values in given.items()
@@ -185,15 +199,16 @@ def compare(
                     bare=True,
                     simpler=list(done.values()),
                     check_stiffness=False,
+                    progress=partial(_within_law, report, k),
                     **mine,
                     **chosen,
                 )
             except MissingNumberError as error:
                 not_compared[name] = str(error)
-            advance(1)
+            report(k + 1)
         return done
 
-    fits = fits_to(several, counted(progress, len(own)))
+    fits = fits_to(several, report)
     if len(fits) < 2:
         raise InputError(
             f"laws must have numbers of two or more, got them of {len(fits)}; "
@@ -207,7 +222,11 @@ def compare(
         rest = judge(fits_to([table.without(out)], lambda _: None, fits))
         found = _without(found, rest, table.row_names[out].tolist())
     found = replace(found, not_compared=not_compared, verdict=found.verdict + _freed(found))
-    return _examined(found) if evidence else found
+    return _examined(found, lambda laws: report(len(own) + laws)) if evidence else found
+
+
+def _within_law(report: Report, laws: int, done: int, total: int) -> None:
+    report(laws + done / total)
 
 
 def _freed(found: Comparison) -> str:
@@ -251,19 +270,20 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
     return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
 
 
-def _examined(found: Comparison) -> Comparison:
+def _examined(found: Comparison, report: Report) -> Comparison:
     """The comparison with evidence and cross-validation of every law.
 
     Orbits that are searched for take minutes for it: of an excluded law, only the normal
     approximation of the evidence.
     """
     judged = {}
-    for name, j in found.laws.items():
+    for k, (name, j) in enumerate(found.laws.items(), 1):
         if j.fit.converged and j.excluded and any_searched(j.fit.objective.terms):
             j = replace(j, evidence=evidence_of(j.fit, samples=0))
         elif j.fit.converged:
             j = replace(j, evidence=evidence_of(j.fit), cross_validation=leave_one_run_out(j.fit))
         judged[name] = j
+        report(k)
     return replace(found, laws=judged, verdict=found.verdict + _second_opinion(judged, found.best))
 
 

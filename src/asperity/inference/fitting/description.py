@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -82,7 +82,11 @@ def failed_fit(objective: Objective) -> Fit:
 
 
 def described_fit(
-    objective: Objective, minima: Sequence[tuple[Float, float]], *, profile: bool
+    objective: Objective,
+    minima: Sequence[tuple[Float, float]],
+    *,
+    profile: bool,
+    described: Callable[[int], None] | None = None,
 ) -> Fit:
     """The fit at the lowest of the minima.
 
@@ -93,10 +97,12 @@ def described_fit(
         Coordinates and chi-squared, best first.
     profile : bool
         Intervals by profile likelihood.
+    described : callable, optional
+        Called with the number of parameters whose intervals are known so far.
     """
     at = parabola_of(objective, *minima[0])
     if at is None:
-        return _fit_at_the_next(objective, minima, profile=profile)
+        return _fit_at_the_next(objective, minima, profile=profile, described=described)
     # Intervals under a law that the data contradict say nothing that a search would make better.
     far_off = at.p_value < FAR_OFF and not profile
     bent = [] if profile or far_off else _bent(objective, at)
@@ -121,8 +127,10 @@ def described_fit(
         if along is not None and along.lowest[1] < at.chi2 - _LOWER:
             # The search has missed a minimum: begin again there.
             missed = objective.minimise(along.lowest[0])
-            return described_fit(objective, [missed, *minima], profile=profile)
+            return described_fit(objective, [missed, *minima], profile=profile, described=described)
         estimates[unknown.name] = _estimate(objective, at, i, ends, rivals)
+        if described is not None:
+            described(i + 1)
     said = _contradicted(objective, at)
     if at.stopped:
         said.append(
@@ -167,7 +175,11 @@ def _not_profiled(names: Sequence[str], odd: set[str]) -> str:
 
 
 def _fit_at_the_next(
-    objective: Objective, minima: Sequence[tuple[Float, float]], *, profile: bool
+    objective: Objective,
+    minima: Sequence[tuple[Float, float]],
+    *,
+    profile: bool,
+    described: Callable[[int], None] | None,
 ) -> Fit:
     """The fit at the second minimum.
 
@@ -175,7 +187,7 @@ def _fit_at_the_next(
     """
     if not minima[1:]:
         return failed_fit(objective)
-    found = described_fit(objective, minima[1:], profile=profile)
+    found = described_fit(objective, minima[1:], profile=profile, described=described)
     lost = (
         f"a lower minimum, of chi-squared {minima[0][1]:.4g}, lies where the law hardly has "
         "periodic orbits, and was not found again: this is the next one; leave out the rows of the "

@@ -117,7 +117,8 @@ def fit(
         Whether a table that the law does not describe is fitted again with K free, and a warning
         says where the law describes it then. Recordings always are where K is fixed or shared.
     progress : callable, optional
-        Called with the number of starts followed to their minima so far, and of all of them.
+        Called with the number of steps done so far, and of all: a minimisation from each start that
+        is followed, then the interval of each parameter. A fit with K free comes after them.
 
     Returns
     -------
@@ -157,10 +158,11 @@ def fit(
         )
 
     objective = compared(recordings)
+    steps = _Steps(progress, len(objective.unknowns))
     # Minima of a long recording are looked for in fewer, longer blocks.
     searched = compared(coarse) if (coarse := coarser(recordings)) else objective
     special = [f.values for f in simpler if f.converged and extends(chosen, f.objective.law)]
-    minima = minima_of(searched, seed, progress, drawn=starts, simpler=special)
+    minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
     if not minima:
         return failed_fit(objective)
     if recordings:
@@ -170,7 +172,7 @@ def fit(
         minima, agreed = with_noise(objective, minima, drifting, besides)
         if not math.isfinite(minima[0][1]):
             return failed_fit(objective)
-        found = described_fit(objective, minima, profile=profile)
+        found = described_fit(objective, minima, profile=profile, described=steps.described)
         said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
         said += unusual_numbers(found, recordings)
         given = (fixed or {}).get("K")
@@ -195,9 +197,29 @@ def fit(
             else:
                 said += contradicted_stiffness(found, freed, recordings, given)
         return replace(found, warnings=(*said, *found.warnings))
-    found = described_fit(objective, minima, profile=profile)
-    other = stiffness_that_describes(found) if check_stiffness else ""
+    found = described_fit(objective, minima, profile=profile, described=steps.described)
+    other = stiffness_that_describes(found, steps.again) if check_stiffness else ""
     return replace(found, warnings=(*found.warnings, other)) if other else found
+
+
+class _Steps:
+    """Progress of a fit: minimisations, then parameters whose intervals are known."""
+
+    def __init__(self, progress: Callable[[int, int], None] | None, parameters: int) -> None:
+        self._report = progress or (lambda done, total: None)
+        self._parameters, self._done, self._total = parameters, 0, parameters
+
+    def minimised(self, done: int, total: int) -> None:
+        self._done, self._total = done, total + self._parameters
+        self._report(self._done, self._total)
+
+    def described(self, parameters: int) -> None:
+        # Where another minimum is found on the way, the first ones are described again.
+        self._done = max(self._done, self._total - self._parameters + parameters)
+        self._report(self._done, self._total)
+
+    def again(self, done: int, total: int) -> None:
+        self._report(self._total + done, self._total + total)
 
 
 def _begun(found: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[str, Any]:

@@ -6,6 +6,7 @@ fail, or has a wrong law take its place.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -21,15 +22,17 @@ from asperity.inference.unknowns import unknowns_of
 _FAILS, _DESCRIBES = 1e-3, 0.01
 
 
-def stiffness_that_describes(found: Fit) -> str:
+def stiffness_that_describes(found: Fit, progress: Callable[[int, int], None] | None = None) -> str:
     """A sentence on the stiffness with which the law describes a table after all, or nothing.
 
     Parameters
     ----------
     found : Fit
         Converged, to one table; nothing is said of one that describes it, or has K free.
+    progress : callable, optional
+        Called with the number of minimisations done, and of all.
     """
-    freed = _freed(found)
+    freed = _freed(found, progress)
     if freed is None or not freed.converged or freed.dof <= 0 or freed.p_value < _DESCRIBES:
         return ""
     estimate, given = freed.parameters["K"], float(np.ravel(found.objective.fixed["K"])[0])
@@ -47,7 +50,7 @@ def stiffness_that_describes(found: Fit) -> str:
     )
 
 
-def _freed(found: Fit) -> Fit | None:
+def _freed(found: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
     """The fit with K free; None where that is not asked for."""
     objective = found.objective
     given = np.unique(objective.fixed.get("K", ()))
@@ -78,5 +81,5 @@ def _freed(found: Fit) -> Fit | None:
         _last=None,
     )
     # Special cases and drawn starts as in any fit, and the estimate with the given stiffness.
-    minima = minima_of(freed, 0, simpler=[{**found.values, **start}])
+    minima = minima_of(freed, 0, progress, simpler=[{**found.values, **start}])
     return described_fit(freed, minima, profile=False) if minima else None

@@ -95,6 +95,7 @@ def minima_of(
         return _as_it_stands(objective)
     begun = _beginnings(objective, seed, drawn, simpler)
     advance = counted(progress, len(begun.followed))
+    advance(0)
     if begun.few is not None:
         found = _by_way_of_few_rows(objective, begun, begun.few, advance)
     else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,7 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law
 from asperity.outputs.json import plain
+from asperity.parameters.arguments import counted
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
@@ -110,6 +111,7 @@ def fit_windows(
     windows: Sequence[tuple[float, float]] | None = None,
     *,
     reading: Mapping[str, Any] | None = None,
+    progress: Callable[[int, int], None] | None = None,
     **options: Any,
 ) -> WindowedFit:
     """Fit a law to several windows of a recording.
@@ -125,6 +127,8 @@ def fit_windows(
         both.
     reading : mapping, optional
         Further arguments of `recorded_run`.
+    progress : callable, optional
+        Called with the number of windows fitted so far, and of all.
     **options
         Further arguments of `fit`.
 
@@ -150,13 +154,15 @@ def fit_windows(
     spans = (
         _automatic(first) if windows is None else tuple((float(a), float(b)) for a, b in windows)
     )
+    advance = counted(progress, len(spans))
     fits = [fit(first, law, free, **options)]
+    advance(1)
     if fits[0].converged:
         begun = {k.name: fits[0].values[k.name] for k in _physical(fits[0])}
         options = {"starts": _STARTS, **options, "start": begun}
-    fits += [
-        fit(recorded_run(trace, **given, window=span), law, free, **options) for span in spans[1:]
-    ]
+    for span in spans[1:]:
+        fits.append(fit(recorded_run(trace, **given, window=span), law, free, **options))
+        advance(1)
     failed = [i for i, found in enumerate(fits) if not found.converged]
     said = [f"{_shown(spans[i])}: {fits[i].message}" for i in failed]
     usable = [found for found in fits if found.converged]

@@ -177,12 +177,15 @@ export class FitPanel {
     try {
       const last = await run("data/fit", asked, (part) => {
         if (part.waiting) this.status.textContent = "Waiting for another fit…";
-        if (part.minimisations !== undefined) this.status.textContent = `Fitting… ${part.minimisations}${part.of ? ` of ${part.of}` : ""} finished.`;
+        if (part.share !== undefined) {
+          this.bar.value = part.share;
+          this.status.textContent = `Fitting… ${Math.round(100 * part.share)} %.`;
+        }
         if (part.draws !== undefined) {
           this.bar.value = part.draws / part.of;
           this.status.textContent = part.draws ? `Sampling… ${part.draws} of ${part.of} draws, those of the warm-up included.` : "Sampling: the processes start…";
         }
-        this.bar.hidden = part.draws === undefined;
+        this.bar.hidden = part.draws === undefined && part.share === undefined;
         if (part.stage === "figures") this.status.textContent = "Drawing the figures…";
         if (part.stage === "report") this.status.textContent = "Writing the report folder…";
       }, signal);
