@@ -38,6 +38,7 @@ def corner(shooting):
         epsilon=epsilon,
         frequency=numbers["f"],
         waveform=4096,
+        methods=("collocation",),
     )
     return base, numbers, epsilon, response
 

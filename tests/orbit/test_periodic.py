@@ -69,16 +69,17 @@ FAST += [(1e-5, 0.005, 120.0), (1e-5, 0.5, 120.0)]
 #: Narrow pulses, slow modulation, and modulation near the stick-slip frequency V/(2 pi D0).
 SLOW = [(1e-4, 0.005, 120.0), (1e-4, 0.24, 120.0), (1e-4, 0.9, 120.0), (1e-5, 0.9, 120.0)]
 SLOW += [(1e-7, 0.5, 1.0), (1e-6, 0.005, 1.0), (1e-6, 0.9, 1.0)]
-SLOW += [(1e-6, 0.24, 0.4), (1e-5, 0.5, 4.0)]
+#: The same, of orbits to which the branch from steady sliding is followed.
+FOLLOWED = [(1e-6, 0.24, 0.4), (1e-5, 0.5, 4.0)]
 #: A pulse on the finest mesh, which takes as long as all other points: of one law.
 SHARPEST = (1e-5, 0.9, 1.0)
 #: Where the first grid of the fast method is enough, and one point for which it is not.
 MILD = [(V, eps, 120.0) for V in (1e-6, 3e-6) for eps in (0.005, 0.05)]
 STRONG = (1e-6, 0.12, 120.0)
-#: One law with and one without elastic asperities: each has the robust method compiled. The others
-#: have the points that the fast method answers.
+#: One law with and one without elastic asperities: each has the robust method compiled, one of them
+#: with the way along branches. The others have the points that the fast method answers.
 POINTS = {name: FAST + SLOW * (name in ("rice-ruina", "elasto-plastic")) for name in LAWS}
-POINTS["rice-ruina"].insert(len(FAST), SHARPEST)
+POINTS["rice-ruina"] = [*FAST, SHARPEST, *SLOW, *FOLLOWED]
 POINTS |= {
     name: [point for point in FAST if point[1] < 0.9]
     for name in ("elasto-plastic-age", "strength-area")
@@ -410,7 +411,7 @@ def test_bad_input_is_refused_in_one_sentence(changed, said):
 
 def test_a_point_that_fails_says_why_and_costs_no_other():
     # K < Kc at a quarter of the stick-slip frequency: the branch turns back at small eps.
-    V, epsilon, frequency = np.transpose([FAST[5], (1e-5, 0.24, 1.0), SLOW[-2]])
+    V, epsilon, frequency = np.transpose([FAST[5], (1e-5, 0.24, 1.0), FOLLOWED[0]])
     counts = []
     response = respond(
         "rice-ruina", V, epsilon, frequency, progress=lambda *count: counts.append(count)

