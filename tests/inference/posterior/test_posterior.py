@@ -189,7 +189,8 @@ def test_a_posterior_of_nothing_is_refused(steps):
     [
         (RunOptions(fit_rate=2.5), 350),
         (RunOptions(fit_rate=2.5, gauge=(2, 1.0)), 350),
-        (RunOptions(gauge=(1, 2.0)), 1400),
+        # At 14 Hz: between the samples, and as many times as the other gauge has, filled up.
+        (RunOptions(gauge=(1, 1.75)), 1400),
     ],
 )
 def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, options, samples):

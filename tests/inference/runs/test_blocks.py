@@ -13,7 +13,7 @@ from asperity.inference.runs.blocks import averaged, reduced
 from asperity.recording import Channel, Trace
 
 #: Ten seconds at 2.4 kHz: D0/V is 65 ms after the step up, and the spring takes 23 ms.
-CASE = Case((3e-5, 1e-4, 0.0, 1e-4), (2.5, 5.0, 7.5), 10.0, 2400.0)
+CASE = Case((3e-5, 1e-4, 0.0), (2.5, 5.0), 10.0, 2400.0)
 FREE = ["A", "B", "D0"]
 NOISE = 3e-4
 
