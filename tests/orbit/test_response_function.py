@@ -376,10 +376,10 @@ def test_derivatives_at_orbits_of_the_search():
 
 
 def test_second_derivatives_at_orbits_of_the_search():
-    # Slow modulation, where the fast method does not converge.
+    # Slow modulation, where the fast method does not converge, and a series does.
     model = response_function("rice-ruina", harmonics=1)
     own = {n: BASE[n] for n in law_parameters(RiceRuina)} | MACHINE
-    own |= {"V": 1e-6, "frequency": 0.3, "epsilon": 0.2, "K": 1e6}
+    own |= {"V": 1e-6, "frequency": 0.1, "epsilon": 0.2, "K": 1e6}
 
     @jax.jit
     def along(logs):
