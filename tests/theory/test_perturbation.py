@@ -214,7 +214,9 @@ def test_equals_the_periodic_response_at_small_amplitudes(name, equations):
     slider = Slider(LAWS[name][0], spring=K, load=W0, mass=1.6)
     point = {"velocity": 1e-5, "frequency": 120.0, **equations}
     epsilon = np.array([1e-3, 2e-3])
-    solved = periodic_response(slider, epsilon=epsilon, **point)
+    # Series would be tried in between, and leave such small harmonics.
+    methods = ("fourier", "collocation")
+    solved = periodic_response(slider, epsilon=epsilon, methods=methods, **point)
     assert solved.converged.all()
     small = perturbation_response(slider, **point)
     steady = float(slider.law.mu_ss(1e-5))
