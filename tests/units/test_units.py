@@ -82,10 +82,17 @@ def test_rpm_is_an_angular_frequency_and_carries_its_two_pi() -> None:
     assert to_si("60 rpm", "angular_frequency", "slider.x") == pytest.approx(2 * math.pi, rel=1e-15)
 
 
+@pytest.fixture(scope="module")
+def exact() -> pint.UnitRegistry:
+    """Units with decimal ratios."""
+    return pint.UnitRegistry(non_int_type=Decimal)
+
+
 @pytest.mark.parametrize(("kind", "unit", "power"), RUNGS)
-def test_the_units_known_without_pint_are_pints(kind: str, unit: str, power: int) -> None:
-    registry = pint.UnitRegistry(non_int_type=Decimal)
-    ratio = registry.Quantity(Decimal(1), unit).to(KINDS[kind].si).magnitude
+def test_the_units_known_without_pint_are_pints(
+    kind: str, unit: str, power: int, exact: pint.UnitRegistry
+) -> None:
+    ratio = exact.Quantity(Decimal(1), unit).to(KINDS[kind].si).magnitude
     assert ratio == Decimal(1).scaleb(power)
 
 
