@@ -54,9 +54,9 @@ def test_inside_the_boundary_is_where_shooting_has_it(stiffness, slow):
     (curve,) = stiffness.curves
     for i in np.linspace(1, len(curve.x) - 2, 3).astype(int):
         here = dataclasses.replace(slow, K=curve.y[i])
-        _, monodromy = here.followed(curve.x[i], 20)
+        state, monodromy = here.followed(curve.x[i], 10)
         # How fast the growth changes with epsilon says what a change of it means.
-        _, beside = here.followed(curve.x[i] * 1.001, 20)
+        _, beside = here.orbit(state, curve.x[i] * 1.001)
         growth, change = (np.log(np.linalg.det(m)) for m in (monodromy, beside))
         assert abs(growth / ((change - growth) / 1e-3)) < BOUNDARY
 
@@ -77,8 +77,8 @@ def test_period_doubling_boundaries_agree_with_shooting(slow):
         np.testing.assert_allclose(curve.frequency, curve.y / 2, rtol=1e-12)
         for i in (1, len(curve.x) // 2):
             here = dataclasses.replace(slow, frequency=curve.y[i])
-            _, monodromy = here.followed(curve.x[i], 20)
-            _, beside = here.followed(curve.x[i] * 1.001, 20)
+            state, monodromy = here.followed(curve.x[i], 10)
+            _, beside = here.orbit(state, curve.x[i] * 1.001)
             test, other = (1 + np.trace(m) + np.linalg.det(m) for m in (monodromy, beside))
             assert abs(test / ((other - test) / 1e-3)) < BOUNDARY
 
