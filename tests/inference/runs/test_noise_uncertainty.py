@@ -73,7 +73,7 @@ def test_intervals_cover_where_those_under_known_noise_do_not():
         steps = np.random.default_rng(seed).normal(size=n + 200)
         y = lfilter([1.0], [1.0, -1.2, 0.4], steps)[200:]
         b, root = np.linalg.lstsq(X, y, rcond=None)[0], np.zeros((0, n))
-        for _ in range(8):
+        for _ in range(4):
             model = fitted([y - X @ b], order=order, parameters=2, uncertain=[root])
             white = model.whiten(X)
             information = white.T @ white
