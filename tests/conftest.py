@@ -27,9 +27,12 @@ LONGEST = (
     "transients",
 )
 
-#: Rooms whose programs take longer to be optimised than they run, in processes that their tests
-#: start too. Others run what users run.
-BRIEF = ("orbit", "docs", "theory", "transients", "laws", "app")
+#: Rooms and files whose programs take longer to be optimised than they run, in processes that their
+#: tests start too. Others run what users run.
+BRIEF = (
+    *("orbit", "docs", "theory", "transients", "laws", "app"),
+    *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
+)
 _SWITCH = "jax_disable_most_optimizations"
 
 
@@ -79,7 +82,8 @@ def compiled_for_few_calls(request):
     """Programs are compiled in half the time, and run several times as long, in some rooms."""
     import jax
 
-    brief = room(request.node.nodeid) in BRIEF
+    file = request.node.nodeid.split("::")[0].partition("/")[2]
+    brief = file in BRIEF or room(request.node.nodeid) in BRIEF
     jax.config.update(_SWITCH, brief)
     with pytest.MonkeyPatch.context() as patch:
         if brief:
