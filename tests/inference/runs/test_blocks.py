@@ -148,6 +148,19 @@ def test_single_samples_far_off_do_not_count(clean, ringing):
     np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
 
 
+def test_large_samples_far_off_take_no_good_ones_with_them(ringing):
+    """Friction that relaxes after each step is no noise, however large the spikes are."""
+    time = np.arange(24_000) / CASE.rate
+    relaxing = [np.where(time > t, np.exp(-(time - t) / 0.1), 0.0) for t in CASE.changes]
+    values = 0.6 + 0.02 * relaxing[0] - 0.02 * relaxing[1] + ringing
+    spoiled = values.copy()
+    spoiled[[3_000, 9_001, 20_202]] += [1.0, -1.0, 1.0]
+    right, run = (reduced(recorded(x), 100.0) for x in (values, spoiled))
+    assert right.blocks.spikes == 0
+    assert run.blocks.spikes == 3
+    np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
+
+
 @pytest.mark.parametrize("rate", [0.0, "-3 Hz", "fast", "3 N"])
 def test_a_rate_that_is_none_is_refused(rate):
     with pytest.raises(InputError, match="fit_rate must"):

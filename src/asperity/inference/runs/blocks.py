@@ -281,24 +281,49 @@ def _without_spikes(run: RecordedRun) -> tuple[RecordedRun, int]:
         if b - a <= 2 * _BESIDE:
             continue
         x = friction[a:b] - np.median(friction[a:b])
-        model = fitted([x[:_LEARNT]], order=_BESIDE)
-        apart = model.departures_of_single_samples(model.whiten(x[:, None])[:, 0])
-        scatter = 1.4826 * float(np.median(np.abs(apart)))
         near = np.searchsorted(run.time[a:b], changes)[:, None] + np.arange(-_BESIDE, _BESIDE + 1)
-        apart[np.clip(near, 0, b - a - 1)] = 0.0
-        far = np.flatnonzero(np.abs(apart) > float(norm.isf(_SPIKE / (2 * x.size))) * scatter)
-        # Beside a sample that is far off, others seem to be.
-        largest = [
-            k
-            for k in far
-            if np.abs(apart[max(k - _BESIDE, 0) : k + _BESIDE + 1]).max() <= abs(apart[k])
-        ]
-        if len(largest) <= _MOST_SPIKES * x.size:
-            weights = np.concatenate([[1.0], model.coefficients()[-1]])
-            size = model.innovation / math.sqrt(float(weights @ weights))
-            friction[a + np.array(largest, np.intp)] -= size * apart[largest]
-            count += len(largest)
+        near = np.clip(near, 0, b - a - 1)
+        far, off = _far_off_alone(x, x, near)
+        if len(far):
+            # The largest were noise to the autoregression, which expects no smooth friction then.
+            learnt = x.copy()
+            learnt[far] -= off
+            far, off = _far_off_alone(x, learnt, near)
+        if len(far) <= _MOST_SPIKES * x.size:
+            friction[a + far] -= off
+            count += len(far)
     return (replace(run, friction=friction) if count else run), count
+
+
+def _far_off_alone(
+    x: Float, learnt: Float, never: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], Float]:
+    """Samples that are far off alone, and by how much.
+
+    Parameters
+    ----------
+    x : array
+        About zero.
+    learnt : array
+        What the noise is learnt from.
+    never : array of int
+        Samples that count as right.
+    """
+    model = fitted([learnt[:_LEARNT]], order=_BESIDE)
+    apart = model.departures_of_single_samples(model.whiten(x[:, None])[:, 0])
+    scatter = 1.4826 * float(np.median(np.abs(apart)))
+    apart[never] = 0.0
+    far = np.flatnonzero(np.abs(apart) > float(norm.isf(_SPIKE / (2 * x.size))) * scatter)
+    # Beside a sample that is far off, others seem to be.
+    largest = [k for k in far.tolist() if np.abs(apart[_about(k)]).max() <= abs(apart[k])]
+    weights = np.concatenate([[1.0], model.coefficients()[-1]])
+    size = model.innovation / math.sqrt(float(weights @ weights))
+    alone = np.array(largest, np.intp)
+    return alone, size * apart[alone]
+
+
+def _about(k: int) -> slice:
+    return slice(max(k - _BESIDE, 0), k + _BESIDE + 1)
 
 
 def _without_lines(run: RecordedRun) -> tuple[RecordedRun, tuple[float, ...]]:
