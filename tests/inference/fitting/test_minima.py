@@ -11,7 +11,7 @@ from asperity.inference.fitting.minima import extends, minima_of
 from asperity.inference.fitting.own_noise import with_noise
 from asperity.inference.fitting.profile import Profile
 from asperity.inference.objective import Objective, Residuals
-from asperity.inference.runs.term import RunTerm
+from asperity.inference.runs.term import NoiseState, RunTerm
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import unknowns_of
@@ -179,8 +179,8 @@ class TwoNoises(RunTerm):
         self.half, self.sizes = half, np.ones(2)
 
     def _raw(self, x):
-        phase = 0.5 * math.pi * (x - FIRST) / (SECOND - FIRST)
-        share, slope = math.sin(phase) ** 2, math.sin(2 * phase) * phase / (x - FIRST)
+        rate = 0.5 * math.pi / (SECOND - FIRST)
+        share, slope = math.sin(rate * (x - FIRST)) ** 2, rate * math.sin(2 * rate * (x - FIRST))
         return np.array([1 + 9 * share, 2 - share]), np.array([9 * slope, -slope])
 
     def residuals(self, values, *, search=None):
@@ -193,11 +193,30 @@ class TwoNoises(RunTerm):
         self.sizes = self._raw(math.log(values["D0"]))[0]
         return True
 
+    outliers = ()
+
     def noise_state(self):
-        return self.sizes
+        return NoiseState(tuple(self.sizes), None, 1.0, (), self.outliers, (), (1.0, 1.0))
 
     def restore_noise(self, state):
-        self.sizes = state
+        self.sizes, self.outliers = np.array(state.models), state.outliers
+
+
+class Spoiled(TwoNoises):
+    """The same with a sample of a far too small error, which is left out with the first noise."""
+
+    def residuals(self, values, *, search=None):
+        whole = super().residuals(values)
+        if self.outliers:
+            return whole
+        spike, slope = 1e3 * (math.log(values["D0"]) - SECOND), 1e3 / values["D0"]
+        return whole._replace(
+            values=np.append(whole.values, spike), jacobian=np.vstack([whole.jacobian, [slope]])
+        )
+
+    def update_noise(self, values):
+        self.outliers = (100,)
+        return super().update_noise(values)
 
 
 def test_minima_of_recordings_are_compared_with_the_noise_of_each():
@@ -212,6 +231,20 @@ def test_minima_of_recordings_are_compared_with_the_noise_of_each():
     # The noise is that of the best.
     np.testing.assert_allclose(term.sizes, [1, 2], atol=0.01)
     assert chi2 == pytest.approx(2 * term.half, rel=0.01)
+
+
+def test_a_wrong_minimum_that_an_outlier_has_led_to_is_left():
+    """Without the outlier, its misfit is the noise that belongs to it, and it stays a minimum."""
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
+    term = Spoiled()
+    objective = Objective((term,), LAW, unknowns, {})
+    spoiled, chi2 = objective.minimise(np.array([FIRST + 0.1]))
+    assert spoiled[0] == pytest.approx(SECOND, abs=0.02)
+    (_, (other, _)), agreed = with_noise(objective, [(spoiled, chi2)])
+    assert agreed
+    assert other[0] == pytest.approx(SECOND, abs=1e-2)
+    # The noise of FIRST, or of one of the same minima a period away.
+    np.testing.assert_allclose(term.sizes, [1, 2], atol=0.01)
 
 
 def test_a_wrong_minimum_that_few_starts_of_the_fast_method_reach_is_left():

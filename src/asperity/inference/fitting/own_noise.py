@@ -68,6 +68,14 @@ def with_noise(
                 term.restore_noise(state)
             ends.append(_with_own_noise(objective, noisy, u))
     best = min(ends, key=lambda end: end.deviance)
+    if _taken_off(best.states) > _taken_off(first):
+        # Minima were looked for with these samples, which may have led to a wrong one, and its
+        # misfit then passes for noise.
+        for term, state, begun in zip(noisy, best.states, first, strict=True):
+            term.restore_noise(state._replace(models=begun.models))
+        objective.forget()
+        ends.append(_with_own_noise(objective, noisy, objective.minimise(best.u)[0]))
+        best = min(ends, key=lambda end: end.deviance)
     for term, state in zip(noisy, best.states, strict=True):
         term.restore_noise(state)
     objective.forget()
@@ -77,6 +85,11 @@ def with_noise(
         if end is not best and math.isfinite(end.deviance):
             found.append((end.u, chi2 + end.deviance - best.deviance))
     return found, best.agreed
+
+
+def _taken_off(states: Sequence[NoiseState]) -> int:
+    """Samples and jumps of the level that are left out."""
+    return sum(len(state.outliers) + len(state.jumps) for state in states)
 
 
 class _End(NamedTuple):

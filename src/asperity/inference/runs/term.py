@@ -464,8 +464,8 @@ class RunTerm:
             said.append(
                 f"what {self.name} shows just after changes of its drive is {size:.2g} times "
                 f"as far from the motion as elsewhere (p = {chance:.2g}): the law, the gauge's lag "
-                "(--gauge), the drive or its times are not those of the recording, and intervals "
-                "do not hold"
+                "(--gauge), the drive or its times are not those of the recording, or a sample "
+                "there is wrong, and intervals do not hold"
             )
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said
