@@ -66,6 +66,9 @@ $(VENV)/%.stamp: $(LOCK)/%.txt $(VENV)/run.stamp
 	$(LOCKED) -r $<
 	@touch $@
 
+# Side by side (make -j 2 check), two installations would write the same files.
+$(VENV)/docs.stamp: | $(if $(filter check,$(MAKECMDGOALS)),$(VENV)/test.stamp)
+
 # Each file takes the versions of those before it, so that all fit into one environment.
 COMPILE = $(BIN)/uv pip compile --universal --python-version 3.11 --generate-hashes --no-header \
   --no-emit-index-url --no-emit-find-links --no-config --quiet $(UPGRADE)

@@ -146,7 +146,7 @@ class Objective:
     unknowns: tuple[Unknown, ...]
     fixed: Mapping[str, Any]
     tolerance: float = 1e-10
-    unsolved: int = 0
+    unsolved: int = field(default=0, init=False, repr=False)
     _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, repr=False)
 
     @property
