@@ -24,7 +24,7 @@ from asperity.inference.fitting.inputs import (
     start_values,
 )
 from asperity.inference.fitting.minima import extends, minima_of
-from asperity.inference.fitting.own_noise import under_drift, with_noise
+from asperity.inference.fitting.own_noise import Found, under_drift, with_noise, without_bad_samples
 from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,
@@ -162,16 +162,22 @@ def fit(
     # Minima of a long recording are looked for in fewer, longer blocks.
     searched = compared(coarse) if (coarse := coarser(recordings)) else objective
     special = [f.values for f in simpler if f.converged and extends(chosen, f.objective.law)]
-    minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
-    if not minima:
-        return failed_fit(objective)
-    if recordings:
+
+    def search() -> Found:
+        minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
+        if not minima or not recordings:
+            return minima, True
         # Under white noise a drift passes for slow evolution, and the true minimum may be none.
         drifting = under_drift(searched) if options.order != 0 else None
         besides = minima_of(drifting, seed, drawn=starts) if drifting else []
-        minima, agreed = with_noise(objective, minima, drifting, besides)
-        if not math.isfinite(minima[0][1]):
-            return failed_fit(objective)
+        return with_noise(objective, minima, drifting, besides)
+
+    minima, agreed = (
+        search() if searched is not objective else without_bad_samples(objective, search)
+    )
+    if not minima or not math.isfinite(minima[0][1]):
+        return failed_fit(objective)
+    if recordings:
         found = described_fit(objective, minima, profile=profile, described=steps.described)
         said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
         said += unusual_numbers(found, recordings)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
@@ -16,6 +16,8 @@ from asperity.inference.objective import Objective
 from asperity.inference.runs.term import NoiseState, RunTerm
 
 Float = NDArray[np.float64]
+#: Minima, best first, and whether noise and parameters agree at the best.
+Found = tuple[list[tuple[Float, float]], bool]
 
 #: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
 _ROUNDS, _STILL = 8, 0.03
@@ -37,7 +39,7 @@ def with_noise(
     minima: list[tuple[Float, float]],
     drifting: Objective | None = None,
     besides: Sequence[tuple[Float, float]] = (),
-) -> tuple[list[tuple[Float, float]], bool]:
+) -> Found:
     """Minima once the noise is that of the residual, and whether the two agree at the best.
 
     Those of `besides`, minima of `drifting`, are followed too if the ends of the others are none
@@ -85,6 +87,36 @@ def with_noise(
         if end is not best and math.isfinite(end.deviance):
             found.append((end.u, chi2 + end.deviance - best.deviance))
     return found, best.agreed
+
+
+def without_bad_samples(objective: Objective, search: Callable[[], Found]) -> Found:
+    """What a search finds without samples at changes of the drive that no motion leads to.
+
+    There the law itself may be off by a sample, which must not hide its misfit, so that samples are
+    not left out as those elsewhere are. The stiffness says which are wrong, and must itself be
+    fitted without them.
+    """
+    noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
+    alone = [term.alone_at_changes() for term in noisy]
+    if not any(alone):
+        return search()
+    first = [term.noise_state() for term in noisy]
+
+    def left_out(samples: Sequence[Sequence[int]]) -> Found:
+        for term, state, some in zip(noisy, first, samples, strict=True):
+            term.restore_noise(state)
+            term.leave_out(some)
+        objective.forget()
+        return search()
+
+    minima, agreed = left_out([list(samples) for samples in alone])
+    wrong: list[list[int]] = [[] for _ in noisy]
+    if minima and not any(term.law_fails_after_changes for term in noisy):
+        values = objective.named(minima[0][0])
+        wrong = [t.beyond_any_motion(a, values) for t, a in zip(noisy, alone, strict=True)]
+    if [*map(len, wrong)] == [*map(len, alone)]:
+        return minima, agreed
+    return left_out(wrong)
 
 
 def _taken_off(states: Sequence[NoiseState]) -> int:

@@ -37,8 +37,11 @@ _NOISE_STEPS, _SEEN = 3, 1e-10
 _OUTLIER, _MOST_OUTLIERS = 1e-4, 0.01
 #: Times of velocity changes are known to this many sampling intervals.
 _CUT_INTERVALS = 2.0
-#: Samples on either side of a velocity change that are never left out.
-_AT_STEP = 5
+#: Samples on either side of a velocity change that are left out only where no motion leads to them;
+#: how many deviations they must stand out by to be asked about, and how many of a change are.
+_AT_STEP, _STANDS_OUT, _MOST_AT_STEP = 5, 8.0, 2
+#: How many times farther than a spring could take them they are off where they are wrong.
+_CLEARLY = 2.0
 #: Jumps of the level that are removed at most, and samples about a change and share of the segments
 #: beside it in which none is looked for.
 _JUMPS, _NEAR_CHANGE, _SHARE_NEAR_CHANGE = 5, 20, 0.05
@@ -291,7 +294,7 @@ class RunTerm:
         """
         size = white.size
         room = int(_MOST_OUTLIERS * size) - len(self._outliers)
-        limit = float(norm.isf(_OUTLIER / (2 * size)))
+        limit = self.largest_by_chance
         found: list[int] = []
         for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
             apart = np.abs(model.departures_of_single_samples(white[a:b]))
@@ -308,14 +311,86 @@ class RunTerm:
                 # Beside a sample that is far off, others seem to be.
                 if all(abs(k + a - other) > reach for other in found):
                     found.append(int(k) + a)
-        if not found:
-            return False
-        columns = np.zeros((size, len(found)))
-        columns[found, np.arange(len(found))] = 1.0
+        self.leave_out(found)
+        return bool(found)
+
+    def leave_out(self, samples: Sequence[int]) -> None:
+        """Leave out samples, by a linear nuisance for each."""
+        if not samples:
+            return
+        columns = np.zeros((self.run.time.size, len(samples)))
+        columns[samples, np.arange(len(samples))] = 1.0
         self._columns = np.column_stack([self._columns, columns])
-        self._outliers += found
+        self._outliers = [*self._outliers, *samples]
         self._prepare()
-        return True
+
+    @property
+    def largest_by_chance(self) -> float:
+        """Deviations that no sample of the run is off by chance."""
+        return float(norm.isf(_OUTLIER / (2 * self.run.time.size)))
+
+    def alone_at_changes(self) -> dict[int, float]:
+        """Samples beside changes of the drive that lie far above both their neighbours, or below.
+
+        They are wrong, or a peak of friction that one sample holds.
+
+        Returns
+        -------
+        dict of int to float
+            Distance from the nearer neighbour.
+        """
+        found: dict[int, float] = {}
+        for a, b in self.run.stretches:
+            friction = self.run.friction[a:b].copy()
+            bends = np.abs(friction[1:-1] - 0.5 * (friction[:-2] + friction[2:]))
+            scatter = 1.4826 * float(np.median(bends))
+            for first in self._first_after_changes():
+                near = slice(max(first - a - _AT_STEP, 1), min(first - a + _AT_STEP, b - a - 1))
+                for _ in range(_MOST_AT_STEP if near.start < near.stop else 0):
+                    apart = _beyond_neighbours(friction[near.start - 1 : near.stop + 1])
+                    k = near.start + int(np.argmax(apart))
+                    if apart[k - near.start] <= _STANDS_OUT * scatter:
+                        break
+                    found[k + a] = float(apart[k - near.start])
+                    # Its neighbours are judged without it.
+                    friction[k] = 0.5 * (friction[k - 1] + friction[k + 1])
+        return found
+
+    def beyond_any_motion(
+        self, samples: Mapping[int, float], values: Mapping[str, float]
+    ) -> list[int]:
+        """Samples that lie farther above or below their neighbours than a spring allows.
+
+        Whatever the law, the force rises by no more than what the drive pulls the spring in the
+        time, since the slider does not slide back: to a peak, or from a dip.
+
+        Parameters
+        ----------
+        samples : mapping of int to float
+            As `alone_at_changes` returns them.
+        values : mapping of str to float
+            Free parameters and nuisances of the fit, in SI.
+        """
+        given = {**self.fixed}
+        for name, value in values.items():
+            given[self.inner(name) or name] = value
+        drive, time = self.run.drive, self.run.time
+        lowest = self.run.W0 * float(np.min(drive.load))
+        stretching = given.get(GAIN, 1.0) * given["K"] / lowest * self.motion.velocity
+        found = []
+        for k, size in samples.items():
+            near = time[[max(k - 2 * _AT_STEP, 0), min(k + 2 * _AT_STEP, time.size - 1)]]
+            first, last = np.searchsorted(drive.edges[1:-1], near)
+            pull = float(np.max(np.abs(drive.pull[first : last + 1])))
+            longest = float(np.max(np.diff(time[k - 1 : k + 2])))
+            if size > _CLEARLY * stretching * pull * longest:
+                found.append(k)
+        return found
+
+    @property
+    def law_fails_after_changes(self) -> bool:
+        """Whether innovations after changes of the drive are too large for the law."""
+        return self._after_changes[0] < _LAW_FAILS
 
     @property
     def jumps(self) -> tuple[float, ...]:
@@ -339,8 +414,7 @@ class RunTerm:
         curves = self._whitened(jacobian[:, np.any(jacobian, axis=0)])
         joined = np.column_stack([curves, self._white_columns])
         fitted_curves = np.linalg.qr(joined / np.sqrt(np.einsum("ij,ij->j", joined, joined)))[0]
-        limit = float(norm.isf(_OUTLIER / (2 * white.size)))
-        largest, best = limit, -1
+        largest, best = self.largest_by_chance, -1
         time, edges = self.run.time, self.run.drive.edges
         for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
             apart = np.abs(departures_of_jumps(model, white[a:b], fitted_curves[a:b]))
@@ -460,7 +534,7 @@ class RunTerm:
                 "a window without it"
             )
         chance, size = self._after_changes
-        if chance < _LAW_FAILS:
+        if self.law_fails_after_changes:
             said.append(
                 f"what {self.name} shows just after changes of its drive is {size:.2g} times "
                 f"as far from the motion as elsewhere (p = {chance:.2g}): the law, the gauge's lag "
@@ -535,6 +609,14 @@ class RunTerm:
         end = float(self.run.at.flat[-1])
         count = math.ceil(end * rate) + 1
         return np.minimum(np.arange(count) / rate, end), rate
+
+
+def _beyond_neighbours(x: Float) -> Float:
+    """How far each sample but the first and last is above both its neighbours, or below both."""
+    before, here, after = x[:-2], x[1:-1], x[2:]
+    above = here - np.maximum(before, after)
+    below = np.minimum(before, after) - here
+    return np.asarray(np.maximum(np.maximum(above, below), 0.0))
 
 
 def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
