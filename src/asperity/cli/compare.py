@@ -38,7 +38,7 @@ if its AICc exceeds the lowest by 10 or more.
 def compare(
     data: tuple[Path, ...],
     laws: str,
-    free: list[str],
+    free: list[str] | None,
     options: Mapping[str, Any],
     reading: FitData,
     windows: str | None,

@@ -30,7 +30,7 @@ EPS_RATIO = Parameter(
 )
 
 #: Where starts are looked for if nothing better is known, in SI: what contacts of rock, polymers
-#: and metals show (Marone, 1998; Baumberger and Caroli, 2006), widened.
+#: and metals show (Marone, 1998; Baumberger and Caroli, 2006; c: Nagata et al., 2012), widened.
 _USUAL = {
     "mu0": (0.2, 1.0),
     "A": (0.003, 0.05),
@@ -38,6 +38,9 @@ _USUAL = {
     "D0": (1e-7, 2e-5),
     "lambda": (1e-7, 5e-6),
     "alpha": (0.01, 0.5),
+    "c": (0.1, 10.0),
+    "B2": (0.001, 0.02),
+    "D2": (1e-7, 1e-4),
     "eps_ratio": (0.2, 1.0),
 }
 #: Share of a usual value that is the least scale of a coordinate.
@@ -45,7 +48,7 @@ _LEAST_SCALE = 1e-3
 #: A positive parameter is looked for within this factor of its starts.
 _FARTHEST = 1e6
 #: Never free: only its product with others is seen.
-_REFERENCES = ("V0",)
+REFERENCES = ("V0",)
 
 
 class MissingNumberError(InputError):
@@ -175,10 +178,10 @@ def unknowns_of(
         If a name is unknown, occurs twice or cannot be free.
     """
     known = {**point_parameters(law), "eps_ratio": EPS_RATIO}
-    fittable = [n for n, p in known.items() if p.place != "drive" and n not in _REFERENCES]
+    fittable = [n for n, p in known.items() if p.place != "drive" and n not in REFERENCES]
     fittable = [n for n in fittable if n not in ("epsilon", "inertia")]
     for name in free:
-        if name in _REFERENCES:
+        if name in REFERENCES:
             raise InputError(
                 f"free must be parameters that data can determine, got '{name}': a change of it is "
                 "one of mu0; free mu0 instead"

@@ -6,7 +6,13 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
-from asperity.inference.runs.noise import Autoregression, fitted, whiteness
+from asperity.inference.runs.noise import (
+    Autoregression,
+    _reflections,
+    _reflections_of_smooth,
+    fitted,
+    whiteness,
+)
 
 
 def process(order_two=(1.2, -0.5), n=4000, seed=0):
@@ -20,6 +26,16 @@ def test_coefficients_and_variance_of_a_known_process():
     # Standard errors of the coefficients: sqrt((1 - a2^2)/n) = 0.014.
     np.testing.assert_allclose(found.coefficients()[-1], [1.2, -0.5], atol=0.05)
     assert found.innovation == pytest.approx(1.0, abs=0.04)
+
+
+def test_sums_of_products_and_prediction_errors_give_the_same_process():
+    random = np.random.default_rng(5)
+    stretches = [lfilter([1.0], [1.0, -0.99], random.normal(size=(4, n))) for n in (700, 90)]
+    quick, direct = (f(stretches, 40) for f in (_reflections, _reflections_of_smooth))
+    np.testing.assert_allclose(quick, direct, atol=1e-12)
+    # Of a trend hardly anything is left to predict, less than the rounding of the sums.
+    smooth = [np.linspace(0, 1, 400)[None] ** 3]
+    assert _reflections(smooth, 40) == _reflections_of_smooth(smooth, 40)
 
 
 def test_the_likelihood_is_that_of_the_whole_covariance():

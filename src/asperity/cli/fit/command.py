@@ -52,7 +52,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(command)
     def gathered(
         *,
-        free: str,
+        free: str | None,
         fixes: tuple[str, ...],
         starts: tuple[str, ...],
         material: str | None,
@@ -73,7 +73,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         fit_rate: str | None,
         **others: Any,
     ) -> Any:
-        names = [name.strip() for name in free.split(",") if name.strip()]
+        names = None if free is None else [n.strip() for n in free.split(",") if n.strip()]
         options = {
             "fixed": settings_of(fixes, "--fix"),
             "start": settings_of(starts, "--start"),
@@ -97,7 +97,11 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
     found: Callable[..., Any] = source_options(gathered)
     for option in (
         click.argument("data", nargs=-1, required=True, type=Path),
-        click.option("--free", required=True, metavar="NAMES", help="Free parameters: a,b,c."),
+        click.option(
+            "--free",
+            metavar="NAMES",
+            help="Free parameters: a,b,c; by default all of the law that the data may show.",
+        ),
         click.option(
             "--fix", "fixes", multiple=True, metavar="NAME=VALUE", help="Fix a parameter."
         ),
@@ -132,7 +136,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
 def fit(
     data: tuple[Path, ...],
     law: str | None,
-    free: list[str],
+    free: list[str] | None,
     options: Mapping[str, Any],
     sampling: PosteriorOptions,
     reading: FitData,

@@ -166,7 +166,12 @@ class FitData:
         return found
 
     def fit_windows(
-        self, paths: Sequence[Path], windows: str, law: Any, free: Sequence[str], options: Any
+        self,
+        paths: Sequence[Path],
+        windows: str,
+        law: Any,
+        free: Sequence[str] | None,
+        options: Any,
     ) -> WindowedFit:
         """Fits of a recording in several windows.
 
@@ -241,7 +246,7 @@ def run_options(
     return RunOptions(linear=linear, initial=initial, gauge=corner, fit_rate=fit_rate)
 
 
-def priors_of(texts: Sequence[str], free: Sequence[str]) -> dict[str, Prior]:
+def priors_of(texts: Sequence[str], free: Sequence[str] | None) -> dict[str, Prior]:
     """Priors of ``--prior``: materials, and NAME=VALUE+-DEVIATION UNIT.
 
     Raises
@@ -260,6 +265,11 @@ def priors_of(texts: Sequence[str], free: Sequence[str]) -> dict[str, Prior]:
     for text in texts:
         name, equals, rest = (part.strip() for part in text.partition("="))
         if not equals:
+            if free is None:
+                raise InputError(
+                    f"--prior {text} must go with --free, got no free parameters; name those that "
+                    "the priors of the material are meant for"
+                )
             found |= material_priors(materials.load(text), free)
             continue
         match = _PRIOR.match(rest)

@@ -15,8 +15,10 @@ from asperity.inference.comparison.cross_validation import CrossValidation, leav
 from asperity.inference.comparison.evidence import Evidence, evidence_of
 from asperity.inference.fitting.fit import Data, fit, listed_data
 from asperity.inference.fitting.free_stiffness import stiffness_that_describes
+from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
+from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.residuals import residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
@@ -105,7 +107,7 @@ class Comparison:
 def compare(
     data: Data | Iterable[Data],
     laws: Sequence[str],
-    free: Sequence[str],
+    free: Sequence[str] | None = None,
     *,
     evidence: bool = True,
     progress: Callable[[int, int], None] | None = None,
@@ -117,9 +119,9 @@ def compare(
     ----------
     data : LockInTable, RecordedRun or Trace, or several
     laws : sequence of str
-    free : sequence of str
+    free : sequence of str, optional
         Free parameters; each law takes those that it has. One that has none of them is compared
-        as it stands, with its fixed numbers.
+        as it stands, with its fixed numbers. By default those of `fit`, for each law its own.
     evidence : bool
         Whether to compute evidence and leave-one-run-out cross-validation too.
     progress : callable, optional
@@ -152,14 +154,19 @@ def compare(
             f"laws must be two or more, got {', '.join(laws) or 'none'}; name those to compare"
         )
     # Those of laws alone; others are of the machine, the runs or unknown, which the fit says.
-    nobodys = [p for p in free if p in _of_any_law() and not any(p in _parameters(n) for n in laws)]
+    nobodys = [
+        p for p in free or () if p in _of_any_law() and not any(p in _parameters(n) for n in laws)
+    ]
     if nobodys:
         raise InputError(
             f"free must be parameters of the laws that are compared, got '{nobodys[0]}', which "
             f"none of {', '.join(dict.fromkeys(laws))} has; leave it out, or add a law with it"
         )
     several = listed_data(data, options.get("runs") or RunOptions())
-    own = {name: _own(name, free, laws) for name in dict.fromkeys(laws)}
+    own = {
+        name: _seen(name, several, options) if free is None else _own(name, free, laws)
+        for name in dict.fromkeys(laws)
+    }
     given = {
         key: options.pop(key)
         for key in ("fixed", "start", "prior")
@@ -221,8 +228,24 @@ def compare(
         out = np.isin(np.arange(table.rows), outliers)
         rest = judge(fits_to([table.without(out)], lambda _: None, fits))
         found = _without(found, rest, table.row_names[out].tolist())
-    found = replace(found, not_compared=not_compared, verdict=found.verdict + _freed(found))
+    found = replace(
+        found,
+        not_compared=not_compared,
+        verdict=found.verdict + _freed(found) + _without_numbers(not_compared),
+    )
     return _examined(found, lambda laws: report(len(own) + laws)) if evidence else found
+
+
+def _without_numbers(not_compared: Mapping[str, str]) -> str:
+    """That laws were not compared: the verdict is not about them."""
+    if not not_compared:
+        return ""
+    names = list(not_compared)
+    which, have = ("these laws", "have") if len(names) > 1 else ("this law", "has")
+    return (
+        f" Nothing is said of {_listed(names)}: {which} {have} numbers that are neither free nor "
+        "given."
+    )
 
 
 def _within_law(report: Report, laws: int, done: int, total: int) -> None:
@@ -351,6 +374,18 @@ def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
     others = {p for law in laws for p in _parameters(law)}
     mine = _parameters(name)
     return [p for p in free if p in mine or p not in others]
+
+
+def _seen(law: str, data: Sequence[Data], options: Mapping[str, Any]) -> list[str]:
+    """What is free by default."""
+    tables = [d for d in data if isinstance(d, LockInTable)]
+    return free_by_default(
+        get_law(law),
+        joined(tables)[0] if tables else None,
+        [d for d in data if isinstance(d, RecordedRun)],
+        options.get("fixed"),
+        options.get("material"),
+    )
 
 
 def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:

@@ -18,6 +18,7 @@ from asperity.inference.fitting.description import described_fit, failed_fit
 from asperity.inference.fitting.free_stiffness import stiffness_that_describes
 from asperity.inference.fitting.inputs import (
     fixed_values,
+    free_by_default,
     require_enough,
     require_free,
     require_motion,
@@ -60,7 +61,7 @@ Data = LockInTable | RecordedRun | Trace
 def fit(
     data: Data | Iterable[Data],
     law: str | type[Law],
-    free: Sequence[str],
+    free: Sequence[str] | None = None,
     *,
     fixed: Mapping[str, Any] | None = None,
     material: Material | None = None,
@@ -85,10 +86,12 @@ def fit(
         All in one likelihood.
     law : str or type of Law
         Rate-dependent.
-    free : sequence of str
-        Free parameters: the law's, K, W0, M, eta, and eps_ratio = eps_eff/eps. The stiffness of a
-        recording is free whether it is named or not, for each run by itself unless it is named.
-        The gain of its gauge, ``gain``, is free where it has a prior.
+    free : sequence of str, optional
+        Free parameters: the law's, K, W0, M, eta, and eps_ratio = eps_eff/eps. By default all
+        numbers of the law that the data may show and that are not fixed, those of a material too,
+        and eps_ratio where there are lock-in readings. The stiffness of a recording is free whether
+        it is named or not, for each run by itself unless it is named. The gain of its gauge,
+        ``gain``, is free where it has a prior.
     fixed : mapping, optional
         Values of other parameters, in SI or as texts with units; before columns of the data, which
         come before the material.
@@ -141,13 +144,16 @@ def fit(
     tables = [d for d in several if isinstance(d, LockInTable)]
     recordings = [d for d in several if isinstance(d, RecordedRun)]
     table = joined(tables)[0] if tables else None
+    names = (
+        free_by_default(chosen, table, recordings, fixed, material) if free is None else list(free)
+    )
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
         return _objective(
             chosen,
             table,
             recordings,
-            list(free),
+            names,
             fixed=fixed or {},
             material=material,
             prior=prior,
@@ -182,12 +188,12 @@ def fit(
         said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
         said += unusual_numbers(found, recordings)
         given = (fixed or {}).get("K")
-        shared = "K" in free and len(recordings) > 1
+        shared = "K" in names and len(recordings) > 1
         if table is None and (given is not None or shared):
             freed = fit(
                 recordings,
                 law,
-                [n for n in free if n != "K"],
+                [n for n in names if n != "K"],
                 fixed={n: v for n, v in (fixed or {}).items() if n != "K"},
                 material=material,
                 prior=prior,

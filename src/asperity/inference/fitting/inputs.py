@@ -10,10 +10,54 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.table import LockInTable
-from asperity.inference.unknowns import EPS_RATIO, MissingNumberError, Prior, Unknown
+from asperity.inference.unknowns import (
+    EPS_RATIO,
+    REFERENCES,
+    MissingNumberError,
+    Prior,
+    Unknown,
+)
 from asperity.laws import Law
 from asperity.materials import Material
-from asperity.parameters import MODULATION, point_parameters
+from asperity.parameters import MODULATION, law_parameters, point_parameters
+
+#: Parameters of laws that have no influence under a constant load.
+_OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
+
+
+def free_by_default(
+    law: type[Law],
+    table: LockInTable | None,
+    runs: Sequence[RecordedRun],
+    fixed: Mapping[str, Any] | None,
+    material: Material | None,
+) -> list[str]:
+    """What is free where nothing is said of it: all numbers of a law that the data may show.
+
+    Parameters
+    ----------
+    law : type of Law
+    table : LockInTable or None
+    runs : sequence of RecordedRun
+        Their stiffness is free in any case.
+    fixed : mapping, optional
+    material : Material, optional
+        Its mu0 stands where no mean friction is reported.
+
+    Returns
+    -------
+    list of str
+        Parameters of the law, and for a table the share of the modulation, ``eps_ratio``.
+    """
+    constant_load = table is None and not any(run.load_varies for run in runs)
+    known = {*(fixed or {}), *({} if table is None else table.points)}
+    if table is None or ("mean_friction" not in table.values and material and "mu0" in material):
+        # The offset of a recording takes its place.
+        known.add("mu0")
+    names = [name for name in law_parameters(law) if name not in REFERENCES]
+    if table is not None:
+        names.append(EPS_RATIO.name)
+    return [n for n in names if n not in known and not (constant_load and n in _OF_LOAD_CHANGES)]
 
 
 def start_values(

@@ -64,7 +64,7 @@ DOUBTFUL, _BESIDE, _SHARE_BESIDE, _ROUNDS_BESIDE = 0.05, math.log(2.0), 0.2, 3
 #: lengths below which they are one minimum.
 _OTHER_LENGTHS, _SAME_LENGTH = (0.1, 1 / 3, 3.0, 10.0), 1.5
 #: Parameters that laws extend others by: without them they are another law.
-_EXTENSIONS = ("lambda", "alpha")
+_EXTENSIONS = ("lambda", "alpha", "c", "B2", "D2")
 #: Their coordinate there.
 _NEARLY_ZERO = 1e-4
 
@@ -464,6 +464,7 @@ def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float
         for unknown in objective.unknowns:
             value = values.get(unknown.name, unknown.middle)
             extending = unknown.name in _EXTENSIONS and unknown.name not in values
+            extending &= not unknown.logarithmic  # such as D2, which B2 = 0 leaves without effect
             near = _NEARLY_ZERO if extending else unknown.to_coordinate(value)
             u.append(float(np.clip(near, *unknown.bounds)))
         found.append(np.array(u))

@@ -18,6 +18,7 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law
 from asperity.outputs.json import plain
+from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
 from asperity.recording import Trace
 from asperity.recording.readers import read
@@ -107,7 +108,7 @@ class WindowedFit:
 def fit_windows(
     recording: Trace | str | os.PathLike[str],
     law: str | type[Law],
-    free: Sequence[str],
+    free: Sequence[str] | None = None,
     windows: Sequence[tuple[float, float]] | None = None,
     *,
     reading: Mapping[str, Any] | None = None,
@@ -120,7 +121,8 @@ def fit_windows(
     ----------
     recording : Trace or path
     law : str or type of Law
-    free : sequence of str
+    free : sequence of str, optional
+        As of `fit`, for all windows what the first one may show.
     windows : sequence of (float, float), optional
         First and last times (s), two or more; the first is the one to look at. By default the
         whole recording, and the same without a third of its first segment, of its last, and of
@@ -160,6 +162,8 @@ def fit_windows(
     if fits[0].converged:
         begun = {k.name: fits[0].values[k.name] for k in _physical(fits[0])}
         options = {"starts": _STARTS, **options, "start": begun}
+        if free is None:
+            free = [name for name in law_parameters(fits[0].objective.law) if name in begun]
     for span in spans[1:]:
         fits.append(fit(recorded_run(trace, **given, window=span), law, free, **options))
         advance(1)

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
@@ -25,6 +26,8 @@ _HIGHEST, _SHARE = 60, 0.05
 #: The order is at least this times the decimal logarithm of the number of samples (Berk, Ann. Stat.
 #: 2, 489, 1974): what matters is the spectrum at low frequency, and criteria choose for all of it.
 _ORDERS_PER_DECADE = 10
+#: Innovations below this share of the power are lost in the rounding of sums over all samples.
+_SMOOTH = 1e-6
 #: Lags of the test of whiteness, at least.
 _LAGS = 20
 
@@ -172,25 +175,13 @@ def fitted(
     highest = order if order is not None else min(_HIGHEST, int(_SHARE * n))
     highest = min(highest, max(0, min(s.size for s in stretches) - 2))
     more = uncertain if uncertain is not None else [np.zeros((0, s.size)) for s in stretches]
-    forward = [np.vstack([s, u]) for s, u in zip(stretches, more, strict=True)]
-    backward = [f.copy() for f in forward]
-    variance = sum(float(np.sum(f * f)) for f in forward) / n
-    reflection: list[float] = []
+    rows = [np.vstack([s, u]) for s, u in zip(stretches, more, strict=True)]
+    variance = sum(float(np.sum(r * r)) for r in rows) / n
+    reflection = _reflections(rows, highest)
     criteria = [n * math.log(max(variance, 1e-300)) + 2]
     rest = variance
-    for _ in range(highest):
-        ahead = [f[:, 1:] for f in forward]
-        behind = [b[:, :-1] for b in backward]
-        power = sum(_dot(f, f) + _dot(b, b) for f, b in zip(ahead, behind, strict=True))
-        if power <= 0:
-            break
-        k = 2 * sum(_dot(f, b) for f, b in zip(ahead, behind, strict=True)) / power
-        k = min(max(k, -1 + 1e-9), 1 - 1e-9)
-        forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
-        backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
-        reflection.append(k)
-        rest *= 1 - k * k
-        k = len(reflection) + 1
+    for k, partial in enumerate(reflection, start=2):
+        rest *= 1 - partial * partial
         penalty = 2 * k + 2 * k * (k + 1) / max(n - k - 1, 1)
         criteria.append(n * math.log(max(rest, 1e-300)) + penalty)
     best = len(reflection)
@@ -207,6 +198,86 @@ def fitted(
 def _lowest_order(n: int) -> int:
     """Order of n samples below which the spectrum of slow noise is too smooth."""
     return round(_ORDERS_PER_DECADE * math.log10(n))
+
+
+def _reflections(stretches: Sequence[Float], highest: int) -> list[float]:
+    """Partial correlations of stretches of rows by Burg's method, up to the highest order."""
+    products = [_LaggedProducts(rows, highest) for rows in stretches]
+    power = rest = sum(p.power for p in products)
+    predictor = np.ones(1)
+    found: list[float] = []
+    while len(found) < highest:
+        if rest <= _SMOOTH * power:
+            return _reflections_of_smooth(stretches, highest)
+        for p in products:
+            p.next_order()
+        table = sum(p.table for p in products)
+        forward, backward = np.append(predictor, 0.0), np.append(0.0, predictor[::-1])
+        along = table @ backward
+        partial = 2 * float(forward @ along) / float(forward @ table @ forward + backward @ along)
+        found.append(_inside(partial))
+        predictor = forward - found[-1] * backward
+        rest *= 1 - found[-1] ** 2
+    return found
+
+
+class _LaggedProducts:
+    """Sums over time of the products of samples at two lags, of one order after the other.
+
+    All that Burg's method asks of the samples, from one Fourier transform of each row: a fit asks
+    it hundreds of times of dozens of rows.
+
+    Attributes
+    ----------
+    power : float
+        Sum of all squares.
+    table : array, shape (m + 1, m + 1)
+        Of order m: sums over the rows and over t = m ... n - 1 of x[t - i] x[t - j].
+    """
+
+    def __init__(self, rows: Float, highest: int) -> None:
+        self._first, self._last = rows[:, :highest], rows[:, ::-1][:, :highest]
+        length = next_fast_len(rows.shape[1] + highest, real=True)
+        spectrum = np.zeros(length // 2 + 1)
+        for row in rows:
+            transform = rfft(row, length)
+            spectrum += transform.real**2 + transform.imag**2
+        self._sums = irfft(spectrum, length)
+        self.power = float(self._sums[0])
+        self.table = np.array([[self.power]])
+
+    def next_order(self) -> None:
+        """Go on to the next order."""
+        m = len(self.table)
+        first, last = self._first[:, :m][:, ::-1], self._last[:, :m]
+        beside = self.table[-1] - last[:, -1] @ last
+        inner = self.table - first.T @ first
+        self.table = np.empty((m + 1, m + 1))
+        self.table[:m, :m] = inner
+        self.table[m, 0] = self._sums[m]
+        self.table[m, 1:] = beside
+        self.table[:m, m] = self.table[m, :m]
+
+
+def _reflections_of_smooth(stretches: Sequence[Float], highest: int) -> list[float]:
+    """The same from the prediction errors of every sample, which rounding hardly touches."""
+    forward, backward = list(stretches), list(stretches)
+    found: list[float] = []
+    for _ in range(highest):
+        ahead = [f[:, 1:] for f in forward]
+        behind = [b[:, :-1] for b in backward]
+        power = sum(_dot(f, f) + _dot(b, b) for f, b in zip(ahead, behind, strict=True))
+        if power <= 0:
+            break
+        k = _inside(2 * sum(_dot(f, b) for f, b in zip(ahead, behind, strict=True)) / power)
+        forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
+        backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
+        found.append(k)
+    return found
+
+
+def _inside(partial: float) -> float:
+    return min(max(partial, -1 + 1e-9), 1 - 1e-9)
 
 
 def _dot(a: Float, b: Float) -> float:
