@@ -36,6 +36,11 @@ def test_a_recording_is_fitted(recording):
     assert record["noise"]["effective_samples"] < 1400
 
 
+def test_priors_of_a_material_want_the_free_parameters(recording):
+    found = run_fit(recording, "--law", "rice-ruina", "--prior", "bureau2000")
+    assert "--prior bureau2000 must go with --free" in found.output + str(found.exception)
+
+
 @pytest.mark.parametrize(
     ("more", "said"),
     [

@@ -55,6 +55,18 @@ def judged(made, pmma):
     return judge_it
 
 
+def test_laws_are_compared_without_naming_what_is_free(made, pmma):
+    fixed = {"K": pmma.K, "W0": pmma.W0, "B": pmma.B, "D0": pmma.D0}
+    laws = ("rice-ruina", "elasto-plastic", "cut-off")
+    found = compare(made("elasto-plastic", 1), laws, fixed=fixed, material=pmma, evidence=False)
+    own = {name: list(j.fit.parameters) for name, j in found.laws.items()}
+    assert own == {"elasto-plastic": ["A", "lambda", "eps_ratio"], "rice-ruina": ["A", "eps_ratio"]}
+    assert found.best == "elasto-plastic"
+    # Nothing says where to look for its cut-off velocities.
+    assert list(found.not_compared) == ["cut-off"]
+    assert "Nothing is said of cut-off: this law has numbers that" in found.verdict
+
+
 @pytest.mark.parametrize("law", ["linker-dieterich", "elasto-plastic"])
 def test_the_law_of_the_data_is_found(judged, law):
     found = judged(law, 1)

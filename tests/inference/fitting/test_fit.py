@@ -6,7 +6,10 @@ from scipy.stats import chi2
 
 from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
+from asperity.inference.fitting.inputs import free_by_default
+from asperity.inference.fitting.record import fit_record
 from asperity.inference.tables.table import LockInTable, joined
+from asperity.laws import get_law
 
 TRUTH = {"A": 0.013, "B": 0.026, "D0": 4e-7, "lambda": 7e-7, "eps_ratio": 0.48}
 FREE = ("lambda", "eps_ratio", "A")
@@ -23,6 +26,29 @@ def test_exact_readings_give_the_truth(readings, pmma):
         # The integration is good to 1e-9, of which the fit makes some 1e-8.
         assert found.values[name] == pytest.approx(TRUTH[name], rel=1e-6)
     assert found.chi2 < 1e-6
+
+
+def test_all_numbers_that_the_readings_may_show_are_free_by_default(readings, pmma):
+    table = readings(None)
+    machine = {"K": 2e5, "W0": 7.0}
+    found = fit(table, "elasto-plastic", fixed={**machine, "B": 0.026, "D0": 4e-7}, material=pmma)
+    # No mean friction is reported, so that mu0 is that of the material.
+    assert list(found.parameters) == ["A", "lambda", "eps_ratio"]
+    for name in FREE:
+        assert found.values[name] == pytest.approx(TRUTH[name], rel=1e-6)
+    record = fit_record(found)
+    assert record["fixed"]["mu0"] == {"value": pmma.mu0, "unit": ""}
+    assert record["fixed"]["V"] == {"value": None, "unit": "m/s"}
+    law = get_law("linker-dieterich")
+    assert free_by_default(law, table, [], machine, None) == [
+        *("mu0", "A", "B", "D0", "alpha", "eps_ratio")
+    ]
+
+
+def test_a_free_friction_is_told_for_a_micrometre_a_second(readings):
+    fixed = {"K": 2e5, "W0": 7.0, "A": 0.013, "B": 0.026, "D0": 4e-7, "eps_ratio": 0.48}
+    found = fit(readings(None), "elasto-plastic", ["mu0", "lambda"], fixed=fixed)
+    assert found.objective.fixed["V0"] == 1e-6
 
 
 def test_starts_are_found_without_a_material(readings):

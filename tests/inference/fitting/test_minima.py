@@ -502,6 +502,8 @@ def test_fits_of_special_cases_are_starts():
     [
         ("elasto-plastic", "rice-ruina", True),
         ("linker-dieterich", "rice-ruina", True),
+        ("nagata", "rice-ruina", True),
+        ("two-state", "ruina-slip", True),
         ("rice-ruina", "elasto-plastic", False),
         ("elasto-plastic", "linker-dieterich", False),
         ("ruina-slip", "rice-ruina", False),

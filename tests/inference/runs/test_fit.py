@@ -10,10 +10,11 @@ from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
 from asperity.errors import InputError
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
 from asperity.inference.fitting.description import described_fit
+from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.plausibility import unusual_numbers
 from asperity.inference.runs.copies import require_own_samples
 from asperity.inference.runs.term import RunTerm
-from asperity.laws import RiceRuina
+from asperity.laws import RiceRuina, get_law
 from asperity.orbit import periodic_response
 from asperity.recording import Channel, Trace
 from asperity.slider import Slider
@@ -121,6 +122,21 @@ def test_white_noise_bars_are_too_small_and_a_factor_of_two_is_seen():
         assert white[name]["mean_se"] < right[name]["mean_se"]
     ratio = np.array([right[n]["mean_se"] / right[n]["scatter"] for n in TRUE])
     assert 0.75 < ratio.mean() < 1.33
+
+
+@pytest.mark.parametrize(
+    ("case", "law", "free"),
+    [
+        ("steps", "rice-ruina", FREE),
+        ("steps", "linker-dieterich", FREE),
+        ("loads", "linker-dieterich", [*FREE, "alpha"]),
+        ("steps", "nagata", [*FREE, "c"]),
+    ],
+)
+def test_what_a_recording_may_show_is_free_by_default(case, law, free):
+    (run,) = runs_of(CASES[case], 1)
+    assert free_by_default(get_law(law), None, [run], None, None) == free
+    assert free_by_default(get_law(law), None, [run], {"A": 0.01}, None) == free[1:]
 
 
 def test_alpha_under_a_constant_load_is_refused():

@@ -19,6 +19,7 @@ from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.run import RecordedRun
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.residuals import residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
@@ -296,12 +297,14 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
 def _examined(found: Comparison, report: Report) -> Comparison:
     """The comparison with evidence and cross-validation of every law.
 
-    Orbits that are searched for take minutes for it: of an excluded law, only the normal
-    approximation of the evidence.
+    Orbits that are searched for, and motions through recordings, take minutes for it: of an
+    excluded law, only the normal approximation of the evidence.
     """
     judged = {}
     for k, (name, j) in enumerate(found.laws.items(), 1):
-        if j.fit.converged and j.excluded and any_searched(j.fit.objective.terms):
+        terms = j.fit.objective.terms
+        slow = any_searched(terms) or any(isinstance(term, RunTerm) for term in terms)
+        if j.fit.converged and j.excluded and slow:
             j = replace(j, evidence=evidence_of(j.fit, samples=0))
         elif j.fit.converged:
             j = replace(j, evidence=evidence_of(j.fit), cross_validation=leave_one_run_out(j.fit))

@@ -18,13 +18,14 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import Objective
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.sampling import whitened_posterior
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm, any_searched
 
 Float = NDArray[np.float64]
 
-#: Samples, those of a law whose orbits are searched for, which takes a hundred times as long, and
-#: the degrees of freedom of the distribution that they come from.
-_SAMPLES, _SEARCHED, _TAILS = 1024, 128, 5.0
+#: Samples, those where motions through recordings or searched orbits take ten or a hundred times
+#: as long, and the degrees of freedom of the distribution that they come from.
+_SAMPLES, _RECORDED, _SEARCHED, _TAILS = 1024, 256, 128, 5.0
 #: Effective samples below which the number is no more than a guess.
 _ENOUGH = 50.0
 
@@ -70,8 +71,8 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     found : Fit
         Converged.
     samples : int, optional
-        By default 1024, and 128 where the orbits of a table are searched for; 0 for the normal
-        approximation alone.
+        By default 1024, 256 with a recording, and 128 where the orbits of a table are searched for;
+        0 for the normal approximation alone.
     seed : int
 
     Notes
@@ -80,7 +81,9 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     lowers the logarithm by ln k.
     """
     if samples is None:
-        samples = _SEARCHED if any_searched(found.objective.terms) else _SAMPLES
+        terms = found.objective.terms
+        recorded = any(isinstance(term, RunTerm) for term in terms)
+        samples = _SEARCHED if any_searched(terms) else _RECORDED if recorded else _SAMPLES
     if not found.objective.unknowns:
         # Nothing to average over.
         density = found.log_likelihood

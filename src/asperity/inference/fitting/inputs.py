@@ -24,6 +24,9 @@ from asperity.parameters import MODULATION, law_parameters, point_parameters
 #: Parameters of laws that have no influence under a constant load.
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
 
+#: Velocity (m/s) that a free mu0 is told for, if no other is given.
+_REFERENCE_VELOCITY = 1e-6
+
 
 def free_by_default(
     law: type[Law],
@@ -103,7 +106,8 @@ def fixed_values(
     """Values of all parameters that are not free, by name in SI.
 
     Without a table, what only its operating points need is left out, and runs give their load,
-    their friction at the begin as mu0, and their first velocity as V0.
+    their friction at the begin as mu0, and their first velocity as V0. Where mu0 is free, V0 is 1
+    um/s if it is not given: the velocity that mu0 is told for.
 
     Raises
     ------
@@ -116,7 +120,7 @@ def fixed_values(
         known = {
             n: p for n, p in known.items() if n not in ("V", "epsilon", "frequency", "K", "W0")
         }
-    assumed = {}
+    assumed = {"V0": _REFERENCE_VELOCITY} if "mu0" in free else {}
     if runs and table is None:
         first = runs[0]
         assumed = {"V0": first.velocity, "mu0": float(np.median(first.friction[:16]))}

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from asperity._version import __version__
 from asperity.inference.fitting.result import Estimate, Fit
+from asperity.inference.unknowns import EPS_RATIO
 from asperity.outputs.json import plain
+from asperity.parameters import point_parameters
 
 
 def fit_record(found: Fit) -> dict[str, Any]:
@@ -16,6 +20,7 @@ def fit_record(found: Fit) -> dict[str, Any]:
         "converged": found.converged,
         "message": found.message,
         "parameters": {name: _estimate(p) for name, p in found.parameters.items()},
+        "fixed": _fixed(found),
         "correlation": {
             "names": list(found.parameters),
             "matrix": [[plain(x) for x in row] for row in found.correlation.tolist()],
@@ -50,6 +55,16 @@ def _estimate(found: Estimate) -> dict[str, Any]:
         "prior": None
         if prior is None
         else {"mean": prior.mean, "sd": prior.sd, "source": prior.source},
+    }
+
+
+def _fixed(found: Fit) -> dict[str, Any]:
+    """Numbers that were not fitted; None for those that each row of a table has its own of."""
+    known = {**point_parameters(found.objective.law), EPS_RATIO.name: EPS_RATIO}
+    several = {n: np.unique(v) for n, v in found.objective.fixed.items()}
+    return {
+        name: {"value": plain(v[0]) if v.size == 1 else None, "unit": known[name].unit}
+        for name, v in several.items()
     }
 
 

@@ -58,6 +58,8 @@ _DENSE = np.array(
         69997945 / 29380423,
     ]
 )
+#: Derivatives beyond this, whose squares overflow, are those of a motion that runs away.
+_STEEPEST = 1e100
 #: Gauss-Legendre on (0, 1): exact for the continuous extension, which is of degree 4.
 _GAUSS = np.stack(np.polynomial.legendre.leggauss(3), axis=1) / 2 + [0.5, 0.0]
 
@@ -167,7 +169,8 @@ class RunMotion:
         f = np.asarray(friction)[taken]
         columns = [np.asarray(slopes[name])[taken] for name in free]
         jacobian = np.stack(columns, axis=1) if columns else np.zeros((f.size, 0))
-        if not (np.isfinite(f).all() and np.isfinite(jacobian).all()):
+        # NaN and infinity are not below it either.
+        if not (np.isfinite(f).all() and (np.abs(jacobian) < _STEEPEST).all()):
             return None
         return Motions(f, jacobian, int(steps))
 
