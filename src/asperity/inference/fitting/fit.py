@@ -222,7 +222,8 @@ class _Steps:
         self._parameters, self._done, self._total = parameters, 0, parameters
 
     def minimised(self, done: int, total: int) -> None:
-        self._done, self._total = done, total + self._parameters
+        # A search that is repeated without bad samples counts on from where the first has ended.
+        self._done, self._total = max(self._done, done), total + self._parameters
         self._report(self._done, self._total)
 
     def described(self, parameters: int) -> None:
