@@ -118,8 +118,16 @@ class DataTerm(Protocol):
         """Try the slower method at every call."""
         ...
 
-    def warnings(self, residuals: Residuals) -> Sequence[str]:
-        """What a reader must know of these data, with the residuals at the estimate."""
+    def warnings(self, residuals: Residuals, information: Float) -> Sequence[str]:
+        """What a reader must know of these data.
+
+        Parameters
+        ----------
+        residuals : Residuals
+            At the estimate.
+        information : array, shape (coordinates, coordinates)
+            Of all data and priors there.
+        """
         ...
 
 

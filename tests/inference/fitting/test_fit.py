@@ -45,6 +45,13 @@ def test_all_numbers_that_the_readings_may_show_are_free_by_default(readings, pm
     ]
 
 
+def test_a_stiffness_is_found_without_a_start(readings):
+    fixed = {**TRUTH, "mu0": 0.5, "V0": 1e-6, "W0": 7.0}
+    del fixed["A"]
+    found = fit(readings(None), "elasto-plastic", ["A", "K"], fixed=fixed)
+    assert found.values["K"] == pytest.approx(2e5, rel=1e-6)
+
+
 def test_a_free_friction_is_told_for_a_micrometre_a_second(readings):
     fixed = {"K": 2e5, "W0": 7.0, "A": 0.013, "B": 0.026, "D0": 4e-7, "eps_ratio": 0.48}
     found = fit(readings(None), "elasto-plastic", ["mu0", "lambda"], fixed=fixed)

@@ -38,7 +38,7 @@ class Formula(LockInTerm):
     def search_from_now_on(self):
         self.searching = True
 
-    def warnings(self, residuals):
+    def warnings(self, residuals, information):
         return []
 
     def residuals(self, values, *, search=None):

@@ -433,8 +433,13 @@ def _with_warnings(found: Fit, said: list[str]) -> Fit:
             f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom is too small: the "
             "uncertainties are too large, and so are the intervals"
         )
+    u = found.objective.coordinates(
+        {k.name: found.values[k.name] for k in found.objective.unknowns}
+    )
+    slopes = [r.jacobian for r in found.residuals] + [found.objective.prior_residuals(u)[1]]
+    information = np.sum([J.T @ J for J in slopes], axis=0)
     for term, residuals in zip(found.objective.terms, found.residuals, strict=True):
-        said += term.warnings(residuals)
+        said += term.warnings(residuals, information)
     for name in found.undetermined:
         said.append(_why_undetermined(found, name))
     for name, estimate in found.parameters.items():

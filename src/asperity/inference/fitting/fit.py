@@ -34,6 +34,7 @@ from asperity.inference.fitting.plausibility import (
 from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.runs.assembly import (
+    USUAL_STIFFNESS,
     RunOptions,
     require_newtons,
     require_no_layer,
@@ -298,6 +299,10 @@ def _objective(
         # It is freed by its prior.
         named = [name for name in named if name.partition("[")[0] != GAIN]
     largest = 0.0 if table is None else float(table.points["epsilon"].max())
+    usual = usual_ranges(recordings) if recordings else {}
+    if "W0" in constants and "K" not in (*begun, *priors):
+        W0 = float(np.median(constants["W0"]))
+        usual["K"] = (USUAL_STIFFNESS[0] * W0, USUAL_STIFFNESS[1] * W0)
     unknowns = list(
         unknowns_of(
             law,
@@ -305,7 +310,7 @@ def _objective(
             largest_epsilon=largest,
             start=begun,
             priors=priors,
-            usual=usual_ranges(recordings) if recordings else None,
+            usual=usual,
         )
     )
     terms: list[DataTerm] = []

@@ -78,6 +78,11 @@ def with_noise(
         objective.forget()
         ends.append(_with_own_noise(objective, noisy, objective.minimise(best.u)[0]))
         best = min(ends, key=lambda end: end.deviance)
+        # What a minimum on the way was far off from may be right beside this one.
+        for term, state in zip(noisy, first, strict=True):
+            term.restore_noise(state)
+        ends.append(_with_own_noise(objective, noisy, best.u))
+        best = min(ends, key=lambda end: end.deviance)
     for term, state in zip(noisy, best.states, strict=True):
         term.restore_noise(state)
     objective.forget()

@@ -21,7 +21,7 @@ from asperity.parameters import MACHINE, Parameter
 _STIFFNESS = {"N": "stiffness", "Pa": "stress_per_length", "": "per_length"}
 #: Where the stiffness over the load is looked for (1/m): what deformation apparatus and
 #: tribometers show.
-_USUAL_STIFFNESS = (5e2, 5e4)
+USUAL_STIFFNESS = (5e2, 5e4)
 #: Samples that a run needs, per free parameter.
 _SAMPLES_PER_PARAMETER = 8
 #: Of an air layer: its gap, the radius of the patch and the pressure, as users call them.
@@ -246,7 +246,7 @@ def free_stiffness(
     """The stiffness of a run as a free parameter."""
     parameter = replace(stiffness(run), name=name)
     given = start.get(name, start.get("K"))
-    usual = (_USUAL_STIFFNESS[0] * run.W0, _USUAL_STIFFNESS[1] * run.W0)
+    usual = (USUAL_STIFFNESS[0] * run.W0, USUAL_STIFFNESS[1] * run.W0)
     return unknown_of(
         parameter,
         None if given is None else stiffness_in(run, given, f"start.{name}"),

@@ -346,7 +346,7 @@ def _load(
     knots = _load_knots(t, W, noise, _CONSTANT_LOAD * mean)
     if len(knots) == 2 and abs(W[0] - W[-1]) < _CONSTANT_LOAD * mean + _LOAD_NOISE * noise:
         return mean, unit, False, ends, np.full(2, mean)
-    at = t[knots]
+    at = _between_samples(t, W, knots)
     values = _line_through(t, W, at)
     at[0], at[-1] = time[0], time[-1]
     return float(values[0]), unit, True, at, values
@@ -374,11 +374,37 @@ def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
     return sorted(found)
 
 
+def _between_samples(t: Float, y: Float, knots: Sequence[int]) -> Float:
+    """Times of the corners at samples; one where two lines meet between samples is put there.
+
+    A corner between two samples seems to be one at each. Friction follows the load within a
+    fraction of a sampling interval, so that the difference shows.
+    """
+    at = t[list(knots)]
+    values = _line_through(t, y, at)
+    slope = np.diff(values) / np.diff(at)
+    size = np.diff(knots)
+    kept = list(at[:1])
+    k = 1
+    while k < at.size:
+        if k + 2 < at.size and size[k] == 1 and min(size[k - 1], size[k + 1]) > 1:
+            before, after = slope[k - 1], slope[k + 1]
+            gap = values[k + 1] - after * at[k + 1] - (values[k] - before * at[k])
+            meeting = gap / (before - after) if before != after else np.nan
+            if at[k] < meeting < at[k + 1]:
+                kept.append(meeting)
+                k += 2
+                continue
+        kept.append(at[k])
+        k += 1
+    return np.array(kept)
+
+
 def _line_through(t: Float, y: Float, at: Float) -> Float:
     """Values at the knots of the line, linear between them, that is nearest to y."""
     i = np.clip(np.searchsorted(at, t, side="right") - 1, 0, at.size - 2)
     share = (t - at[i]) / (at[i + 1] - at[i])
-    # Normal equations of the hat functions, each of which has the sample at its knot.
+    # Normal equations of the hat functions, each of which has a sample at its knot or beside it.
     bands = np.zeros((2, at.size))
     bands[1] = np.bincount(i, (1 - share) ** 2, at.size) + np.bincount(i + 1, share**2, at.size)
     bands[0, 1:] = np.bincount(i, share * (1 - share), at.size)[:-1]
@@ -388,19 +414,30 @@ def _line_through(t: Float, y: Float, at: Float) -> Float:
 
 def _line_knots(t: Float, y: Float, tolerance: float) -> list[int]:
     """Samples at the corners of a line through y within a tolerance (Ramer, Douglas, Peucker)."""
+
+    def away(a: int, b: int) -> Float:
+        """Distances from the chord."""
+        chord = y[a] + (y[b] - y[a]) * (t[a : b + 1] - t[a]) / max(t[b] - t[a], 1e-300)
+        return np.abs(y[a : b + 1] - chord)
+
     kept = {0, t.size - 1}
     parts = [(0, t.size - 1)]
     while parts:
         a, b = parts.pop()
         if b - a < 2:
             continue
-        chord = y[a] + (y[b] - y[a]) * (t[a : b + 1] - t[a]) / max(t[b] - t[a], 1e-300)
-        away = np.abs(y[a : b + 1] - chord)
-        k = int(np.argmax(away))
-        if away[k] > tolerance:
+        apart = away(a, b)
+        k = int(np.argmax(apart))
+        if apart[k] > tolerance:
             kept.add(a + k)
             parts += [(a, a + k), (a + k, b)]
-    return sorted(kept)
+    corners = sorted(kept)
+    # Those beside the corners that were found after them are mostly none.
+    needed = corners[:1]
+    for k, after in pairwise(corners[1:]):
+        if away(needed[-1], after).max() > tolerance:
+            needed.append(k)
+    return [*needed, corners[-1]]
 
 
 def _drive(

@@ -34,8 +34,9 @@ def outlying_rows(residuals: Residuals) -> list[int]:
     if predictions are linear in the coordinates.
     """
     kept = np.ones(residuals.values.size, bool)
-    # Residuals that the linear fit would have, which follow from those at the minimum.
-    J, r = residuals.jacobian, residuals.values
+    # Residuals that the linear fit would have, which follow from those at the minimum. Coordinates
+    # of other data are none of these.
+    J, r = residuals.jacobian[:, residuals.jacobian.any(0)], residuals.values
     rows = np.unique(residuals.row)
     found: list[int] = []
     shift: Float = np.zeros(J.shape[1])
@@ -70,13 +71,20 @@ def _drop(r: Float, J: Float, of_row: NDArray[np.bool_]) -> tuple[float, int]:
     return float(part @ np.linalg.pinv(left, hermitian=True) @ part), int(of_row.sum())
 
 
-def standardised(residuals: Residuals) -> Float:
+def standardised(residuals: Residuals, information: Float) -> Float:
     """Residuals over their own standard deviations at the minimum, shape (n,).
 
     A reading that the fit follows has a small residual; over sqrt(1 - leverage) it shows.
+
+    Parameters
+    ----------
+    residuals : Residuals
+    information : array, shape (coordinates, coordinates)
+        Of all data and priors of the fit: what other data know, the fit does not follow here.
     """
     J = residuals.jacobian
-    if not J.shape[1]:
-        return residuals.values
-    Q = np.linalg.qr(J)[0]
-    return np.asarray(residuals.values / np.sqrt(np.maximum(1 - (Q**2).sum(1), 1e-6)))
+    size = np.sqrt(np.diag(information))
+    size = np.where(size > 0, size, 1.0)
+    inverse = np.linalg.pinv(information / np.outer(size, size), hermitian=True)
+    leverage = np.einsum("ij,jk,ik->i", J / size, inverse, J / size)
+    return np.asarray(residuals.values / np.sqrt(np.maximum(1 - leverage, 1e-6)))

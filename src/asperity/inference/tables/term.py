@@ -138,7 +138,7 @@ class LockInTerm:
         """Search for the orbits that the fast method does not find, at every call."""
         self.forward.search_from_now_on()
 
-    def warnings(self, residuals: Residuals) -> list[str]:
+    def warnings(self, residuals: Residuals, information: Float) -> list[str]:
         """Outliers, and amplitudes without a phase that are small beside their uncertainty."""
         said = list(self.table.remarks)
         outliers = outlying_rows(residuals)
@@ -150,7 +150,7 @@ class LockInTerm:
                 "may shift every estimate; check the measurement, or fit without it"
             )
         expected = norm.isf(0.005 / residuals.values.size)
-        apart = np.abs(standardised(residuals))
+        apart = np.abs(standardised(residuals, information))
         beyond = np.flatnonzero(apart > expected)
         # So many are no outliers: the law or the uncertainties are wrong, as chi-squared says.
         few = beyond if beyond.size <= max(1, _FEW * apart.size) else beyond[:0]

@@ -1,0 +1,53 @@
+"""The drive of a recording as it is read: corners of the load."""
+
+import numpy as np
+import pytest
+
+from asperity.inference import recorded_run
+from asperity.recording import Channel, Trace
+
+
+def run_under(corners, levels, *, noise=1e-4, rate=10.0, end=100.0):
+    """A recording at constant velocity under a load of straight lines."""
+    time = np.arange(int(end * rate)) / rate
+    load = np.interp(time, corners, levels)
+    load = 2e7 * (load + noise * np.random.default_rng(0).normal(size=time.size))
+    return recorded_run(
+        Trace(
+            time,
+            {
+                "friction": Channel(np.full(time.size, 0.6), "dimensionless", "", "friction", ""),
+                "displacement": Channel(1e-6 * time, "length", "m", "displacement", "m"),
+                "normal stress": Channel(load, "pressure", "Pa", "normal stress", "Pa"),
+            },
+        ),
+        name="run",
+        steps=[],
+        velocities=[1e-6],
+    )
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+def test_corners_of_the_load_are_found_between_samples(noise):
+    corners = np.array([0.0, 20.037, 20.512, 50.0, 50.451, 70.083, 95.0, 99.9])
+    levels = np.array([1.0, 1.0, 1.15, 1.15, 1.0, 1.0, 0.7, 0.7])
+    drive = run_under(corners, levels, noise=noise).drive
+    # The slowest ramp, of 1.2 % a second, is known to some hundredths of a second.
+    found = drive.edges
+    assert found.size == corners.size
+    np.testing.assert_allclose(found[1:5], corners[1:5], atol=0.004 if noise else 5e-4)
+    np.testing.assert_allclose(found[5:7], corners[5:7], atol=0.1 if noise else 0.02)
+    at = np.arange(0.0, 99.9, 0.013)
+    np.testing.assert_allclose(
+        drive.load_at(at) * drive.load[0] / np.interp(0.0, corners, levels),
+        np.interp(at, corners, levels),
+        atol=1.5e-3 if noise else 3e-4,
+    )
+
+
+def test_a_load_that_jumps_between_two_samples_stays_there():
+    drive = run_under([0.0, 39.92, 39.98, 99.9], [1.0, 1.0, 1.2, 1.2]).drive
+    np.testing.assert_allclose(drive.edges, [0.0, 39.9, 40.0, 99.9])
+    np.testing.assert_allclose(
+        drive.load_at(np.array([10.0, 39.9, 40.0, 80.0])), [1, 1, 1.2, 1.2], atol=1e-4
+    )
