@@ -81,8 +81,10 @@ def with_noise(
         # What a minimum on the way was far off from may be right beside this one.
         for term, state in zip(noisy, first, strict=True):
             term.restore_noise(state)
-        ends.append(_with_own_noise(objective, noisy, best.u))
-        best = min(ends, key=lambda end: end.deviance)
+        anew = _with_own_noise(objective, noisy, best.u)
+        if anew.deviance < best.deviance:
+            ends = [anew if end is best else end for end in ends]
+            best = anew
     for term, state in zip(noisy, best.states, strict=True):
         term.restore_noise(state)
     objective.forget()
