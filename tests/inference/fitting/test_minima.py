@@ -219,6 +219,38 @@ class Spoiled(TwoNoises):
         return super().update_noise(values)
 
 
+class Doubted(TwoNoises):
+    """The same with an exact sample that agrees with FIRST alone, or a period away."""
+
+    rate = 0.5 * math.pi / (SECOND - FIRST)
+
+    def residuals(self, values, *, search=None):
+        whole = super().residuals(values)
+        if self.outliers:
+            return whole
+        phase = self.rate * (math.log(values["D0"]) - FIRST)
+        exact, slope = 1e3 * math.sin(phase), 1e3 * self.rate * math.cos(phase) / values["D0"]
+        return whole._replace(
+            values=np.append(whole.values, exact),
+            jacobian=np.vstack([whole.jacobian, [slope]]),
+            log_scale=whole.log_scale - math.log(1e3),
+        )
+
+    def update_noise(self, values):
+        if abs(math.sin(self.rate * (math.log(values["D0"]) - FIRST))) > 0.1:
+            self.outliers = (100,)
+        return super().update_noise(values)
+
+
+def test_a_sample_that_only_a_wrong_minimum_is_off_from_is_not_left_out():
+    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
+    term = Doubted()
+    objective = Objective((term,), LAW, unknowns, {})
+    with_noise(objective, [(np.array([SECOND - 0.02]), 1.0)])
+    np.testing.assert_allclose(term.sizes, [1, 2], atol=0.01)
+    assert term.outliers == ()
+
+
 def test_minima_of_recordings_are_compared_with_the_noise_of_each():
     unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
     term = TwoNoises()

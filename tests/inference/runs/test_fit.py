@@ -274,8 +274,11 @@ def test_a_peak_that_one_sample_holds_is_not_taken_for_a_wrong_sample(name, rate
     pulled = coverage.STIFFNESS * max(case.velocities) / rate
     spoiled = run.friction.copy()
     spoiled[k] -= 3 * pulled + np.ptp(spoiled)
-    term = RunTerm(replace(run, friction=spoiled), RiceRuina, truth)
-    assert term.beyond_any_motion(term.alone_at_changes(), {}) == [k]
+    term = RunTerm(replace(run, friction=spoiled), RiceRuina, truth, own={"K[run]": "K"})
+    # The other stiffness is that of lock-in readings.
+    both = {"K[run]": truth["K"], "K": 1e6 * truth["K"]}
+    for values in ({}, both):
+        assert term.beyond_any_motion(term.alone_at_changes(), values) == [k]
 
 
 def test_a_jump_of_the_gauge_is_fitted_and_named(found):

@@ -371,9 +371,11 @@ class RunTerm:
         values : mapping of str to float
             Free parameters and nuisances of the fit, in SI.
         """
-        given = {**self.fixed}
+        given = dict(self.fixed)
         for name, value in values.items():
-            given[self.inner(name) or name] = value
+            inner = self.inner(name)
+            if inner is not None:
+                given[inner] = value
         drive, time = self.run.drive, self.run.time
         lowest = self.run.W0 * float(np.min(drive.load))
         stretching = given.get(GAIN, 1.0) * given["K"] / lowest * self.motion.velocity
