@@ -7,6 +7,7 @@ likelihood is the product over the terms; priors are normal in the parameter its
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -292,9 +293,14 @@ class Objective:
             full[moving] = part
             return full
 
-        def triangle(part: Float) -> Float:
-            r, jacobian = self.residuals(whole(part))
+        # SciPy asks for the Jacobian where it has just asked for the residuals.
+        @functools.lru_cache(1)
+        def triangle_of(part: bytes) -> Float:
+            r, jacobian = self.residuals(whole(np.frombuffer(part)))
             return compressed(np.column_stack([jacobian[:, moving], r]))
+
+        def triangle(part: Float) -> Float:
+            return triangle_of(part.tobytes())
 
         result = least_squares(
             lambda part: triangle(part)[:, -1],

@@ -13,6 +13,7 @@ from scipy.stats import chi2 as chi_squared
 from scipy.stats.qmc import Sobol
 
 from asperity.inference.objective import Objective
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.laws import Law
 from asperity.parameters import law_parameters
@@ -149,7 +150,7 @@ def _beginnings(
     high = np.array([u.to_coordinate(u.start[1]) for u in unknowns])
     shares = Sobol(len(unknowns), seed=seed).random(drawn)
     candidates = [middle, *(low + (high - low) * shares)]
-    chi2 = np.array([objective.chi2(u) for u in candidates])
+    chi2 = _chi2_of_starts(objective, candidates)
     at = np.flatnonzero(np.isfinite(chi2))
     searched = at.size < (_RARE * chi2.size if _has_table(objective) else 1)
     few: Objective | None = None
@@ -317,6 +318,16 @@ def _few_rows(objective: Objective) -> Objective | None:
         return None
     kept = order[np.linspace(0, table.rows - 1, rows).round().astype(int)]
     return replace(objective, terms=(term.with_rows(np.isin(np.arange(table.rows), kept)),))
+
+
+def _chi2_of_starts(objective: Objective, starts: list[Float]) -> Float:
+    """chi-squared of starts, infinite where the law has no solution."""
+    runs = [term for term in objective.terms if isinstance(term, RunTerm)]
+    if len(runs) < len(objective.terms):
+        return np.array([objective.chi2(u) for u in starts])
+    priors = [float(np.sum(objective.prior_residuals(u)[0] ** 2)) for u in starts]
+    named = [objective.named(u) for u in starts]
+    return np.array([sum(r.chi2(v) for r in runs) for v in named]) + priors
 
 
 def _chi2_of_many(objective: Objective, candidates: list[Float]) -> Float:

@@ -21,6 +21,8 @@ Found = tuple[list[tuple[Float, float]], bool]
 
 #: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
 _ROUNDS, _STILL = 8, 0.03
+#: Minima under white noise that are nearer than so many standard deviations are followed as one.
+_ONE_END = 1.0
 #: Standard deviations of the parameters within which two starts lead to the same minimum.
 _ALLOWED = 5.0
 
@@ -57,7 +59,7 @@ def with_noise(
     noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
     first = [term.noise_state() for term in noisy]
     ends = []
-    for u, _ in distinct(minima):
+    for u in _apart(objective, minima):
         for term, state in zip(noisy, first, strict=True):
             term.restore_noise(state)
         ends.append(_with_own_noise(objective, noisy, u))
@@ -124,6 +126,16 @@ def without_bad_samples(objective: Objective, search: Callable[[], Found]) -> Fo
     if [*map(len, wrong)] == [*map(len, alone)]:
         return minima, agreed
     return left_out(wrong)
+
+
+def _apart(objective: Objective, minima: list[tuple[Float, float]]) -> list[Float]:
+    """Minima without those that the data hardly tell from an earlier one: both lead to one end."""
+    kept: list[Float] = []
+    for u, _ in minima:
+        _, jacobian = objective.residuals(u)
+        if all(float(np.linalg.norm(jacobian @ (u - other))) > _ONE_END for other in kept):
+            kept.append(u)
+    return kept
 
 
 def _taken_off(states: Sequence[NoiseState]) -> int:

@@ -11,7 +11,8 @@ move with the changes of the drive.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -58,6 +59,8 @@ _DENSE = np.array(
         69997945 / 29380423,
     ]
 )
+#: Steps that are differentiated side by side.
+_SIDE_BY_SIDE = 64
 #: Derivatives beyond this, whose squares overflow, are those of a motion that runs away.
 _STEEPEST = 1e100
 #: Gauss-Legendre on (0, 1): exact for the continuous extension, which is of degree 4.
@@ -157,7 +160,7 @@ class RunMotion:
         motion, padded, at, taken = self.prepared(given, drive, times)
         friction, slopes, steps, done = through(
             motion,
-            {k: given[k] for k in free},
+            free,
             given,
             padded,
             at,
@@ -167,8 +170,7 @@ class RunMotion:
         if not bool(done):
             return None
         f = np.asarray(friction)[taken]
-        columns = [np.asarray(slopes[name])[taken] for name in free]
-        jacobian = np.stack(columns, axis=1) if columns else np.zeros((f.size, 0))
+        jacobian = np.asarray(slopes).T[taken]
         # NaN and infinity are not below it either.
         if not (np.isfinite(f).all() and (np.abs(jacobian) < _STEEPEST).all()):
             return None
@@ -245,22 +247,22 @@ def _padded(drive: Drive) -> Drive:
 @eqx.filter_jit
 def through(
     motion: Motion,
-    free: dict[str, Any],
+    free: tuple[str, ...],
     given: dict[str, Any],
     drive: Drive,
     times: Any,
     *,
     room: int,
     means: bool = False,
-) -> tuple[Array, dict[str, Array], Array, Array]:
+) -> tuple[Array, Array, Array, Array]:
     """Friction at the samples under given numbers, differentiated forwards.
 
     Parameters
     ----------
     motion : Motion
         Whose numbers are replaced by `given`.
-    free : dict of str to array, shape ()
-        Parameters for derivatives.
+    free : tuple of str
+        Names for derivatives.
     given : dict of str to array, shape ()
         All parameters, as of `RunMotion`.
     drive : Drive
@@ -273,25 +275,78 @@ def through(
     Returns
     -------
     friction : array, shape (n,), or (n - 1,) for means
-    derivatives : dict of str to array, of the same shape
+    derivatives : array, shape (parameters, n)
+        In the order of `free`.
     steps : array, shape ()
     done : array, shape ()
         Whether the end was reached.
     """
+    x = _numbers(free, given)
+    curve, slopes, steps, done = _integrated(motion, free, given, drive, room)
+    shown = _averaged if means else _observed
 
-    def friction(moving: dict[str, Array]) -> tuple[Array, tuple[Array, Array, Array]]:
-        values = {**given, **moving}
-        changed = _with_values(motion, values)
-        moved = _shifted(drive, values)
-        dense = _integrated(changed, moved, values, room)
-        f = (_averaged if means else _observed)(changed, moved, values, dense, times)
-        return f, (f, dense.steps, dense.done)
+    def friction(curve: _Curve, x: Array) -> Array:
+        values = {**given, **dict(zip(free, x, strict=True))}
+        changed, moved = _with_values(motion, values), _shifted(drive, values)
+        return shown(changed, moved, values, curve, steps, times)
 
+    f = friction(curve, x)
     if not free:
-        f, (_, count, done) = friction(free)
-        return f, {}, count, done
-    slopes, (f, count, done) = jax.jacfwd(friction, has_aux=True)(free)
-    return f, slopes, count, done
+        return f, jnp.zeros((0, f.size)), steps, done
+
+    def along(change: _Curve, direction: Array) -> Array:
+        return jax.jvp(friction, (curve, x), (change, direction))[1]
+
+    return f, jax.vmap(along)(slopes, jnp.eye(len(free))), steps, done
+
+
+def density_through(
+    density: Callable[[Array, Mapping[str, Array]], Array],
+    motion: Motion,
+    free: tuple[str, ...],
+    given: dict[str, Any],
+    drive: Drive,
+    times: Any,
+    *,
+    room: int,
+    means: bool = False,
+) -> tuple[Array, Array]:
+    """A number that depends on the friction at the samples, and its gradient.
+
+    The motion is differentiated forwards, as by `through`, and the samples, of which there are far
+    more than steps, backwards.
+
+    Parameters
+    ----------
+    density : callable
+        Of what `through` gives as friction, and of the parameters by name.
+    motion, free, given, drive, times, room, means
+        As of `through`.
+
+    Returns
+    -------
+    value : array, shape ()
+        NaN where the end was not reached.
+    gradient : array, shape (parameters,)
+        In the order of `free`.
+    """
+    x = _numbers(free, given)
+    curve, slopes, steps, done = _integrated(motion, free, given, drive, room)
+    shown = _averaged if means else _observed
+
+    def value_of(curve: _Curve, x: Array) -> Array:
+        values = {**given, **dict(zip(free, x, strict=True))}
+        changed, moved = _with_values(motion, values), _shifted(drive, values)
+        return density(shown(changed, moved, values, curve, steps, times), values)
+
+    value, (back, gradient) = jax.value_and_grad(value_of, argnums=(0, 1))(curve, x)
+    for weight, slope in zip(back, slopes, strict=True):
+        gradient += jnp.sum(weight * slope, axis=tuple(range(1, slope.ndim)))
+    return jnp.where(done, value, jnp.nan), gradient
+
+
+def _numbers(names: tuple[str, ...], given: Mapping[str, Any]) -> Array:
+    return jnp.array([given[name] for name in names], float)
 
 
 def _with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:
@@ -307,21 +362,20 @@ def _with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:
 
 
 def _shifted(drive: Drive, values: Mapping[str, Array]) -> Drive:
-    edges = jnp.asarray(drive.edges)
+    drive = Drive(*map(jnp.asarray, drive))
+    edges = drive.edges
     for name, value in values.items():
         if name.startswith("shift_"):
             edges = edges.at[int(name.removeprefix("shift_"))].add(value)
     return drive._replace(edges=edges)
 
 
-class _Dense(NamedTuple):
-    """Steps with the coefficients of the continuous extension."""
+class _Curve(NamedTuple):
+    """Steps with the coefficients of the continuous extension, filled up to the room for them."""
 
     begin: Array
     length: Array
     coefficients: Array
-    steps: Array
-    done: Array
 
 
 def _excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array) -> Excitation:
@@ -335,137 +389,252 @@ def _excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Arra
     )
 
 
-def _integrated(motion: Motion, drive: Drive, values: Mapping[str, Array], room: int) -> _Dense:
-    still = jax.lax.stop_gradient
-    pieces = drive.pull.shape[0]
-    y0 = motion.steady()
-    m = y0.shape[0]
-    departures = [values.get("start_force", 0.0)] + [
-        values.get(f"start_state_{i}", 0.0) for i in range(m - 1)
-    ]
-    y0 = y0 + jnp.stack([jnp.asarray(d, float) for d in departures])
-    end = still(drive.edges[-1])
+def _integrated(
+    motion: Motion, free: tuple[str, ...], given: dict[str, Any], drive: Drive, room: int
+) -> tuple[_Curve, _Curve, Array, Array]:
+    """The motion, its derivatives, its number of steps, and whether the end was reached.
+
+    Of a step the derivatives depend on those of the steps before it only through the states at its
+    beginning: they are computed for many steps side by side, and then added up along them. Their
+    first axis is that of the parameters.
+    """
+
+    def begun(x: Array) -> tuple[Motion, Drive, Mapping[str, Array]]:
+        values = {**given, **dict(zip(free, x, strict=True))}
+        return _with_values(motion, values), _shifted(drive, values), values
+
+    def first_states(x: Array) -> Array:
+        now, _, values = begun(x)
+        return _first_states(now, values)
+
+    x = _numbers(free, given)
+    taken, curve, steps, done = _steps_taken(*begun(x), room)
+    count, m = x.size, taken.states.shape[1]
+    nothing = jax.tree.map(lambda all_: jnp.zeros((count, *all_.shape)), curve)
+    if not free:
+        return curve, nothing, steps, done
+
+    def slopes_of(part: _Step, change: Array) -> tuple[Array, _Curve]:
+        """Of the states after a part of the steps, and of the motion at these."""
+
+        def one(step: _Step, direction: Array) -> tuple[Array, _Curve]:
+            """Along one direction of the parameters, or of the states."""
+
+            def moved(x: Array, y: Array) -> tuple[Array, _Curve]:
+                now, drawn, values = begun(x)
+                begin = drawn.edges[step.piece] + step.since
+                length = jnp.where(step.last, drawn.edges[step.piece + 1] - begin, step.length)
+                new, _, rows = _stepped(now, drawn, values, step.piece, begin, length, y)
+                return new, _Curve(begin, length, rows)
+
+            along = direction[:count], direction[count:]
+            return jax.jvp(moved, (x, step.states), along)[1]
+
+        each_direction = jax.vmap(one, (None, 0))
+        after, found = jax.vmap(each_direction, (0, None), 1)(part, jnp.eye(count + m))
+
+        def onwards(dy: Array, own: Array) -> tuple[Array, Array]:
+            return own[:count] + jnp.sum(dy[:, :, None] * own[count:], axis=1), dy
+
+        change, before = jax.lax.scan(onwards, change, jnp.moveaxis(after, 1, 0))
+        by_states = jnp.moveaxis(before, 0, 1)[..., None, None]
+        whole = jnp.sum(by_states * found.coefficients[count:].swapaxes(0, 1), axis=2)
+        return change, _Curve(
+            found.begin[:count], found.length[:count], found.coefficients[:count] + whole
+        )
 
     def body(carry: Any) -> Any:
-        t, h, y, piece, n, tries, begin, length, table = carry
+        first, change, slopes = carry
+        part = jax.tree.map(
+            lambda all_: jax.lax.dynamic_slice_in_dim(all_, first, _SIDE_BY_SIDE), taken
+        )
+        change, found = slopes_of(part, change)
+        slopes = jax.tree.map(
+            lambda all_, new: jax.lax.dynamic_update_slice_in_dim(all_, new, first, 1),
+            slopes,
+            found,
+        )
+        return first + _SIDE_BY_SIDE, change, slopes
+
+    start = jnp.asarray(0), jax.jacfwd(first_states)(x).T, nothing
+    *_, slopes = jax.lax.while_loop(lambda carry: carry[0] < steps, body, start)
+    return curve, slopes, steps, done
+
+
+class _Step(NamedTuple):
+    """What a step begins with.
+
+    Attributes
+    ----------
+    piece : int array
+        Of the drive.
+    since, length : array
+        Time since the beginning of the piece, and length of the step (s).
+    last : bool array
+        Whether it ends with the piece.
+    states : array
+    """
+
+    piece: Array
+    since: Array
+    length: Array
+    last: Array
+    states: Array
+
+
+def _first_states(motion: Motion, values: Mapping[str, Array]) -> Array:
+    """States at the beginning: those of steady sliding and the departures from it."""
+    steady = motion.steady()
+    names = ("start_force", *(f"start_state_{i}" for i in range(steady.shape[0] - 1)))
+    return steady + jnp.stack([jnp.asarray(values.get(n, 0.0), float) for n in names])
+
+
+def _stepped(
+    motion: Motion,
+    drive: Drive,
+    values: Mapping[str, Array],
+    piece: Array,
+    begin: Array,
+    length: Array,
+    y: Array,
+) -> tuple[Array, Array, Array]:
+    """States after a step, their error, and the coefficients of the continuous extension."""
+
+    @jax.jit  # traced once for all stages
+    def rates(at: Array, state: Array) -> Array:
+        return motion.rates(state, _excitation(drive, values, piece, at))
+
+    # Sums written out: products of such small matrices take longer than all else.
+    k: list[Array] = []
+    new = y
+    for node, row in zip(_NODES, _STAGES, strict=True):
+        new = y + length * _combined(row, k) if k else y
+        k.append(rates(begin + node * length, new))
+    # The last stage is the solution of order 5.
+    rise = new - y
+    first = length * k[0] - rise
+    second = rise - length * k[6] - first
+    rows = jnp.stack([y, rise, first, second, length * _combined(_DENSE, k)])
+    return new, length * _combined(_ERROR, k), rows
+
+
+def _steps_taken(
+    motion: Motion, drive: Drive, values: Mapping[str, Array], room: int
+) -> tuple[_Step, _Curve, Array, Array]:
+    """The steps, the motion at them, their number, and whether the end was reached."""
+    pieces = drive.pull.shape[0]
+    y0 = _first_states(motion, values)
+    end = drive.edges[-1]
+
+    def body(carry: Any) -> Any:
+        t, h, y, piece, n, tries, kept, curve = carry
         edge = drive.edges[piece + 1]
-        last = still(t + 1.01 * h) >= still(edge)
-        step = jnp.where(last, edge - t, still(h))
-
-        def rates(at: Array, state: Array) -> Array:
-            return motion.rates(state, _excitation(drive, values, piece, at))
-
-        def stage(k: Array, coefficients: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-            number, node, row = coefficients
-            inner = y + step * (row @ k)
-            return k.at[number].set(rates(t + node * step, inner)), inner
-
-        # Unrolled: half the time for 1.7 s more of compiling.
-        numbers = (jnp.arange(7), jnp.asarray(_NODES), jnp.asarray(_STAGES))
-        k, inner = jax.lax.scan(stage, jnp.zeros((7, m)), numbers, unroll=7)
-        new = inner[-1]  # the last stage is the solution of order 5
-        error = step * (jnp.asarray(_ERROR) @ k)
+        last = t + 1.01 * h >= edge
+        step = jnp.where(last, edge - t, h)
+        new, error, rows = _stepped(motion, drive, values, piece, t, step, y)
         scale = _ABSOLUTE + _RELATIVE * jnp.maximum(jnp.abs(y), jnp.abs(new))
-        norm = still(jnp.sqrt(jnp.mean((error / scale) ** 2)))
+        norm = jnp.sqrt(jnp.mean((error / scale) ** 2))
         norm = jnp.where(jnp.isfinite(norm), norm, 1e10)
         # A piece without length is passed.
-        accepted = (norm <= 1.0) | (still(step) <= 1e-14 * end)
-        dense = step * (jnp.asarray(_DENSE) @ k)
-        rise = new - y
-        first = step * k[0] - rise
-        second = rise - step * k[6] - first
-        begin = begin.at[n].set(t)
-        length = length.at[n].set(step)
-        table = table.at[n].set(jnp.stack([y, rise, first, second, dense]))
+        accepted = (norm <= 1.0) | (step <= 1e-14 * end)
+        this = _Step(piece, t - drive.edges[piece], step, last, y)
+        kept = jax.tree.map(lambda all_, one: all_.at[n].set(one), kept, this)
+        curve = jax.tree.map(lambda all_, one: all_.at[n].set(one), curve, _Curve(t, step, rows))
         factor = jnp.clip(0.9 * jnp.maximum(norm, 1e-10) ** -0.2, 0.2, 5.0)
-        h_next = still(step) * factor
+        h_next = step * factor
         h_next = jnp.where(last & accepted, jnp.maximum(h_next, h), h_next)
-        moved = accepted & (still(step) > 1e-14 * end)
+        moved = accepted & (step > 1e-14 * end)
         t = jnp.where(accepted, jnp.where(last, edge, t + step), t)
         y = jnp.where(moved, new, y)
         piece = jnp.where(accepted & last, piece + 1, piece)
-        return (
-            t,
-            still(h_next),
-            y,
-            piece,
-            jnp.where(moved, n + 1, n),
-            tries + 1,
-            begin,
-            length,
-            table,
-        )
+        return t, h_next, y, piece, jnp.where(moved, n + 1, n), tries + 1, kept, curve
 
     def going(carry: Any) -> Array:
         _, h, _, piece, n, tries, *_ = carry
         return (piece < pieces) & (n < room) & (tries < room + room // 2) & (h > 1e-13 * end)
 
-    start: Any = (
-        drive.edges[0],
-        1e-3 * (drive.edges[1] - drive.edges[0]),
-        y0,
-        jnp.asarray(0),
-        jnp.asarray(0),
-        jnp.asarray(0),
-        jnp.full(room, jnp.inf),
-        jnp.ones(room),
-        jnp.zeros((room, 5, m)),
+    zero = jnp.asarray(0)
+    kept = _Step(
+        jnp.zeros(room, int),
+        jnp.zeros(room),
+        jnp.zeros(room),
+        jnp.zeros(room, bool),
+        # Those that fill up are computed with the others.
+        jnp.zeros((room, *y0.shape)) + y0,
     )
-    start = (start[0], still(start[1]), *start[2:])
-    *_, piece, n, _, begin, length, table = jax.lax.while_loop(going, body, start)
-    return _Dense(begin, length, table, n, piece >= pieces)
+    curve = _Curve(jnp.full(room, jnp.inf), jnp.ones(room), jnp.zeros((room, 5, *y0.shape)))
+    start = drive.edges[0], 1e-3 * (drive.edges[1] - drive.edges[0]), y0, zero, zero, zero
+    *_, piece, n, _, kept, curve = jax.lax.while_loop(going, body, (*start, kept, curve))
+    return kept, curve, n, piece >= pieces
+
+
+def _combined(weights: Float, rates: Sequence[Array]) -> Array:
+    """Sum of the rates by their weights, those of zero left out."""
+    return functools.reduce(
+        jnp.add, [w * k for w, k in zip(weights, rates, strict=False) if w != 0.0]
+    )
 
 
 def _observed(
-    motion: Motion, drive: Drive, values: Mapping[str, Array], dense: _Dense, times: Array
+    motion: Motion,
+    drive: Drive,
+    values: Mapping[str, Array],
+    curve: _Curve,
+    steps: Array,
+    times: Array,
 ) -> Array:
     """F/W at the samples."""
-    i = _step_of(dense, times)
-    share = (times - dense.begin[i]) / dense.length[i]
-    return _friction(motion, drive, values, dense, i, share, times)
+    i = _step_of(curve, steps, times)
+    share = (times - curve.begin[i]) / curve.length[i]
+    return _friction(motion, drive, values, curve, i, share, times)
 
 
 def _averaged(
-    motion: Motion, drive: Drive, values: Mapping[str, Array], dense: _Dense, edges: Array
+    motion: Motion,
+    drive: Drive,
+    values: Mapping[str, Array],
+    curve: _Curve,
+    steps: Array,
+    edges: Array,
 ) -> Array:
     """Mean F/W between neighbouring edges; 0 where there is no time between them."""
-    numbers = jnp.arange(dense.begin.size)
-    taken = numbers < dense.steps
-    begin = jnp.where(taken, dense.begin, 0.0)
+    numbers = jnp.arange(curve.begin.size)
+    taken = numbers < steps
+    begin = jnp.where(taken, curve.begin, 0.0)
     # Means are differences of an integral: of what is small, they keep more digits.
     level = jax.lax.stop_gradient(
-        _friction(motion, drive, values, dense, numbers[:1], jnp.zeros(1), begin[:1])
+        _friction(motion, drive, values, curve, numbers[:1], jnp.zeros(1), begin[:1])
     )
 
     def integral(step: Array, share: Array) -> Array:
         """Of F/W from the beginning of a step to a share of its length."""
         total = jnp.zeros(share.shape)
         for node, weight in _GAUSS:
-            at = begin[step] + node * share * dense.length[step]
-            f = _friction(motion, drive, values, dense, step, node * share, at)
+            at = begin[step] + node * share * curve.length[step]
+            f = _friction(motion, drive, values, curve, step, node * share, at)
             total = total + weight * (f - level)
-        return total * share * dense.length[step]
+        return total * share * curve.length[step]
 
     whole = jnp.where(taken, integral(numbers, jnp.ones(numbers.size)), 0.0)
     before = jnp.cumsum(whole) - whole
-    i = _step_of(dense, edges)
-    rise = jnp.diff(before[i] + integral(i, (edges - begin[i]) / dense.length[i]))
+    i = _step_of(curve, steps, edges)
+    rise = jnp.diff(before[i] + integral(i, (edges - begin[i]) / curve.length[i]))
     apart = jnp.diff(edges)
     return jnp.where(apart > 0, level + rise / jnp.where(apart > 0, apart, 1.0), 0.0)
 
 
-def _step_of(dense: _Dense, times: Array) -> Array:
+def _step_of(curve: _Curve, steps: Array, times: Array) -> Array:
     """Step of the integrator that each time lies in."""
-    begin = jax.lax.stop_gradient(dense.begin)
+    begin = jax.lax.stop_gradient(curve.begin)
     i = jnp.clip(jnp.searchsorted(begin, times, side="right") - 1, 0)
-    return jnp.minimum(i, dense.steps - 1)
+    return jnp.minimum(i, steps - 1)
 
 
 def _friction(
     motion: Motion,
     drive: Drive,
     values: Mapping[str, Array],
-    dense: _Dense,
+    curve: _Curve,
     step: Array,
     share: Array,
     times: Array,
@@ -475,10 +644,10 @@ def _friction(
 
     def state(i: int) -> Array:
         # Each state by itself: those that the force does not depend on are not computed.
-        c = [dense.coefficients[:, j, i][step] for j in range(5)]
+        c = [curve.coefficients[:, j, i][step] for j in range(5)]
         return c[0] + x * (c[1] + (1 - x) * (c[2] + x * (c[3] + (1 - x) * c[4])))
 
-    y = [state(i) for i in range(dense.coefficients.shape[2])]
+    y = [state(i) for i in range(curve.coefficients.shape[2])]
     piece = jnp.searchsorted(jax.lax.stop_gradient(drive.edges), times, side="right") - 1
     piece = jnp.clip(piece, 0, drive.pull.shape[0] - 1)
     at = _excitation(drive, values, piece, times)

@@ -28,6 +28,8 @@ Float = NDArray[np.float64]
 _CONSTANT_LOAD = 1e-3
 #: The load is followed to this many standard deviations of its noise.
 _LOAD_NOISE = 5.0
+#: Samples between two corners that may be one.
+_AT_CORNER = 5
 #: Samples up to which a recording is compared sample by sample.
 LONGEST = 20_000
 #: Of longer ones: parts into which the load between its quick
@@ -346,7 +348,7 @@ def _load(
     knots = _load_knots(t, W, noise, _CONSTANT_LOAD * mean)
     if len(knots) == 2 and abs(W[0] - W[-1]) < _CONSTANT_LOAD * mean + _LOAD_NOISE * noise:
         return mean, unit, False, ends, np.full(2, mean)
-    at = _between_samples(t, W, knots)
+    at = _between_samples(t, W, knots, max(_LOAD_NOISE * noise, _CONSTANT_LOAD * mean))
     values = _line_through(t, W, at)
     at[0], at[-1] = time[0], time[-1]
     return float(values[0]), unit, True, at, values
@@ -374,11 +376,12 @@ def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
     return sorted(found)
 
 
-def _between_samples(t: Float, y: Float, knots: Sequence[int]) -> Float:
+def _between_samples(t: Float, y: Float, knots: Sequence[int], tolerance: float) -> Float:
     """Times of the corners at samples; one where two lines meet between samples is put there.
 
-    A corner between two samples seems to be one at each. Friction follows the load within a
-    fraction of a sampling interval, so that the difference shows.
+    A corner between two samples seems to be one at each, or at samples some way off, since the line
+    is followed within a tolerance only. Friction follows the load within a fraction of a sampling
+    interval, so that the difference shows.
     """
     at = t[list(knots)]
     values = _line_through(t, y, at)
@@ -387,11 +390,17 @@ def _between_samples(t: Float, y: Float, knots: Sequence[int]) -> Float:
     kept = list(at[:1])
     k = 1
     while k < at.size:
-        if k + 2 < at.size and size[k] == 1 and min(size[k - 1], size[k + 1]) > 1:
+        if k + 2 < at.size and size[k] <= min(_AT_CORNER, size[k - 1] - 1, size[k + 1] - 1):
             before, after = slope[k - 1], slope[k + 1]
             gap = values[k + 1] - after * at[k + 1] - (values[k] - before * at[k])
             meeting = gap / (before - after) if before != after else np.nan
-            if at[k] < meeting < at[k + 1]:
+            near = slice(knots[k], knots[k + 1] + 1)
+            line = np.where(
+                t[near] < meeting,
+                values[k] + before * (t[near] - at[k]),
+                values[k + 1] + after * (t[near] - at[k + 1]),
+            )
+            if at[k] < meeting < at[k + 1] and np.abs(line - y[near]).max() <= tolerance:
                 kept.append(meeting)
                 k += 2
                 continue

@@ -135,6 +135,8 @@ class RunTerm:
         self._outliers: list[int] = []
         self._jumps: list[int] = []
         self._after_changes = (1.0, 1.0)
+        # Of starts, shared by copies that differ in their noise.
+        self._differences: dict[tuple[float, ...], Float | None] = {}
         self.models = [self._first_noise(a, b) for a, b in run.stretches]
         self._prepare()
 
@@ -216,6 +218,23 @@ class RunTerm:
             white[:, 0], white[:, 1:], np.full(n, "friction"), np.arange(n, dtype=np.intp), scale
         )
 
+    def chi2(self, values: Mapping[str, float]) -> float:
+        """Sum of the squared innovations; infinite where the motion cannot be computed.
+
+        The motion is remembered, for the same values under another noise, until the noise of the
+        residual is known.
+        """
+        key = tuple(values.values())
+        if key not in self._differences:
+            raw = self.departures(values)
+            self._differences[key] = None if raw is None else raw[0]
+        difference = self._differences[key]
+        if difference is None:
+            return math.inf
+        white = self._whitened(difference[:, None])[:, 0]
+        white -= self.basis @ (self.basis.T @ white)
+        return float(white @ white)
+
     def departures(self, values: Mapping[str, float]) -> tuple[Float, Float] | None:
         """Computed less recorded friction without linear nuisances, and the derivatives."""
         given = {**self.fixed, "W0": self.run.W0}
@@ -249,6 +268,7 @@ class RunTerm:
 
     def update_noise(self, values: Mapping[str, float]) -> bool:
         """Estimate the noise from the residual at `values`; False if there is no motion."""
+        self._differences.clear()
         raw = self.departures(values)
         if raw is None:
             return False
