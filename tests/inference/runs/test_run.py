@@ -51,3 +51,15 @@ def test_a_load_that_jumps_between_two_samples_stays_there():
     np.testing.assert_allclose(
         drive.load_at(np.array([10.0, 39.9, 40.0, 80.0])), [1, 1, 1.2, 1.2], atol=1e-4
     )
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_corners_of_short_ramps_are_placed_within_the_noise(seed):
+    rng = np.random.default_rng(seed)
+    begin, last, size = rng.uniform(40, 60), rng.uniform(0.35, 1.0), rng.uniform(0.05, 0.25)
+    size *= rng.choice([-1, 1])
+    corners, levels = [0.0, begin, begin + last, 99.9], [1.0, 1.0, 1.0 + size, 1.0 + size]
+    found = run_under(corners, levels).drive.edges
+    assert found.size == 4
+    # The noise of 1e-4 over the slope, from the few samples of the ramp.
+    np.testing.assert_allclose(found[1:3], corners[1:3], atol=6e-4 * last / abs(size))

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
+from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
 from asperity.errors import InputError
@@ -30,6 +31,8 @@ _CONSTANT_LOAD = 1e-3
 _LOAD_NOISE = 5.0
 #: Samples between two corners that may be one.
 _AT_CORNER = 5
+#: Samples on either side of a corner that place it.
+_BESIDE_CORNER = 50
 #: Samples up to which a recording is compared sample by sample.
 LONGEST = 20_000
 #: Of longer ones: parts into which the load between its quick
@@ -349,6 +352,7 @@ def _load(
     if len(knots) == 2 and abs(W[0] - W[-1]) < _CONSTANT_LOAD * mean + _LOAD_NOISE * noise:
         return mean, unit, False, ends, np.full(2, mean)
     at = _between_samples(t, W, knots, max(_LOAD_NOISE * noise, _CONSTANT_LOAD * mean))
+    at = _placed(t, W, at)
     values = _line_through(t, W, at)
     at[0], at[-1] = time[0], time[-1]
     return float(values[0]), unit, True, at, values
@@ -407,6 +411,29 @@ def _between_samples(t: Float, y: Float, knots: Sequence[int], tolerance: float)
         kept.append(at[k])
         k += 1
     return np.array(kept)
+
+
+def _placed(t: Float, y: Float, at: Float) -> Float:
+    """Corners moved by up to an interval to where the lines on either side are nearest to y."""
+    placed = at.copy()
+    for k in range(1, at.size - 1):
+        middle = int(np.searchsorted(t, at[k]))
+        first = max(middle - _BESIDE_CORNER, int(np.searchsorted(t, placed[k - 1])))
+        last = min(middle + _BESIDE_CORNER, int(np.searchsorted(t, at[k + 1], side="right")))
+        near, values = t[first:last], y[first:last]
+        if not first + 1 < middle < last - 2:
+            continue
+
+        def squares(corner: float, near: Float = near, values: Float = values) -> float:
+            knots = np.array([near[0], corner, near[-1]])
+            line = np.interp(near, knots, _line_through(near, values, knots))
+            return float(np.sum((line - values) ** 2))
+
+        inside = max(t[middle - 1], near[1]), min(t[middle + 1], near[-2])
+        found = minimize_scalar(squares, bounds=inside, method="bounded")
+        if found.fun < squares(at[k]):
+            placed[k] = found.x
+    return placed
 
 
 def _line_through(t: Float, y: Float, at: Float) -> Float:
