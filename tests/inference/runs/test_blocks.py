@@ -161,6 +161,25 @@ def test_large_samples_far_off_take_no_good_ones_with_them(ringing):
     np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
 
 
+@pytest.mark.parametrize("offset", [-3, 0, 2, 12])
+@pytest.mark.parametrize("size", [0.02, -0.5])
+def test_a_sample_far_off_beside_a_step_is_left_out(clean, ringing, offset, size):
+    values = clean + ringing
+    spoiled = values.copy()
+    spoiled[round(CASE.changes[0] * CASE.rate) + offset] += size
+    right, run = (reduced(recorded(x), 100.0) for x in (values, spoiled))
+    assert (right.blocks.spikes, run.blocks.spikes) == (0, 1)
+    np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
+
+
+def test_peaks_of_one_sample_after_each_step_stay(clean, ringing):
+    """Friction that rises and relaxes between two samples is no spike of the electronics."""
+    values = clean + ringing
+    for change, size in zip(CASE.changes, (0.05, -0.04), strict=True):
+        values[round(change * CASE.rate) + 1] += size
+    assert reduced(recorded(values), 100.0).blocks.spikes == 0
+
+
 @pytest.mark.parametrize("rate", [0.0, "-3 Hz", "fast", "3 N"])
 def test_a_rate_that_is_none_is_refused(rate):
     with pytest.raises(InputError, match="fit_rate must"):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from asperity.inference.runs.motion import Drive, RunMotion
+from asperity.inference.runs.drive import Drive
+from asperity.inference.runs.motion import RunMotion
 from asperity.laws import get_law
 
 VALUES = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6, "K": 4e3, "W0": 1.0}

@@ -19,8 +19,9 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.inference.posterior.gauge import GaugeArrays, gauge_arrays
+from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.gain import GAIN
-from asperity.inference.runs.motion import Drive, density_through
+from asperity.inference.runs.motion import density_through
 from asperity.inference.runs.term import RunTerm
 
 Float = NDArray[np.float64]

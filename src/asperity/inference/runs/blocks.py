@@ -28,6 +28,7 @@ from scipy.stats import chi2, norm
 from asperity.errors import InputError
 from asperity.inference.runs.noise import fitted
 from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
+from asperity.inference.runs.wrong_samples import CLEARLY, standing_out
 from asperity.units import to_si
 
 Float = NDArray[np.float64]
@@ -88,7 +89,9 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
         _require_blocks(run, length)
         if all(q == 1 for q in _counts(run, length)):
             return run
-    clean, lines = _without_lines(run)
+    # A sample that is far off has every frequency: it would be taken for lines.
+    clean, wrong = _without_wrong_at_changes(run)
+    clean, lines = _without_lines(clean)
     clean, spikes = _without_spikes(clean)
     doubts = list(run.doubts)
     if length is None:
@@ -103,7 +106,9 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
     if short.blocks is None:
         return run  # every sample is needed
     return replace(
-        short, doubts=tuple(doubts), blocks=replace(short.blocks, lines=lines, spikes=spikes)
+        short,
+        doubts=tuple(doubts),
+        blocks=replace(short.blocks, lines=lines, spikes=wrong + spikes),
     )
 
 
@@ -295,6 +300,32 @@ def _without_spikes(run: RecordedRun) -> tuple[RecordedRun, int]:
     return (replace(run, friction=friction) if count else run), count
 
 
+def _without_wrong_at_changes(run: RecordedRun) -> tuple[RecordedRun, int]:
+    """The recording with means of their neighbours for wrong samples at changes of the drive.
+
+    Those are wrong that no motion leads to and back. How fast the spring can be pulled is not known
+    yet; but no two neighbours elsewhere, after other changes of the drive too, are half as far
+    apart.
+    """
+    friction = run.friction.copy()
+    count = 0
+    for a, b in run.stretches:
+        x = friction[a:b]
+        if x.size <= 2 * _BESIDE:
+            continue
+        first = np.searchsorted(run.time[a:b], run.drive.edges[1:-1])
+        alone = standing_out(x, first.tolist(), _BESIDE)
+        steps = np.abs(np.diff(x))
+        for k, apart in alone.items():
+            # Peaks that one sample holds stand after several changes, and each speaks for others.
+            before, after = steps[: max(k - 2 * _BESIDE, 0)], steps[k + 2 * _BESIDE :]
+            farthest = max(before.max(initial=0.0), after.max(initial=0.0))
+            if apart > CLEARLY * farthest:
+                x[k] = 0.5 * (x[k - 1] + x[k + 1])
+                count += 1
+    return (replace(run, friction=friction) if count else run), count
+
+
 def _far_off_alone(
     x: Float, learnt: Float, never: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], Float]:
@@ -312,8 +343,10 @@ def _far_off_alone(
     model = fitted([learnt[:_LEARNT]], order=_BESIDE)
     apart = model.departures_of_single_samples(model.whiten(x[:, None])[:, 0])
     scatter = 1.4826 * float(np.median(np.abs(apart)))
-    apart[never] = 0.0
-    far = np.flatnonzero(np.abs(apart) > float(norm.isf(_SPIKE / (2 * x.size))) * scatter)
+    judged = np.ones(x.size, bool)
+    judged[never] = False
+    limit = float(norm.isf(_SPIKE / (2 * x.size))) * scatter
+    far = np.flatnonzero(judged & (np.abs(apart) > limit))
     # Beside a sample that is far off, others seem to be.
     largest = [k for k in far.tolist() if np.abs(apart[_about(k)]).max() <= abs(apart[k])]
     weights = np.concatenate([[1.0], model.coefficients()[-1]])

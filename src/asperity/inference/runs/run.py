@@ -16,7 +16,7 @@ from scipy.optimize import minimize_scalar
 from scipy.stats import norm
 
 from asperity.errors import InputError
-from asperity.inference.runs.motion import Drive
+from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.velocities import constant_velocities
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals

@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from asperity.inference.objective import Residuals
 from asperity.inference.runs.gain import GAIN
@@ -17,6 +16,15 @@ from asperity.inference.runs.motion import RunMotion
 from asperity.inference.runs.noise import Autoregression, fitted, strongest_peak, whiteness
 from asperity.inference.runs.noise_uncertainty import added_by_noise
 from asperity.inference.runs.run import RecordedRun
+from asperity.inference.runs.wrong_samples import (
+    AT_CHANGE,
+    MOST,
+    alone_at_changes,
+    beyond_any_motion,
+    far_off_alone,
+    first_after_changes,
+    largest_by_chance,
+)
 from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law
 from asperity.parameters import Parameter, law_parameters
@@ -32,21 +40,11 @@ _LINE, _LINES = 1e-4, 6
 _SLOW = 0.999
 #: Steps towards the noise at given parameters, and what of the fitted curve counts as seen.
 _NOISE_STEPS, _SEEN = 3, 1e-10
-#: A sample that is farther off than this by chance, over the whole run, is an outlier; the largest
-#: share of samples that are left out as such.
-_OUTLIER, _MOST_OUTLIERS = 1e-4, 0.01
 #: Times of velocity changes are known to this many sampling intervals.
 _CUT_INTERVALS = 2.0
-#: Samples on either side of a velocity change that are left out only where no motion leads to them;
-#: how many deviations they must stand out by to be asked about, and how many of a change are.
-_AT_STEP, _STANDS_OUT, _MOST_AT_STEP = 5, 8.0, 2
-#: How many times farther than a spring could take them they are off where they are wrong.
-_CLEARLY = 2.0
 #: Jumps of the level that are removed at most, and samples about a change and share of the segments
 #: beside it in which none is looked for.
 _JUMPS, _NEAR_CHANGE, _SHARE_NEAR_CHANGE = 5, 20, 0.05
-#: Changes of the load are few if there are so many samples to each.
-_FEW_CHANGES = 100
 #: Below this probability innovations after the changes are too large for the law.
 _LAW_FAILS = 1e-4
 #: Outliers that a warning names.
@@ -277,12 +275,15 @@ class RunTerm:
                 self._estimate_noise(*raw)
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             white = self._whitened(left[:, None])[:, 0]
-            added = self._add_jump(white, raw[1]) or self._add_outliers(white)
-            if not (added or (self._order != 0 and self._add_line(white))):
+            if self._add_jump(white, raw[1]):
+                continue
+            wrong = far_off_alone(self.run, self.models, white, self._outliers)
+            self.leave_out(wrong)
+            if not (wrong or (self._order != 0 and self._add_line(white))):
                 break
         innovations = [white[a:b] for a, b in self.run.stretches]
         self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
-        self._after_changes = misfit_after_changes(white, self._first_after_changes())
+        self._after_changes = misfit_after_changes(white, first_after_changes(self.run))
         return True
 
     def _estimate_noise(self, difference: Float, jacobian: Float) -> None:
@@ -306,34 +307,6 @@ class RunTerm:
         ]
         self._prepare()
 
-    def _add_outliers(self, white: Float) -> bool:
-        """Leave out the samples that are too far off alone, if there are any.
-
-        A sample is left out by a linear nuisance of its own, so that those beside it keep their
-        correlation.
-        """
-        size = white.size
-        room = int(_MOST_OUTLIERS * size) - len(self._outliers)
-        limit = self.largest_by_chance
-        found: list[int] = []
-        for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
-            apart = np.abs(model.departures_of_single_samples(white[a:b]))
-            known = [k - a for k in self._outliers if a <= k < b]
-            apart[known] = 0.0
-            # At a step a wrong motion is off by a few samples, and must not hide its misfit.
-            for first in self._first_after_changes():
-                first -= a
-                apart[max(first - _AT_STEP, 0) : max(first + _AT_STEP, 0)] = 0.0
-            reach = max(3, model.order)
-            for k in np.argsort(-apart):
-                if apart[k] <= limit or len(found) >= room:
-                    break
-                # Beside a sample that is far off, others seem to be.
-                if all(abs(k + a - other) > reach for other in found):
-                    found.append(int(k) + a)
-        self.leave_out(found)
-        return bool(found)
-
     def leave_out(self, samples: Sequence[int]) -> None:
         """Leave out samples, by a linear nuisance for each."""
         if not samples:
@@ -344,45 +317,14 @@ class RunTerm:
         self._outliers = [*self._outliers, *samples]
         self._prepare()
 
-    @property
-    def largest_by_chance(self) -> float:
-        """Deviations that no sample of the run is off by chance."""
-        return float(norm.isf(_OUTLIER / (2 * self.run.time.size)))
-
     def alone_at_changes(self) -> dict[int, float]:
-        """Samples beside changes of the drive that lie far above both their neighbours, or below.
-
-        They are wrong, or a peak of friction that one sample holds.
-
-        Returns
-        -------
-        dict of int to float
-            Distance from the nearer neighbour.
-        """
-        found: dict[int, float] = {}
-        for a, b in self.run.stretches:
-            friction = self.run.friction[a:b].copy()
-            bends = np.abs(friction[1:-1] - 0.5 * (friction[:-2] + friction[2:]))
-            scatter = 1.4826 * float(np.median(bends))
-            for first in self._first_after_changes():
-                near = slice(max(first - a - _AT_STEP, 1), min(first - a + _AT_STEP, b - a - 1))
-                for _ in range(_MOST_AT_STEP if near.start < near.stop else 0):
-                    apart = _beyond_neighbours(friction[near.start - 1 : near.stop + 1])
-                    k = near.start + int(np.argmax(apart))
-                    if apart[k - near.start] <= _STANDS_OUT * scatter:
-                        break
-                    found[k + a] = float(apart[k - near.start])
-                    # Its neighbours are judged without it.
-                    friction[k] = 0.5 * (friction[k - 1] + friction[k + 1])
-        return found
+        """Samples beside changes of the drive that are wrong, or peaks that one sample holds."""
+        return alone_at_changes(self.run)
 
     def beyond_any_motion(
         self, samples: Mapping[int, float], values: Mapping[str, float]
     ) -> list[int]:
-        """Samples that lie farther above or below their neighbours than a spring allows.
-
-        Whatever the law, the force rises by no more than what the drive pulls the spring in the
-        time, since the slider does not slide back: to a peak, or from a dip.
+        """Those of the samples that no motion leads to.
 
         Parameters
         ----------
@@ -396,18 +338,7 @@ class RunTerm:
             inner = self.inner(name)
             if inner is not None:
                 given[inner] = value
-        drive, time = self.run.drive, self.run.time
-        lowest = self.run.W0 * float(np.min(drive.load))
-        stretching = given.get(GAIN, 1.0) * given["K"] / lowest * self.motion.velocity
-        found = []
-        for k, size in samples.items():
-            near = time[[max(k - 2 * _AT_STEP, 0), min(k + 2 * _AT_STEP, time.size - 1)]]
-            first, last = np.searchsorted(drive.edges[1:-1], near)
-            pull = float(np.max(np.abs(drive.pull[first : last + 1])))
-            longest = float(np.max(np.diff(time[k - 1 : k + 2])))
-            if size > _CLEARLY * stretching * pull * longest:
-                found.append(k)
-        return found
+        return beyond_any_motion(self.run, samples, given.get(GAIN, 1.0) * given["K"])
 
     @property
     def law_fails_after_changes(self) -> bool:
@@ -419,13 +350,6 @@ class RunTerm:
         """Times (s) of jumps of the level that were removed, from the first sample on."""
         return tuple(float(self.run.time[k]) for k in sorted(self._jumps))
 
-    def _first_after_changes(self) -> list[int]:
-        """First samples after changes of the velocity, and of the load where they are few."""
-        inner = self.run.drive.edges[1:-1]
-        few = inner.size * _FEW_CHANGES <= self.run.time.size
-        edges = inner if few else self.run.drive.edges[list(self.run.cuts)]
-        return [int(k) for k in np.searchsorted(self.run.time, edges)]
-
     def _add_jump(self, white: Float, jacobian: Float) -> bool:
         """Remove the largest jump of the gauge's offset, if there is one.
 
@@ -436,14 +360,14 @@ class RunTerm:
         curves = self._whitened(jacobian[:, np.any(jacobian, axis=0)])
         joined = np.column_stack([curves, self._white_columns])
         fitted_curves = np.linalg.qr(joined / np.sqrt(np.einsum("ij,ij->j", joined, joined)))[0]
-        largest, best = self.largest_by_chance, -1
+        largest, best = largest_by_chance(white.size), -1
         time, edges = self.run.time, self.run.drive.edges
         for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
             apart = np.abs(departures_of_jumps(model, white[a:b], fitted_curves[a:b]))
             alone = np.abs(model.departures_of_single_samples(white[a:b]))
             apart[apart <= alone] = 0.0
             # The first sample and one beside a change of the sampling rate have no level before.
-            apart[: _AT_STEP + 1] = apart[-_AT_STEP:] = 0.0
+            apart[: AT_CHANGE + 1] = apart[-AT_CHANGE:] = 0.0
             for before, at, after in zip(edges[:-2], edges[1:-1], edges[2:], strict=True):
                 first, last = np.searchsorted(
                     time,
@@ -570,7 +494,7 @@ class RunTerm:
         times = [f"{self.run.time[k]:.6g}" for k in sorted(self._outliers)]
         count = len(times)
         shown = ", ".join(times[:_NAMED]) + (", ..." if count > _NAMED else "")
-        many = count >= int(_MOST_OUTLIERS * self.run.time.size)
+        many = count >= int(MOST * self.run.time.size)
         those, were = (f"{count} samples", "were") if count > 1 else ("a sample", "was")
         return (
             f"{those} of {self.name} {were} left out as farther off than noise can be, at {shown} "
@@ -631,14 +555,6 @@ class RunTerm:
         end = float(self.run.at.flat[-1])
         count = math.ceil(end * rate) + 1
         return np.minimum(np.arange(count) / rate, end), rate
-
-
-def _beyond_neighbours(x: Float) -> Float:
-    """How far each sample but the first and last is above both its neighbours, or below both."""
-    before, here, after = x[:-2], x[1:-1], x[2:]
-    above = here - np.maximum(before, after)
-    below = np.minimum(before, after) - here
-    return np.asarray(np.maximum(np.maximum(above, below), 0.0))
 
 
 def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:

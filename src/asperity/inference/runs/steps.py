@@ -1,0 +1,271 @@
+"""Steps of the motion through a recording, and their derivatives.
+
+The integrator is the pair of Dormand and Prince (J. Comput. Appl. Math. 6, 19, 1980) of orders 5
+and 4 with adaptive steps that end at every change of the drive, and its continuous extension.
+Derivatives are those of the computed solution at its steps; step ends move with the changes of the
+drive.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from asperity.inference.runs.drive import Drive, excitation, shifted
+from asperity.laws import Law
+from asperity.parameters import law_parameters
+from asperity.slider.motion import Motion
+
+Float = NDArray[np.float64]
+
+#: Relative and absolute local error of a step, of states of order 1.
+_RELATIVE, _ABSOLUTE = 1e-7, 1e-9
+#: Steps that are differentiated side by side.
+_SIDE_BY_SIDE = 64
+#: Dormand and Prince: nodes, coefficients of the stages, error of the step.
+_NODES = np.array([0.0, 0.2, 0.3, 0.8, 8 / 9, 1.0, 1.0])
+_STAGES = np.zeros((7, 7))
+_STAGES[1, :1] = 1 / 5
+_STAGES[2, :2] = 3 / 40, 9 / 40
+_STAGES[3, :3] = 44 / 45, -56 / 15, 32 / 9
+_STAGES[4, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
+_STAGES[5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
+_STAGES[6, :6] = 35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
+_ERROR = np.array([71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40])
+#: Of the continuous extension (Hairer, Norsett and Wanner, Solving ODEs I, II.6).
+_DENSE = np.array(
+    [
+        -12715105075 / 11282082432,
+        0.0,
+        87487479700 / 32700410799,
+        -10690763975 / 1880347072,
+        701980252875 / 199316789632,
+        -1453857185 / 822651844,
+        69997945 / 29380423,
+    ]
+)
+
+
+class Curve(NamedTuple):
+    """Steps with the coefficients of the continuous extension, filled up to the room for them."""
+
+    begin: Array
+    length: Array
+    coefficients: Array
+
+
+def integrated(
+    motion: Motion, free: tuple[str, ...], given: dict[str, Any], drive: Drive, room: int
+) -> tuple[Curve, Curve, Array, Array]:
+    """The motion, its derivatives, its number of steps, and whether the end was reached.
+
+    Of a step the derivatives depend on those of the steps before it only through the states at its
+    beginning: they are computed for many steps side by side, and then added up along them. Their
+    first axis is that of the parameters.
+    """
+
+    def begun(x: Array) -> tuple[Motion, Drive, Mapping[str, Array]]:
+        values = {**given, **dict(zip(free, x, strict=True))}
+        return with_values(motion, values), shifted(drive, values), values
+
+    def first_states(x: Array) -> Array:
+        now, _, values = begun(x)
+        return _first_states(now, values)
+
+    x = numbers(free, given)
+    taken, curve, steps, done = _steps_taken(*begun(x), room)
+    count, m = x.size, taken.states.shape[1]
+    nothing = jax.tree.map(lambda all_: jnp.zeros((count, *all_.shape)), curve)
+    if not free:
+        return curve, nothing, steps, done
+
+    def slopes_of(part: _Step, change: Array) -> tuple[Array, Curve]:
+        """Of the states after a part of the steps, and of the motion at these."""
+
+        def one(step: _Step, direction: Array) -> tuple[Array, Curve]:
+            """Along one direction of the parameters, or of the states."""
+
+            def moved(x: Array, y: Array) -> tuple[Array, Curve]:
+                now, drawn, values = begun(x)
+                begin = drawn.edges[step.piece] + step.since
+                length = jnp.where(step.last, drawn.edges[step.piece + 1] - begin, step.length)
+                new, _, rows = _stepped(now, drawn, values, step.piece, begin, length, y)
+                return new, Curve(begin, length, rows)
+
+            along = direction[:count], direction[count:]
+            return jax.jvp(moved, (x, step.states), along)[1]
+
+        each_direction = jax.vmap(one, (None, 0))
+        after, found = jax.vmap(each_direction, (0, None), 1)(part, jnp.eye(count + m))
+
+        def onwards(dy: Array, own: Array) -> tuple[Array, Array]:
+            return own[:count] + jnp.sum(dy[:, :, None] * own[count:], axis=1), dy
+
+        change, before = jax.lax.scan(onwards, change, jnp.moveaxis(after, 1, 0))
+        by_states = jnp.moveaxis(before, 0, 1)[..., None, None]
+        whole = jnp.sum(by_states * found.coefficients[count:].swapaxes(0, 1), axis=2)
+        return change, Curve(
+            found.begin[:count], found.length[:count], found.coefficients[:count] + whole
+        )
+
+    def body(carry: Any) -> Any:
+        first, change, slopes = carry
+        part = jax.tree.map(
+            lambda all_: jax.lax.dynamic_slice_in_dim(all_, first, _SIDE_BY_SIDE), taken
+        )
+        change, found = slopes_of(part, change)
+        slopes = jax.tree.map(
+            lambda all_, new: jax.lax.dynamic_update_slice_in_dim(all_, new, first, 1),
+            slopes,
+            found,
+        )
+        return first + _SIDE_BY_SIDE, change, slopes
+
+    start = jnp.asarray(0), jax.jacfwd(first_states)(x).T, nothing
+    *_, slopes = jax.lax.while_loop(lambda carry: carry[0] < steps, body, start)
+    return curve, slopes, steps, done
+
+
+class _Step(NamedTuple):
+    """What a step begins with.
+
+    Attributes
+    ----------
+    piece : int array
+        Of the drive.
+    since, length : array
+        Time since the beginning of the piece, and length of the step (s).
+    last : bool array
+        Whether it ends with the piece.
+    states : array
+    """
+
+    piece: Array
+    since: Array
+    length: Array
+    last: Array
+    states: Array
+
+
+def _first_states(motion: Motion, values: Mapping[str, Array]) -> Array:
+    """States at the beginning: those of steady sliding and the departures from it."""
+    steady = motion.steady()
+    names = ("start_force", *(f"start_state_{i}" for i in range(steady.shape[0] - 1)))
+    return steady + jnp.stack([jnp.asarray(values.get(n, 0.0), float) for n in names])
+
+
+def _stepped(
+    motion: Motion,
+    drive: Drive,
+    values: Mapping[str, Array],
+    piece: Array,
+    begin: Array,
+    length: Array,
+    y: Array,
+) -> tuple[Array, Array, Array]:
+    """States after a step, their error, and the coefficients of the continuous extension."""
+
+    @jax.jit  # traced once for all stages
+    def rates(at: Array, state: Array) -> Array:
+        return motion.rates(state, excitation(drive, values, piece, at))
+
+    # Sums written out: products of such small matrices take longer than all else.
+    k: list[Array] = []
+    new = y
+    for node, row in zip(_NODES, _STAGES, strict=True):
+        new = y + length * _combined(row, k) if k else y
+        k.append(rates(begin + node * length, new))
+    # The last stage is the solution of order 5.
+    rise = new - y
+    first = length * k[0] - rise
+    second = rise - length * k[6] - first
+    rows = jnp.stack([y, rise, first, second, length * _combined(_DENSE, k)])
+    return new, length * _combined(_ERROR, k), rows
+
+
+def _steps_taken(
+    motion: Motion, drive: Drive, values: Mapping[str, Array], room: int
+) -> tuple[_Step, Curve, Array, Array]:
+    """The steps, the motion at them, their number, and whether the end was reached."""
+    pieces = drive.pull.shape[0]
+    y0 = _first_states(motion, values)
+    end = drive.edges[-1]
+
+    def body(carry: Any) -> Any:
+        t, h, y, piece, n, tries, kept, curve = carry
+        edge = drive.edges[piece + 1]
+        last = t + 1.01 * h >= edge
+        step = jnp.where(last, edge - t, h)
+        new, error, rows = _stepped(motion, drive, values, piece, t, step, y)
+        scale = _ABSOLUTE + _RELATIVE * jnp.maximum(jnp.abs(y), jnp.abs(new))
+        norm = jnp.sqrt(jnp.mean((error / scale) ** 2))
+        norm = jnp.where(jnp.isfinite(norm), norm, 1e10)
+        # A piece without length is passed.
+        accepted = (norm <= 1.0) | (step <= 1e-14 * end)
+        this = _Step(piece, t - drive.edges[piece], step, last, y)
+        kept = jax.tree.map(lambda all_, one: all_.at[n].set(one), kept, this)
+        curve = jax.tree.map(lambda all_, one: all_.at[n].set(one), curve, Curve(t, step, rows))
+        factor = jnp.clip(0.9 * jnp.maximum(norm, 1e-10) ** -0.2, 0.2, 5.0)
+        h_next = step * factor
+        h_next = jnp.where(last & accepted, jnp.maximum(h_next, h), h_next)
+        moved = accepted & (step > 1e-14 * end)
+        t = jnp.where(accepted, jnp.where(last, edge, t + step), t)
+        y = jnp.where(moved, new, y)
+        piece = jnp.where(accepted & last, piece + 1, piece)
+        return t, h_next, y, piece, jnp.where(moved, n + 1, n), tries + 1, kept, curve
+
+    def going(carry: Any) -> Array:
+        _, h, _, piece, n, tries, *_ = carry
+        return (piece < pieces) & (n < room) & (tries < room + room // 2) & (h > 1e-13 * end)
+
+    zero = jnp.asarray(0)
+    kept = _Step(
+        jnp.zeros(room, int),
+        jnp.zeros(room),
+        jnp.zeros(room),
+        jnp.zeros(room, bool),
+        # Those that fill up are computed with the others.
+        jnp.zeros((room, *y0.shape)) + y0,
+    )
+    curve = Curve(jnp.full(room, jnp.inf), jnp.ones(room), jnp.zeros((room, 5, *y0.shape)))
+    start = drive.edges[0], 1e-3 * (drive.edges[1] - drive.edges[0]), y0, zero, zero, zero
+    *_, piece, n, _, kept, curve = jax.lax.while_loop(going, body, (*start, kept, curve))
+    return kept, curve, n, piece >= pieces
+
+
+def _combined(weights: Float, rates: Sequence[Array]) -> Array:
+    """Sum of the rates by their weights, those of zero left out."""
+    return functools.reduce(
+        jnp.add, [w * k for w, k in zip(weights, rates, strict=False) if w != 0.0]
+    )
+
+
+def numbers(names: tuple[str, ...], given: Mapping[str, Any]) -> Array:
+    """Values of the named parameters, shape (parameters,)."""
+    return jnp.array([given[name] for name in names], float)
+
+
+def with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:
+    """The equation of motion with other numbers of the law and the slider."""
+    fields = law_fields(type(motion.slider.law))
+    law = type(motion.slider.law)(**{f: values[n] for n, f in fields.items()})
+    slider = motion.slider
+    changed = eqx.tree_at(
+        lambda s: (s.law, s.K, s.W0, s.M),
+        slider,
+        (law, values["K"], values["W0"], values.get("M", slider.M)),
+    )
+    return eqx.tree_at(lambda m: m.slider, motion, changed)
+
+
+def law_fields(law: type[Law]) -> dict[str, str]:
+    """Fields of a law by the names of their parameters."""
+    return {n: p.path.rsplit(".", 1)[-1] for n, p in law_parameters(law).items()}
