@@ -40,7 +40,7 @@ def test_all_numbers_that_the_readings_may_show_are_free_by_default(readings, pm
     assert record["fixed"]["mu0"] == {"value": pmma.mu0, "unit": ""}
     assert record["fixed"]["V"] == {"value": None, "unit": "m/s"}
     law = get_law("linker-dieterich")
-    assert free_by_default(law, table, [], machine, None) == [
+    assert free_by_default(law, [table], machine, None) == [
         *("mu0", "A", "B", "D0", "alpha", "eps_ratio")
     ]
 

@@ -135,8 +135,8 @@ def test_white_noise_bars_are_too_small_and_a_factor_of_two_is_seen():
 )
 def test_what_a_recording_may_show_is_free_by_default(case, law, free):
     (run,) = runs_of(CASES[case], 1)
-    assert free_by_default(get_law(law), None, [run], None, None) == free
-    assert free_by_default(get_law(law), None, [run], {"A": 0.01}, None) == free[1:]
+    assert free_by_default(get_law(law), [run], None, None) == free
+    assert free_by_default(get_law(law), [run], {"A": 0.01}, None) == free[1:]
 
 
 def test_alpha_under_a_constant_load_is_refused():

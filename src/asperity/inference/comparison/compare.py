@@ -18,7 +18,6 @@ from asperity.inference.fitting.free_stiffness import stiffness_that_describes
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
-from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.residuals import residuals_of, weights_of
@@ -165,7 +164,11 @@ def compare(
         )
     several = listed_data(data, options.get("runs") or RunOptions())
     own = {
-        name: _seen(name, several, options) if free is None else _own(name, free, laws)
+        name: (
+            free_by_default(get_law(name), several, options.get("fixed"), options.get("material"))
+            if free is None
+            else _own(name, free, laws)
+        )
         for name in dict.fromkeys(laws)
     }
     given = {
@@ -377,18 +380,6 @@ def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
     others = {p for law in laws for p in _parameters(law)}
     mine = _parameters(name)
     return [p for p in free if p in mine or p not in others]
-
-
-def _seen(law: str, data: Sequence[Data], options: Mapping[str, Any]) -> list[str]:
-    """What is free by default."""
-    tables = [d for d in data if isinstance(d, LockInTable)]
-    return free_by_default(
-        get_law(law),
-        joined(tables)[0] if tables else None,
-        [d for d in data if isinstance(d, RecordedRun)],
-        options.get("fixed"),
-        options.get("material"),
-    )
 
 
 def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:

@@ -145,9 +145,7 @@ def fit(
     tables = [d for d in several if isinstance(d, LockInTable)]
     recordings = [d for d in several if isinstance(d, RecordedRun)]
     table = joined(tables)[0] if tables else None
-    names = (
-        free_by_default(chosen, table, recordings, fixed, material) if free is None else list(free)
-    )
+    names = free_by_default(chosen, several, fixed, material) if free is None else list(free)
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
         return _objective(

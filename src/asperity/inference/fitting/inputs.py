@@ -9,7 +9,7 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.inference.runs.run import RecordedRun
-from asperity.inference.tables.table import LockInTable
+from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.unknowns import (
     EPS_RATIO,
     REFERENCES,
@@ -30,8 +30,7 @@ _REFERENCE_VELOCITY = 1e-6
 
 def free_by_default(
     law: type[Law],
-    table: LockInTable | None,
-    runs: Sequence[RecordedRun],
+    data: Sequence[LockInTable | RecordedRun],
     fixed: Mapping[str, Any] | None,
     material: Material | None,
 ) -> list[str]:
@@ -40,9 +39,8 @@ def free_by_default(
     Parameters
     ----------
     law : type of Law
-    table : LockInTable or None
-    runs : sequence of RecordedRun
-        Their stiffness is free in any case.
+    data : sequence of LockInTable or RecordedRun
+        The stiffness of a recording is free in any case.
     fixed : mapping, optional
     material : Material, optional
         Its mu0 stands where no mean friction is reported.
@@ -52,6 +50,9 @@ def free_by_default(
     list of str
         Parameters of the law, and for a table the share of the modulation, ``eps_ratio``.
     """
+    tables = [d for d in data if isinstance(d, LockInTable)]
+    runs = [d for d in data if isinstance(d, RecordedRun)]
+    table = joined(tables)[0] if tables else None
     constant_load = table is None and not any(run.load_varies for run in runs)
     known = {*(fixed or {}), *({} if table is None else table.points)}
     if table is None or ("mean_friction" not in table.values and material and "mu0" in material):
