@@ -24,7 +24,7 @@ def process(order_two=(1.2, -0.5), n=4000, seed=0):
 def test_coefficients_and_variance_of_a_known_process():
     found = fitted([process()], order=2)
     # Standard errors of the coefficients: sqrt((1 - a2^2)/n) = 0.014.
-    np.testing.assert_allclose(found.coefficients()[-1], [1.2, -0.5], atol=0.05)
+    np.testing.assert_allclose(found.coefficients[-1], [1.2, -0.5], atol=0.05)
     assert found.innovation == pytest.approx(1.0, abs=0.04)
 
 

@@ -349,7 +349,7 @@ def _far_off_alone(
     far = np.flatnonzero(judged & (np.abs(apart) > limit))
     # Beside a sample that is far off, others seem to be.
     largest = [k for k in far.tolist() if np.abs(apart[_about(k)]).max() <= abs(apart[k])]
-    weights = np.concatenate([[1.0], model.coefficients()[-1]])
+    weights = np.concatenate([[1.0], model.coefficients[-1]])
     size = model.innovation / math.sqrt(float(weights @ weights))
     alone = np.array(largest, np.intp)
     return alone, size * apart[alone]

@@ -45,7 +45,7 @@ def departures_of_jumps(model: Autoregression, white: Float, curves: Float) -> F
     the curves.
     """
     n, p = white.size, model.order
-    taps = np.concatenate([[1.0], -model.coefficients()[-1]]) / model.innovation
+    taps = np.concatenate([[1.0], -model.coefficients[-1]]) / model.innovation
     rise = np.cumsum(taps)
 
     def along(y: Float) -> Float:

@@ -9,6 +9,7 @@ samples are predicted by the lower orders, so that the likelihood is that of all
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -57,6 +58,7 @@ class Autoregression:
         """Standard deviation of a sample if all before it are known."""
         return math.sqrt(self.variance * float(np.prod(1 - self.reflection**2)))
 
+    @functools.cached_property
     def coefficients(self) -> list[Float]:
         """Coefficients a_k of the predictors of every order up to that of the process."""
         orders = [np.zeros(0)]
@@ -70,7 +72,7 @@ class Autoregression:
         found = np.zeros(n)
         found[:1] = self.variance
         rest = self.variance
-        for k, (a, partial) in enumerate(zip(self.coefficients(), self.reflection, strict=False)):
+        for k, (a, partial) in enumerate(zip(self.coefficients, self.reflection, strict=False)):
             if k + 1 >= n:
                 break
             found[k + 1] = partial * rest + a @ found[k:0:-1]
@@ -80,18 +82,22 @@ class Autoregression:
     def whiten(self, columns: Float) -> Float:
         """Innovations of unit variance of samples along the first axis."""
         x = np.asarray(columns, float)
-        orders = self.coefficients()
-        p = self.order
-        a = orders[-1]
+        taps = np.concatenate([[1.0], -self.coefficients[-1]]) / self.innovation
+        out = np.asarray(lfilter(taps, [1.0], x, axis=0))
         # In place of the unknown samples before the first, lower orders predict.
-        out = lfilter(np.concatenate([[1.0], -a]), [1.0], x, axis=0) / self.innovation
+        first = min(self.order, x.shape[0])
+        out[:first] = np.tensordot(self._first_taps[:first, :first], x[:first], axes=1)
+        return out
+
+    @functools.cached_property
+    def _first_taps(self) -> Float:
+        """Weights of the first samples, by which lower orders predict, shape (p, p)."""
+        found = np.zeros((self.order, self.order))
         scale = self.variance
-        for t in range(min(p, x.shape[0])):
-            b = orders[t]
-            known = x[t - 1 :: -1][:t] if t else x[:0]
-            out[t] = (x[t] - np.tensordot(b, known, axes=(0, 0))) / math.sqrt(scale)
-            scale *= 1 - self.reflection[t] ** 2
-        return np.asarray(out)
+        for t, (b, partial) in enumerate(zip(self.coefficients, self.reflection, strict=False)):
+            found[t, : t + 1] = np.concatenate([-b[::-1], [1.0]]) / math.sqrt(scale)
+            scale *= 1 - partial**2
+        return found
 
     def departures_of_single_samples(self, white: Float) -> Float:
         """How far each sample alone is off what the others predict, in standard deviations.
@@ -106,7 +112,7 @@ class Autoregression:
         The estimate of a spike at each sample over its standard error (Fox, J. R. Stat. Soc. B
         34, 350, 1972).
         """
-        a = np.concatenate([[1.0], -self.coefficients()[-1]])
+        a = np.concatenate([[1.0], -self.coefficients[-1]])
         ends = np.concatenate([white, np.zeros(self.order)])
         along = np.correlate(ends, a, mode="valid")
         reached = np.minimum(np.arange(white.size, 0, -1), self.order + 1)
@@ -114,14 +120,11 @@ class Autoregression:
 
     def taps(self, n: int) -> Float:
         """Weights c of `whiten` for n samples: w_t = sum_k c[t, k] x_(t-k), shape (n, p + 1)."""
-        orders = self.coefficients()
         found = np.zeros((n, self.order + 1))
-        found[:] = np.concatenate([[1.0], -orders[-1]]) / self.innovation
-        scale = self.variance
-        for t in range(min(self.order, n)):
+        found[:] = np.concatenate([[1.0], -self.coefficients[-1]]) / self.innovation
+        for t, row in enumerate(self._first_taps[:n]):
             found[t] = 0.0
-            found[t, : t + 1] = np.concatenate([[1.0], -orders[t]]) / math.sqrt(scale)
-            scale *= 1 - self.reflection[t] ** 2
+            found[t, : t + 1] = row[t::-1]
         return found
 
     def log_scale(self, n: int) -> float:
@@ -134,7 +137,7 @@ class Autoregression:
 
     def spectrum(self, frequency: Float) -> Float:
         """Power per frequency in cycles a sample, two-sided; it integrates to the variance."""
-        a = self.coefficients()[-1]
+        a = self.coefficients[-1]
         k = np.arange(1, self.order + 1)
         transfer = 1 - np.exp(-2j * np.pi * np.outer(frequency, k)) @ a
         return np.asarray(self.innovation**2 / np.abs(transfer) ** 2)
@@ -229,6 +232,8 @@ class _LaggedProducts:
 
     Attributes
     ----------
+    sums : array, shape (highest + 1,)
+        Of the products of all samples with those so many before.
     power : float
         Sum of all squares.
     table : array, shape (m + 1, m + 1)
@@ -242,8 +247,8 @@ class _LaggedProducts:
         for row in rows:
             transform = rfft(row, length)
             spectrum += transform.real**2 + transform.imag**2
-        self._sums = irfft(spectrum, length)
-        self.power = float(self._sums[0])
+        self.sums = irfft(spectrum, length)[: highest + 1]
+        self.power = float(self.sums[0])
         self.table = np.array([[self.power]])
 
     def next_order(self) -> None:
@@ -254,7 +259,7 @@ class _LaggedProducts:
         inner = self.table - first.T @ first
         self.table = np.empty((m + 1, m + 1))
         self.table[:m, :m] = inner
-        self.table[m, 0] = self._sums[m]
+        self.table[m, 0] = self.sums[m]
         self.table[m, 1:] = beside
         self.table[:m, m] = self.table[m, :m]
 
@@ -320,11 +325,9 @@ def whiteness(innovations: Sequence[Float], fitted_order: int) -> Whiteness:
     """
     n = sum(x.size for x in innovations)
     lags = min(max(_LAGS, 2 * fitted_order), n // 4)
-    power = sum(float(x @ x) for x in innovations)
-    q = 0.0
-    for k in range(1, lags + 1):
-        r = sum(float(x[k:] @ x[:-k]) for x in innovations if x.size > k) / power
-        q += r * r / (n - k)
+    products = sum(_LaggedProducts(x[None], lags).sums for x in innovations)
+    r = products[1 : lags + 1] / products[0]
+    q = float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
     portmanteau = float(chi2.sf(n * (n + 2) * q, max(lags - fitted_order, 1)))
     worst = peak = 1.0
     for x in innovations:

@@ -62,7 +62,7 @@ def added_by_noise(
     s = model.innovation
     lagged = toeplitz(model.autocovariances(p))
     root = np.linalg.cholesky(s**2 / n * np.linalg.inv(lagged))
-    a = np.concatenate([[1.0], -model.coefficients()[-1]])
+    a = np.concatenate([[1.0], -model.coefficients[-1]])
     before = np.vstack([np.zeros((p, covariance.shape[0])), curves @ covariance])
     ahead = lfilter([1.0], a, weights[::-1], axis=0)[::-1]
     ahead = np.vstack([ahead, np.zeros((p + 1, covariance.shape[0]))])

@@ -270,16 +270,18 @@ class RunTerm:
         raw = self.departures(values)
         if raw is None:
             return False
+        steps = 1
         while True:
-            for _ in range(_NOISE_STEPS):
+            for _ in range(steps):
                 self._estimate_noise(*raw)
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             white = self._whitened(left[:, None])[:, 0]
-            if self._add_jump(white, raw[1]):
-                continue
-            wrong = far_off_alone(self.run, self.models, white, self._outliers)
-            self.leave_out(wrong)
-            if not (wrong or (self._order != 0 and self._add_line(white))):
+            if self._take_something_off(white, raw[1]):
+                # The noise that was estimated with it is not worth further steps.
+                steps = 1
+            elif steps == 1:
+                steps = _NOISE_STEPS - 1
+            else:
                 break
         innovations = [white[a:b] for a, b in self.run.stretches]
         self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
@@ -306,6 +308,14 @@ class RunTerm:
             for a, b in self.run.stretches
         ]
         self._prepare()
+
+    def _take_something_off(self, white: Float, jacobian: Float) -> bool:
+        """Take a jump, wrong samples or a line off the residual, if it has any."""
+        if self._add_jump(white, jacobian):
+            return True
+        wrong = far_off_alone(self.run, self.models, white, self._outliers)
+        self.leave_out(wrong)
+        return bool(wrong) or (self._order != 0 and self._add_line(white))
 
     def leave_out(self, samples: Sequence[int]) -> None:
         """Leave out samples, by a linear nuisance for each."""

@@ -1,0 +1,157 @@
+"""Fit, posterior and comparison of one recording of 10,000 samples, beside what is at hand.
+
+    python -m benchmarks.recording_fits [--samples 10000] [--draws 1000] [--without-peers]
+
+Two velocity steps by SciPy, with noise of the coverage benchmark; free are A, B, D0, K and the
+times of the two steps. Rows of the answer, beside those of asperity:
+
+- SciPy's `least_squares` with differences over SciPy's integration, under the noise of asperity's
+  fit, from 10 % off the truth, which asperity is not told;
+- emcee with the density of asperity; left out where it is not installed.
+
+"Off" and the effective draws are those of `benchmarks.fits`, in whose table of times programs are
+compiled too. asperity's chains run in one process to a core.
+"""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from dataclasses import replace
+from itertools import pairwise
+
+import jax
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.optimize import least_squares
+
+from asperity.inference import Fit, compare, fit, sample_posterior
+from asperity.inference.posterior.sampling import whitened_posterior
+from benchmarks.coverage import CASES, LOAD, STIFFNESS, TRUTH, runs_of
+from benchmarks.fits import effective, off, timed
+
+FREE = ("A", "B", "D0", "K")
+LAWS = ("rice-ruina", "ruina-slip", "perrin-rice-zheng", "nagata")
+
+
+def integrated(found: Fit, values: dict[str, float]) -> np.ndarray:
+    """Friction of the ageing law at the samples, by SciPy."""
+    (term,) = found.objective.terms
+    run, (A, B, D0) = term.run, (values[n] for n in ("A", "B", "D0"))
+    V0, mu0 = term.fixed["V0"], term.fixed["mu0"]
+    changes = [
+        run.drive.edges[edge] + values[f"step_time_{k}"] for k, edge in enumerate(run.cuts, 1)
+    ]
+
+    def rhs(_: float, y: np.ndarray, V: float) -> list[float]:
+        v = V0 * np.exp((y[0] - mu0 - B * y[1]) / A)
+        return [values["K"] / run.W0 * (V - v), (V0 * np.exp(-y[1]) - v) / D0]
+
+    first = np.log(run.velocities[0] / V0)
+    y = np.array([mu0 + (A - B) * first, -first])
+    out = np.empty_like(run.time)
+    edges = [0.0, *changes, run.time[-1]]
+    for V, (a, b) in zip(run.velocities, pairwise(edges), strict=True):
+        here = (run.time >= a) & (run.time <= b)
+        solution = solve_ivp(
+            rhs, (a, b), y, method="LSODA", rtol=1e-10, atol=1e-12, dense_output=True, args=(V,)
+        )
+        out[here] = solution.sol(run.time[here])[0]
+        y = solution.y[:, -1]
+    return out
+
+
+def scipy_fit(found: Fit) -> dict[str, float]:
+    """Least squares under the noise and the priors of asperity's fit, with forward differences."""
+    (term,) = found.objective.terms
+    (model,) = term.models
+    sizes = {n: TRUTH.get(n, STIFFNESS * LOAD) for n in FREE}
+    unknowns = {k.name: k for k in found.objective.unknowns}
+    times = [n for n in found.values if n not in FREE]
+
+    def named(u: np.ndarray) -> dict[str, float]:
+        logs = {n: s * np.exp(x) for (n, s), x in zip(sizes.items(), u, strict=False)}
+        return logs | {n: unknowns[n].scale * x for n, x in zip(times, u[len(FREE) :], strict=True)}
+
+    def residuals(u: np.ndarray) -> np.ndarray:
+        values = named(u)
+        white = model.whiten((integrated(found, values) - term.run.friction)[:, None])[:, 0]
+        white -= term.basis @ (term.basis.T @ white)
+        priors = [(values[n] - unknowns[n].prior.mean) / unknowns[n].prior.sd for n in times]
+        return np.concatenate([white, priors])
+
+    start = np.concatenate([np.full(len(FREE), 0.1), np.zeros(len(times))])
+    return named(least_squares(residuals, start, diff_step=1e-5, x_scale="jac").x)
+
+
+def emcee_draws(found: Fit, draws: int) -> np.ndarray:
+    """Draws of 32 walkers about the fit in its whitened coordinates; (walkers, draws, n)."""
+    emcee = importlib.import_module("emcee")
+    whitened = whitened_posterior(found)
+    density, data = whitened.compiled()
+    compiled = jax.jit(lambda z: density(z, data))
+    rng = np.random.default_rng(1)
+    n = len(found.values)
+    sampler = emcee.EnsembleSampler(32, n, lambda z: float(np.nan_to_num(compiled(z), nan=-np.inf)))
+    sampler.run_mcmc(0.5 * rng.normal(size=(32, n)), draws + draws // 2)
+    u = whitened.u_of(np.moveaxis(sampler.get_chain(discard=draws // 2), 0, 1))
+    values = [k.to_value(u[..., i]) for i, k in enumerate(found.objective.unknowns)]
+    return np.stack([values[list(found.values).index(n)] for n in FREE], axis=-1)
+
+
+def asperity_draws(found: Fit, draws: int) -> np.ndarray:
+    """Draws of four chains; (4, draws, n)."""
+    posterior = sample_posterior(found, chains=4, draws=draws)
+    return np.stack([posterior.draws[name] for name in FREE], axis=-1)
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.recording_fits")
+    parser.add_argument("--samples", type=int, default=10_000)
+    parser.add_argument("--draws", type=int, default=1000)
+    parser.add_argument("--without-peers", action="store_true")
+    chosen = parser.parse_args()
+    case = replace(CASES["steps"], rate=chosen.samples / CASES["steps"].end)
+    runs = list(runs_of(case, 2))
+    print("| method | time (s) | off (standard errors) | effective draws | of a second |")
+    print("|---|---|---|---|---|")
+    for k, run in enumerate(runs):
+        first, _ = timed(lambda run=run: fit(run, "rice-ruina", FREE))
+        seconds, found = timed(lambda run=run: fit(run, "rice-ruina", FREE))
+        print(
+            f"| fit, noise {k + 1} (the first {first:.1f} s) | {seconds:.2f} | 0 | | |", flush=True
+        )
+    several = [*FREE, "c"]
+    seconds, compared = timed(lambda: compare(runs[-1], LAWS, several))
+    name = f"asperity compare, four laws, best {compared.best}"
+    print(f"| {name} | {seconds:.0f} | | | |", flush=True)
+    samplers = {"asperity posterior": asperity_draws}
+    if not chosen.without_peers:
+        seconds, values = timed(lambda: scipy_fit(found))
+        name = "SciPy least_squares, differences"
+        print(f"| {name} | {seconds:.0f} | {off(values, found):.0e} | | |", flush=True)
+        samplers["emcee, same density"] = emcee_draws
+    reference = None
+    for name, sample in samplers.items():
+        try:
+            seconds, draws = timed(lambda sample=sample: sample(found, chosen.draws))
+        except ModuleNotFoundError as absent:
+            print(f"| {name} | not installed: {absent.name} | | | |")
+            continue
+        means = draws.mean((0, 1))
+        reference = means if reference is None else reference
+        gap = max(
+            abs(m - r) / found.parameters[n].se
+            for n, m, r in zip(FREE, means, reference, strict=True)
+        )
+        count = effective(draws)
+        print(
+            f"| {name}, {draws.shape[0]} x {draws.shape[1]} | {seconds:.1f} | {gap:.2f} | "
+            f"{count:.0f} | {count / seconds:.0f} |",
+            flush=True,
+        )
+
+
+if __name__ == "__main__":
+    main()
