@@ -120,7 +120,8 @@ def main() -> None:
         first, _ = timed(lambda run=run: fit(run, "rice-ruina", FREE))
         seconds, found = timed(lambda run=run: fit(run, "rice-ruina", FREE))
         print(
-            f"| fit, noise {k + 1} (the first {first:.1f} s) | {seconds:.2f} | 0 | | |", flush=True
+            f"| asperity fit, noise {k + 1} (the first {first:.1f} s) | {seconds:.2f} | 0 | | |",
+            flush=True,
         )
     several = [*FREE, "c"]
     seconds, compared = timed(lambda: compare(runs[-1], LAWS, several))
