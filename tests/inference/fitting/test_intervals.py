@@ -36,6 +36,11 @@ def test_an_upper_bound_is_the_mirror_image():
     np.testing.assert_allclose(found, (-high, -low), atol=1e-9)
 
 
+@pytest.mark.parametrize("estimate", [-3.0, 0.1, 0.5, 4.0])
+def test_where_bounds_leave_no_room_the_interval_is_the_whole_range(estimate):
+    assert bounded_interval(estimate, 1.0, 0.95, 0.0, 0.5) == (0.0, 0.5)
+
+
 @pytest.mark.parametrize("truth", [0.0, 0.3, 1.5])
 def test_coverage(truth):
     # Estimates at the middles of equal probabilities: the share is exact to two of them.

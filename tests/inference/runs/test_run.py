@@ -7,9 +7,11 @@ from asperity.inference import recorded_run
 from asperity.recording import Channel, Trace
 
 
-def run_under(corners, levels, *, noise=1e-4, rate=10.0, end=100.0):
-    """A recording at constant velocity under a load of straight lines."""
+def run_under(corners, levels, *, noise=1e-4, rate=10.0, end=100.0, steps=(), velocities=(1e-6,)):
+    """A recording under a load of straight lines."""
     time = np.arange(int(end * rate)) / rate
+    edges = np.array([0.0, *steps, end])
+    slip = np.interp(time, edges, np.append(0.0, np.cumsum(velocities * np.diff(edges))))
     load = np.interp(time, corners, levels)
     load = 2e7 * (load + noise * np.random.default_rng(0).normal(size=time.size))
     return recorded_run(
@@ -17,13 +19,13 @@ def run_under(corners, levels, *, noise=1e-4, rate=10.0, end=100.0):
             time,
             {
                 "friction": Channel(np.full(time.size, 0.6), "dimensionless", "", "friction", ""),
-                "displacement": Channel(1e-6 * time, "length", "m", "displacement", "m"),
+                "displacement": Channel(slip, "length", "m", "displacement", "m"),
                 "normal stress": Channel(load, "pressure", "Pa", "normal stress", "Pa"),
             },
         ),
         name="run",
-        steps=[],
-        velocities=[1e-6],
+        steps=list(steps),
+        velocities=list(velocities),
     )
 
 
@@ -63,3 +65,20 @@ def test_corners_of_short_ramps_are_placed_within_the_noise(seed):
     assert found.size == 4
     # The noise of 1e-4 over the slope, from the few samples of the ramp.
     np.testing.assert_allclose(found[1:3], corners[1:3], atol=6e-4 * last / abs(size))
+
+
+def test_a_velocity_that_changes_with_the_load_changes_at_its_corner():
+    """A piece of a millisecond between them would leave the delay of the change no room."""
+    corners, levels = [0.0, 40.03, 40.43, 99.9], [1.0, 1.0, 1.15, 1.15]
+    run = run_under(corners, levels, steps=[40.028], velocities=[1e-6, 3e-6])
+    assert run.drive.edges.size == 4
+    assert run.cuts == (1,)
+    assert run.drive.edges[1] == pytest.approx(40.03, abs=1e-3)
+    np.testing.assert_allclose(run.drive.pull, [1, 3, 3])
+
+
+def test_a_velocity_that_changes_an_interval_from_the_load_changes_there():
+    corners, levels = [0.0, 40.03, 40.43, 99.9], [1.0, 1.0, 1.15, 1.15]
+    run = run_under(corners, levels, steps=[39.9], velocities=[1e-6, 3e-6])
+    assert run.drive.edges.size == 5
+    assert run.drive.edges[1] == pytest.approx(39.9, abs=1e-9)

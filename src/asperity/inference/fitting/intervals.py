@@ -66,14 +66,16 @@ def bounded_interval(
     level : float
         Coverage.
     lower, upper : float
-        Bounds; infinite where there is none. They are treated one by one, so that they should be
-        several standard deviations apart.
+        Bounds; infinite where there is none. Treated one by one; where there is no room for
+        the interval between them it is the whole range.
 
     Returns
     -------
     (float, float)
     """
     root = float(norm.isf((1 - level) / 2))
+    if upper - lower < 2 * root * sd:
+        return lower, upper
     low, high = estimate - root * sd, estimate + root * sd
     if (estimate - lower) < _FAR * sd:
         low, high = _above(estimate, sd, level, lower)

@@ -17,6 +17,8 @@ Float = NDArray[np.float64]
 
 #: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
 UNDETERMINED = 1.0
+#: A nuisance that is nearer to its bound, as a share of its range, is there.
+_AT_BOUND = 1e-3
 #: Decrease of chi-squared that must not be left at a minimum: a third of a standard error.
 _STOPPED = 0.1
 
@@ -95,6 +97,8 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
     data = objective.data_residuals(u)
     if data is None:
         return None
+    # A delay whose range the pieces of the drive leave no room in is as good as known.
+    J = np.where(_held(objective, u), 0.0, J)
     covariance, missing = inverse_information(J.T @ J)
     total, freedom = _with_estimated_noise(objective, u, covariance, missing)
     of_data = np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0)
@@ -125,6 +129,14 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
     )
 
 
+def _held(objective: Objective, u: Float) -> NDArray[np.bool_]:
+    """Nuisances at a bound, which others do not follow beyond it."""
+    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
+    nuisance = np.array([k.nuisance for k in objective.unknowns], bool)
+    room = np.where(np.isfinite(high - low), high - low, 1.0)
+    return np.asarray(nuisance & (np.minimum(u - low, high - u) < _AT_BOUND * room))
+
+
 def _with_estimated_noise(
     objective: Objective, u: Float, covariance: Float, missing: NDArray[np.bool_]
 ) -> tuple[Float, Float]:
@@ -136,10 +148,21 @@ def _with_estimated_noise(
     for term in objective.terms:
         if isinstance(term, RunTerm):
             added, spread = term.uncertainty_of_noise(values, slopes, known)
-            total += added
+            total += nowhere_negative(added, known)
             variance += spread
     freedom = 2 * np.diag(known) ** 2 / np.where(variance > 0, variance, 1.0)
     return total, np.where(variance > 0, np.maximum(freedom, 1.0), np.inf)
+
+
+def nowhere_negative(added: Float, covariance: Float) -> Float:
+    """What is added to a covariance, without what is negative by rounding.
+
+    Where data hardly tell parameters apart, it is the difference of two numbers of many more digits
+    than there are.
+    """
+    sd = np.sqrt(np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0))
+    values, vectors = np.linalg.eigh(added / np.outer(sd, sd))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(sd, sd))
 
 
 def is_of_tables(objective: Objective) -> bool:

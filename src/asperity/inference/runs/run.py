@@ -204,6 +204,7 @@ def recorded_run(
     cut_times = [cut.time - origin for cut in cuts_found]
     times = time - origin
     W, unit, varies, knots, load_values = _load(trace, load, shown, time, signals.load_unit)
+    cut_times = _with_corners(times, cut_times, knots - origin)
     drive, cuts = _drive(times, cut_times, speeds, knots - origin, load_values / W)
     slip = np.interp(
         times,
@@ -474,6 +475,21 @@ def _line_knots(t: Float, y: Float, tolerance: float) -> list[int]:
         if away(needed[-1], after).max() > tolerance:
             needed.append(k)
     return [*needed, corners[-1]]
+
+
+def _with_corners(times: Float, cut_times: Sequence[float], knots: Float) -> list[float]:
+    """Times of velocity changes, those within a sampling interval of a corner of the load there.
+
+    The drive then changes both at once. A corner is known to a fraction of the interval, a change
+    of the velocity is not, and the piece between them would leave its delay no room.
+    """
+    moved = []
+    for cut in cut_times:
+        k = int(np.clip(np.searchsorted(times, cut), 1, times.size - 1))
+        corner = float(knots[np.argmin(np.abs(knots - cut))])
+        beside = 0 < corner < times[-1] and abs(corner - cut) < times[k] - times[k - 1]
+        moved.append(corner if beside else cut)
+    return sorted(set(moved)) if len(set(moved)) == len(moved) else list(cut_times)
 
 
 def _drive(
