@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from benchmarks.coverage import CASES, TRUE, covered, friction, runs_of
+from scipy.signal import lfilter
 
 from asperity.errors import InputError
 from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
@@ -257,6 +258,29 @@ def test_samples_that_are_far_off_are_left_out_and_named(found):
     assert "30, 40.1, 70.5, 110 s" in said
     for name in TRUE:
         assert abs(bad.values[name] - found.values[name]) < found.parameters[name].se
+
+
+def test_large_samples_far_off_leave_no_lines_and_jumps_behind():
+    """Noise that is estimated before they are left out would have both."""
+    case = coverage.Case((3e-5, 1e-4, 3e-5), (2.5, 6.0), 10.0, 400.0)
+    time = np.arange(4_000) / case.rate
+    turn = 1.8 * np.cos(2 * np.pi * 35 / case.rate)
+    noise = lfilter([1.0], [1.0, -turn, 0.81], np.random.default_rng(0).normal(size=time.size))
+    values = coverage.friction(case, time) + 3e-4 * noise / noise.std()
+    spoiled = [323, 1814, 2042, 3520, 3757, 3765, 3879, 3902]
+    random = np.random.default_rng(4)
+    values[spoiled] += random.choice([-1, 1], 8) * random.uniform(0.3, 1.0, 8)
+    path = np.interp(time, [0, 2.5, 6, 10], [0, 7.5e-5, 4.25e-4, 5.45e-4])
+    run = recorded_run(
+        trace_of(time, values, path, np.full(time.size, coverage.LOAD)),
+        name="run",
+        steps=case.changes,
+        velocities=case.velocities,
+    )
+    (term,) = fit(run, "rice-ruina", FREE, start=TRUE, starts=1).objective.terms
+    assert term.noise["outliers"] == [k / case.rate for k in spoiled]
+    assert term.noise["lines_removed"] == []
+    assert term.noise["jumps"] == []
 
 
 @pytest.mark.parametrize(("name", "rate"), [("steps", 0.7), ("holds", 0.7), ("loads", 10.0)])

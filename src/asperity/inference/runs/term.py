@@ -270,18 +270,13 @@ class RunTerm:
         raw = self.departures(values)
         if raw is None:
             return False
-        steps = 1
+        # After fewer steps the noise is not yet known well enough to judge what is none.
         while True:
-            for _ in range(steps):
+            for _ in range(_NOISE_STEPS):
                 self._estimate_noise(*raw)
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             white = self._whitened(left[:, None])[:, 0]
-            if self._take_something_off(white, raw[1]):
-                # The noise that was estimated with it is not worth further steps.
-                steps = 1
-            elif steps == 1:
-                steps = _NOISE_STEPS - 1
-            else:
+            if not self._take_something_off(white, raw[1]):
                 break
         innovations = [white[a:b] for a, b in self.run.stretches]
         self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
