@@ -21,7 +21,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import jax
@@ -190,6 +190,31 @@ def off(values: dict[str, float], found: Fit) -> float:
     return max(abs(values[n] - p.value) / p.se for n, p in found.parameters.items() if n in values)
 
 
+def print_samplers(
+    samplers: dict[str, Callable[[], np.ndarray]], found: Fit, names: Iterable[str]
+) -> None:
+    """Print a row of the table for each sampler, whose draws have the shape (chains, draws, n)."""
+    reference = None
+    for name, sample in samplers.items():
+        try:
+            seconds, draws = timed(sample)
+        except ModuleNotFoundError as absent:
+            print(f"| {name} | not installed: {absent.name} | | | |")
+            continue
+        means = draws.mean((0, 1))
+        reference = means if reference is None else reference
+        gap = max(
+            abs(m - r) / found.parameters[n].se
+            for n, m, r in zip(names, means, reference, strict=True)
+        )
+        count = effective(draws)
+        print(
+            f"| {name}, {draws.shape[0]} x {draws.shape[1]} | {seconds:.1f} | {gap:.2f} | "
+            f"{count:.0f} | {count / seconds:.0f} |",
+            flush=True,
+        )
+
+
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.fits", description=__doc__)
@@ -215,30 +240,12 @@ def main() -> None:
         name = "SciPy least_squares, differences"
         print(f"| {name} | {seconds:.0f} | {off(values, found):.0e} | | |", flush=True)
     density = log_density(*data)
-    reference = None
     samplers: dict[str, Callable[[], np.ndarray]] = {
         "asperity posterior": lambda: asperity_draws(found, chosen.draws),
         "numpyro, same density": lambda: numpyro_draws(density, found, chosen.draws),
         "emcee, same density": lambda: emcee_draws(density, found, chosen.draws),
     }
-    for name, sample in samplers.items():
-        try:
-            seconds, draws = timed(sample)
-        except ModuleNotFoundError as absent:
-            print(f"| {name} | not installed: {absent.name} | | | |")
-            continue
-        means = draws.mean((0, 1))
-        reference = means if reference is None else reference
-        gap = max(
-            abs(m - r) / found.parameters[n].se
-            for n, m, r in zip(TRUTH, means, reference, strict=True)
-        )
-        count = effective(draws)
-        print(
-            f"| {name}, {draws.shape[0]} x {draws.shape[1]} | {seconds:.1f} | {gap:.2f} | "
-            f"{count:.0f} | {count / seconds:.0f} |",
-            flush=True,
-        )
+    print_samplers(samplers, found, TRUTH)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from scipy.optimize import least_squares
 from asperity.inference import Fit, compare, fit, sample_posterior
 from asperity.inference.posterior.sampling import whitened_posterior
 from benchmarks.coverage import CASES, LOAD, STIFFNESS, TRUTH, runs_of
-from benchmarks.fits import effective, off, timed
+from benchmarks.fits import off, print_samplers, timed
 
 FREE = ("A", "B", "D0", "K")
 LAWS = ("rice-ruina", "ruina-slip", "perrin-rice-zheng", "nagata")
@@ -127,31 +127,13 @@ def main() -> None:
     seconds, compared = timed(lambda: compare(runs[-1], LAWS, several))
     name = f"asperity compare, four laws, best {compared.best}"
     print(f"| {name} | {seconds:.0f} | | | |", flush=True)
-    samplers = {"asperity posterior": asperity_draws}
+    samplers = {"asperity posterior": lambda: asperity_draws(found, chosen.draws)}
     if not chosen.without_peers:
         seconds, values = timed(lambda: scipy_fit(found))
         name = "SciPy least_squares, differences"
         print(f"| {name} | {seconds:.0f} | {off(values, found):.0e} | | |", flush=True)
-        samplers["emcee, same density"] = emcee_draws
-    reference = None
-    for name, sample in samplers.items():
-        try:
-            seconds, draws = timed(lambda sample=sample: sample(found, chosen.draws))
-        except ModuleNotFoundError as absent:
-            print(f"| {name} | not installed: {absent.name} | | | |")
-            continue
-        means = draws.mean((0, 1))
-        reference = means if reference is None else reference
-        gap = max(
-            abs(m - r) / found.parameters[n].se
-            for n, m, r in zip(FREE, means, reference, strict=True)
-        )
-        count = effective(draws)
-        print(
-            f"| {name}, {draws.shape[0]} x {draws.shape[1]} | {seconds:.1f} | {gap:.2f} | "
-            f"{count:.0f} | {count / seconds:.0f} |",
-            flush=True,
-        )
+        samplers["emcee, same density"] = lambda: emcee_draws(found, chosen.draws)
+    print_samplers(samplers, found, FREE)
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ Float = NDArray[np.float64]
 
 #: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
 UNDETERMINED = 1.0
-#: A nuisance that is nearer to its bound, as a share of its range, is there.
+#: A delay that is nearer to its bound, as a share of its range, is there.
 _AT_BOUND = 1e-3
 #: Decrease of chi-squared that must not be left at a minimum: a third of a standard error.
 _STOPPED = 0.1
@@ -130,11 +130,14 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
 
 
 def _held(objective: Objective, u: Float) -> NDArray[np.bool_]:
-    """Nuisances at a bound, which others do not follow beyond it."""
+    """Delays and offsets at a bound, which others do not follow beyond it.
+
+    A stiffness at its bound is none: the data bound it on the other side.
+    """
     low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
-    nuisance = np.array([k.nuisance for k in objective.unknowns], bool)
+    linear = np.array([k.nuisance and not k.logarithmic for k in objective.unknowns], bool)
     room = np.where(np.isfinite(high - low), high - low, 1.0)
-    return np.asarray(nuisance & (np.minimum(u - low, high - u) < _AT_BOUND * room))
+    return np.asarray(linear & (np.minimum(u - low, high - u) < _AT_BOUND * room))
 
 
 def _with_estimated_noise(

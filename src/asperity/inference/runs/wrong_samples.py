@@ -145,7 +145,7 @@ def beyond_any_motion(
     samples : mapping of int to float
         As `alone_at_changes` returns them.
     stiffness : float
-        Force that the gauge shows over the pulled length, in the units of the load (1/m of it).
+        Force that the gauge shows over the pulled length, in the unit of the load over a metre.
     """
     drive, time = run.drive, run.time
     stretching = stiffness / (run.W0 * float(np.min(drive.load))) * run.velocity
