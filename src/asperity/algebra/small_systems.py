@@ -12,6 +12,7 @@ from collections.abc import Callable
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 #: Entries [row][column] of a small matrix, each an array over the operating points.
@@ -233,6 +234,8 @@ def product(a: Array, b: Array) -> Array:
 def scaled_product(maps: Array) -> tuple[Array, Array]:
     """Product of the maps of successive intervals, the last one leftmost, kept near unit size.
 
+    Of NumPy or JAX arrays, as `spectral_radius` and `spectral_abscissa`.
+
     Parameters
     ----------
     maps : array, shape (n, n, intervals, points)
@@ -243,32 +246,38 @@ def scaled_product(maps: Array) -> tuple[Array, Array]:
         Divided by the exponential of its scale.
     log_scale : array, shape (points,)
     """
+    xp = maps.__array_namespace__()
     n, _, intervals, points = maps.shape
     # The root of their number side by side, and then the products of these: few operations to
     # compile, and an error that grows with the root only.
     length = math.isqrt(intervals - 1) + 1
     blocks = -(-intervals // length)
     added = (n, n, blocks * length - intervals, points)
-    padding = jnp.broadcast_to(jnp.eye(n)[..., None, None], added)
-    maps = jnp.concatenate([maps, padding], axis=2).reshape(n, n, blocks, length, points)
-    rows, scales = _scaled_products(jnp.moveaxis(maps, 3, 0))
-    whole, scale = _scaled_products(jnp.moveaxis(rows, 2, 0))
+    padding = xp.broadcast_to(xp.eye(n)[..., None, None], added)
+    maps = xp.concatenate([maps, padding], axis=2).reshape(n, n, blocks, length, points)
+    rows, scales = _scaled_products(xp.moveaxis(maps, 3, 0))
+    whole, scale = _scaled_products(xp.moveaxis(rows, 2, 0))
     return whole, scale + scales.sum(0)
 
 
 def _scaled_products(factors: Array) -> tuple[Array, Array]:
     """Products over the first axis of (count, n, n, ...), and the logarithms of their scales."""
+    xp = factors.__array_namespace__()
 
     def step(carry: tuple[Array, Array], factor: Array) -> tuple[tuple[Array, Array], None]:
         done, log_scale = carry
         done = product(factor, done)
-        size = jnp.abs(done).max((0, 1))
-        size = jnp.where(size > 0, size, 1.0)
-        return (done / size, log_scale + jnp.log(size)), None
+        size = abs(done).max((0, 1))
+        size = xp.where(size > 0, size, 1.0)
+        return (done / size, log_scale + xp.log(size)), None
 
-    start = factors[0], jnp.zeros(factors.shape[3:])
-    (whole, log_scale), _ = jax.lax.scan(step, start, factors[1:])
-    return whole, log_scale
+    carry = factors[0], xp.zeros(factors.shape[3:])
+    if xp is jnp:
+        carry, _ = jax.lax.scan(step, carry, factors[1:])
+    else:
+        for factor in factors[1:]:
+            carry, _ = step(carry, factor)
+    return carry
 
 
 def spectral_radius(matrix: Array) -> Array:
@@ -276,21 +285,22 @@ def spectral_radius(matrix: Array) -> Array:
 
     Exact up to two states; to a per mille for more, by repeated squaring.
     """
+    xp = matrix.__array_namespace__()
     if matrix.shape[0] == 1:
-        return jnp.abs(matrix[0, 0])
+        return abs(matrix[0, 0])
     if matrix.shape[0] == 2:
         (a, b), (c, d) = matrix
-        half, determinant = 0.5 * jnp.abs(a + d), a * d - b * c
+        half, determinant = 0.5 * abs(a + d), a * d - b * c
         square = 0.25 * (a - d) ** 2 + b * c
-        real = half + jnp.sqrt(jnp.maximum(square, 0.0))
-        return jnp.where(square >= 0, real, jnp.sqrt(jnp.abs(determinant)))
-    log_scale = jnp.zeros(matrix.shape[2:])
+        real = half + xp.sqrt(xp.maximum(square, 0.0))
+        return xp.where(square >= 0, real, xp.sqrt(abs(determinant)))
+    log_scale = xp.zeros(matrix.shape[2:])
     for k in range(12):
-        size = jnp.abs(matrix).max((0, 1)) + 1e-300
-        log_scale = log_scale + jnp.log(size) / 2**k
+        size = abs(matrix).max((0, 1)) + 1e-300
+        log_scale = log_scale + xp.log(size) / 2**k
         matrix = matrix / size
         matrix = product(matrix, matrix)
-    return jnp.exp(log_scale + jnp.log(jnp.abs(matrix).max((0, 1)) + 1e-300) / 2**12)
+    return xp.exp(log_scale + xp.log(abs(matrix).max((0, 1)) + 1e-300) / 2**12)
 
 
 def spectral_abscissa(matrix: Array) -> Array:
@@ -300,14 +310,16 @@ def spectral_abscissa(matrix: Array) -> Array:
     with inertia have entries that differ by many orders of magnitude, and entries larger than any
     eigenvalue. A program must not call it twice, see above.
     """
-    n = matrix.shape[0]
+    n, xp = matrix.shape[0], matrix.__array_namespace__()
     if n == 1:
         return matrix[0, 0]
     if n == 2:
         (a, b), (c, d) = matrix
         square = 0.25 * (a - d) ** 2 + b * c
-        return 0.5 * (a + d) + jnp.sqrt(jnp.maximum(square, 0.0))
-    finite = jnp.isfinite(matrix).all((0, 1))
-    points_first = jnp.moveaxis(jnp.where(finite, matrix, 0.0), (0, 1), (-2, -1))
-    values = jnp.linalg.eigvals(jax.lax.stop_gradient(points_first))
-    return jnp.where(finite, values.real.max(-1), jnp.nan)
+        return 0.5 * (a + d) + xp.sqrt(xp.maximum(square, 0.0))
+    finite = xp.isfinite(matrix).all((0, 1))
+    points_first = xp.moveaxis(xp.where(finite, matrix, 0.0), (0, 1), (-2, -1))
+    if xp is jnp:
+        points_first = jax.lax.stop_gradient(points_first)
+    values = xp.linalg.eigvals(points_first)
+    return xp.where(finite, values.real.max(-1), np.nan)

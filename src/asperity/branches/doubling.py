@@ -14,20 +14,20 @@ from collections.abc import Callable
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from jax.typing import ArrayLike
+from numpy.typing import NDArray
 
-from asperity._jax import jit_large
 from asperity.branches.branch import Bifurcation, Branch
 from asperity.branches.recorder import INTERVALS, BranchRecorder
 from asperity.branches.steps import BranchFollower, BranchOrbit
 from asperity.errors import InputError
 from asperity.loads import Excitation, Modulation
-from asperity.orbit.mesh.condensation import condense, localise, transfer_maps
+from asperity.orbit.mesh.condensation import transfer_maps
+from asperity.orbit.mesh.equations import condensed
 from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import Change
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
-    Tangent,
     slip_units,
     weighted_row,
 )
@@ -145,24 +145,20 @@ def _beside(
 ) -> BranchOrbit | None:
     """A doubled orbit near the critical simple one."""
     point = simple.point
-    orbit, tangent = _alternating(follower.line, point.orbit, point.t)
+    start = _alternating(follower.line, point.orbit, point.t)
     for distance in _DISTANCES:
-        branch_orbit, _ = twice.step(ContinuationPoint(orbit, point.t, tangent), distance)
+        branch_orbit, _ = twice.step(start, distance)
         if branch_orbit is not None:
             return branch_orbit
     return None
 
 
-@jit_large
-def _maps(line: ParameterLine, orbit: Orbit, t: Array) -> tuple[Array, Array, Array]:
-    """Transfer maps, response of the slopes, and units of the states."""
-    (response,) = condense(localise(*line.at(t), orbit), orbit)
-    return transfer_maps(response, orbit), response, slip_units(line, orbit, t)
-
-
-def _alternating(line: ParameterLine, orbit: Orbit, t: Array) -> tuple[Orbit, Tangent]:
+def _alternating(line: ParameterLine, orbit: Orbit, t: NDArray[np.float64]) -> ContinuationPoint:
     """The simple orbit twice, and the unit direction that changes sign in between."""
-    maps, response, units = (np.asarray(a) for a in _maps(line, orbit, t))
+    problem = line.at(t)
+    values, response, _ = condensed(problem, orbit)
+    maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
+    units = slip_units(problem.system, values)
     total = np.eye(len(maps))
     for i in range(maps.shape[2]):
         total = maps[:, :, i, 0] @ total
@@ -181,5 +177,5 @@ def _alternating(line: ParameterLine, orbit: Orbit, t: Array) -> tuple[Orbit, Ta
     )
     nodes = np.concatenate([nodes, -nodes], axis=1)
     slopes = np.concatenate([slopes, -slopes], axis=2)
-    size = np.sqrt((np.asarray(weighted_row(twice, nodes, units)) * nodes).sum())
-    return twice, Tangent(nodes / size, slopes / size, np.zeros(1))
+    size = np.sqrt((weighted_row(twice, nodes, units) * nodes).sum())
+    return ContinuationPoint(twice, t, Change(nodes / size, slopes / size, np.zeros(1)), units)

@@ -14,7 +14,7 @@ from asperity.branches.steps import BranchFollower, BranchOrbit, follow_branch
 from asperity.slider.problem import Problem
 
 #: Mesh for a branch of simple period; bifurcations are solved again on three times as many.
-INTERVALS = 144
+INTERVALS = 216
 
 _RESULTS = {
     "end": "the branch reaches the end of the span, {value:.6g}{unit}",

@@ -3,23 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity._jax import spare_mappings
 from asperity.orbit.floquet import log_multipliers
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import refined
+from asperity.orbit.mesh.newton import Change
+from asperity.orbit.mesh.reading import read_orbit
+from asperity.orbit.mesh.remeshing import remeshed
 from asperity.orbit.methods.branch_following.arclength import (
     ArclengthStep,
     ContinuationPoint,
-    Tangent,
     arclength_step,
-    first_tangent,
-    read_orbit,
+    first_point,
+    interpolated,
 )
 from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
 
@@ -79,15 +79,14 @@ class BranchFollower(NamedTuple):
     ) -> tuple[BranchOrbit | None, ArclengthStep]:
         """The orbit at the distance `length` from `point`, None where Newton's method fails."""
         spare_mappings()
-        inputs = (self.line, point, np.array([length]))
-        step = _on_host(arclength_step(inputs, max_steps=_NEWTON_STEPS))
+        step = arclength_step(self.line, point, np.array([length]), max_steps=_NEWTON_STEPS)
         if not step.error[0] < _CONVERGED:
             return None, step
         return self.branch_orbit(step.orbit, step.next), step
 
     def branch_orbit(self, orbit: Orbit, point: ContinuationPoint) -> BranchOrbit:
         """Read off an orbit."""
-        read = _on_host(read_orbit((self.line, orbit, point.t), harmonics=self.harmonics))
+        read = read_orbit(self.line.at(point.t), orbit, self.harmonics)
         logs = log_multipliers(read.monodromy, read.log_scale, read.log_determinant)
         return BranchOrbit(
             float(point.t[0]),
@@ -119,24 +118,21 @@ class BranchFollower(NamedTuple):
     def begin(self, orbit: Orbit, t: float, intervals: int) -> BranchOrbit | None:
         """An orbit at `t` on a mesh of `intervals`, in the direction of rising t."""
         at = np.array([t])
-        orbit = jax.jit(refined, static_argnums=3)(*self.line.at(at), orbit, intervals)
-        bare = ContinuationPoint(
-            orbit, at, Tangent(np.zeros_like(orbit.nodes), orbit.slopes, np.ones(1))
-        )
+        orbit = remeshed(self.line.at(at), orbit, intervals)
+        none = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.ones(1))
+        bare = ContinuationPoint(orbit, at, none, np.ones_like(orbit.centre))
         branch_orbit = self.at(bare, t)
         if branch_orbit is None:
             return None
-        tangent = _on_host(first_tangent((self.line, branch_orbit.point.orbit, at)))
-        return branch_orbit._replace(
-            direction=float(tangent.t[0]), point=branch_orbit.point._replace(tangent=tangent)
-        )
+        point = first_point(self.line, branch_orbit.point.orbit, at)
+        return branch_orbit._replace(direction=float(point.tangent.t[0]), point=point)
 
     def at(self, point: ContinuationPoint, t: float) -> BranchOrbit | None:
         """The orbit at the coordinate `t`, from the orbit of a point nearby."""
         # With this tangent the plane of the corrector is that of constant t.
         nodes = np.zeros_like(point.tangent.nodes)
-        tangent = Tangent(nodes, np.zeros_like(point.tangent.slopes), np.ones(1))
-        return self.step(ContinuationPoint(point.orbit, np.array([t]), tangent), 0.0)[0]
+        tangent = Change(nodes, np.zeros_like(point.tangent.slopes), np.ones(1))
+        return self.step(point._replace(t=np.array([t]), tangent=tangent), 0.0)[0]
 
     def across(self, point: ContinuationPoint, t: float) -> BranchOrbit | None:
         """The orbit in the plane across the branch of a point nearby, from the guess `t`."""
@@ -144,20 +140,16 @@ class BranchFollower(NamedTuple):
 
     def finer(self, point: ContinuationPoint, intervals: int) -> BranchOrbit | None:
         """The orbit in the plane across the branch at a point, on a mesh of `intervals`."""
-        orbit = jax.jit(refined, static_argnums=3)(*self.line.at(point.t), point.orbit, intervals)
-        nodes = point.tangent.nodes[:, :, 0]
-        periodic = np.concatenate([nodes, nodes[:, :1]], axis=1)
-        carried = np.stack(
-            [np.interp(orbit.mesh[:-1, 0], point.orbit.mesh[:, 0], row) for row in periodic]
-        )
+        orbit = remeshed(self.line.at(point.t), point.orbit, intervals)
+        carried = interpolated(point.tangent.nodes, point.orbit.mesh, orbit.mesh)
         slopes = np.zeros(orbit.slopes.shape)  # not used by a step of no length
-        tangent = Tangent(carried[..., None], slopes, point.tangent.t)
-        return self.step(ContinuationPoint(orbit, point.t, tangent), 0.0)[0]
+        tangent = Change(carried, slopes, point.tangent.t)
+        return self.step(point._replace(orbit=orbit, tangent=tangent), 0.0)[0]
 
 
 def reversed_point(point: ContinuationPoint) -> ContinuationPoint:
     """The same point, to be left in the other direction."""
-    return point._replace(tangent=Tangent(*(-a for a in point.tangent)))
+    return point._replace(tangent=Change(*(-a for a in point.tangent)))
 
 
 def follow_branch(
@@ -208,7 +200,3 @@ def follow_branch(
         elif iterations > _HARD:
             length *= _SHRINKAGE
     return "steps"
-
-
-def _on_host(tree: Any) -> Any:
-    return jax.tree.map(np.asarray, tree)

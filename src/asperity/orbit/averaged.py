@@ -54,7 +54,7 @@ def averaged_response(
     problem, shape = flatten(Problem(QuasiStatic(slider, V, np.asarray(1.0)), np.asarray(0.0)))
     stiffness = np.zeros(problem.system.V.shape)
     for part, value in run_chunks(
-        stiffness_of_steady_sliding, problem, np.arange(stiffness.size), 4096
+        stiffness_of_steady_sliding, (problem,), np.arange(stiffness.size), 4096
     ):
         stiffness[part] = value
     omega = np.maximum(stiffness.reshape(shape), 1e-300) / _STIFFNESS

@@ -21,8 +21,8 @@ Indices = NDArray[np.intp]
 #: Points in a block of the fast method; no power of two, at which arrays share cache lines.
 FAST_BLOCK = 240
 
-#: Samples of waveforms in a call.
-_SAMPLES = 2**17
+#: Points in a chunk of orbits on meshes, for up to two states and for more.
+_MESH_CHUNKS = (24, 8)
 
 
 def points_of(tree: Any) -> int:
@@ -45,16 +45,16 @@ def put(tree: Any, index: Indices, values: Any) -> None:
 
 
 def run_chunks(
-    function: Callable[[Any], Any], inputs: Any, index: Indices, chunk: int
+    function: Callable[..., Any], inputs: tuple[Any, ...], index: Indices, chunk: int
 ) -> Iterator[tuple[Indices, Any]]:
     """Apply `function` to the points `index` of `inputs`.
 
     Parameters
     ----------
     function : callable
-        Compiled; takes a pytree with `chunk` points along the last axis of every
-        array, returns another.
-    inputs : pytree of NumPy arrays
+        Takes pytrees with `chunk` points along the last axis of every array, returns another.
+    inputs : tuple of pytrees of NumPy arrays
+        Its arguments.
     index : array of int
         The points to work on.
     chunk : int
@@ -68,7 +68,7 @@ def run_chunks(
 
     def work(part: Indices) -> tuple[Indices, Any]:
         filled = np.concatenate([part, np.full(chunk - len(part), part[-1])])
-        outputs = function(take(inputs, filled))
+        outputs = function(*take(inputs, filled))
         return part, jax.tree.map(lambda a: np.asarray(a)[..., : len(part)], outputs)
 
     for start in range(0, len(index), chunk):
@@ -76,6 +76,6 @@ def run_chunks(
         yield work(index[start : start + chunk])
 
 
-def samples_chunk(phases: int) -> int:
-    """Points in a call that samples waveforms at so many phases."""
-    return min(max(_SAMPLES // phases, 1), FAST_BLOCK)
+def mesh_chunk(size: int) -> int:
+    """Points in a call that works on orbits with `size` states on meshes."""
+    return _MESH_CHUNKS[size > 2]

@@ -23,7 +23,7 @@ def mark_too_unstable(problem: Problem, solution: Solution) -> None:
     failed = np.isin(solution.outcome, (Outcome.NO_ORBIT, Outcome.NOT_RESOLVED))
     amplitude = np.broadcast_to(problem.load.amplitude, failed.shape)
     rows = np.flatnonzero(failed & solution.informed)
-    for part, growth in run_chunks(adiabatic_growth, problem, rows, CHUNK):
+    for part, growth in run_chunks(adiabatic_growth, (problem,), rows, CHUNK):
         part = part[growth > LARGEST_GROWTH]
         share = np.where(solution.outcome[part] == Outcome.NO_ORBIT, solution.detail[part], 1.0)
         solution.detail[part] = np.minimum(share, 1.0) * amplitude[part]

@@ -25,9 +25,11 @@ def mark_out_of_range(problem: Problem, solution: Solution) -> None:
     # Mass and damping add fast rates that methods can treat, so they do not count here.
     sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
     rate, unloading = np.empty((2, len(points)))
-    for part, values in run_chunks(stiffness_of_steady_sliding, sliding, points, STIFFNESS_CHUNK):
+    for part, values in run_chunks(
+        stiffness_of_steady_sliding, (sliding,), points, STIFFNESS_CHUNK
+    ):
         rate[part] = values
-    for part, values in run_chunks(deepest_unloading, sliding, points, STIFFNESS_CHUNK):
+    for part, values in run_chunks(deepest_unloading, (sliding,), points, STIFFNESS_CHUNK):
         unloading[part] = values
     _mark(solution, ~((rate >= SMALLEST_RATE) & (rate <= LARGEST_RATE)), rate)
     _mark(solution, ~(unloading <= LARGEST_UNLOADING), unloading)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-import jax
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,7 +12,12 @@ from asperity.algebra.small_systems import scaled_product
 from asperity.orbit.batches import Indices, run_chunks
 from asperity.orbit.floquet import LARGEST_LOG, from_logs, log_multipliers
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.programs import piece_map, read_orbit, split_observables
+from asperity.orbit.mesh.reading import (
+    VANISHING_GROWTH,
+    piece_map,
+    read_orbit,
+    split_observables,
+)
 from asperity.orbit.observables import Observables
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.solution import Solution
@@ -27,27 +31,14 @@ AGREEMENT = 2e-7
 #: of all intervals at once, and of one after the other.
 _MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 40_000_000
 
-#: Interval-points in a chunk, for up to two states and for more: keeps the working set of
-#: collocation within a core's cache.
-_CHUNK_INTERVALS = (1536, 384)
-
 #: Multipliers below this modulus are compared absolutely: no experiment sees them. Two have their
 #: product from Liouville's formula; of more the small ones drown in the round-off of the large.
 _VANISHING = (1e-12, 1e-6)
 _LOST_IN_ROUND_OFF = 1e-7
 
-#: Where the largest eigenvalue of the Jacobian integrates to less than this, all multipliers
-#: vanish as doubles, and those of the transfer maps of a stiff method are not used.
-_VANISHING_GROWTH = -200.0
-
 #: Mean logarithm of the multipliers, exact by Liouville's formula, above which the largest
 #: certainly overflows a double, and above which no mesh of ours resolves the others.
 _OVERFLOW, _HOPELESS = 750.0, 5000.0
-
-
-def chunk_size(intervals: int, size: int) -> int:
-    """Points per chunk on a mesh of `intervals`, for `size` states."""
-    return max(4, _CHUNK_INTERVALS[size > 2] // intervals)
 
 
 def extreme_multipliers(
@@ -59,7 +50,7 @@ def extreme_multipliers(
     -------
     bool array, shape (points,)
     """
-    vanishing = observables.growth < _VANISHING_GROWTH
+    vanishing = observables.growth < VANISHING_GROWTH
     overflowing = ~vanishing & (observables.log_determinant > _HOPELESS * len(logs))
     for k in np.flatnonzero(vanishing):
         logs[:, k] = _frozen_logs(observables, k)
@@ -84,8 +75,7 @@ def _resolve_by_splitting(
     splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_AT_ONCE]
     for parts in splits:
         solve = partial(split_observables, parts=parts)
-        chunk = max(1, chunk_size(intervals * parts, problem.system.size))
-        for part, observables in run_chunks(solve, (problem, orbit), index, chunk):
+        for part, observables in run_chunks(solve, (problem, orbit), index, 1):
             logs = observables.log_multipliers
             gap = _compare_with_coarser(solution, part, logs)
             over = np.flatnonzero(
@@ -131,23 +121,19 @@ def _compare_with_coarser(
 
 
 def _monodromy_by_intervals(
-    inputs: tuple[Problem, Orbit], *, parts: int
+    problem: Problem, orbit: Orbit, *, parts: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Monodromy matrix, logarithm of its scale, and logarithm of the determinant."""
-    problem, orbit = inputs
     maps, log_scales = [], []
     for k in range(orbit.mesh.shape[0] - 1):
-        step, log_step = piece_map((problem, orbit.piece(k, k + 1)), parts=parts)
-        maps.append(np.asarray(step))
-        log_scales.append(np.asarray(log_step))
+        step, log_step = piece_map(problem, orbit.piece(k, k + 1), parts)
+        maps.append(step)
+        log_scales.append(log_step)
     # Maps that miss growth within a part may lose the product; then no two agree.
-    whole, log_scale = _product_of_maps(np.stack(maps, axis=2))
-    observables = read_orbit(inputs, harmonics=1)
-    log_scale = np.asarray(log_scale) + np.sum(log_scales, axis=0)
-    return np.asarray(whole), log_scale, np.asarray(observables.log_determinant)
-
-
-_product_of_maps = jax.jit(scaled_product)
+    with np.errstate(all="ignore"):
+        whole, log_scale = scaled_product(np.stack(maps, axis=2))
+    observables = read_orbit(problem, orbit, 1)
+    return whole, log_scale + np.sum(log_scales, axis=0), observables.log_determinant
 
 
 def _overflowing_logs(size: int, log_determinant: Any) -> NDArray[np.complex128]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
 from asperity.orbit.floquet import log_multipliers, log_multipliers_of_exponent
+from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
 
@@ -79,13 +79,16 @@ class PeriodicOrbit(Protocol):
         ...
 
 
-def waveform(problem: Problem, orbit: PeriodicOrbit, phases: int) -> Array:
+def waveform(problem: Problem, orbit: PeriodicOrbit, phases: int) -> NDArray[np.float64]:
     """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points)."""
     theta = even_phases(phases)
-    return waveform_of(problem, orbit.states(theta), jnp.asarray(theta))
+    return waveform_of(problem, orbit.states(theta), theta)
 
 
-def waveform_of(problem: Problem, Y: Array, theta: Array) -> Array:
+def waveform_of(
+    problem: Problem, Y: NDArray[np.float64], theta: NDArray[np.float64]
+) -> NDArray[np.float64]:
     """F/W0 and ln(v_pl/V) of the states `Y`, (size, phases, points), at the phases `theta`."""
-    at = problem.load.at(theta)
-    return jnp.stack([problem.system.force(Y, at), problem.system.log_slip(Y, at)])
+    at = excitation_at(problem.load, theta * np.ones(Y.shape[2]))
+    values = values_at(problem.system, at, np.zeros_like(Y[:, 0]), Y)
+    return np.stack([values.force, values.log_slip])

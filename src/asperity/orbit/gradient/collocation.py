@@ -15,9 +15,10 @@ import jax.numpy as jnp
 from jax import Array
 
 from asperity.algebra.cyclic import CyclicFactors, factorise_cyclic, solve_factorised
-from asperity.orbit.mesh.condensation import condense, localise, transfer_maps
+from asperity.orbit.mesh.condensation import condense, transfer_maps
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.scheme import STAGES
+from asperity.slider.pointwise import PointValues, point_values
 from asperity.slider.problem import Problem
 
 
@@ -31,6 +32,24 @@ def unknowns_of(orbit: Orbit) -> Array:
         depends on what is transposed.
     """
     return jnp.concatenate([orbit.nodes[:, None], orbit.slopes], axis=1)
+
+
+def values_on(problem: Problem, orbit: Orbit) -> PointValues:
+    """The equation of motion at the collocation points, within a program."""
+    system, load = problem
+    centre = orbit.centre[:, None, None]
+    return point_values(system, load.at(orbit.stage_phases), centre, orbit.stage_deviations)
+
+
+def condensed_jacobian(jacobian: Array, right: Array, orbit: Orbit) -> tuple[Array, Array]:
+    """`condense` of arrays (..., intervals, points) on the mesh of an orbit, within a program."""
+
+    def flat(a: Array) -> Array:
+        return a.reshape(*a.shape[:-2], -1)
+
+    solved = condense(flat(jacobian), flat(right), flat(orbit.widths), orbit.scheme.a)
+    response, constant = (a.reshape(*a.shape[:-1], *orbit.widths.shape) for a in solved)
+    return response, constant
 
 
 class _CondensedEquations(NamedTuple):
@@ -53,17 +72,17 @@ class CollocationEquations:
     def prepare(self, parameters: tuple[Problem, Orbit], unknowns: Array) -> _CondensedEquations:
         """Condensed equations."""
         problem, orbit = parameters[0], self.orbit(parameters, unknowns)
-        local = localise(*problem, orbit)
-        n = local.rates.shape[0]
-        unit = jnp.eye(n * STAGES).reshape(n * STAGES, n, STAGES, 1, 1)
-        columns = [column + jnp.zeros_like(local.rates) for column in unit]
-        response, *inverse = condense(local, orbit, *columns)
+        values = values_on(problem, orbit)
+        n = values.rates.shape[0]
+        unit = jnp.eye(n * STAGES).reshape(n, STAGES, n * STAGES, 1, 1)
+        unit = jnp.broadcast_to(unit, (*unit.shape[:3], *orbit.widths.shape))
+        response, inverse = condensed_jacobian(values.jacobian, unit, orbit)
         return _CondensedEquations(
             orbit.widths,
             jnp.asarray(orbit.scheme.b),
             response,
-            jnp.stack(inverse, axis=2),
-            factorise_cyclic(transfer_maps(response, orbit)),
+            inverse,
+            factorise_cyclic(transfer_maps(response, orbit.widths, orbit.scheme.b)),
         )
 
     def residual(

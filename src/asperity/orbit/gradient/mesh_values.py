@@ -9,14 +9,19 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.orbit.gradient.collocation import CollocationEquations, unknowns_of
+from asperity.orbit.gradient.collocation import (
+    CollocationEquations,
+    condensed_jacobian,
+    unknowns_of,
+    values_on,
+)
 from asperity.orbit.gradient.implicit import implicit_solution
 from asperity.orbit.gradient.multipliers import log_multipliers, sorted_logs
 from asperity.orbit.gradient.program import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, mesh_orbit_shapes
 from asperity.orbit.gradient.search.search import TRACED_MESH, search_in_another_process
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import collocation_observables
+from asperity.orbit.mesh.reading import orbit_observables
 from asperity.orbit.mesh.scheme import scheme_for
 from asperity.orbit.outcome import Outcome
 
@@ -104,7 +109,10 @@ def mesh_chunk_values(
     equations = CollocationEquations()
     unknowns = implicit_solution(equations, (problem, found), unknowns_of(found))
     orbit = equations.orbit((problem, found), unknowns)
-    response = collocation_observables(*problem, orbit, harmonics=program.harmonics, growth=False)
+    local = values_on(problem, orbit)
+    none = jnp.zeros((*orbit.slopes.shape[:2], 0, *orbit.widths.shape))
+    maps, _ = condensed_jacobian(local.jacobian, none, orbit)
+    response = orbit_observables(local, maps, orbit, program.harmonics)
     logs = jnp.zeros((0, *response.mean_friction.shape), dtype=complex)
     if program.multipliers:
         logs = log_multipliers(response.monodromy, response.log_scale, response.log_determinant)

@@ -1,69 +1,60 @@
 """Collocation on one interval: linearised at its collocation points, condensed to a transfer map.
 
 The response of the slopes at the collocation points to a change at the left node of an interval
-is a small dense system. Solved interval by interval it leaves equations for the nodes alone.
+is a small dense system. Solved interval by interval it leaves equations for the nodes alone. No
+interval knows its neighbours here, so that intervals of any mesh and any operating point lie along
+one axis.
 """
 
 from __future__ import annotations
 
 from functools import partial
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
-from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.algebra.small_systems import inverse_points, jacobian_columns, product
-from asperity.loads import Excitation, Modulation
-from asperity.orbit.mesh.mesh import Orbit
+from asperity.algebra.small_systems import inverse_points, product
 from asperity.orbit.mesh.scheme import STAGES
-from asperity.slider import Motion
 
 #: Entries of small matrices that are eliminated at a time: they fit into a core's cache.
 _CACHED = 20_000
 
 
-class LinearisedEquations(NamedTuple):
-    """The equations at the collocation points."""
-
-    at: Excitation
-    states: Array
-    rates: Array
-    jacobian: Array  # (row, column, STAGES, intervals, points)
-
-
-def localise(system: Motion, load: Modulation, orbit: Orbit) -> LinearisedEquations:
-    """The equations and their derivatives at the collocation points of an orbit."""
-    theta = orbit.stage_phases
-    at = load.at(theta)
-    states = orbit.centre[:, None, None] + orbit.stage_deviations
-    rates, columns = jacobian_columns(lambda Y: system.rates(Y, at), states)
-    return LinearisedEquations(at, states, rates, jnp.stack(columns, axis=1))
-
-
-def condense(local: LinearisedEquations, orbit: Orbit, *right: Array) -> list[Array]:
+def condense(jacobian: Array, right: Array, widths: Array, a: Array) -> tuple[Array, Array]:
     """Slopes at the stages as a linear function of the state at the left node.
 
-    Returns the matrix (n, STAGES, n, intervals, points) and for each right-hand side, of shape
-    (n, STAGES, intervals, points), the constant part of the change of the slopes.
+    Parameters
+    ----------
+    jacobian : array, shape (n, n, STAGES, intervals)
+        [row, column] at the collocation points.
+    right : array, shape (n, STAGES, sides, intervals)
+        Right-hand sides.
+    widths : array, shape (intervals,)
+    a : array, shape (STAGES, STAGES)
+        Of the collocation scheme.
+
+    Returns
+    -------
+    response : array, shape (n, STAGES, n, intervals)
+        Change of the slopes for a change at the left node.
+    constant : array, shape (n, STAGES, sides, intervals)
+        Change of the slopes for each right-hand side.
     """
-    solve = partial(_condense, scheme=orbit.scheme)
-    constants = jnp.stack(right) if right else jnp.zeros((0, *local.rates.shape))
-    whole = (local.jacobian, constants, orbit.widths)
-    n, (intervals, points) = local.rates.shape[0], orbit.widths.shape
-    entries = STAGES * n * ((STAGES + 1) * n + len(right)) * points
+    n, intervals = jacobian.shape[0], widths.shape[-1]
+    solve = partial(_condense, a=a)
+    entries = STAGES * n * ((STAGES + 1) * n + right.shape[2])
     divisors = (k for k in range(1, intervals) if _fits(intervals, k, entries))
     blocks = next(divisors, intervals)
-    if blocks == 1:
-        solution = solve(whole)
-    else:
+    parts = jacobian, right, widths
+    if blocks > 1:
         # Block by block, so that the elimination stays within a core's cache.
-        cut = (blocks, intervals // blocks, points)
-        parts = tuple(jnp.moveaxis(a.reshape(*a.shape[:-2], *cut), -3, 0) for a in whole)
-        solved = jax.lax.map(solve, parts)
-        solution = jnp.moveaxis(solved, 0, -3).reshape(n, STAGES, -1, intervals, points)
-    return [solution[:, :, :n], *(solution[:, :, n + i] for i in range(len(right)))]
+        cut = tuple(jnp.moveaxis(p.reshape(*p.shape[:-1], blocks, -1), -2, 0) for p in parts)
+        solved = jax.lax.map(solve, cut)
+        solution = jnp.moveaxis(solved, 0, -2).reshape(*solved.shape[1:-1], intervals)
+    else:
+        solution = solve(parts)
+    return solution[:, :, :n], solution[:, :, n:]
 
 
 def _fits(intervals: int, blocks: int, entries: int) -> bool:
@@ -71,16 +62,16 @@ def _fits(intervals: int, blocks: int, entries: int) -> bool:
     return intervals % blocks == 0 and intervals // blocks * entries <= _CACHED
 
 
-def _condense(part: tuple[Array, Array, Array], *, scheme: CollocationScheme) -> Array:
-    """The same of some intervals; (n, STAGES, n + right-hand sides, intervals, points)."""
-    jacobian, constants, widths = part
+def _condense(part: tuple[Array, Array, Array], *, a: Array) -> Array:
+    """The same of some intervals; (n, STAGES, n + right-hand sides, intervals)."""
+    jacobian, right, widths = part
     n = jacobian.shape[0]
-    per_stage = jnp.transpose(jacobian, (2, 0, 1, 3, 4))  # (stage, row, column, ...)
-    right = jnp.transpose(constants, (2, 1, 0, 3, 4))
-    # Row blocks (I - h a_jk J_j | J_j, F_j - K_j), one per stage j, columns (k, state).
-    coupling = per_stage[:, :, None] * (widths * scheme.a[:, None, :, None, None, None])
+    per_stage = jnp.transpose(jacobian, (2, 0, 1, 3))  # (stage, row, column, intervals)
+    right = jnp.transpose(right, (1, 0, 2, 3))
+    # Row blocks (I - h a_jk J_j | J_j, right-hand sides), one per stage j, columns (k, state).
+    coupling = per_stage[:, :, None] * (widths * a[:, None, :, None, None])
     identity = jnp.eye(STAGES)[:, None, :, None] * jnp.eye(n)[:, None, :]
-    left = (identity[..., None, None] - coupling).reshape(STAGES, n, -1, *widths.shape)
+    left = (identity[..., None] - coupling).reshape(STAGES, n, -1, *widths.shape)
     solution = _eliminate_stages(jnp.concatenate([left, per_stage, right], axis=2))
     return jnp.swapaxes(solution, 0, 1)
 
@@ -108,7 +99,17 @@ def _eliminate_stages(rows: Array) -> Array:
     return jnp.stack(solved)
 
 
-def transfer_maps(response: Array, orbit: Orbit) -> Array:
-    """Maps (n, n, intervals, points) from a change at the left node to that at the right."""
-    identity = jnp.eye(response.shape[0])[:, :, None, None]
-    return identity + orbit.widths * jnp.einsum("k,nkcmb->ncmb", orbit.scheme.b, response)
+def transfer_maps(response: Array, widths: Array, b: Array) -> Array:
+    """Maps (n, n, ...) from a change at the left node to that at the right.
+
+    Parameters
+    ----------
+    response : array, shape (n, STAGES, n, ...)
+        As `condense` returns it.
+    widths : array, shape (...)
+    b : array, shape (STAGES,)
+        Of the collocation scheme.
+    """
+    n = response.shape[0]
+    identity = jnp.eye(n).reshape(n, n, *(1 for _ in widths.shape))
+    return identity + widths * sum(b[k] * response[:, k] for k in range(STAGES))

@@ -1,10 +1,13 @@
-"""The robust method: collocation with Newton's method on the whole orbit.
+"""Newton's method on whole orbits, along a line of parameters or at fixed ones.
 
-On each interval the states are polynomials that obey the equations at four points: those of
-Gauss-Legendre, or of Radau IIA where modes decay within an interval. Newton's step is condensed
-interval by interval to a transfer map, the maps are tied into a cycle by `asperity.algebra.cyclic`,
-and their product is the monodromy matrix. Stable or not makes no difference to it, and neither do
-fast and slow directions.
+The unknowns are an orbit X and the coordinate t of a line of parameters. Newton's step is condensed
+interval by interval to a transfer map and the maps are tied into a cycle by
+`asperity.algebra.cyclic`, together with one more equation
+
+    <row, dX> + corner dt = value:
+
+of a plane across a branch of orbits for continuation, or dt = 0 where the parameters are fixed.
+Stable or not makes no difference to it, and neither do fast and slow directions.
 
 The exponent of the slip rate changes by tens of units within a period, so the step is shortened
 until no exponent and no logarithmic state changes by more than a few units.
@@ -12,198 +15,237 @@ until no exponent and no logarithmic state changes by more than a few units.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
-from asperity.algebra.cyclic import solve_cyclic
-from asperity.algebra.small_systems import (
-    jacobian_columns,
-    scaled_product,
-    spectral_abscissa,
-    spectral_radius,
-)
-from asperity.loads import Modulation
-from asperity.orbit.mesh.condensation import (
-    LinearisedEquations,
-    condense,
-    localise,
-    transfer_maps,
-)
-from asperity.orbit.mesh.mesh import (
-    Orbit,
-    equidistributed,
-    graded_mesh,
-)
-from asperity.orbit.mesh.scheme import STAGES, scheme_for
-from asperity.orbit.newton_step import exponent_change
-from asperity.orbit.observables import Observables
-from asperity.slider import Motion, QuasiStatic
-from asperity.theory.averaged import averaged_limit
+from asperity._jax import jit_large
+from asperity.algebra.cyclic import Border, solve_bordered
+from asperity.orbit.mesh.condensation import transfer_maps
+from asperity.orbit.mesh.equations import CondensedEquations, condensed
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.slider.motion import Motion
+from asperity.slider.pointwise import excitation_at
+from asperity.slider.problem import Problem
 
-#: Modulus of the logarithms of the multipliers below which the mean Jacobian gives them better
-#: than the monodromy matrix does: its error is about their square, of the latter the round-off of 1
-#: or, of two that are close to each other, the root of that.
-_SMALL_EXPONENT = 1e-5
+Float = NDArray[np.float64]
+
+#: Change at which Newton's method ends: the error is about its square.
+TOLERANCE = 1e-8
+#: A last change below this counts as converged.
+ACCEPTED = 1e-6
+#: Bound on the change of an exponent or logarithmic state in one step: bold from a rough guess,
+#: since the change of the slip rate is e to that.
+_LARGEST_CHANGE = 2.0
 
 
-def averaged_orbit(
-    system: QuasiStatic, load: Modulation, points: int, *, intervals: int, grading: float
-) -> Orbit:
-    """The averaged limit as a first guess."""
-    orbit = steady_orbit(system, points, intervals=intervals, grading=grading)
-    at = load.at(orbit.stage_phases)
-    samples = jax.tree.map(lambda a: a.reshape(-1, points) if jnp.ndim(a) else a, at)
-    weights = (jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths).reshape(-1, points)
-    averaged = averaged_limit(system, samples, weights[:, 0] / (2 * jnp.pi))
-    return orbit.moved(centre=jnp.stack(averaged.centre))
+class Plane(NamedTuple):
+    """The equation <row, dX> + corner dt = 0 on the changes of the nodes and of t.
+
+    Attributes
+    ----------
+    row : array, shape (n, intervals, points)
+    corner : array, shape (points,)
+    """
+
+    row: Float
+    corner: Float
+
+    @classmethod
+    def of_fixed_parameters(cls, orbit: Orbit) -> Plane:
+        """Dt = 0."""
+        return cls(np.zeros_like(orbit.nodes), np.ones(orbit.nodes.shape[-1]))
 
 
-def steady_orbit(system: Motion, points: int, *, intervals: int, grading: float) -> Orbit:
-    """Steady sliding under constant load: the orbit at epsilon = 0."""
-    n = system.size
-    return Orbit(
-        graded_mesh(intervals, points, grading),
-        jnp.broadcast_to(system.steady(), (n, points)),
-        jnp.zeros((n, intervals, points)),
-        jnp.zeros((n, STAGES, intervals, points)),
-        scheme_for(system),
-    )
+class Change(NamedTuple):
+    """Changes of nodes (n, intervals, points), slopes (n, STAGES, intervals, points) and t."""
+
+    nodes: Array
+    slopes: Array
+    t: Array
 
 
-def _newton_step(
-    system: Motion, load: Modulation, orbit: Orbit
-) -> tuple[LinearisedEquations, Array, Array]:
-    local = localise(system, load, orbit)
-    response, constant = condense(local, orbit, local.rates - orbit.slopes)
-    maps = transfer_maps(response, orbit)
-    gap = jnp.roll(orbit.nodes, -1, axis=1) - orbit.nodes
-    rise = orbit.widths * jnp.einsum("k,nkmb->nmb", orbit.scheme.b, orbit.slopes + constant)
-    nodes = solve_cyclic(maps, rise - gap)
-    slopes = jnp.einsum("nkcmb,cmb->nkmb", response, nodes) + constant
-    return local, nodes, slopes
+class NewtonStep(NamedTuple):
+    """A step and its size.
 
+    Attributes
+    ----------
+    change : Change
+    largest : array, shape (points,)
+        Largest change of the slip exponent and of a logarithmic state at the collocation points.
+    error : array, shape (points,)
+        The same with t, and with forces and velocities relative to their swing.
+    """
 
-def swing_change(system: Motion, orbit: Orbit, stages: Array) -> Array:
-    """Largest change of a force or velocity at the stages, relative to its swing, (points,)."""
-    linear = jnp.array(system.linear)
-    # Against round-off where there is hardly any swing: of a force, see its rate.
-    swing = jnp.abs(orbit.nodes[linear]).max(1) + 1e-4 * jnp.minimum(system.kappa, 1.0)
-    relative = jnp.abs(stages[linear] - stages[linear, :1, :1]).max((1, 2)) / swing
-    return relative.max(0)
-
-
-def newton_update(system: Motion, load: Modulation, orbit: Orbit) -> Orbit:
-    """One undamped Newton step: at a converged orbit an identity with the orbit's derivative."""
-    _, nodes, slopes = _newton_step(system, load, orbit)
-    return orbit.moved(nodes=orbit.nodes + nodes, slopes=orbit.slopes + slopes)
+    change: Change
+    largest: Array
+    error: Array
 
 
 class NewtonResult(NamedTuple):
-    """Orbit, last change (inf where it was not finite) and number of steps."""
+    """Where Newton's method ended.
+
+    Attributes
+    ----------
+    orbit : Orbit
+    t : array, shape (points,)
+    error : array, shape (points,)
+        Last change, inf where it was not finite.
+    steps : int array, shape (points,)
+    """
 
     orbit: Orbit
-    error: Array
-    steps: Array
+    t: Float
+    error: Float
+    steps: NDArray[np.int_]
 
 
-def newton_orbit(
+@jit_large
+def _step(
+    response: Array,
+    constant: Array,
+    slip_gradient: Array,
+    orbit: tuple[Array, Array, Array],
+    plane: Plane,
+    value: Array,
+    coefficients: tuple[Array, Array],
+    linear: Array,
+    least_swing: Array,
+) -> NewtonStep:
+    """Solve the linearised equations; `orbit` is (widths, nodes, slopes)."""
+    widths, nodes, slopes = orbit
+    a, b = coefficients
+    defect = constant[:, :, 0]
+    # Without a direction of the parameters t does not matter to the equations.
+    column = constant[:, :, 1] if constant.shape[2] > 1 else jnp.zeros_like(defect)
+    gain = widths * jnp.einsum("k,nkmb->nmb", b, column)
+    gap = jnp.roll(nodes, -1, axis=1) - nodes
+    rise = widths * jnp.einsum("k,nkmb->nmb", b, slopes + defect) - gap
+    border = Border(gain, plane.row, plane.corner, value)
+    moved, t = solve_bordered(transfer_maps(response, widths, b), rise, border)
+    bent = jnp.einsum("nkcmb,cmb->nkmb", response, moved) + defect + column * t
+    stages = moved[:, None] + widths * jnp.einsum("jk,nkmb->njmb", a, bent)
+    exponent = jnp.abs((slip_gradient * stages).sum(0)).max((0, 1))
+    each = jnp.abs(stages).max((1, 2))
+    mask = linear[:, None]
+    largest = jnp.maximum(exponent, jnp.where(mask, 0.0, each).max(0))
+    # Against round-off where there is hardly any swing: of a force, see its rate.
+    after = nodes + moved
+    swing = jnp.abs(after - after[:, :1]).max(1) + least_swing
+    relative = jnp.abs(stages - stages[:, :1, :1]).max((1, 2)) / swing
+    error = jnp.maximum(largest, jnp.where(mask, relative, 0.0).max(0))
+    return NewtonStep(Change(moved, bent, t), largest, jnp.maximum(error, jnp.abs(t)))
+
+
+def newton_step(
     system: Motion,
-    load: Modulation,
+    equations: CondensedEquations,
     orbit: Orbit,
+    plane: Plane,
+    value: float = 0.0,
     *,
-    tolerance: float,
-    max_steps: int,
-    largest_change: float,
-) -> NewtonResult:
-    """Newton's method from the guess `orbit`.
+    closed: bool = True,
+) -> NewtonStep:
+    """One step, not yet taken.
 
     Parameters
     ----------
-    system, load
-        Parameters of shape (points,).
+    system : Motion
+    equations : CondensedEquations
     orbit : Orbit
-    tolerance : float
-        On the last change: of the slip exponent and the logarithmic states absolutely, of the
-        force relative to its own swing. Convergence is quadratic, so the error is
-        about the square of that.
-    max_steps : int
-    largest_change : float
-        Bound on the change of an exponent or logarithmic state in one step.
+    plane : Plane
+    value : float
+        Distance of the new point from the plane.
+    closed : bool
+        Whether the step makes up for the defect of the orbit, or keeps to the solutions of the
+        linear equations: the tangent of a branch.
     """
-
-    def body(carry: tuple) -> tuple:
-        orbit, _, steps = carry
-        local, nodes, slopes = _newton_step(system, load, orbit)
-        stages = nodes[:, None] + orbit.widths * orbit.stage_sums(slopes)
-        change = exponent_change(system, local.at, local.states, stages).max((0, 1))
-        damping = jnp.minimum(1.0, largest_change / jnp.where(change > 0, change, 1.0))
-        nodes = orbit.nodes + damping * nodes
-        centre = orbit.centre + nodes[:, 0]
-        nodes = nodes - nodes[:, :1]
-        slopes = orbit.slopes + damping * slopes
-        moved = orbit.moved(centre=centre, nodes=nodes, slopes=slopes)
-        error = jnp.maximum(change, swing_change(system, moved, stages))
-        return moved, jnp.where(jnp.isfinite(error), error, jnp.inf), steps + 1
-
-    def unfinished(carry: tuple) -> Array:
-        return (carry[2] < max_steps) & jnp.any(carry[1] > tolerance)
-
-    start = (orbit, jnp.full(orbit.mesh.shape[1], jnp.inf), 0)
-    return NewtonResult(*jax.lax.while_loop(unfinished, body, start))
-
-
-def refined(system: Motion, load: Modulation, orbit: Orbit, intervals: int) -> Orbit:
-    """The orbit on an equidistributed mesh of `intervals` intervals."""
-    at = load.at(orbit.stage_phases)
-    states = orbit.centre[:, None, None] + orbit.stage_deviations
-    _, sensitivity = jacobian_columns(lambda Y: system.log_slip(Y, at)[None], states)
-    scales = jnp.stack([jnp.abs(s[0]).mean(0) for s in sensitivity])
-    for i in range(system.size):
-        if i not in system.linear:
-            # Logarithmic states matter on their own, not only through the slip they allow.
-            scales = scales.at[i].set(jnp.maximum(scales[i], 1.0))
-        else:
-            # Slip does not feel every force and velocity: those count beside their own swing.
-            swing = jnp.abs(orbit.nodes[i]).max(0) + 1e-4 * jnp.minimum(system.kappa, 1.0)
-            scales = scales.at[i].set(jnp.where(scales[i] > 0, scales[i], 1 / swing))
-    return equidistributed(orbit, scales, intervals)
-
-
-def collocation_observables(
-    system: Motion, load: Modulation, orbit: Orbit, *, harmonics: int, growth: bool = True
-) -> Observables:
-    """Observables of a converged orbit; `growth` may be left out as inf."""
-    local = localise(system, load, orbit)
-    weights = jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths / (2 * jnp.pi)
-    constant, rest = system.force_split(
-        orbit.centre[:, None, None], orbit.stage_deviations, local.at
+    nodes, slopes = (orbit.nodes, orbit.slopes) if closed else (0 * orbit.nodes, 0 * orbit.slopes)
+    linear = np.isin(np.arange(len(nodes)), system.linear)
+    points = nodes.shape[-1]
+    step = _step(
+        equations.response,
+        equations.constant,
+        equations.values.slip_gradient,
+        (orbit.widths, nodes, slopes),
+        plane,
+        np.full(points, value),
+        (np.asarray(orbit.scheme.a), np.asarray(orbit.scheme.b)),
+        linear,
+        least_swing(system, points),
     )
-    theta = orbit.stage_phases
-    orders = jnp.arange(1, harmonics + 1)
-    phasors = jax.lax.map(
-        lambda k: 2 * (weights * rest * jnp.exp(-1j * k * theta)).sum((0, 1)), orders
+    return jax.tree.map(np.asarray, step)
+
+
+def least_swing(system: Motion, points: int) -> Float:
+    """What a swing of a force or velocity is taken to be at least, shape (points,)."""
+    return np.broadcast_to(1e-4 * np.minimum(np.asarray(system.kappa), 1.0), (points,))
+
+
+def moved(orbit: Orbit, t: Float, change: Change, length: Float) -> tuple[Orbit, Float]:
+    """The orbit and the coordinate changed by `length`, (points,), times `change`."""
+    nodes = orbit.nodes + length * change.nodes
+    centre = orbit.centre + nodes[:, 0]
+    slopes = orbit.slopes + length * change.slopes
+    return orbit.moved(centre=centre, nodes=nodes - nodes[:, :1], slopes=slopes), (
+        t + length * change.t
     )
-    mean = constant.reshape(-1) + (weights * rest).sum((0, 1))
-    (response,) = condense(local, orbit)
-    monodromy, log_scale = scaled_product(transfer_maps(response, orbit))
-    trace = jnp.trace(local.jacobian)
-    # Of two states it costs next to nothing.
-    wanted = growth or system.size <= 2
-    # Where rates are so small that the order in which they act does not matter, their mean.
-    mean_jacobian = 2 * jnp.pi * (weights * local.jacobian).sum((2, 3))
-    small = spectral_radius(mean_jacobian) < _SMALL_EXPONENT
-    exponent = jnp.where(small, mean_jacobian, jnp.nan)
-    abscissa = spectral_abscissa(local.jacobian) if wanted else jnp.full_like(trace, jnp.inf)
-    return Observables(
-        mean,
-        phasors,
-        monodromy,
-        log_scale,
-        2 * jnp.pi * (weights * trace).sum((0, 1)),
-        exponent,
-        2 * jnp.pi * (weights * abscissa).sum((0, 1)),
-        orbit.start,
-    )
+
+
+def solve_in_plane(
+    line: Callable[[Float], tuple[Problem, Problem | None]],
+    guess: Orbit,
+    t: Float,
+    plane: Plane,
+    *,
+    max_steps: int,
+    tolerance: float = TOLERANCE,
+) -> NewtonResult:
+    """Newton's method on the plane through a guess.
+
+    Parameters
+    ----------
+    line : callable
+        Parameters at the coordinate t, and their derivative or None.
+    guess : Orbit
+    t : array, shape (points,)
+    plane : Plane
+    max_steps : int
+    tolerance : float
+        On the last change: of the slip exponent and the logarithmic states absolutely, of forces
+        relative to their swing.
+    """
+    orbit, t = guess, np.array(t, float)
+    problem, direction = line(t)
+    at = excitation_at(problem.load, orbit.stage_phases)
+    error, steps = np.full(t.shape, np.inf), np.zeros(t.shape, int)
+    for _ in range(max_steps):
+        going = error > tolerance
+        if not going.any():
+            break
+        equations = condensed(problem, orbit, direction, at=at)
+        # The guess lies in the plane, and every change keeps it there.
+        step = newton_step(problem.system, equations, orbit, plane)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            shortened = np.minimum(1.0, _LARGEST_CHANGE / step.largest)
+        # Points that have converged stay as they are, whatever the others of the chunk need.
+        change = Change(*(np.where(going, part, 0.0) for part in step.change))
+        orbit, t = moved(orbit, t, change, shortened)
+        size = np.where(np.isfinite(step.error), step.error, np.inf)
+        error, steps = np.where(going, size, error), steps + going
+        if direction is not None:
+            problem, direction = line(t)
+            at = excitation_at(problem.load, orbit.stage_phases)
+    return NewtonResult(orbit, t, error, steps)
+
+
+def solve(problem: Problem, guess: Orbit, max_steps: int) -> NewtonResult:
+    """Newton's method at fixed parameters, NumPy arrays (points,)."""
+    t = np.zeros(guess.nodes.shape[-1])
+    plane = Plane.of_fixed_parameters(guess)
+    return solve_in_plane(lambda _: (problem, None), guess, t, plane, max_steps=max_steps)

@@ -89,7 +89,7 @@ class FourierSeries(Method):
         # Mass and damping make the equations stiff too, but not their orbits smooth.
         sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
         slow, weak = np.zeros((2, len(points)), dtype=bool)
-        for part, smoothness in run_chunks(_smoothness, sliding, points, STIFFNESS_CHUNK):
+        for part, smoothness in run_chunks(_smoothness, (sliding,), points, STIFFNESS_CHUNK):
             slow[part], weak[part] = smoothness
         smooth = np.flatnonzero(slow | weak)
         if not len(smooth):

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from asperity.orbit.batches import put, run_chunks, take
-from asperity.orbit.mesh.programs import remeshed
+from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
+from asperity.orbit.mesh.remeshing import remeshed
 from asperity.orbit.methods.branch_following.from_steady_sliding import MESHES
 from asperity.orbit.methods.branch_following.method import orbits_along_branches
 from asperity.orbit.methods.collocation.frequency_path import orbits_from_high_frequency
@@ -15,7 +15,6 @@ from asperity.orbit.methods.collocation.initial_guess import (
     InitialGuess,
     orbits_from_averaged_limit,
 )
-from asperity.orbit.multipliers import chunk_size
 from asperity.slider.problem import Problem
 
 
@@ -31,8 +30,8 @@ def starting_orbits(problem: Problem, points: int, intervals: int) -> InitialGue
         Of the mesh of the orbits.
     """
     guess = InitialGuess.none(problem, points, intervals)
+    chunk = mesh_chunk(problem.system.size)
     remesh = partial(remeshed, intervals=intervals)
-    chunk = chunk_size(intervals, problem.system.size)
     along = [lambda part, n, mesh=mesh: orbits_along_branches(part, n, mesh)[0] for mesh in MESHES]
     for find in (orbits_from_averaged_limit, *along, orbits_from_high_frequency):
         left = np.flatnonzero(~guess.found)

@@ -13,23 +13,24 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.programs import ACCEPTED, refine_orbit, remeshed
-from asperity.orbit.multipliers import AGREEMENT, chunk_size
+from asperity.orbit.mesh.newton import ACCEPTED
+from asperity.orbit.mesh.remeshing import FIRST_MESH, refined_orbit, remeshed
+from asperity.orbit.multipliers import AGREEMENT
 from asperity.orbit.observables import Observables
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
 
 #: Intervals of the meshes that known orbits are kept on.
-KEPT = 144
+KEPT = 216
 #: Intervals of the mesh that is compared with the first one on which orbits are differentiated.
-COARSER = 72
-#: Largest relative change of mean and harmonics from a mesh to one with twice the intervals at
-#: which the finer serves: its own error is smaller by 2^8, for a stiff orbit by 2^4. The same for
-#: three times, 3^8 or 3^4, and of the last mesh, as good as the whole search.
-_TWICE_AGREEMENT, _THRICE_AGREEMENT, _LAST_AGREEMENT = 1e-9, 1e-8, AGREEMENT
+COARSER = FIRST_MESH
+#: Largest relative change of mean and harmonics from a mesh to the next at which the finer serves:
+#: its own error is smaller by 3^8, for a stiff orbit by 3^4. The same of the last mesh, as good as
+#: the whole search.
+_AGREEMENT, _LAST_AGREEMENT = 1e-8, AGREEMENT
 
 
 @dataclass
@@ -64,7 +65,7 @@ class KnownOrbits:
             return
         remesh = partial(remeshed, intervals=KEPT)
         inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
-        for part, kept in run_chunks(remesh, inputs, everyone, chunk_size(KEPT, size)):
+        for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
             put(self.orbit, index[part], kept)
 
     def picked(self, index: Indices) -> KnownOrbits:
@@ -104,16 +105,17 @@ def followed_orbits(
     size, points = guess.centre.shape
     before = np.full((1 + harmonics, points), np.nan + 0j)
     for intervals in (COARSER, *meshes):
-        solve = partial(refine_orbit, intervals=intervals, harmonics=harmonics)
+        solve = partial(refined_orbit, intervals=intervals, harmonics=harmonics)
         finer = Orbit.empty(guess.scheme, size, intervals, points)
         good, left = [], []
-        chunk = chunk_size(intervals, size)
+        chunk = mesh_chunk(size)
         for part, (fine, reading, error) in run_chunks(solve, (problem, guess), index, chunk):
             put(finer, part, fine)
             change = largest_change(before[:, part], reading)
             before[:, part] = np.vstack([reading.mean_friction, reading.harmonics])
             solved = error < ACCEPTED
-            served = solved & (change < _agreement(intervals, meshes))
+            agreement = _LAST_AGREEMENT if intervals == meshes[-1] else _AGREEMENT
+            served = solved & (change < agreement)
             if served.any():
                 kept = np.flatnonzero(served)
                 good.append((part[kept], take(fine, kept), take(reading, kept)))
@@ -124,12 +126,6 @@ def followed_orbits(
         if not len(index):
             break
     return found
-
-
-def _agreement(intervals: int, meshes: tuple[int, ...]) -> float:
-    if intervals == meshes[0]:
-        return _TWICE_AGREEMENT
-    return _LAST_AGREEMENT if intervals == meshes[-1] else _THRICE_AGREEMENT
 
 
 def largest_change(before: NDArray[np.complex128], reading: Observables) -> Float:

@@ -16,9 +16,9 @@ from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, SearchedOrbit
 from asperity.orbit.gradient.search.whole import whole_search
 
 #: Intervals of the meshes on which orbits are differentiated: each on the first that serves it.
-MESHES = (144, 432, 1296)
+MESHES = (216, 648, 1944)
 #: Of the one mesh in a program that is traced, whose shapes are fixed before orbits are known.
-TRACED_MESH = 432
+TRACED_MESH = 648
 
 #: Time after which an idle process of the search ends (s); to start one takes seconds.
 _IDLE = 600

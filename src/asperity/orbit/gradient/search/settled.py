@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,6 +19,7 @@ from asperity.orbit.batches import Indices, put, take
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.scheme import scheme_for
+from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
 from asperity.transients.initial_state import first_checkpoint
@@ -142,13 +142,8 @@ def _on_mesh(problem: Problem, period: DenseOutput, intervals: int) -> Orbit:
     stages = mesh[:-1] + np.asarray(scheme.c)[:, None] * np.diff(mesh)
     nodes = period.evaluate(mesh[:-1])
     inner = period.evaluate(stages.ravel()).reshape(len(nodes), *stages.shape)
-    slopes = problem.system.rates(
-        jnp.asarray(inner)[..., None], problem.load.at(jnp.asarray(stages)[..., None])
-    )
+    at = excitation_at(problem.load, stages[..., None])
+    values = values_at(problem.system, at, np.zeros_like(nodes[:, :1]), inner[..., None])
     return Orbit(
-        mesh[:, None],
-        nodes[:, :1],
-        (nodes - nodes[:, :1])[..., None],
-        np.asarray(slopes),
-        scheme,
+        mesh[:, None], nodes[:, :1], (nodes - nodes[:, :1])[..., None], values.rates, scheme
     )

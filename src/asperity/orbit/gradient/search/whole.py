@@ -6,13 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from asperity.orbit.batches import put, run_chunks, take
+from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
 from asperity.orbit.gradient.search.known import largest_change
 from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, SearchedOrbits
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.programs import ACCEPTED, refine_orbit
+from asperity.orbit.mesh.newton import ACCEPTED
+from asperity.orbit.mesh.remeshing import refined_orbit
 from asperity.orbit.methods.starting_orbits import starting_orbits
-from asperity.orbit.multipliers import chunk_size
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
 from asperity.slider.problem import Problem
@@ -65,8 +65,8 @@ def whole_search(
     for intervals in meshes:
         agreement = _LAST_AGREEMENT if intervals == meshes[-1] else _AGREEMENT
         finer = Orbit.empty(orbit.scheme, size, intervals, points)
-        solve = partial(refine_orbit, intervals=intervals, harmonics=counted)
-        chunk = chunk_size(intervals, size)
+        solve = partial(refined_orbit, intervals=intervals, harmonics=counted)
+        chunk = mesh_chunk(size)
         for part, (fine, reading, error) in run_chunks(solve, (problem, orbit), left, chunk):
             put(finer, part, fine)
             numbers = np.vstack([found.mean_friction[part], found.harmonics[:, part]])

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 from asperity.orbit.batches import Indices, put, run_chunks, take
 from asperity.orbit.instability import CHUNK, LARGEST_GROWTH
 from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import Change
+from asperity.orbit.mesh.reading import growth_within
 from asperity.orbit.mesh.scheme import scheme_for
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
-    Tangent,
-    first_tangent,
+    first_point,
 )
 from asperity.orbit.methods.branch_following.moving_mesh import (
     MovingMeshStep,
     PointPair,
-    growth_within,
     moving_step,
     straight,
 )
@@ -40,7 +40,7 @@ class BranchMesh(NamedTuple):
 
 
 #: For all points, and for those whose outcome the first mesh leaves open.
-MESHES = (BranchMesh(144, 200), BranchMesh(288, 1000))
+MESHES = (BranchMesh(216, 200), BranchMesh(648, 1000))
 #: Exponent of the slip rate beyond which a pulse is so narrow, below 1e-7 of the period, that
 #: round-off in the phase limits it.
 RUNAWAY = 13.0
@@ -140,13 +140,17 @@ def follow_from_steady_sliding(problem: Problem, index: Indices, mesh: BranchMes
     pair = _steady_pair(line, len(problem.system.V), index, mesh.intervals)
     progress = BranchProgress.from_steady(len(problem.system.V))
     _follow(line, pair, progress, index, mesh.most_steps)
-    orbit, share, _ = pair.point
+    orbit, share = pair.point.orbit, pair.point.t
     known = (progress.fold, progress.farthest, progress.fastest, progress.limit)
     result = SteadyBranch(orbit, share, *known, np.zeros_like(share))
     left = index[~result.definite[index]]
-    for part, growth in run_chunks(growth_within, (line, orbit, share), left, CHUNK):
+
+    def growth_of(line: ParameterLine, orbit: Orbit, t: Float) -> Float:
+        return growth_within(line.at(t), orbit)
+
+    for part, growth in run_chunks(growth_of, (line, orbit, share), left, CHUNK):
         result.growth[part] = growth
-    for part, growth in run_chunks(adiabatic_growth, problem, left, CHUNK):
+    for part, growth in run_chunks(adiabatic_growth, (problem,), left, CHUNK):
         result.growth[part] = np.fmax(growth, result.growth[part])
     return result
 
@@ -224,13 +228,15 @@ def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: in
     steady = jax.jit(lambda s: s.steady())(system)
     orbit.centre[:] = np.broadcast_to(np.asarray(steady), orbit.centre.shape)
     t = np.zeros(points)
-    tangent = Tangent(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.zeros(points))
-    for part, found in run_chunks(first_tangent, (line, orbit, t), index, CHUNK):
-        put(tangent, part, found)
-    pair = jax.tree.map(np.array, PointPair(orbit, t, ContinuationPoint(orbit, t, tangent)))
-    inputs = (line, pair.point, np.full(points, _FIRST))
-    for part, found in run_chunks(straight, inputs, index, CHUNK):
-        put(pair, part, found)
+    tangent = Change(np.zeros_like(orbit.nodes), np.zeros_like(orbit.slopes), np.zeros(points))
+    start = ContinuationPoint(orbit, t, tangent, np.zeros_like(orbit.centre))
+    pair = jax.tree.map(np.array, PointPair(orbit, t, start))
+
+    def begin(line: ParameterLine, orbit: Orbit, t: Float) -> PointPair:
+        return straight(first_point(line, orbit, t), np.full(len(t), _FIRST))
+
+    for part, begun in run_chunks(begin, (line, orbit, t), index, CHUNK):
+        put(pair, part, begun)
     return pair
 
 
@@ -262,7 +268,7 @@ def _follow(
             )
         stuck = at[progress.failures[at] >= _RESTART]
         lengths = progress.last * 0.1 * _SHRINKAGE ** (progress.failures - float(_RESTART))
-        for part, fresh in run_chunks(straight, (line, pair.point, lengths), stuck, CHUNK):
+        for part, fresh in run_chunks(straight, (pair.point, lengths), stuck, CHUNK):
             put(pair, part, fresh)
         progress.ratio[stuck] = 1.0
 

@@ -9,28 +9,24 @@ extrapolated interval by interval, phases included.
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
-from jax import Array
+import numpy as np
+from numpy.typing import NDArray
 
-from asperity._jax import jit_large
-from asperity.algebra.small_systems import spectral_abscissa
-from asperity.orbit.mesh.condensation import localise
-from asperity.orbit.mesh.mesh import Orbit, on_mesh
+from asperity.orbit.mesh.mesh import Orbit, on_mesh, spread
+from asperity.orbit.mesh.newton import Plane, moved
 from asperity.orbit.mesh.scheme import STAGES
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
-    along,
     correct,
-    slip_units,
-    turned_tangent,
+    turned,
     usable,
     weighted_row,
 )
 from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
+
+Float = NDArray[np.float64]
 
 #: Change at which Newton's method ends and a step is accepted: the error is about its square.
 ACCEPTED = 1e-5
@@ -44,7 +40,7 @@ class PointPair(NamedTuple):
     """Two successive points of a branch, the first without its tangent."""
 
     before: Orbit
-    t_before: Array
+    t_before: Float
     point: ContinuationPoint
 
 
@@ -65,110 +61,82 @@ class MovingMeshStep(NamedTuple):
     """
 
     next: PointPair
-    error: Array
-    iterations: Array
-    miss: Array
-    length: Array
-    fastest: Array
+    error: Float
+    iterations: Float
+    miss: Float
+    length: Float
+    fastest: Float
 
 
-def _predicted(pair: PointPair, ratio: Array) -> tuple[Orbit, Array]:
+def _predicted(pair: PointPair, ratio: Float) -> tuple[Orbit, Float]:
     """Extrapolation by `ratio` times the last step."""
     before, now = pair.before, pair.point.orbit
     widths = now.widths + ratio * (now.widths - before.widths)
-    widths = jnp.maximum(widths, _NARROWEST * now.widths)
-    widths = widths * (2 * jnp.pi / widths.sum(0))
-    mesh = jnp.concatenate([jnp.zeros_like(widths[:1]), jnp.cumsum(widths, axis=0)])
-    mesh = mesh.at[-1].set(2 * jnp.pi)
+    widths = np.maximum(widths, _NARROWEST * now.widths)
+    widths = widths * (2 * np.pi / widths.sum(0))
+    mesh = np.concatenate([np.zeros_like(widths[:1]), np.cumsum(widths, axis=0)])
+    mesh[-1] = 2 * np.pi
     rises = now.slopes * now.widths
     rises = rises + ratio * (rises - before.slopes * before.widths)
     return now.moved(
         mesh=mesh,
         centre=now.centre + ratio * (now.centre - before.centre),
         nodes=now.nodes + ratio * (now.nodes - before.nodes),
-        slopes=rises / jnp.diff(mesh, axis=0),
+        slopes=rises / np.diff(mesh, axis=0),
     ), pair.point.t + ratio * (pair.point.t - pair.t_before)
 
 
-def _distance(units: Array, a: Orbit, s: Array, b: Orbit, t: Array) -> Array:
+def _distance(units: Float, a: Orbit, s: Float, b: Orbit, t: Float) -> Float:
     """Distance interval by interval, of states, phases and coordinate."""
     states = (a.centre - b.centre)[:, None] + a.nodes - b.nodes
     square = ((units[:, None] * states) ** 2).sum(0).mean(0)
-    return jnp.sqrt(square + ((a.mesh - b.mesh) ** 2).mean(0) + (s - t) ** 2)
+    return np.sqrt(square + ((a.mesh - b.mesh) ** 2).mean(0) + (s - t) ** 2)
 
 
-def fastest_slip(line: ParameterLine, orbit: Orbit, t: Array) -> Array:
-    """Largest ln(v_pl/V) at the collocation points."""
-    system, load = line.at(t)
-    states = orbit.centre[:, None, None] + orbit.stage_deviations
-    return system.log_slip(states, load.at(orbit.stage_phases)).max((0, 1))
-
-
-@jit_large
-def growth_within(inputs: tuple[ParameterLine, Orbit, Array]) -> Array:
-    """Integral of the growth rate of disturbances over the part of the period where they grow.
-
-    From the eigenvalues of the Jacobian along the orbit: what it is where the orbit changes slowly.
-    """
-    line, orbit, t = inputs
-    local = localise(*line.at(t), orbit)
-    weights = jnp.asarray(orbit.scheme.b)[:, None, None] * orbit.widths
-    return (weights * jnp.maximum(spectral_abscissa(local.jacobian), 0.0)).sum((0, 1))
-
-
-def relaid(orbit: Orbit, units: Array) -> Orbit:
+def relaid(orbit: Orbit, units: Float) -> Orbit:
     """The orbit on a mesh with intervals of equal length in the space of phase and states.
 
     Other than a mesh that spreads an error estimate it changes as smoothly as the orbit does, which
     extrapolation lives on.
     """
     widths = orbit.widths
-    rises = widths * jnp.abs(orbit.slopes).mean(1) * units[:, None]
-    top = jnp.einsum("k,nkmb->nmb", orbit.scheme.top, orbit.slopes)
-    local = (jnp.abs(top) * widths * units[:, None]).max(0)
+    rises = widths * np.abs(orbit.slopes).mean(1) * units[:, None]
+    top = np.einsum("k,nkmb->nmb", orbit.scheme.top, orbit.slopes)
+    local = (np.abs(top) * widths * units[:, None]).max(0)
     error = (local + 1e-10) ** (1 / (STAGES + 1))
     for _ in range(2):
-        error = (jnp.roll(error, 1, 0) + 2 * error + jnp.roll(error, -1, 0)) / 4
-    length = jnp.sqrt(widths**2 + (rises**2).sum(0))
+        error = (np.roll(error, 1, 0) + 2 * error + np.roll(error, -1, 0)) / 4
+    length = np.sqrt(widths**2 + (rises**2).sum(0))
     density = sum(a / a.sum(0) for a in (error, length, widths)) / widths
-    for _ in range(3):
-        density = (jnp.roll(density, 1, 0) + 2 * density + jnp.roll(density, -1, 0)) / 4
-    mass = jnp.cumsum(density * orbit.widths, axis=0)
-    mass = jnp.concatenate([jnp.zeros_like(mass[:1]), mass]) / mass[-1]
-    share = jnp.linspace(0.0, 1.0, orbit.mesh.shape[0])
-    mesh = jax.vmap(lambda m, t: jnp.interp(share, m, t), (1, 1), 1)(mass, orbit.mesh)
-    return on_mesh(orbit, mesh.at[0].set(0.0).at[-1].set(2 * jnp.pi))
+    return on_mesh(orbit, spread(orbit.mesh, density, len(widths), smoothings=3))
 
 
-@jax.jit
-def straight(inputs: tuple[ParameterLine, ContinuationPoint, Array]) -> PointPair:
+def straight(point: ContinuationPoint, length: Float) -> PointPair:
     """A pair that extrapolates along the tangent, by the given length."""
-    _, point, length = inputs
-    before, t = along(point.orbit, point.t, point.tangent, -length)
-    return PointPair(before, t, point)
+    return PointPair(*moved(point.orbit, point.t, point.tangent, -length), point)
 
 
-@partial(jit_large, static_argnames=("max_steps",))
 def moving_step(
-    inputs: tuple[ParameterLine, PointPair, Array], *, max_steps: int
+    line: ParameterLine, pair: PointPair, ratio: Float, *, max_steps: int
 ) -> MovingMeshStep:
     """One step of `ratio` times the last one along each branch."""
-    line, pair, ratio = inputs
     point = pair.point
-    guess, t_guess = _predicted(pair, ratio)
-    units = slip_units(line, point.orbit, point.t)
-    row = weighted_row(guess, point.tangent.nodes, units)
-    orbit, t, error, iterations = correct(
-        line, guess, t_guess, row, point.tangent.t, max_steps=max_steps, tolerance=ACCEPTED
-    )
-    there = relaid(orbit, units)
-    tangent, turn = turned_tangent(line, there, t, point.tangent.nodes, point.tangent.t)
-    step = _distance(units, guess, t_guess, point.orbit, point.t)
-    forward = ratio * (t - point.t) * (point.tangent.t + tangent.t)
-    backward = (point.tangent.t * tangent.t > 0) & (forward < 0)
-    miss = _distance(units, orbit, t, guess, t_guess) / step
-    length = _distance(units, there, t, point.orbit, point.t)
-    fine = usable(there, turn) & (turn > _SHARPEST_TURN) & ~backward
-    error = jnp.where(fine & (error <= ACCEPTED), error, jnp.inf)
-    following = PointPair(point.orbit, point.t, ContinuationPoint(there, t, tangent))
-    return MovingMeshStep(following, error, iterations, miss, length, fastest_slip(line, there, t))
+    tangent, units = point.tangent, point.units
+    with np.errstate(all="ignore"):
+        guess, t_guess = _predicted(pair, ratio)
+        plane = Plane(weighted_row(guess, tangent.nodes, units), tangent.t)
+        result = correct(line, guess, t_guess, plane, max_steps=max_steps, tolerance=ACCEPTED)
+        orbit, t = result.orbit, result.t
+        there = relaid(orbit, units)
+        turn = turned(line, there, t, tangent.nodes, tangent.t)
+        step = _distance(units, guess, t_guess, point.orbit, point.t)
+        t_slope = turn.point.tangent.t
+        forward = ratio * (t - point.t) * (tangent.t + t_slope)
+        backward = (tangent.t * t_slope > 0) & (forward < 0)
+        miss = _distance(units, orbit, t, guess, t_guess) / step
+        length = _distance(units, there, t, point.orbit, point.t)
+        fine = usable(there, turn.cosine) & (turn.cosine > _SHARPEST_TURN) & ~backward
+        error = np.where(fine & (result.error <= ACCEPTED), result.error, np.inf)
+        fastest = turn.values.log_slip.max((0, 1))
+    following = PointPair(point.orbit, point.t, turn.point)
+    return MovingMeshStep(following, error, result.steps, miss, length, fastest)

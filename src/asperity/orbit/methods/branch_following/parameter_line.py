@@ -13,15 +13,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import jax
-import jax.numpy as jnp
 import numpy as np
-from jax.typing import ArrayLike
+from numpy.typing import NDArray
 
 from asperity.slider.problem import Problem
 
+Float = NDArray[np.float64]
+
 
 class ParameterLine(NamedTuple):
-    """A line in the parameters of many operating points.
+    """A line in the parameters of many operating points, NumPy arrays (points,).
 
     Attributes
     ----------
@@ -35,9 +36,13 @@ class ParameterLine(NamedTuple):
     added: Problem
     growth: Problem
 
-    def at(self, t: ArrayLike) -> Problem:
+    def at(self, t: Float) -> Problem:
         """Parameters at the coordinate `t`, shape (points,)."""
-        return jax.tree.map(lambda x, a, g: (x + a * t) * jnp.exp(g * t), *self)
+        return jax.tree.map(lambda x, a, g: (x + a * t) * np.exp(g * t), *self)
+
+    def slope(self, t: Float) -> Problem:
+        """Their derivatives by t."""
+        return jax.tree.map(lambda x, a, g: (a + g * (x + a * t)) * np.exp(g * t), *self)
 
 
 def still(problem: Problem) -> Problem:

@@ -5,24 +5,19 @@ Each point takes its own steps along its path: longer after a success, shorter a
 
 from __future__ import annotations
 
-from functools import partial
-
 import equinox as eqx
 import numpy as np
-from jax import Array
 from numpy.typing import NDArray
 
-from asperity._jax import jit_large
-from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import refined
-from asperity.orbit.mesh.programs import solve_on_mesh
+from asperity.orbit.mesh.newton import solve
+from asperity.orbit.mesh.remeshing import remeshed
 from asperity.orbit.methods.collocation.initial_guess import (
     InitialGuess,
     orbits_from_averaged_limit,
 )
 from asperity.orbit.methods.collocation.method import solve_from
-from asperity.orbit.methods.collocation.refinement import FIRST_MESH
 from asperity.orbit.methods.method import Method
 from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
 from asperity.orbit.solution import SearchOptions, Solution
@@ -39,8 +34,6 @@ _FIRST_STEP, _SHORTEST_STEP, _MOST_STEPS = 0.02, 1e-4, 250
 _GROWTH, _SHRINKAGE = 1.6, 0.35
 #: A step is accepted when Newton's method has converged to this; the end point is solved again.
 _ACCEPTED, _NEWTON_STEPS = 1e-5, 10
-#: Points in a call.
-_CHUNK = 16
 
 
 class FrequencyPath(Method):
@@ -72,7 +65,7 @@ def orbits_from_high_frequency(problem: Problem, points: int) -> InitialGuess:
     """Orbits of all points of `problem` (NumPy arrays) at the end of their path in frequency."""
     stiffness = np.zeros(points)
     for part, value in run_chunks(
-        stiffness_of_steady_sliding, problem, np.arange(points), STIFFNESS_CHUNK
+        stiffness_of_steady_sliding, (problem,), np.arange(points), STIFFNESS_CHUNK
     ):
         stiffness[part] = value
     omega = np.asarray(problem.system.omega)
@@ -103,16 +96,14 @@ def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool
     reached, step = np.zeros(len(found)), np.full(len(found), _FIRST_STEP)
     active = np.flatnonzero(found)
 
-    def advance(inputs: tuple[Problem, Orbit]) -> tuple[Orbit, Float]:
-        return follow_orbit(inputs, intervals=FIRST_MESH, max_steps=_NEWTON_STEPS)
-
+    chunk = mesh_chunk(problem.system.size)
     for _ in range(_MOST_STEPS):
         if not len(active):
             break
         trial = np.minimum(1.0, reached + step)
         omega = first * (np.asarray(problem.system.omega) / first) ** trial
         inputs = (_at_frequency(problem, omega), orbit)
-        for part, (moved, error) in run_chunks(advance, inputs, active, _CHUNK):
+        for part, (moved, error) in run_chunks(_advance, inputs, active, chunk):
             # The re-meshed orbit must be finite too: it is the next guess.
             good = (error < _ACCEPTED) & np.isfinite(moved.slopes).all((0, 1, 2))
             put(orbit, part[good], take(moved, np.flatnonzero(good)))
@@ -122,11 +113,7 @@ def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool
     found[:] = reached >= 1
 
 
-@partial(jit_large, static_argnames=("intervals", "max_steps"))
-def follow_orbit(
-    problem_and_orbit: tuple[Problem, Orbit], *, intervals: int, max_steps: int
-) -> tuple[Orbit, Array]:
+def _advance(problem: Problem, guess: Orbit) -> tuple[Orbit, Float]:
     """Collocation from a neighbouring orbit; the result lies on a mesh made for it."""
-    problem, guess = problem_and_orbit
-    result = solve_on_mesh(problem, guess, max_steps)
-    return refined(*problem, result.orbit, intervals), result.error
+    result = solve(problem, guess, _NEWTON_STEPS)
+    return remeshed(problem, result.orbit, len(guess.mesh) - 1), result.error

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
-from asperity.loads import Modulation
+from asperity._jax import jit_large
 from asperity.orbit.mesh.mesh import Orbit, evaluate
 from asperity.orbit.mesh.scheme import scheme_for
-from asperity.slider import Motion, QuasiStatic
+from asperity.slider import QuasiStatic
+from asperity.slider.problem import Problem
 
 
-def inertial_guess(
-    quasi_static: QuasiStatic, system: Motion, load: Modulation, orbit: Orbit
-) -> Orbit:
-    """A quasi-static orbit as a first guess of another equation of motion."""
+@jit_large
+def _converted(problem: Problem, states: Array, slopes: Array, theta: Array) -> tuple[Array, Array]:
+    """States of the problem from quasi-static ones, (size, ..., points), and their slopes."""
+    system, load = problem
+    quasi_static = QuasiStatic(system.slider, system.V, system.omega)
 
     def convert(Y: Array, theta: Array) -> Array:
         at = load.at(theta)
@@ -27,11 +30,22 @@ def inertial_guess(
         )
         return jnp.stack([*mechanical, *quasi_static.law_state(Y)])
 
-    nodes = convert(orbit.centre[:, None] + orbit.nodes, orbit.mesh[:-1])
-    bare = Orbit(orbit.mesh, nodes[:, 0], nodes - nodes[:, :1], orbit.slopes, scheme_for(system))
-    theta = bare.stage_phases
+    return jax.jvp(convert, (states, theta), (slopes, jnp.ones_like(theta)))
+
+
+def inertial_guess(problem: Problem, orbit: Orbit) -> Orbit:
+    """A quasi-static orbit as a first guess of another equation of motion, NumPy arrays."""
+    theta = np.concatenate([orbit.mesh[None, :-1], orbit.stage_phases])
     inside, slopes = evaluate(orbit, theta.reshape(-1, theta.shape[-1]))
-    states = (orbit.centre[:, None] + inside).reshape(-1, *theta.shape)
-    slopes = slopes.reshape(states.shape)
-    _, slopes = jax.jvp(convert, (states, theta), (slopes, jnp.ones_like(theta)))
-    return bare.moved(slopes=slopes)
+    shape = (len(inside), *theta.shape)
+    states = orbit.centre[:, None, None] + inside.reshape(shape)
+    converted = _converted(problem, states, slopes.reshape(shape), theta)
+    states, slopes = (np.asarray(a) for a in converted)
+    nodes = states[:, 0]
+    return Orbit(
+        orbit.mesh,
+        nodes[:, 0],
+        nodes - nodes[:, :1],
+        slopes[:, 1:],
+        scheme_for(problem.system),
+    )

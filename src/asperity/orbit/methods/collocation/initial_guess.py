@@ -2,27 +2,30 @@
 
 from __future__ import annotations
 
-from functools import partial
 from typing import NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
-from asperity.orbit.batches import Indices, points_of, put, run_chunks, take
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import averaged_orbit
-from asperity.orbit.mesh.programs import ACCEPTED, solve_on_mesh
-from asperity.orbit.mesh.scheme import scheme_for
+from asperity.orbit.batches import Indices, mesh_chunk, points_of, put, run_chunks, take
+from asperity.orbit.mesh.mesh import Orbit, graded_mesh
+from asperity.orbit.mesh.newton import ACCEPTED, solve
+from asperity.orbit.mesh.remeshing import FIRST_MESH
+from asperity.orbit.mesh.scheme import GAUSS, scheme_for
 from asperity.orbit.methods.collocation.inertial_guess import inertial_guess
-from asperity.orbit.methods.collocation.refinement import FIRST_MESH
-from asperity.orbit.multipliers import chunk_size
 from asperity.orbit.outcome import Outcome
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
+from asperity.theory.averaged import averaged_limit
 
 Float = NDArray[np.float64]
+
+#: Grading of the first mesh towards the weakest contact, and Newton steps on it.
+_GRADING, _NEWTON_STEPS = 0.5, 30
 
 
 class InitialGuess(NamedTuple):
@@ -70,26 +73,37 @@ def orbits_from_averaged_limit(
         Points to work on; all by default.
     """
     guess = InitialGuess.none(problem, points)
-    solve = partial(first_orbit, intervals=FIRST_MESH)
     index = np.arange(points) if index is None else index
-    for part, (first, error) in run_chunks(
-        solve, problem, index, chunk_size(FIRST_MESH, problem.system.size)
-    ):
+    chunk = mesh_chunk(problem.system.size)
+    for part, (first, error) in run_chunks(_first_orbit, (problem,), index, chunk):
         good = error < ACCEPTED
         put(guess.orbit, part[good], take(first, np.flatnonzero(good)))
         guess.found[part] = good
     return guess
 
 
-@partial(jit_large, static_argnames=("intervals",))
-def first_orbit(problem: Problem, *, intervals: int) -> tuple[Orbit, Array]:
+def _first_orbit(problem: Problem) -> tuple[Orbit, Float]:
     """Collocation from the averaged limit, of which only the quasi-static equations are sure."""
     system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
-    guess = averaged_orbit(quasi_static, load, points_of(problem), intervals=intervals, grading=0.5)
-    result = solve_on_mesh(Problem(quasi_static, load), guess, 30)
+    centre = np.asarray(_averaged_states(Problem(quasi_static, load)))
+    bare = Orbit.empty(GAUSS, *centre.shape[:1], FIRST_MESH, centre.shape[1])
+    mesh = graded_mesh(FIRST_MESH, centre.shape[1], _GRADING)
+    guess = bare.moved(mesh=mesh, centre=centre)
+    result = solve(Problem(quasi_static, load), guess, _NEWTON_STEPS)
     if not isinstance(system, QuasiStatic):
-        result = solve_on_mesh(
-            problem, inertial_guess(quasi_static, system, load, result.orbit), 30
-        )
+        result = solve(problem, inertial_guess(problem, result.orbit), _NEWTON_STEPS)
     return result.orbit, result.error
+
+
+@jit_large
+def _averaged_states(sliding: Problem) -> Array:
+    """The averaged limit, (size, points), from samples where collocation has them."""
+    points = points_of(sliding)
+    mesh = graded_mesh(FIRST_MESH, 1, _GRADING)
+    widths = np.diff(mesh, axis=0)
+    theta = mesh[:-1] + GAUSS.c[:, None, None] * widths
+    weights = (GAUSS.b[:, None, None] * widths).ravel() / (2 * np.pi)
+    at = sliding.load.at(theta.reshape(-1, 1) * jnp.ones(points))
+    samples = jax.tree.map(lambda a: a.reshape(-1, points) if jnp.ndim(a) else a, at)
+    return jnp.stack(averaged_limit(sliding.system, samples, weights).centre)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from asperity.orbit.mesh.remeshing import MESHES
 from asperity.orbit.methods.collocation.initial_guess import (
     InitialGuess,
     orbits_from_averaged_limit,
 )
-from asperity.orbit.methods.collocation.refinement import MESHES, refine
+from asperity.orbit.methods.collocation.refinement import refine
 from asperity.orbit.methods.method import Method
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.slider.problem import Problem

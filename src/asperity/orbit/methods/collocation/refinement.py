@@ -8,27 +8,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.orbit.batches import Indices, put, run_chunks, samples_chunk, take
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.programs import ACCEPTED, read_orbit, refine_orbit, remeshed, sample_orbit
+from asperity.orbit.mesh.newton import ACCEPTED
+from asperity.orbit.mesh.reading import read_orbit
+from asperity.orbit.mesh.remeshing import MESHES, refined_orbit, remeshed
 from asperity.orbit.multipliers import (
     AGREEMENT,
-    chunk_size,
     extreme_multipliers,
     multiplier_gap,
     resolve_multipliers,
 )
-from asperity.orbit.observables import Observables
+from asperity.orbit.observables import Observables, waveform
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.slider.problem import Problem
 
-#: Intervals of the mesh that orbits are followed on, and of those that they are refined on.
-FIRST_MESH = 48
-MESHES = (72, 216, 648, 1296)
-
-#: As `AGREEMENT`, between the initial mesh and the first and between the last two, whose numbers of
-#: intervals are closer.
+#: As `AGREEMENT`, between two meshes of as many intervals.
 _CLOSE_AGREEMENT = 1e-8
 
 
@@ -66,17 +62,13 @@ def refine(
     size, points = orbit.centre.shape
     previous = _initial_observables(problem, orbit, index, options)
     for intervals in meshes:
-        close = intervals in (meshes[0], meshes[-1])
+        close = intervals == len(orbit.mesh) - 1
         agreement = _CLOSE_AGREEMENT if close else AGREEMENT
         finer = Orbit.empty(orbit.scheme, size, intervals, points)
-        solve = partial(
-            refine_orbit,
-            intervals=intervals,
-            harmonics=options.harmonics,
-        )
+        solve = partial(refined_orbit, intervals=intervals, harmonics=options.harmonics)
         resolved = np.zeros(points, dtype=bool)
         for part, (fine, observables, error) in run_chunks(
-            solve, (problem, orbit), index, chunk_size(intervals, size)
+            solve, (problem, orbit), index, mesh_chunk(size)
         ):
             put(finer, part, fine)
             solution.iterations[part] = intervals
@@ -95,13 +87,14 @@ def _keep(problem: Problem, solution: Solution, orbit: Orbit, rows: Indices) -> 
     """Write waveforms and orbits of the points `rows` to `solution`, which may have room."""
     phases = solution.waveform.shape[1]
     if phases:
-        sample = partial(sample_orbit, phases=phases)
-        for part, samples in run_chunks(sample, (problem, orbit), rows, samples_chunk(phases)):
+        chunk = mesh_chunk(problem.system.size)
+        sample = partial(waveform, phases=phases)
+        for part, samples in run_chunks(sample, (problem, orbit), rows, chunk):
             solution.waveform[..., part] = samples
     intervals = len(solution.orbit.mesh) - 1
     if intervals:
         remesh = partial(remeshed, intervals=intervals)
-        chunk = chunk_size(intervals, problem.system.size)
+        chunk = mesh_chunk(problem.system.size)
         for part, kept in run_chunks(remesh, (problem, orbit), rows, chunk):
             put(solution.orbit, part, kept)
 
@@ -120,7 +113,7 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     """
     intervals = orbit.mesh.shape[0] - 1
     evaluate = partial(read_orbit, harmonics=options.harmonics)
-    chunk = chunk_size(intervals, problem.system.size)
+    chunk = mesh_chunk(problem.system.size)
     points = np.arange(orbit.centre.shape[1])
     stiff = []
     for part, observables in run_chunks(evaluate, (problem, orbit), points, chunk):
@@ -142,7 +135,7 @@ def _initial_observables(
     """Observables on the initial mesh."""
     initial: dict[int, _Compared] = {}
     evaluate = partial(read_orbit, harmonics=options.harmonics)
-    chunk = chunk_size(FIRST_MESH, problem.system.size)
+    chunk = mesh_chunk(problem.system.size)
     for part, observables in run_chunks(evaluate, (problem, orbit), index, chunk):
         initial.update(zip(part, _rows(observables, observables.log_multipliers), strict=True))
     return initial

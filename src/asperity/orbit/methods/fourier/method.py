@@ -5,10 +5,13 @@ from __future__ import annotations
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from asperity.orbit.batches import FAST_BLOCK, run_chunks, samples_chunk, take
-from asperity.orbit.methods.fourier.programs import fast_solve, sample_fourier_orbit
+from asperity.orbit.batches import FAST_BLOCK, run_chunks, take
+from asperity.orbit.methods.fourier.orbit import FourierOrbit
+from asperity.orbit.methods.fourier.programs import fast_solve
 from asperity.orbit.methods.method import Method
+from asperity.orbit.observables import waveform
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.orbit.stiffness import STIFFNESS_CHUNK, sharpness_of_slip, stiffness_of_steady_sliding
 from asperity.slider import QuasiStatic
@@ -45,7 +48,7 @@ class Fourier(Method):
             (stiffness_of_steady_sliding, stiffness),
             (sharpness_of_slip, sharpness),
         ):
-            for part, value in run_chunks(measure, problem, points, STIFFNESS_CHUNK):
+            for part, value in run_chunks(measure, (problem,), points, STIFFNESS_CHUNK):
                 values[part] = value
         left = points[stiffness < LARGEST_STIFFNESS]
         # Blocks run until their slowest point is done: points of like difficulty belong together.
@@ -58,16 +61,21 @@ class Fourier(Method):
                 harmonics=options.harmonics,
             )
             chosen = left[sharpness[left] <= sharpest]
-            for part, (observables, error, orbit) in run_chunks(solve, problem, chosen, _CHUNK):
+            for part, (observables, error, orbit) in run_chunks(solve, (problem,), chosen, _CHUNK):
                 good = np.flatnonzero(error < _ERROR)
                 solution.store(part[good], take(observables, good))
                 solution.iterations[part] += orbit.steps
                 if options.phases:
-                    sample = partial(sample_fourier_orbit, grading=grading, phases=options.phases)
+                    sample = partial(_sample, grading=grading, phases=options.phases)
                     inputs = (take(problem, part), orbit)
-                    chunk = samples_chunk(options.phases)
-                    for some, samples in run_chunks(sample, inputs, good, chunk):
+                    for some, samples in run_chunks(sample, inputs, good, FAST_BLOCK):
                         solution.waveform[..., part[some]] = samples
                 options.progress(len(good))
             left = left[~solution.converged[left]]
         return solution
+
+
+def _sample(
+    problem: Problem, orbit: FourierOrbit, *, grading: float, phases: int
+) -> NDArray[np.float64]:
+    return waveform(problem, orbit._replace(grading=grading), phases)

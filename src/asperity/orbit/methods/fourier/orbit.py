@@ -81,7 +81,9 @@ class FourierOrbit(NamedTuple):
         nodes = len(self.rest[0])
         apart = tau - grid(nodes)[0]
         kernel = (2 / nodes) * sum(np.cos(k * apart) for k in range(1, nodes // 2))
-        return jnp.stack([m + kernel @ y for m, y in zip(self.mean, self.rest, strict=True)])
+        # NumPy or JAX, as the arrays are.
+        xp = self.rest[0].__array_namespace__()
+        return xp.stack([m + kernel @ y for m, y in zip(self.mean, self.rest, strict=True)])
 
 
 class LoadCycle(NamedTuple):

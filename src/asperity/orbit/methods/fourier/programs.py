@@ -1,4 +1,4 @@
-"""The compiled programs of the fast method: orbits solved in blocks, and their waveforms."""
+"""The compiled program of the fast method: orbits solved in blocks."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from asperity._jax import jit_large
 from asperity.orbit.batches import FAST_BLOCK, points_of
 from asperity.orbit.methods.fourier.observables import fourier_observables
 from asperity.orbit.methods.fourier.orbit import FourierOrbit, fourier_orbit
-from asperity.orbit.observables import Observables, waveform
+from asperity.orbit.observables import Observables
 from asperity.slider.problem import Problem
 
 
@@ -45,12 +45,3 @@ def _fast_block(
     observables, error = fourier_observables(system, load, orbit, harmonics=harmonics, max_steps=40)
     each = {name: jnp.full(points, getattr(orbit, name)) for name in ("steps", "grading")}
     return observables, error, orbit._replace(**each)
-
-
-@partial(jax.jit, static_argnames=("grading", "phases"))
-def sample_fourier_orbit(
-    problem_and_orbit: tuple[Problem, FourierOrbit], *, grading: float, phases: int
-) -> Array:
-    """The waveform of orbits of the fast method, shape (2, phases, points)."""
-    problem, orbit = problem_and_orbit
-    return waveform(problem, orbit._replace(grading=grading), phases)

@@ -23,6 +23,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
 from asperity.algebra.kepler import eccentric_phase
 from asperity.algebra.runge_kutta import dormand_prince_8
@@ -136,15 +137,20 @@ def _advance(problem: Problem, steps: Steps, k: Array, flow: Any) -> Any:
 
 
 @jax.jit
-def chord_step(given: tuple[Problem, Array, Array], steps: Steps) -> tuple[Array, Array]:
-    """One chord step with a given inverse: first states, and the change as in `PeriodIntegration`.
+def chord_step(
+    problem: Problem, start: Array, inverse: Array, *, steps: Steps
+) -> tuple[Array, Array]:
+    """One chord step: first states, and the change as in `PeriodIntegration`.
 
     Parameters
     ----------
-    given : tuple
-        The problem, first states (size, points) and `PeriodIntegration.inverse` of orbits close by.
+    problem : Problem
+    start : array, shape (size, points)
+        First states.
+    inverse : array, shape (size, size, points)
+        `PeriodIntegration.inverse` of orbits close by.
+    steps : Steps
     """
-    problem, start, inverse = given
 
     def body(k: Array, flow: Any) -> Any:
         return _advance(problem, steps, k, flow)
@@ -155,15 +161,16 @@ def chord_step(given: tuple[Problem, Array, Array], steps: Steps) -> tuple[Array
 
 
 @jax.jit
-def newton_pass(given: tuple[Problem, Array], steps: Steps) -> PeriodIntegration:
+def newton_pass(problem: Problem, start: Array, *, steps: Steps) -> PeriodIntegration:
     """Integrate states and derivatives over the period.
 
     Parameters
     ----------
-    given : tuple
-        The problem and first states, (size, points).
+    problem : Problem
+    start : array, shape (size, points)
+        First states.
+    steps : Steps
     """
-    problem, start = given
     n, points = start.shape
 
     def body(k: Array, carry: tuple) -> tuple:
@@ -239,23 +246,28 @@ def _changes(problem: Problem, start: Array, step: Array) -> tuple[Array, Array]
     return leap, jnp.maximum(leap, jnp.abs(step[velocity]))
 
 
-@partial(jax.jit, static_argnames=("count", "grading", "phases"))
-def shot_waveform(
-    given: tuple[Problem, Array], steps: Steps, *, count: int, grading: float, phases: int
-) -> Array:
-    """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points).
-
-    By trigonometric interpolation in tau between the ends of `count` steps.
-    """
-    problem, start = given
+@partial(jax.jit, static_argnames=("count",))
+def _path(problem: Problem, start: Array, steps: Steps, *, count: int) -> Array:
+    """States at the beginnings of `count` steps less those of the first, (count, size, points)."""
 
     def body(flow: Any, k: Array) -> tuple[Any, Array]:
         return _advance(problem, steps, k, flow), flow[0] - start
 
     _, path = jax.lax.scan(body, (start,), jnp.arange(count))
+    return path
+
+
+def shot_waveform(
+    problem: Problem, start: Array, *, steps: Steps, count: int, grading: float, phases: int
+) -> NDArray[np.float64]:
+    """F/W0 and ln(v_pl/V) at theta = 2 pi k / phases, shape (2, phases, points).
+
+    By trigonometric interpolation in tau between the ends of `count` steps.
+    """
+    path = np.asarray(_path(problem, start, steps, count=count))
     theta = even_phases(phases)
     apart = eccentric_phase(theta, grading) - 2 * np.pi * np.arange(count) / count
     k = np.arange(1, (count + 1) // 2)[:, None, None]
     interpolate = (1 + 2 * np.cos(k * apart).sum(0)) / count
-    Y = start[:, None] + jnp.einsum("pk,knb->npb", interpolate, path)
-    return waveform_of(problem, Y, jnp.asarray(theta))
+    Y = start[:, None] + np.einsum("pk,knb->npb", interpolate, path)
+    return waveform_of(problem, Y, theta)

@@ -89,7 +89,7 @@ class Shooting(Method):
         size, rows = problem.system.size, np.arange(problem.system.V.shape[-1])
         solution = Solution.unsolved(problem, len(rows), options)
         guess, relaxation = np.empty((size, len(rows))), np.empty(len(rows))
-        for some, values in run_chunks(averaged_start, problem, rows, _chunk(rows)):
+        for some, values in run_chunks(averaged_start, (problem,), rows, _chunk(rows)):
             guess[:, some], relaxation[some] = values
         # Points of like difficulty belong together.
         rows = np.argsort(relaxation, kind="stable")

@@ -1,0 +1,169 @@
+"""What is compiled for each law: its equation of motion at single phases, with derivatives.
+
+Everything that solves orbits on meshes works on these arrays and knows no law. A program works on
+`ROWS` phases of all operating points, so that one serves all meshes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from asperity._jax import jit_large
+from asperity.algebra.small_systems import jacobian_columns
+from asperity.loads import Excitation, Modulation
+from asperity.slider.motion import Motion
+from asperity.slider.problem import Problem
+
+Float = NDArray[np.float64]
+
+#: Phases in a call: the collocation points of 72 intervals.
+ROWS = 288
+
+
+class PointValues(NamedTuple):
+    """An equation of motion at phases and states of any shape (...).
+
+    Attributes
+    ----------
+    rates : array, shape (size, ...)
+        dY/dtheta.
+    jacobian : array, shape (size, size, ...)
+        [row, column]: derivatives of the rates to the states.
+    log_slip : array, shape (...)
+        ln(v_pl/V).
+    slip_gradient : array, shape (size, ...)
+        Derivatives of `log_slip` to the states.
+    force_mean, force_rest : array, shape (...)
+        F/W0 as a constant and what the motion and the modulation change, as `Motion.force_split`.
+    """
+
+    rates: Array
+    jacobian: Array
+    log_slip: Array
+    slip_gradient: Array
+    force_mean: Array
+    force_rest: Array
+
+    @property
+    def force(self) -> Array:
+        """F/W0."""
+        return self.force_mean + self.force_rest
+
+
+def point_values(system: Motion, at: Excitation, centre: Array, deviations: Array) -> PointValues:
+    """Values at the states `centre + deviations`.
+
+    Parameters
+    ----------
+    system : Motion
+        Parameters that broadcast against the phases.
+    at : Excitation
+        At the phases, of shape (...).
+    centre : array, shape (size, ...)
+    deviations : array, shape (size, ...)
+        Apart from the centre, so that small ones keep their digits.
+    """
+
+    def both(Y: Array) -> Array:
+        return jnp.concatenate([system.rates(Y, at), system.log_slip(Y, at)[None]])
+
+    values, columns = jacobian_columns(both, centre + deviations)
+    derivatives = jnp.stack(columns, axis=1)
+    constant, rest = system.force_split(centre, deviations, at)
+    constant, rest = (a * jnp.ones_like(values[0]) for a in (constant, rest))
+    return PointValues(values[:-1], derivatives[:-1], values[-1], derivatives[-1], constant, rest)
+
+
+@jax.jit
+def _excitation(load: Modulation, theta: Array) -> Excitation:
+    return load.at(theta)
+
+
+@jit_large
+def _values(system: Motion, at: Excitation, centre: Array, deviations: Array) -> PointValues:
+    return point_values(system, at, centre[:, None], deviations)
+
+
+@jit_large
+def _slopes(problem: Problem, direction: Problem, theta: Array, states: Array) -> Array:
+    def rates(problem: Problem) -> Array:
+        return problem.system.rates(states, problem.load.at(theta))
+
+    return jax.jvp(rates, (problem,), (direction,))[1]
+
+
+def excitation_at(load: Modulation, theta: Float) -> Excitation:
+    """The excitation at phases of shape (..., points), for NumPy arrays."""
+    return _by_rows(lambda theta: _excitation(load, theta), theta)
+
+
+def values_at(system: Motion, at: Excitation, centre: Float, deviations: Float) -> PointValues:
+    """`point_values` of NumPy arrays.
+
+    Parameters
+    ----------
+    system : Motion
+        Parameters of shape (points,).
+    at : Excitation
+        Arrays of shape (..., points), as `excitation_at` returns them.
+    centre : array, shape (size, points)
+    deviations : array, shape (size, ..., points)
+    """
+    return _by_rows(lambda at, y: _values(system, at, centre, y), at, deviations)
+
+
+def parameter_slopes(
+    problem: Problem, direction: Problem, theta: Float, centre: Float, deviations: Float
+) -> Float:
+    """Derivative of the rates along a direction of the parameters, shape as `deviations`.
+
+    Parameters
+    ----------
+    problem, direction : Problem
+        Parameters of shape (points,).
+    theta : array, shape (..., points)
+    centre, deviations : array
+        As of `values_at`.
+    """
+    shape = (len(centre), *(1 for _ in theta.shape[1:]), theta.shape[-1])
+    states = centre.reshape(shape) + deviations
+    return _by_rows(lambda theta, Y: _slopes(problem, direction, theta, Y), theta, states)
+
+
+def _by_rows(function: Callable[..., Any], *trees: Any) -> Any:
+    """Apply a function to arrays (..., rows, points) in blocks of `ROWS` rows.
+
+    The first tree has arrays (*shape, points), the others may have further axes in front; arrays
+    without axes are passed on. The last block is filled up with its last row.
+    """
+    lead = next(a for a in jax.tree.leaves(trees[0]) if np.ndim(a))
+    shape, points = lead.shape[:-1], lead.shape[-1]
+    rows = int(np.prod(shape))
+
+    def flat(a: Float) -> Float:
+        return a.reshape(*a.shape[: a.ndim - lead.ndim], rows, points) if np.ndim(a) else a
+
+    trees = jax.tree.map(flat, trees)
+    parts = []
+    for start in range(0, rows, ROWS):
+        chosen: Any = slice(start, start + ROWS)
+        if start + ROWS > rows:
+            chosen = np.minimum(np.arange(start, start + ROWS), rows - 1)
+        cut = jax.tree.map(lambda a, c=chosen: a[..., c, :] if np.ndim(a) else a, trees)
+        parts.append(function(*cut))
+
+    def joined(*blocks: Any) -> Any:
+        if not np.ndim(blocks[0]):
+            return np.asarray(blocks[0])
+        whole = np.asarray(blocks[0]) if len(blocks) == 1 else np.concatenate(blocks, axis=-2)
+        whole = whole[..., :rows, :]
+        return whole.reshape(*whole.shape[:-2], *shape, points)
+
+    return jax.tree.map(joined, *parts)
