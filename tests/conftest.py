@@ -7,6 +7,7 @@ import pytest
 
 pytest_plugins = [
     "references.browser",
+    "references.compilation",
     "references.planted_recordings",
     "references.published_equations",
 ]

@@ -8,7 +8,7 @@ rule at the orbit, whichever method found it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import partial
 from typing import Any, Literal
 
@@ -17,21 +17,14 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
+from numpy.typing import NDArray
 
 from asperity._jax import jit_large, spare_mappings
 from asperity.errors import InputError, closest
 from asperity.laws import Law, get_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
-from asperity.orbit.batches import Indices, take
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
-from asperity.orbit.gradient.mesh_values import (
-    found_values,
-    in_chunks,
-    mesh_chunk_values,
-    mesh_orbits,
-    mesh_values,
-)
 from asperity.orbit.gradient.parametrised import (
     ParametrisedProblem,
     coefficients_of,
@@ -45,8 +38,9 @@ from asperity.orbit.gradient.program import (
     chosen,
 )
 from asperity.orbit.gradient.search.known import KnownOrbits
-from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, SearchedOrbits
+from asperity.orbit.gradient.search.mesh_orbits import SearchedOrbits
 from asperity.orbit.gradient.search.search import search_orbits
+from asperity.orbit.gradient.searched import derivatives_of, searched_values, values_of
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
 from asperity.parameters.arguments import switch, whole_number
@@ -56,8 +50,6 @@ from asperity.slider.radiating import Radiating
 
 #: Smallest number of points that a program is compiled for; others are powers of two.
 _FEWEST = 4
-#: Orbits of the search that are differentiated in a call.
-_BLOCK = 16
 
 
 class ResponseFunction:
@@ -136,8 +128,8 @@ class ResponseFunction:
         padded, points = self._padded(parameters)
         self._require_fitting(known, points or 1, traced=_traced(padded))
         if _traced(padded):
-            fast, meshed = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
-            return _cut(_evaluate(padded, fast, meshed, program=self._program), points)
+            fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
+            return _cut(_evaluate(padded, fast, wanted, program=self._program), points)
         fast, searched = _orbits(self._program, padded, points or 1, known)
         part = _fast_part(self._program)
         values = _evaluate(padded, fast, None, program=part)
@@ -172,8 +164,8 @@ class ResponseFunction:
         self._require_fitting(known, points or 1, traced=_traced(padded))
         table: Any
         if _traced(padded):
-            fast, meshed = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
-            whole, table = _differentiate(padded, fast, meshed, program=self._program)
+            fast, wanted = _traced_orbits(self._program, jax.lax.stop_gradient(padded))
+            whole, table = _differentiate(padded, fast, wanted, program=self._program)
         else:
             fast, searched = _orbits(self._program, padded, points or 1, known, every=every)
             part = _fast_part(self._program)
@@ -182,8 +174,7 @@ class ResponseFunction:
             outcome = np.asarray(whole.outcome)[: points or 1]
             table = np.array(table)
             if not every or (outcome == Outcome.CONVERGED).all():
-                for index, columns in _mesh_derivatives(padded, searched, part):
-                    table[:, index] = columns
+                _add_searched_derivatives(table, padded, searched, part)
         values = _cut(whole, points)
         cut = table[:, 0] if points is None else table[:, :points]
         names = self._program.equations.names
@@ -324,14 +315,13 @@ def response_function(
 
     Where the search is needed within `jax.jit`, a process of its own does it, which takes some
     seconds to start. Multipliers with inertia or radiation damping need it at every point.
-    Derivatives at its orbits are those of collocation on 144, 432 or 1,296 intervals, the fewest on
+    Derivatives at its orbits are those of collocation on 216, 648 or 1,944 intervals, the fewest on
     which mean and harmonics agree with those of the search to 1e-10: within some 1e-7 of the
     largest derivative of an output, 1e-5 where the interface sticks (`cut-off`) and slip is sharp.
-    Within `jax.jit`, `jax.grad` and the like, where shapes are fixed before orbits are known, the
-    mesh has 432 intervals. A direct search takes its values from these meshes too, from the first
-    that agrees with one of half or a third as many intervals so well that its own error is below
-    1e-10. Where the finest mesh agrees with the search to less than 1e-8, the
-    outcome is `Outcome.NOT_RESOLVED`.
+    Their second derivatives, within JAX's transformations, are NaN. A direct search takes its
+    values from these meshes too, from the first that agrees with one of a third as many intervals
+    so well that its own error is below 1e-10. Where the finest mesh agrees with the search to less
+    than 1e-8, the outcome is `Outcome.NOT_RESOLVED`.
     """
     law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
     inertia = switch(inertia, "inertia")
@@ -364,13 +354,13 @@ def _traced(parameters: Parameters) -> bool:
 
 def _traced_orbits(
     program: Program, parameters: Parameters
-) -> tuple[FastOrbits | None, MeshOrbits | None]:
-    """Orbits of all points, of no derivative, within a program: by the fast method and the search.
+) -> tuple[FastOrbits | None, Array | None]:
+    """Orbits of the fast method within a program, and which points the search has to find.
 
     None for a method that the program does not have.
     """
     fast, wanted = _fast_orbits(program, parameters)
-    return fast, mesh_orbits(program, parameters, wanted) if program.search else None
+    return fast, wanted if program.search else None
 
 
 def _orbits(
@@ -425,61 +415,31 @@ def _with_searched(
     missing = whole.outcome == Outcome.NO_ORBIT
     whole.outcome[missing] = searched.outcome[missing]
     for index, orbits in searched.parts:
-        for target, own in zip(whole, found_values(orbits, program), strict=True):
-            target[index] = own
+        values = values_of(orbits, multipliers=program.multipliers)
+        for target, part in zip(whole, values, strict=True):
+            target[index] = part
     return whole
 
 
-def _mesh_derivatives(
-    parameters: Parameters, searched: SearchedOrbits | None, program: Program
-) -> Iterator[tuple[Indices, Any]]:
-    """Derivatives at the orbits of the search, as by `_differentiate`, with the points of each."""
-    if searched is None:
-        return
-    # JAX takes a millisecond to index an array.
-    own_values = {n: np.asarray(v) for n, v in parameters.items()}
-    for index, orbits in searched.parts:
-        for start in range(0, len(index), _BLOCK):
-            part = np.arange(start, min(start + _BLOCK, len(index)))
-            filled = np.concatenate([part, np.full(_BLOCK - len(part), part[-1])])
-            own = take(own_values, index[filled])
-            table = _mesh_table(own, take(orbits, filled), program=program)
-            yield index[part], np.asarray(table)[:, : len(part)]
-
-
-@partial(jit_large, static_argnames=("program",))
-def _mesh_table(parameters: Parameters, orbits: MeshOrbits, *, program: Program) -> Array:
-    """Derivatives at converged orbits, (parameters, points, columns) as by `_differentiate`.
-
-    Forward mode within each chunk: a linear program of `mesh_values` for all points takes half as
-    long again, and more, to trace and to compile.
-    """
-    names = program.equations.names
-
-    def chunk(inputs: tuple[Parameters, MeshOrbits]) -> Array:
-        parameters, orbits = inputs
-
-        def evaluate(parameters: Parameters) -> Array:
-            values = mesh_chunk_values(parameters, orbits, program)
-            return jnp.concatenate([_real(a) for a in values[:3]], axis=1)
-
-        def along(direction: Array) -> Array:
-            moved = {
-                n: d * jnp.ones_like(parameters[n]) for n, d in zip(names, direction, strict=True)
-            }
-            return jax.jvp(evaluate, (parameters,), (moved,))[1]
-
-        return jax.vmap(along)(jnp.eye(len(names)))
-
-    chunked = in_chunks(parameters), in_chunks(orbits)
-    tables = jax.lax.map(chunk, chunked)
-    return jnp.moveaxis(tables, 0, 1).reshape(len(names), -1, tables.shape[-1])
+def _add_searched_derivatives(
+    table: NDArray[np.float64],
+    parameters: Parameters,
+    searched: SearchedOrbits | None,
+    program: Program,
+) -> None:
+    """Write derivatives at the orbits of the search into a table as of `_differentiate`."""
+    values = {n: np.asarray(v) for n, v in parameters.items()}
+    for index, orbits in searched.parts if searched else []:
+        part = {n: v[index] for n, v in values.items()}
+        table[:, index] = derivatives_of(
+            program.equations, part, orbits, multipliers=program.multipliers
+        )
 
 
 def _values(
     parameters: Parameters,
     fast: FastOrbits | None,
-    meshed: MeshOrbits | None,
+    wanted: Array | None,
     program: Program,
 ) -> ResponseValues:
     """Response of orbits that were found, with its derivatives to the parameters."""
@@ -493,8 +453,8 @@ def _values(
         jnp.zeros((points, count[1]), dtype=complex),
         outcome,
     )
-    if meshed is not None:
-        values = mesh_values(parameters, meshed, program)
+    if wanted is not None:
+        values = searched_values(parameters, wanted, program)
         values = values._replace(outcome=jnp.where(valid, values.outcome, outcome))
     if fast is not None:
         values = chosen(fast.converged, fast_values(parameters, fast, program), values)
@@ -511,7 +471,7 @@ _evaluate = jit_large(_values, static_argnames=("program",))
 def _differentiate(
     parameters: Parameters,
     fast: FastOrbits | None,
-    meshed: MeshOrbits | None,
+    wanted: Array | None,
     *,
     program: Program,
 ) -> tuple[ResponseValues, Array]:
@@ -522,15 +482,14 @@ def _differentiate(
     """
 
     def evaluate(parameters: Parameters) -> tuple[Any, ResponseValues]:
-        values = _values(parameters, fast, meshed, program)
+        values = _values(parameters, fast, wanted, program)
         return tuple(_real(a) for a in values[:3]), values
 
     names = program.equations.names
     points = parameters[names[0]].shape[0]
     shapes, values = jax.eval_shape(evaluate, parameters)
     count = sum(s.shape[1] for s in shapes)
-    # Of the equations on meshes, reverse mode takes several times as long to compile.
-    if meshed is None and count < len(names):
+    if count < len(names):
         _, pull, values = jax.vjp(evaluate, parameters, has_aux=True)
         unit = _split(jnp.broadcast_to(jnp.eye(count)[:, None], (count, points, count)), shapes)
         (gradients,) = jax.vmap(pull)(unit)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.small_systems import scaled_product
-from asperity.orbit.batches import Indices, run_chunks
+from asperity.orbit.batches import Indices, mesh_chunk, run_chunks
 from asperity.orbit.floquet import LARGEST_LOG, from_logs, log_multipliers
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.reading import (
@@ -30,6 +30,8 @@ AGREEMENT = 2e-7
 #: Each interval is cut into 3, 9, 27... parts for finer transfer maps, up to these numbers in all:
 #: of all intervals at once, and of one after the other.
 _MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 40_000_000
+#: Up to so many intervals of all points, whole chunks of points are worked on, in some 200 MB.
+_MOST_SIDE_BY_SIDE = 100_000
 
 #: Multipliers below this modulus are compared absolutely: no experiment sees them. Two have their
 #: product from Liouville's formula; of more the small ones drown in the round-off of the large.
@@ -75,7 +77,9 @@ def _resolve_by_splitting(
     splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_AT_ONCE]
     for parts in splits:
         solve = partial(split_observables, parts=parts)
-        for part, observables in run_chunks(solve, (problem, orbit), index, 1):
+        chunk = mesh_chunk(problem.system.size)
+        chunk = chunk if intervals * parts * chunk <= _MOST_SIDE_BY_SIDE else 1
+        for part, observables in run_chunks(solve, (problem, orbit), index, chunk):
             logs = observables.log_multipliers
             gap = _compare_with_coarser(solution, part, logs)
             over = np.flatnonzero(

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+import jax
 import numpy as np
+from jax import Array
 from jax.typing import ArrayLike
 
+from asperity.laws import Law
 from asperity.loads import Modulation
 from asperity.orbit.methods.registry import CHOICES, chosen_methods
 from asperity.orbit.outcome import Outcome
@@ -117,8 +120,13 @@ def periodic_response(
     else:
         solution = _proportional(flat, points, harmonics, waveform)
         report(points)
-    mu_ss = np.asarray(slider.law.mu_ss(problem.system.V)) * np.ones(shape)
+    mu_ss = np.asarray(_mu_ss(slider.law, problem.system.V)) * np.ones(shape)
     return PeriodicResponse.from_search(solution, shape, mu_ss, *problem)
+
+
+@jax.jit
+def _mu_ss(law: Law, V: ArrayLike) -> Array:
+    return law.mu_ss(V)
 
 
 def _proportional(problem: Problem, points: int, harmonics: int, phases: int) -> Solution:

@@ -86,5 +86,6 @@ def _leaf(owner: Any, path: str) -> Any:
 
 
 def _shown(value: Any) -> str:
-    low, high = float(np.min(value)), float(np.max(value))
+    value = np.asarray(value)
+    low, high = float(value.min()), float(value.max())
     return f"{low!r}" if low == high else f"{low!r} to {high!r}"

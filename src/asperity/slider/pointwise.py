@@ -7,6 +7,7 @@ Everything that solves orbits on meshes works on these arrays and knows no law. 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -91,17 +92,43 @@ def _values(system: Motion, at: Excitation, centre: Array, deviations: Array) ->
     return point_values(system, at, centre[:, None], deviations)
 
 
-@jit_large
-def _slopes(problem: Problem, direction: Problem, theta: Array, states: Array) -> Array:
-    def rates(problem: Problem) -> Array:
-        return problem.system.rates(states, problem.load.at(theta))
+def _slopes_along(
+    problem: Problem, direction: Problem, theta: Array, states: Array, change: Array
+) -> tuple[Array, Array]:
+    def rates_and_force(problem: Problem, Y: Array) -> tuple[Array, Array]:
+        at = problem.load.at(theta)
+        return problem.system.rates(Y, at), problem.system.force(Y, at)
 
-    return jax.jvp(rates, (problem,), (direction,))[1]
+    return jax.jvp(rates_and_force, (problem, states), (direction, change))[1]
+
+
+@jit_large
+def _slopes(
+    problem: Problem, direction: Problem, theta: Array, states: Array, change: Array
+) -> tuple[Array, Array]:
+    return _slopes_along(problem, direction, theta, states, change)
+
+
+@jit_large
+def _curvature(
+    problem: Problem,
+    direction: Problem,
+    theta: Array,
+    states: Array,
+    change: Array,
+    vector: Array,
+) -> Array:
+    none = jax.tree.map(jnp.zeros_like, problem)
+
+    def jacobian_times_vector(problem: Problem, Y: Array) -> Array:
+        return _slopes_along(problem, none, theta, Y, vector)[0]
+
+    return jax.jvp(jacobian_times_vector, (problem, states), (direction, change))[1]
 
 
 def excitation_at(load: Modulation, theta: Float) -> Excitation:
     """The excitation at phases of shape (..., points), for NumPy arrays."""
-    return _by_rows(lambda theta: _excitation(load, theta), theta)
+    return _by_rows(partial(_excitation, load), theta)
 
 
 def values_at(system: Motion, at: Excitation, centre: Float, deviations: Float) -> PointValues:
@@ -119,22 +146,39 @@ def values_at(system: Motion, at: Excitation, centre: Float, deviations: Float) 
     return _by_rows(lambda at, y: _values(system, at, centre, y), at, deviations)
 
 
-def parameter_slopes(
-    problem: Problem, direction: Problem, theta: Float, centre: Float, deviations: Float
-) -> Float:
-    """Derivative of the rates along a direction of the parameters, shape as `deviations`.
+def slopes_along(
+    problem: Problem, direction: Problem, theta: Float, states: Float, change: Float
+) -> tuple[Float, Float]:
+    """Derivatives of rates (size, ..., points) and of F/W0 (..., points).
 
     Parameters
     ----------
     problem, direction : Problem
-        Parameters of shape (points,).
+        Parameters of shape (points,), and how they change.
     theta : array, shape (..., points)
-    centre, deviations : array
-        As of `values_at`.
+    states, change : array, shape (size, ..., points)
+        States, and how they change.
     """
-    shape = (len(centre), *(1 for _ in theta.shape[1:]), theta.shape[-1])
-    states = centre.reshape(shape) + deviations
-    return _by_rows(lambda theta, Y: _slopes(problem, direction, theta, Y), theta, states)
+    return _by_rows(partial(_slopes, problem, direction), theta, states, change)
+
+
+def curvature_along(
+    problem: Problem,
+    direction: Problem,
+    theta: Float,
+    states: Float,
+    change: Float,
+    vector: Float,
+) -> Float:
+    """Derivative of the product of the Jacobian with `vector`, (size, ..., points).
+
+    Parameters
+    ----------
+    problem, direction, theta, states, change
+        As of `slopes_along`.
+    vector : array, shape (size, ..., points)
+    """
+    return _by_rows(partial(_curvature, problem, direction), theta, states, change, vector)
 
 
 def _by_rows(function: Callable[..., Any], *trees: Any) -> Any:

@@ -76,7 +76,7 @@ def require_contact(programme: Programme, W0: float) -> None:
     InputError
         If the load before the first step, or at its beginning, is not above 1e-6 of W0.
     """
-    first = float(programme.segments[0].load(jnp.zeros(()))[0])
+    first = float(programme.load(0.0))
     for moment, load in (("before the first step", programme.level.load), ("at t = 0", first)):
         if not load > NO_LOAD * W0:
             raise InputError(
@@ -97,7 +97,7 @@ def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
             f"{level.velocity:g} m/s; give it, or the states at rest as initial"
         )
     first = SegmentEquations(motion, programme.segments[0])
-    w = level.load / motion.slider.W0
+    w = level.load / np.asarray(motion.slider.W0)
     return np.asarray(_steady(first, jnp.asarray(level.velocity), jnp.asarray(w)))
 
 

@@ -17,7 +17,6 @@ from functools import cache, wraps
 from typing import Any
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 from jax.experimental.xla_metadata import set_xla_metadata
 
@@ -78,13 +77,13 @@ def _goes_well(system: SegmentEquations) -> bool:
 @cache
 def _elementwise(structure: Any) -> bool:
     """Whether rates and excitation of a system of scalars are element-wise."""
-    system = jax.tree.unflatten(structure, [jnp.ones(())] * structure.num_leaves)
+    system = jax.tree.unflatten(structure, [np.ones(())] * structure.num_leaves)
 
-    def what_runs(t: jax.Array, Y: jax.Array) -> tuple:
+    def what_runs(system: SegmentEquations, t: jax.Array, Y: jax.Array) -> tuple:
         return system.rates(system.at(t), Y), system.segment.next_kink(t)
 
     with set_xla_metadata(**_NO_ATTRIBUTES):
-        jaxpr = jax.make_jaxpr(what_runs)(jnp.ones(()), jnp.ones(system.motion.size + 1))
+        jaxpr = jax.make_jaxpr(what_runs)(system, np.ones(()), np.ones(system.motion.size + 1))
     return _ALLOWED.issuperset(_primitives(jaxpr.jaxpr))
 
 

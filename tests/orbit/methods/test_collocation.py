@@ -1,13 +1,10 @@
 """Collocation: order of convergence, the linear algebra under it, and its meshes.
 
-Everything is called within `jax.jit`: operations outside are programs of their own, compiled one by
-one. Cases of one kind have one shape, and so one program.
+Small systems are called within `jax.jit`: operations outside are programs of their own, compiled
+one by one. Cases of one kind have one shape, and so one program.
 """
 
-from functools import partial
-
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.linalg import expm
@@ -16,16 +13,12 @@ from asperity.algebra import cyclic, small_systems
 from asperity.laws import RiceRuina, get_law
 from asperity.loads import Harmonic
 from asperity.orbit.mesh import condensation
-from asperity.orbit.mesh import mesh as meshes
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import (
-    averaged_orbit,
-    collocation_observables,
-    newton_orbit,
-)
+from asperity.orbit.mesh.mesh import Orbit, equidistributed, evaluate, graded_mesh, split
+from asperity.orbit.mesh.newton import ACCEPTED, Plane, solve, solve_in_plane
+from asperity.orbit.mesh.reading import read_orbit
 from asperity.orbit.mesh.scheme import GAUSS, STAGES
 from asperity.slider import QuasiStatic, Slider
-from asperity.slider.problem import checked_problem, flatten
+from asperity.slider.problem import Problem, checked_problem, flatten
 from asperity.theory.adiabatic import adiabatic_growth
 
 #: Round-off times the condition of a random small matrix.
@@ -39,10 +32,6 @@ solve_columns = jax.jit(small_systems.solve_columns)
 spectral_abscissa = jax.jit(small_systems.spectral_abscissa)
 spectral_radius = jax.jit(small_systems.spectral_radius)
 solve_cyclic = jax.jit(cyclic.solve_cyclic)
-evaluate = jax.jit(meshes.evaluate)
-graded_mesh = jax.jit(meshes.graded_mesh, static_argnums=(0, 1))
-split = jax.jit(meshes.split, static_argnums=1)
-equidistributed = jax.jit(meshes.equidistributed, static_argnums=2)
 
 
 @jax.jit
@@ -202,15 +191,15 @@ def split_mesh(parts):
     ] * np.ones(2)
 
 
-@jax.jit
 def on_mesh(problem, mesh):
     """Mean, c1, c2, trace of the monodromy matrix and log of its determinant."""
-    orbit = averaged_orbit(*problem, 2, intervals=len(mesh) - 1, grading=0.0)
-    orbit = orbit.moved(mesh=mesh)
-    result = newton_orbit(*problem, orbit, tolerance=1e-12, max_steps=12, largest_change=2.0)
-    read = collocation_observables(*problem, result.orbit, harmonics=2)
-    trace = jnp.trace(read.monodromy) * jnp.exp(read.log_scale)
-    return jnp.stack([read.mean_friction, *read.harmonics, trace, read.log_determinant])
+    orbit = Orbit.empty(GAUSS, 2, len(mesh) - 1, 2).moved(mesh=mesh)
+    orbit = orbit.moved(centre=np.asarray(problem.system.steady()))
+    result = solve(problem, orbit, 30)
+    assert (result.error < ACCEPTED).all()
+    read = read_orbit(problem, result.orbit, 2)
+    trace = np.trace(read.monodromy) * np.exp(read.log_scale)
+    return np.stack([read.mean_friction, *read.harmonics, trace, read.log_determinant])
 
 
 def test_order_of_convergence():
@@ -219,20 +208,19 @@ def test_order_of_convergence():
     pair = np.ones(2)
     slider = jax.tree.map(lambda a: a * pair, Slider(law, spring=2e5, load=7.0))
     system = QuasiStatic(slider, np.array([1e-5, 2e-5]), 2 * np.pi * 120.0 * pair)
-    problem = (system, Harmonic(0.1 * pair))
+    problem = Problem(jax.tree.map(np.asarray, system), Harmonic(0.1 * pair))
     exact, *others = (np.asarray(on_mesh(problem, split_mesh(parts))) for parts in (PARTS, 4, 8))
     coarse, fine = (np.abs(other - exact) for other in others)
     # Next terms of the error: (h/radius of convergence)^2 of the leading one.
     np.testing.assert_allclose(np.log2(coarse / fine), 2 * STAGES, atol=0.5)
 
 
-@jax.jit
 def polynomial_orbit(mesh, power):
     """Orbit whose two states are theta^power and 2 - theta, not periodic."""
-    bare = Orbit(mesh, jnp.zeros((2, mesh.shape[1])), None, None, GAUSS)
+    bare = Orbit(mesh, np.zeros((2, mesh.shape[1])), None, None, GAUSS)
     theta = bare.stage_phases
-    nodes = jnp.stack([mesh[:-1] ** power, -mesh[:-1]])
-    slopes = jnp.stack([power * theta ** (power - 1), -jnp.ones_like(theta)])
+    nodes = np.stack([mesh[:-1] ** power, -mesh[:-1]])
+    slopes = np.stack([power * theta ** (power - 1), -np.ones_like(theta)])
     return bare.moved(nodes=nodes, slopes=slopes)
 
 
@@ -240,8 +228,7 @@ THETA = np.sort(np.random.default_rng(7).uniform(0, 2 * np.pi, (40, 3)), axis=0)
 
 
 def values(orbit):
-    states, slopes = evaluate(orbit, THETA)
-    return np.asarray(states), np.asarray(slopes)
+    return evaluate(orbit, THETA)
 
 
 @pytest.mark.parametrize("power", [1, 2, 4])
@@ -261,8 +248,7 @@ def test_one_power_more_is_no_longer_exact():
 
 def test_stage_deviations_are_the_states_at_the_stages():
     orbit = polynomial_orbit(graded_mesh(9, 3, 0.5), 4)
-    deviations, phases = jax.jit(lambda o: (o.stage_deviations, o.stage_phases))(orbit)
-    phases = np.asarray(phases)
+    deviations, phases = orbit.stage_deviations, orbit.stage_phases
     np.testing.assert_allclose(deviations[0], phases**4, rtol=EXACT, atol=EXACT)
     assert phases.shape == (STAGES, 9, 3)
     np.testing.assert_allclose(phases[:, 0, 0], GAUSS.c * widths(orbit)[0, 0])
@@ -280,12 +266,11 @@ def test_split_cuts_every_interval_and_keeps_the_orbit():
         np.testing.assert_allclose(after, before, rtol=EXACT, atol=EXACT)
 
 
-@partial(jax.jit, static_argnums=0)
 def peaked_orbit(intervals):
     """A state that rises within 0.1 rad of theta = 4."""
-    mesh = meshes.graded_mesh(intervals, 3, 0.0)
-    bare = Orbit(mesh, jnp.zeros((1, 3)), None, None, GAUSS)
-    nodes = jnp.arctan((mesh[:-1] - 4) / 0.1)[None]
+    mesh = graded_mesh(intervals, 3, 0.0)
+    bare = Orbit(mesh, np.zeros((1, 3)), None, None, GAUSS)
+    nodes = np.arctan((mesh[:-1] - 4) / 0.1)[None]
     slopes = (0.1 / ((bare.stage_phases - 4) ** 2 + 0.01))[None]
     return bare.moved(nodes=nodes, slopes=slopes)
 
@@ -313,8 +298,7 @@ def test_equidistributed_puts_intervals_where_the_orbit_is_steep():
 
 def test_scales_choose_the_state_that_matters():
     orbit = peaked_orbit(200)
-    slopes = np.asarray(orbit.slopes)
-    slopes = np.concatenate([slopes, slopes[:, ::-1, ::-1]])
+    slopes = np.concatenate([orbit.slopes, orbit.slopes[:, ::-1, ::-1]])
     nodes = np.zeros((2, 200, 3))  # only slopes are used
     both = Orbit(orbit.mesh, np.zeros((2, 3)), nodes, slopes, GAUSS)
     for weights, at in (([1.0, 0.0], 4.0), ([0.0, 1.0], 2 * np.pi - 4.0)):
@@ -326,29 +310,50 @@ def test_scales_choose_the_state_that_matters():
 
 def test_condensation_is_that_of_each_interval(monkeypatch):
     """Against the stage equations solved as one dense system, whether in blocks or at once."""
-    n, intervals, points = 3, 12, 5
-    jacobian = 0.3 * normal(n, n, STAGES, intervals, points)
-    right = normal(2, n, STAGES, intervals, points, seed=8)
-    mesh = graded_mesh(intervals, points, 0.4)
-    orbit = Orbit.empty(GAUSS, n, intervals, points).moved(mesh=mesh)
-    local = condensation.LinearisedEquations(None, right[0], right[0], jacobian)
-    entries = STAGES * n * ((STAGES + 1) * n + 2) * points
+    n, intervals, sides = 3, 60, 2
+    jacobian = 0.3 * normal(n, n, STAGES, intervals)
+    right = normal(n, STAGES, sides, intervals, seed=8)
+    widths = np.random.default_rng(9).uniform(0.2, 0.8, intervals)
+    entries = STAGES * n * ((STAGES + 1) * n + sides)
     blocks = {}
-    for name, at_a_time in (("whole", intervals), ("blocks", 4)):
+    for name, at_a_time in (("whole", intervals), ("blocks", 20)):
         monkeypatch.setattr(condensation, "_CACHED", at_a_time * entries)
         # A new function each time: the size of the blocks is a constant of the program.
-        condense = jax.jit(lambda *given: condensation.condense(*given))
-        blocks[name] = jax.tree.map(np.asarray, condense(local, orbit, *right))
-    for m, b in ((0, 0), (7, 3), (11, 4)):
-        J, h = np.moveaxis(jacobian[..., m, b], 2, 0), widths(orbit)[m, b]
+        condense = jax.jit(lambda *inputs: condensation.condense(*inputs))
+        blocks[name] = jax.tree.map(np.asarray, condense(jacobian, right, widths, GAUSS.a))
+    for m in (0, 27, 59):
+        J, h = np.moveaxis(jacobian[..., m], 2, 0), widths[m]
         # Slopes k_j = J_j (y + h sum_l a_jl k_l) + r_j, ordered by stage and state.
         matrix = np.eye(STAGES * n) - h * np.einsum("jl,jnc->jnlc", GAUSS.a, J).reshape(
             STAGES * n, -1
         )
-        known = [J.reshape(STAGES * n, n), *(r[..., m, b].T.reshape(-1, 1) for r in right)]
-        exact = np.linalg.solve(matrix, np.hstack(known)).reshape(STAGES, n, -1)
-        for response, *constants in blocks.values():
-            found = np.concatenate(
-                [response[..., m, b], *(c[:, :, None, m, b] for c in constants)], axis=2
-            )
-            np.testing.assert_allclose(np.swapaxes(found, 0, 1), exact, rtol=1e-10, atol=1e-12)
+        sides_here = np.swapaxes(right[..., m], 0, 1).reshape(STAGES * n, -1)
+        known = np.hstack([J.reshape(STAGES * n, n), sides_here])
+        exact = np.linalg.solve(matrix, known).reshape(STAGES, n, -1)
+        for response, constant in blocks.values():
+            solution = np.concatenate([response[..., m], constant[..., m]], axis=2)
+            np.testing.assert_allclose(np.swapaxes(solution, 0, 1), exact, rtol=1e-10, atol=1e-12)
+
+
+def test_newton_keeps_to_the_plane_of_its_guess():
+    """Along a line of parameters: <row, dX> + corner dt = 0, and the equations at the new t."""
+    law = RiceRuina(mu0=0.5, A=0.013, B=0.026, D0=4e-7, V0=1e-6)
+    slider = jax.tree.map(lambda a: np.asarray(a) * np.ones(2), Slider(law, spring=2e5, load=7.0))
+    system = QuasiStatic(slider, np.array([1e-5, 2e-5]), 2 * np.pi * 120.0 * np.ones(2))
+
+    def line(t):
+        return Problem(system, Harmonic(0.1 + 0.05 * t)), Problem(
+            jax.tree.map(np.zeros_like, system), Harmonic(np.full(2, 0.05))
+        )
+
+    mesh = graded_mesh(PARTS, 2, 0.3)
+    bare = Orbit.empty(GAUSS, 2, PARTS, 2).moved(mesh=mesh)
+    start = solve(line(np.zeros(2))[0], bare.moved(centre=np.asarray(system.steady())), 30).orbit
+    row = normal(2, PARTS, 2)
+    result = solve_in_plane(line, start, np.full(2, 0.1), Plane(row, np.ones(2)), max_steps=20)
+    assert (result.error < ACCEPTED).all()
+    moved = result.orbit.nodes + result.orbit.centre[:, None] - start.nodes - start.centre[:, None]
+    distance = (row * moved).sum((0, 1)) + result.t - 0.1
+    np.testing.assert_allclose(distance, 0.0, atol=1e-10)
+    again = solve(line(result.t)[0], result.orbit, 3)
+    np.testing.assert_allclose(again.orbit.nodes, result.orbit.nodes, atol=1e-10)

@@ -6,7 +6,9 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
+import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from asperity.errors import InputError
@@ -15,6 +17,7 @@ from asperity.loads import Harmonic, Modulation, Periodic
 from asperity.parameters import RULES, Parameter, law_parameters, point_parameters
 from asperity.slider import Motion, QuasiStatic, Slider
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
+from asperity.slider.named import equation_parameters, with_value
 from asperity.slider.problem import Problem
 
 #: Series of a `Periodic` load, as the names of their coefficients begin.
@@ -130,6 +133,21 @@ class ParametrisedProblem:
         if self.damped:
             values["eta"] = system.eta
         return values | load_values(load)
+
+    def directions(self, problem: Problem) -> dict[str, Problem]:
+        """Derivatives of a problem, NumPy arrays, by each parameter that has an influence."""
+        none = jax.tree.map(np.zeros_like, problem)
+        one = np.ones(np.shape(problem.system.V))
+        known = equation_parameters(*problem)
+        directions = {}
+        for name in self.names:
+            if name in self.load_names:
+                unit = {n: one * (n == name) for n in self.load_names}
+                load = jax.tree.map(np.asarray, self._load(unit))
+                directions[name] = none._replace(load=load)
+            elif name in known:
+                directions[name] = with_value(none, known[name], one)
+        return directions
 
     def valid(self, parameters: Mapping[str, Array]) -> Array:
         """Whether all parameters of a point obey their rules, shape (points,)."""

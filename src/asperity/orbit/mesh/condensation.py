@@ -12,6 +12,7 @@ from functools import partial
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax import Array
 
 from asperity.algebra.small_systems import inverse_points, product
@@ -111,5 +112,5 @@ def transfer_maps(response: Array, widths: Array, b: Array) -> Array:
         Of the collocation scheme.
     """
     n = response.shape[0]
-    identity = jnp.eye(n).reshape(n, n, *(1 for _ in widths.shape))
+    identity = np.eye(n).reshape(n, n, *(1 for _ in widths.shape))
     return identity + widths * sum(b[k] * response[:, k] for k in range(STAGES))

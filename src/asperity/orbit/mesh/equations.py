@@ -15,7 +15,7 @@ from asperity._jax import jit_large
 from asperity.loads import Excitation
 from asperity.orbit.mesh.condensation import condense
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.slider.pointwise import PointValues, excitation_at, parameter_slopes, values_at
+from asperity.slider.pointwise import PointValues, excitation_at, slopes_along, values_at
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
@@ -59,6 +59,12 @@ def collocated(problem: Problem, orbit: Orbit, at: Excitation | None = None) -> 
     return values_at(problem.system, at, orbit.centre, orbit.stage_deviations)
 
 
+def parameter_slopes(problem: Problem, direction: Problem, orbit: Orbit) -> Float:
+    """Derivative of the rates at the collocation points along a direction of the parameters."""
+    states = orbit.stage_states
+    return slopes_along(problem, direction, orbit.stage_phases, states, np.zeros_like(states))[0]
+
+
 def condensed(
     problem: Problem,
     orbit: Orbit,
@@ -86,8 +92,7 @@ def condensed(
     if closed:
         right[:, :, 0] = values.rates - orbit.slopes
     if direction is not None:
-        states = orbit.stage_phases, orbit.centre, orbit.stage_deviations
-        right[:, :, 1] = parameter_slopes(problem, direction, *states)
+        right[:, :, 1] = parameter_slopes(problem, direction, orbit)
     return CondensedEquations(values, *condensed_jacobian(values.jacobian, right, orbit))
 
 

@@ -97,6 +97,11 @@ class Orbit(eqx.Module):
         """States at the collocation points less `centre`, shape as `slopes`."""
         return self.nodes[:, None] + self.widths * self.stage_sums(self.slopes)
 
+    @property
+    def stage_states(self) -> Array:
+        """States at the collocation points, shape as `slopes`."""
+        return self.centre[:, None, None] + self.stage_deviations
+
 
 def graded_mesh(intervals: int, points: int, grading: float) -> Float:
     """Mesh theta = tau + g sin(tau), finest at the weakest contact theta = pi."""

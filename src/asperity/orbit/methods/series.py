@@ -18,23 +18,19 @@ from __future__ import annotations
 from functools import cache
 from itertools import pairwise
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from jax import Array
 from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.algebra.small_systems import jacobian_columns
-from asperity.orbit.batches import Indices, put, run_chunks, take
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.scheme import scheme_for
 from asperity.orbit.methods.collocation.refinement import accept
 from asperity.orbit.methods.method import Method
-from asperity.orbit.newton_step import exponent_change
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.orbit.stiffness import STIFFNESS_CHUNK, sharpness_of_slip, stiffness_of_steady_sliding
 from asperity.slider import QuasiStatic
+from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import adiabatic_states, even_phases
 
@@ -55,7 +51,6 @@ _WEAK = (1e-3, 0.5)
 #: a round-off of some 3e-16, of which smaller harmonics feel more than 1e-10; a mesh keeps them as
 #: deviations from their mean.
 _LEAST_HARMONIC = 3e-6
-_CHUNK = 64
 #: Newton's steps from sequences of steady states, and from the series on fewer nodes.
 _FIRST_STEPS, _NEXT_STEPS = 14, 4
 #: Largest change of an exponent in one step.
@@ -122,10 +117,11 @@ def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool
     scheme, size = scheme_for(problem.system), problem.system.size
     orbit = Orbit.empty(scheme, size, INTERVALS, points)
     resolved = np.zeros(points, bool)
-    for start in range(0, points, _CHUNK):
-        rows = np.arange(start, min(start + _CHUNK, points))
+    chunk = mesh_chunk(size)
+    for start in range(0, points, chunk):
+        rows = np.arange(start, min(start + chunk, points))
         # The last chunk is filled up so that one program serves all; the filling is not solved.
-        filled = np.concatenate([rows, np.full(_CHUNK - len(rows), rows[-1])])
+        filled = np.concatenate([rows, np.full(chunk - len(rows), rows[-1])])
         harmonics, resolved[rows] = _solve(take(problem, filled), len(rows))
         put(orbit, rows, _on_even_mesh(harmonics, scheme))
     return orbit, resolved
@@ -155,29 +151,18 @@ def _solve(problem: Problem, points: int) -> tuple[NDArray[np.complex128], NDArr
     return harmonics, exact
 
 
-@jax.jit
-def _linearised(problem: Problem, Y: Array) -> tuple[Array, Array]:
-    """Rates (size, nodes, points) and their Jacobian (row, column, nodes, points)."""
-    at = problem.load.at(even_phases(Y.shape[1]) * jnp.ones(Y.shape[2]))
-    rates, columns = jacobian_columns(lambda y: problem.system.rates(y, at), Y)
-    return rates, jnp.stack(columns, axis=1)
-
-
-@jax.jit
-def _largest_change(problem: Problem, Y: Array, step: Array) -> Array:
-    """Largest change of an exponent by a step, shape (points,)."""
-    at = problem.load.at(even_phases(Y.shape[1]) * jnp.ones(Y.shape[2]))
-    return exponent_change(problem.system, at, Y, step).max(0)
-
-
 def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices:
     """Improve the points `at` of the states in place; returns those that converged."""
     derivative = _derivative(Y.shape[1])
+    system = problem.system
+    logarithms = [i for i in range(system.size) if i not in system.linear]
+    excitation = excitation_at(problem.load, even_phases(Y.shape[1]) * np.ones(Y.shape[2]))
     done = []
     for count in range(1, most_steps + 1):
         if not len(at):
             break
-        rates, jacobian = (np.asarray(a) for a in _linearised(problem, Y))
+        values = values_at(system, excitation, np.zeros_like(Y[:, 0]), Y)
+        rates, jacobian = values.rates, values.jacobian
         finite = np.isfinite(rates).all((0, 1)) & np.isfinite(jacobian).all((0, 1, 2))
         at = at[finite[at]]
         gap = rates[..., at] - np.einsum("kl,nlb->nkb", derivative, Y[..., at], optimize=True)
@@ -185,9 +170,9 @@ def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices
             step = _solved(jacobian[..., at], derivative, gap)
         except np.linalg.LinAlgError:
             break
-        every = np.zeros_like(Y)
-        every[..., at] = step
-        change = np.asarray(_largest_change(problem, Y, every))[at]
+        with np.errstate(all="ignore"):
+            exponent = (values.slip_gradient[..., at] * step).sum(0)
+            change = np.abs([exponent, *step[logarithms]]).max((0, 1))
         usable = np.isfinite(change)
         at, step, change = at[usable], step[..., usable], change[usable]
         Y[..., at] += step * np.minimum(1.0, _LARGEST_CHANGE / np.maximum(change, 1e-300))

@@ -72,16 +72,11 @@ def whole_search(
             numbers = np.vstack([found.mean_friction[part], found.harmonics[:, part]])
             served = (error < ACCEPTED) & (largest_change(numbers, reading) < agreement)
             kept = np.flatnonzero(served)
-            mesh = take(fine, kept)
             orbits = MeshOrbits(
-                mesh.mesh,
-                mesh.centre,
-                mesh.nodes,
-                mesh.slopes,
+                take(fine, kept),
                 found.mean_friction[part[kept]],
                 found.harmonics[:harmonics, part[kept]],
                 found.log_multipliers[:, part[kept]],
-                np.full(len(kept), int(Outcome.CONVERGED)),
             )
             result.add(part[kept], orbits)
         orbit, left = finer, left[result.outcome[left] != Outcome.CONVERGED]

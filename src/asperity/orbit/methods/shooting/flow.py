@@ -28,8 +28,9 @@ from numpy.typing import NDArray
 from asperity.algebra.kepler import eccentric_phase
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import Matrix, inverse_points, jacobian_columns, product
-from asperity.orbit.newton_step import exponent_change
+from asperity.loads import Excitation
 from asperity.orbit.observables import waveform_of
+from asperity.slider import Motion
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
 
@@ -229,6 +230,25 @@ def _trace(problem: Problem, theta: Array, states: Array) -> Array:
     return sum((column[i] for i, column in enumerate(columns)), jnp.zeros_like(states[0]))
 
 
+def _exponent_change(system: Motion, at: Excitation, states: Array, step: Array) -> Array:
+    """Largest first-order change of the slip exponent and of the logarithmic states.
+
+    Parameters
+    ----------
+    system : Motion
+    at : Excitation
+        At the phases of the states.
+    states, step : array, shape (size, ...)
+
+    Returns
+    -------
+    array, shape (...)
+    """
+    _, exponent = jax.jvp(lambda Y: system.log_slip(Y, at), (states,), (step,))
+    logarithms = [step[i] for i in range(system.size) if i not in system.linear]
+    return jnp.abs(jnp.stack([exponent, *logarithms])).max(0)
+
+
 def _changes(problem: Problem, start: Array, step: Array) -> tuple[Array, Array]:
     """Largest change of slip exponent and logarithmic states by a step, without and with velocity.
 
@@ -240,7 +260,7 @@ def _changes(problem: Problem, start: Array, step: Array) -> tuple[Array, Array]
     force, velocity, friction = (names.index(n) for n in ("force", "velocity", "friction"))
     carried = jnp.zeros_like(step).at[friction].set(step[force] / at.w)
     leap = jnp.maximum(
-        exponent_change(system, at, start, step), exponent_change(system, at, start, carried)
+        _exponent_change(system, at, start, step), _exponent_change(system, at, start, carried)
     )
     leap = jnp.where(jnp.isfinite(leap), leap, jnp.inf)
     return leap, jnp.maximum(leap, jnp.abs(step[velocity]))

@@ -1,0 +1,232 @@
+"""Derivatives of orbits on meshes by the implicit function theorem, without knowing the law.
+
+With D the collocation equations of an orbit Y for parameters p, D(p, Y) = 0, its derivative is
+-D_Y^-1 D_p: the linear equations of a Newton step with another right-hand side. What a law has to
+give is in `asperity.slider.pointwise`.
+
+The derivative of a multiplier m with the right eigenvector v and the left one w of the monodromy
+matrix T_M ... T_1 is sum_i w_i (dT_i) v_i / (w_i T_i v_i), with both carried along the transfer
+maps T_i.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.algebra.small_systems import scaled_product
+from asperity.orbit.gradient.parametrised import ParametrisedProblem
+from asperity.orbit.mesh.condensation import transfer_maps
+from asperity.orbit.mesh.equations import (
+    CondensedEquations,
+    collocated,
+    condensed_jacobian,
+    parameter_slopes,
+)
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import Plane, newton_step
+from asperity.orbit.mesh.reading import quadrature
+from asperity.slider.pointwise import curvature_along, slopes_along
+from asperity.slider.problem import Problem
+
+Float = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+#: Right-hand sides that are condensed together, whatever their number.
+_SIDES = 16
+#: Largest relative difference of multipliers on the mesh from the known ones.
+_MULTIPLIER_GAP = 1e-5
+
+
+def orbit_derivatives(
+    equations: ParametrisedProblem,
+    problem: Problem,
+    orbit: Orbit,
+    harmonics: int,
+    logs: Complex | None = None,
+) -> Float:
+    """Derivatives of mean, harmonics and multipliers to every parameter.
+
+    Parameters
+    ----------
+    equations : ParametrisedProblem
+    problem : Problem
+        NumPy arrays (points,).
+    orbit : Orbit
+        Converged orbits.
+    harmonics : int
+    logs : complex array, shape (size, points), optional
+        Logarithms of the multipliers, whose derivatives are wanted too. They are NaN where the mesh
+        does not resolve them.
+
+    Returns
+    -------
+    array, shape (parameters, points, columns)
+        Columns are the mean, the real and the imaginary parts of the harmonics, and those of the
+        logarithms of the multipliers.
+    """
+    with np.errstate(all="ignore"):
+        directions = equations.directions(problem)
+        values = collocated(problem, orbit)
+        changes = _orbit_changes(problem, orbit, values, directions)
+        columns = [_force_columns(problem, orbit, directions, changes, harmonics)]
+        if logs is not None:
+            columns += _multiplier_columns(problem, orbit, values, directions, changes, logs)
+        part = np.concatenate(columns, axis=-1)
+    table = np.zeros((len(equations.names), *part.shape[1:]))
+    table[[name in directions for name in equations.names]] = part
+    return table
+
+
+def _orbit_changes(
+    problem: Problem, orbit: Orbit, values: Any, directions: dict[str, Problem]
+) -> Float:
+    """Changes of the states at the collocation points, (directions, size, STAGES, ...)."""
+    sides = np.stack([parameter_slopes(problem, d, orbit) for d in directions.values()], axis=2)
+    response, constant = _condensed(values.jacobian, sides, orbit)
+    plane = Plane.of_fixed_parameters(orbit)
+    changes = []
+    for k in range(sides.shape[2]):
+        part = CondensedEquations(values, response, constant[:, :, k : k + 1])
+        change = newton_step(problem.system, part, orbit, plane, closed=False).change
+        changes.append(change.nodes[:, None] + orbit.widths * orbit.stage_sums(change.slopes))
+    return np.stack(changes)
+
+
+def _condensed(jacobian: Float, sides: Float, orbit: Orbit) -> tuple[Float, Float]:
+    """`condensed_jacobian` of any number of right-hand sides, by one compiled program."""
+    count = sides.shape[2]
+    constants = []
+    for start in range(0, count, _SIDES):
+        part = np.zeros((*sides.shape[:2], _SIDES, *sides.shape[3:]))
+        some = sides[:, :, start : start + _SIDES]
+        part[:, :, : some.shape[2]] = some
+        response, constant = condensed_jacobian(jacobian, part, orbit)
+        constants.append(constant[:, :, : some.shape[2]])
+    return response, np.concatenate(constants, axis=2)
+
+
+def _force_columns(
+    problem: Problem,
+    orbit: Orbit,
+    directions: dict[str, Problem],
+    changes: Float,
+    harmonics: int,
+) -> Float:
+    """Changes of mean and harmonics, (directions, points, 1 + 2 harmonics)."""
+    theta, states = orbit.stage_phases, orbit.stage_states
+    weights = quadrature(orbit) / (2 * np.pi)
+    turn = np.exp(-1j * theta)
+    turns = np.cumprod(np.broadcast_to(turn, (harmonics, *turn.shape)), axis=0)
+    rows = []
+    for direction, change in zip(directions.values(), changes, strict=True):
+        _, force = slopes_along(problem, direction, theta, states, change)
+        phasors = 2 * (turns * (weights * force)).sum((1, 2))
+        rows.append(np.vstack([(weights * force).sum((0, 1)), phasors.real, phasors.imag]).T)
+    return np.stack(rows)
+
+
+def _multiplier_columns(
+    problem: Problem,
+    orbit: Orbit,
+    values: Any,
+    directions: dict[str, Problem],
+    changes: Float,
+    logs: Complex,
+) -> list[Float]:
+    """Changes of the logarithms of the multipliers, real and imaginary parts."""
+    size, points = logs.shape
+    # Liouville: the smaller of two, which drowns in the round-off of the larger, from their sum.
+    pair = size == 2
+    theta, states = orbit.stage_phases, orbit.stage_states
+    none = np.zeros((*orbit.slopes.shape[:2], 1, *orbit.widths.shape))
+    response, _ = condensed_jacobian(values.jacobian, none, orbit)
+    maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
+    right, left, gap = _eigenvectors(maps, logs)
+
+    def along(direction: Problem, change: Float, vector: Float) -> Float:
+        return curvature_along(problem, direction, theta, states, change, vector)
+
+    result = np.zeros((len(changes), size, points), complex)
+    for j in range(size - pair):
+        bent = np.einsum("nkcmb,cmb->nkmb", response, right[j])
+        inner = right[j][:, None] + orbit.widths * orbit.stage_sums(bent)
+        sides = [
+            along(d, change, part)
+            for d, change in zip(directions.values(), changes, strict=True)
+            for part in (inner.real, inner.imag)
+        ]
+        _, constant = _condensed(values.jacobian, np.stack(sides, axis=2), orbit)
+        moved = orbit.widths * np.einsum("k,nkcmb->cnmb", orbit.scheme.b, constant)
+        moved = moved[0::2] + 1j * moved[1::2]
+        after = np.einsum("ncmb,cmb->nmb", maps, right[j])
+        share = (left[j] * moved).sum(1) / (left[j] * after).sum(0)
+        result[:, j] = share.sum(1)
+    if pair:
+        trace = sum(
+            np.stack(
+                [
+                    along(d, change, _unit(i, states))[i]
+                    for d, change in zip(directions.values(), changes, strict=True)
+                ]
+            )
+            for i in range(size)
+        )
+        whole = (quadrature(orbit) * trace).sum((1, 2))
+        # Of a complex pair both have half of it.
+        turning = (logs[0].imag != 0) & (np.abs(logs[0].imag) != np.pi)
+        result[:, 0].real[:] = np.where(turning, whole / 2, result[:, 0].real)
+        result[:, 1] = whole - result[:, 0]
+        gap[1] = gap[0]
+    result = np.where(gap < _MULTIPLIER_GAP, result, np.nan)
+    both = np.concatenate([result.real, result.imag], axis=1)
+    return [np.moveaxis(both, 1, 2)]
+
+
+def _unit(i: int, like: Float) -> Float:
+    vector = np.zeros_like(like)
+    vector[i] = 1.0
+    return vector
+
+
+def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Complex], Float]:
+    """Eigenvectors that belong to `logs`, carried along the maps.
+
+    Returns
+    -------
+    right : list of complex array, shape (size, intervals, points)
+        At the left node of each interval, to any scale.
+    left : list of complex array
+        The same at the right node.
+    gap : array, shape (size, points)
+        Relative difference of the multipliers of the maps from the known ones.
+    """
+    size, _, intervals, points = maps.shape
+    whole, log_scale = scaled_product(maps)
+    finite = np.isfinite(whole).all((0, 1))
+    matrix = np.moveaxis(np.where(finite, whole, np.eye(size)[..., None]), -1, 0)
+    multipliers, vectors = np.linalg.eig(matrix.astype(complex))
+    duals = np.linalg.inv(vectors)
+    mesh_logs = np.where(finite[:, None], np.log(multipliers) + log_scale[:, None], np.nan)
+    apart = np.abs(np.expm1(mesh_logs[:, None] - logs.T[:, :, None]))  # (points, known, mesh)
+    nearest = np.argmin(np.nan_to_num(apart, nan=np.inf), axis=2)
+    gap = np.take_along_axis(apart, nearest[..., None], 2)[..., 0].T
+    at = np.arange(points)
+    right, left = [], []
+    for j in range(size):
+        v, w = vectors[at, :, nearest[:, j]].T, duals[at, nearest[:, j]].T
+        forward = np.empty((size, intervals, points), complex)
+        backward = np.empty_like(forward)
+        for i in range(intervals):
+            forward[:, i] = v
+            v = np.einsum("nmb,mb->nb", maps[:, :, i], v)
+            v = v / np.abs(v).max(0)
+        for i in reversed(range(intervals)):
+            backward[:, i] = w
+            w = np.einsum("nmb,nb->mb", maps[:, :, i], w)
+            w = w / np.abs(w).max(0)
+        right.append(forward)
+        left.append(backward)
+    return right, left, gap

@@ -1,0 +1,84 @@
+"""A table at the end of a run of the tests: programs compiled in each room, and the time it took.
+
+Programs that tests compile in processes of their own are not counted.
+"""
+
+from collections import Counter, defaultdict
+
+import pytest
+
+_EVENTS = {
+    "/jax/core/compile/backend_compile_duration": "compiling",
+    "/jax/core/compile/jaxpr_to_mlir_module_duration": "tracing",
+    "/jax/core/compile/jaxpr_trace_duration": "tracing",
+}
+
+#: Of each room: tests, programs, and seconds in all, compiling and tracing.
+totals = defaultdict(Counter)
+_running = Counter()
+
+
+def _count(event, duration_secs, **_):
+    kind = _EVENTS.get(event)
+    if kind:
+        _running[kind] += duration_secs
+        _running["programs"] += kind == "compiling"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection(session):
+    """Listen once tests are collected: whoever only lists them does not wait for JAX."""
+    result = yield
+    if not session.config.option.collectonly:
+        import jax
+
+        jax.monitoring.register_event_duration_secs_listener(_count)
+    return result
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item):
+    """What a test compiles, its fixtures included, goes to its room."""
+    _running.clear()
+    result = yield
+    totals[item.nodeid.split("/")[1]].update(_running)
+    return result
+
+
+def pytest_runtest_logreport(report):
+    """Time of all parts of a test."""
+    counts = totals[report.nodeid.split("/")[1]]
+    # Processes of xdist send their reports here, and their programs at the end.
+    counts["seconds"] += report.duration
+    counts["tests"] += report.when == "call"
+
+
+def pytest_sessionfinish(session):
+    """Send what one process of xdist compiled to the one that prints."""
+    output = getattr(session.config, "workeroutput", None)
+    if output is not None:
+        kinds = ("programs", "compiling", "tracing")
+        output["compilation"] = {r: {k: c[k] for k in kinds} for r, c in totals.items()}
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_testnodedown(node):
+    """Add what a process of xdist compiled."""
+    for room, counts in getattr(node, "workeroutput", {}).get("compilation", {}).items():
+        totals[room].update(counts)
+
+
+def pytest_terminal_summary(terminalreporter):
+    """Print the table, the slowest room first."""
+    rows = sorted(totals.items(), key=lambda pair: -pair[1]["seconds"])
+    if sum(counts["programs"] for _, counts in rows) == 0:
+        return
+    write = terminalreporter.write_line
+    terminalreporter.section("seconds and compiled programs")
+    write(f"{'room':<16}{'tests':>7}{'seconds':>9}{'programs':>10}{'compiling':>11}{'tracing':>9}")
+    whole = sum((counts for _, counts in rows), Counter())
+    for room, c in [*rows, ("all", whole)]:
+        write(
+            f"{room:<16}{c['tests']:>7}{c['seconds']:>9.0f}{c['programs']:>10}"
+            f"{c['compiling']:>11.1f}{c['tracing']:>9.1f}"
+        )
