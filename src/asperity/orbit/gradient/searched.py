@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import jax
@@ -75,23 +76,6 @@ def searched_values(parameters: Parameters, wanted: Array, program: Program) -> 
     mean, *pairs = jnp.split(columns, cuts, axis=1)
     harmonics, logs = pairs[0] + 1j * pairs[1], pairs[2] + 1j * pairs[3]
     return ResponseValues(mean[:, 0], harmonics, logs, outcome)
-
-
-def _columns_of(program: Program, parameters: Parameters, wanted: Array) -> tuple[Array, Array]:
-    """Real columns (points, count) of the response, and the outcome."""
-    (points,) = wanted.shape
-    shapes = (
-        jax.ShapeDtypeStruct((points, _count(program)), float),
-        jax.ShapeDtypeStruct((points,), np.dtype(np.int64)),
-    )
-    return _called(_response, shapes, program, parameters, wanted)
-
-
-def _table_of(program: Program, parameters: Parameters, wanted: Array) -> Array:
-    """Derivatives of the columns, (parameters, points, count)."""
-    (points,) = wanted.shape
-    shape = (len(program.equations.names), points, _count(program))
-    return _called(_table, jax.ShapeDtypeStruct(shape, float), program, parameters, wanted)
 
 
 def _count(program: Program) -> int:
@@ -176,18 +160,39 @@ def _unknown_rule(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
     return primals[0], jnp.full_like(primals[0], jnp.nan)
 
 
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _columns(program: Program, parameters: Parameters, wanted: Array) -> tuple[Array, Array]:
-    @jax.custom_jvp
-    def columns(parameters: Parameters) -> tuple[Array, Array]:
-        return _columns_of(program, jax.lax.stop_gradient(parameters), wanted)
+    """Real columns (points, count) of the response, and the outcome."""
+    (points,) = wanted.shape
+    shapes = (
+        jax.ShapeDtypeStruct((points, _count(program)), np.dtype(float)),
+        jax.ShapeDtypeStruct((points,), np.dtype(np.int64)),
+    )
+    return _called(_response, shapes, program, parameters, wanted)
 
-    @columns.defjvp
-    def rule(primals: tuple, tangents: tuple) -> tuple[Any, Any]:
-        (parameters,), (moved,) = primals, tangents
-        values, outcome = columns(parameters)
-        table = _unknown(_table_of(program, jax.lax.stop_gradient(parameters), wanted))
-        names = program.equations.names
-        change = sum(table[k] * moved[n][:, None] for k, n in enumerate(names))
-        return (values, outcome), (change, np.zeros(outcome.shape, jax.dtypes.float0))
 
-    return columns(parameters)
+@_columns.defjvp
+def _columns_rule(program: Program, primals: tuple, tangents: tuple) -> tuple[Any, Any]:
+    parameters, wanted = primals
+    columns, outcome = _columns(program, parameters, wanted)
+    names = program.equations.names
+    shape = (len(names), *columns.shape)
+    fixed = jax.lax.stop_gradient(parameters)
+    shapes = jax.ShapeDtypeStruct(shape, np.dtype(float))
+    table = _called(_table, shapes, program, fixed, wanted)
+    table = _unknown(table, sum(parameters.values()))
+    change = sum(table[k] * tangents[0][n][:, None] for k, n in enumerate(names))
+    return (columns, outcome), (change, np.zeros(outcome.shape, jax.dtypes.float0))
+
+
+@jax.custom_jvp
+def _unknown(values: Array, point: Array) -> Array:
+    """Values whose derivatives are NaN where those of `point`, (points,), are not zero."""
+    return values
+
+
+@_unknown.defjvp
+def _unknown_rule(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
+    values, point = primals
+    lost = jnp.where(tangents[1] != 0, jnp.nan, 0.0)
+    return _unknown(values, point), lost[:, None] * jnp.ones_like(values)
