@@ -156,19 +156,19 @@ def _beside(
 def _alternating(line: ParameterLine, orbit: Orbit, t: NDArray[np.float64]) -> ContinuationPoint:
     """The simple orbit twice, and the unit direction that changes sign in between."""
     problem = line.at(t)
-    values, response, _ = condensed(problem, orbit)
-    maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
-    units = slip_units(problem.system, values)
+    equations = condensed(problem, orbit)
+    maps = np.asarray(transfer_maps(equations.response, orbit.widths, orbit.scheme.b))
+    units = slip_units(problem.system, equations.values)
     total = np.eye(len(maps))
     for i in range(maps.shape[2]):
         total = maps[:, :, i, 0] @ total
-    values, vectors = np.linalg.eig(total)
-    vector = vectors[:, np.argmin(np.abs(values + 1))].real
+    multipliers, vectors = np.linalg.eig(total)
+    vector = vectors[:, int(np.argmin(np.abs(multipliers + 1)))].real
     nodes = np.empty(orbit.nodes.shape)
     for i in range(maps.shape[2]):
         nodes[:, i, 0] = vector
         vector = maps[:, :, i, 0] @ vector
-    slopes = 2 * np.einsum("nkcmb,cmb->nkmb", response, nodes)
+    slopes = 2 * np.einsum("nkcmb,cmb->nkmb", equations.response, nodes)
     mesh = np.concatenate([orbit.mesh / 2, np.pi + orbit.mesh[1:] / 2])
     twice = orbit.moved(
         mesh=mesh,

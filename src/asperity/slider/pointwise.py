@@ -58,30 +58,6 @@ class PointValues(NamedTuple):
         return self.force_mean + self.force_rest
 
 
-def point_values(system: Motion, at: Excitation, centre: Array, deviations: Array) -> PointValues:
-    """Values at the states `centre + deviations`.
-
-    Parameters
-    ----------
-    system : Motion
-        Parameters that broadcast against the phases.
-    at : Excitation
-        At the phases, of shape (...).
-    centre : array, shape (size, ...)
-    deviations : array, shape (size, ...)
-        Apart from the centre, so that small ones keep their digits.
-    """
-
-    def both(Y: Array) -> Array:
-        return jnp.concatenate([system.rates(Y, at), system.log_slip(Y, at)[None]])
-
-    values, columns = jacobian_columns(both, centre + deviations)
-    derivatives = jnp.stack(columns, axis=1)
-    constant, rest = system.force_split(centre, deviations, at)
-    constant, rest = (a * jnp.ones_like(values[0]) for a in (constant, rest))
-    return PointValues(values[:-1], derivatives[:-1], values[-1], derivatives[-1], constant, rest)
-
-
 @jax.jit
 def _excitation(load: Modulation, theta: Array) -> Excitation:
     return load.at(theta)
@@ -89,7 +65,16 @@ def _excitation(load: Modulation, theta: Array) -> Excitation:
 
 @jit_large
 def _values(system: Motion, at: Excitation, centre: Array, deviations: Array) -> PointValues:
-    return point_values(system, at, centre[:, None], deviations)
+    centre = centre[:, None]
+
+    def rates_and_slip(Y: Array) -> Array:
+        return jnp.concatenate([system.rates(Y, at), system.log_slip(Y, at)[None]])
+
+    values, columns = jacobian_columns(rates_and_slip, centre + deviations)
+    derivatives = jnp.stack(columns, axis=1)
+    constant, rest = system.force_split(centre, deviations, at)
+    constant, rest = (a * jnp.ones_like(values[0]) for a in (constant, rest))
+    return PointValues(values[:-1], derivatives[:-1], values[-1], derivatives[-1], constant, rest)
 
 
 def _slopes_along(
@@ -131,8 +116,8 @@ def excitation_at(load: Modulation, theta: Float) -> Excitation:
     return _by_rows(partial(_excitation, load), theta)
 
 
-def values_at(system: Motion, at: Excitation, centre: Float, deviations: Float) -> PointValues:
-    """`point_values` of NumPy arrays.
+def values_at(system: Motion, at: Excitation, centre: Any, deviations: Float) -> PointValues:
+    """The equation of motion at the states `centre + deviations`, for NumPy arrays.
 
     Parameters
     ----------
@@ -142,8 +127,13 @@ def values_at(system: Motion, at: Excitation, centre: Float, deviations: Float) 
         Arrays of shape (..., points), as `excitation_at` returns them.
     centre : array, shape (size, points)
     deviations : array, shape (size, ..., points)
+        Apart from the centre, so that small ones keep their digits.
     """
-    return _by_rows(lambda at, y: _values(system, at, centre, y), at, deviations)
+
+    def values(at: Any, deviations: Any) -> PointValues:
+        return _values(system, at, centre, deviations)
+
+    return _by_rows(values, at, deviations)
 
 
 def slopes_along(

@@ -205,7 +205,7 @@ def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Compl
     """
     size, _, intervals, points = maps.shape
     whole, log_scale = scaled_product(maps)
-    finite = np.isfinite(whole).all((0, 1))
+    finite = np.asarray(np.isfinite(whole).all((0, 1)))
     matrix = np.moveaxis(np.where(finite, whole, np.eye(size)[..., None]), -1, 0)
     multipliers, vectors = np.linalg.eig(matrix.astype(complex))
     duals = np.linalg.inv(vectors)

@@ -149,17 +149,6 @@ def _table(program: Program, parameters: dict[str, Float], wanted: NDArray[np.bo
     return table
 
 
-@jax.custom_jvp
-def _unknown(values: Array) -> Array:
-    """Values whose derivatives are NaN."""
-    return values
-
-
-@_unknown.defjvp
-def _unknown_rule(primals: tuple, tangents: tuple) -> tuple[Array, Array]:
-    return primals[0], jnp.full_like(primals[0], jnp.nan)
-
-
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _columns(program: Program, parameters: Parameters, wanted: Array) -> tuple[Array, Array]:
     """Real columns (points, count) of the response, and the outcome."""

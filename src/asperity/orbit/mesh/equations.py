@@ -99,9 +99,11 @@ def condensed(
 def condensed_jacobian(jacobian: Float, right: Float, orbit: Orbit) -> tuple[Float, Float]:
     """`condense` of NumPy arrays (..., intervals, points) on the mesh of an orbit."""
     a, shape = np.asarray(orbit.scheme.a), orbit.widths.shape
-    flat = [_flat(x) for x in (jacobian, right, orbit.widths)]
-    blocks = range(0, flat[-1].shape[-1], _INTERVALS)
-    solved = [_condense(*(x[..., i : i + _INTERVALS] for x in flat), a) for i in blocks]
+    jacobian, right, widths = _flat(jacobian), _flat(right), _flat(orbit.widths)
+    solved = []
+    for start in range(0, widths.shape[-1], _INTERVALS):
+        at = slice(start, start + _INTERVALS)
+        solved.append(_condense(jacobian[..., at], right[..., at], widths[at], a))
     response, constant = (_joined(parts, shape) for parts in zip(*solved, strict=True))
     return response, constant
 

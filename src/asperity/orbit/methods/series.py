@@ -163,7 +163,8 @@ def _newton(problem: Problem, Y: Float, at: Indices, most_steps: int) -> Indices
             break
         values = values_at(system, excitation, np.zeros_like(Y[:, 0]), Y)
         rates, jacobian = values.rates, values.jacobian
-        finite = np.isfinite(rates).all((0, 1)) & np.isfinite(jacobian).all((0, 1, 2))
+        usable = np.isfinite(rates).all((0, 1)) & np.isfinite(jacobian).all((0, 1, 2))
+        finite = np.asarray(usable)
         at = at[finite[at]]
         gap = rates[..., at] - np.einsum("kl,nlb->nkb", derivative, Y[..., at], optimize=True)
         try:

@@ -71,8 +71,8 @@ class MovingMeshStep(NamedTuple):
 def _predicted(pair: PointPair, ratio: Float) -> tuple[Orbit, Float]:
     """Extrapolation by `ratio` times the last step."""
     before, now = pair.before, pair.point.orbit
-    widths = now.widths + ratio * (now.widths - before.widths)
-    widths = np.maximum(widths, _NARROWEST * now.widths)
+    longer = now.widths + ratio * (now.widths - before.widths)
+    widths = np.maximum(longer, _NARROWEST * now.widths)
     widths = widths * (2 * np.pi / widths.sum(0))
     mesh = np.concatenate([np.zeros_like(widths[:1]), np.cumsum(widths, axis=0)])
     mesh[-1] = 2 * np.pi

@@ -38,8 +38,8 @@ def inertial_guess(problem: Problem, orbit: Orbit) -> Orbit:
     theta = np.concatenate([orbit.mesh[None, :-1], orbit.stage_phases])
     inside, slopes = evaluate(orbit, theta.reshape(-1, theta.shape[-1]))
     shape = (len(inside), *theta.shape)
-    states = orbit.centre[:, None, None] + inside.reshape(shape)
-    converted = _converted(problem, states, slopes.reshape(shape), theta)
+    sliding = orbit.centre[:, None, None] + inside.reshape(shape)
+    converted = _converted(problem, sliding, slopes.reshape(shape), theta)
     states, slopes = (np.asarray(a) for a in converted)
     nodes = states[:, 0]
     return Orbit(

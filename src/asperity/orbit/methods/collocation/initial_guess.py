@@ -87,8 +87,9 @@ def _first_orbit(problem: Problem) -> tuple[Orbit, Float]:
     system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
     centre = np.asarray(_averaged_states(Problem(quasi_static, load)))
-    bare = Orbit.empty(GAUSS, *centre.shape[:1], FIRST_MESH, centre.shape[1])
-    mesh = graded_mesh(FIRST_MESH, centre.shape[1], _GRADING)
+    size, points = centre.shape
+    bare = Orbit.empty(GAUSS, size, FIRST_MESH, points)
+    mesh = graded_mesh(FIRST_MESH, points, _GRADING)
     guess = bare.moved(mesh=mesh, centre=centre)
     result = solve(Problem(quasi_static, load), guess, _NEWTON_STEPS)
     if not isinstance(system, QuasiStatic):
