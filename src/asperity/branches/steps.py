@@ -147,11 +147,6 @@ class BranchFollower(NamedTuple):
         return self.step(point._replace(orbit=orbit, tangent=tangent), 0.0)[0]
 
 
-def reversed_point(point: ContinuationPoint) -> ContinuationPoint:
-    """The same point, to be left in the other direction."""
-    return point._replace(tangent=Change(*(-a for a in point.tangent)))
-
-
 def follow_branch(
     follower: BranchFollower,
     start: BranchOrbit,

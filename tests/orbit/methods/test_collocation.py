@@ -31,7 +31,17 @@ product = jax.jit(small_systems.product)
 solve_columns = jax.jit(small_systems.solve_columns)
 spectral_abscissa = jax.jit(small_systems.spectral_abscissa)
 spectral_radius = jax.jit(small_systems.spectral_radius)
-solve_cyclic = jax.jit(cyclic.solve_cyclic)
+
+
+@jax.jit
+def solve_cyclic(maps, right):
+    """The periodic recurrence alone: the further unknown is 0."""
+    points = right.shape[-1]
+    border = cyclic.Border(right, 0 * right, jnp.ones(points), jnp.zeros(points))
+    return cyclic.solve_bordered(maps, right, border)[0]
+
+
+solve_bordered = jax.jit(cyclic.solve_bordered)
 
 
 @jax.jit
@@ -155,6 +165,18 @@ def test_solve_cyclic(n, count):
     right = normal(n, count, 6, seed=8)
     found = solve_cyclic(maps, right)
     np.testing.assert_allclose(found, dense_cyclic(maps, right), rtol=1e-8, atol=1e-10)
+
+
+@pytest.mark.parametrize("n", [1, 2, 3])
+def test_solve_bordered(n):
+    """Both equations hold, with one more unknown that the periodic recurrence alone leaves open."""
+    maps = normal(n, n, 17, 6) + np.eye(n)[:, :, None, None]
+    right, column, row = (normal(n, 17, 6, seed=seed) for seed in (8, 9, 10))
+    corner, value = normal(2, 6, seed=11)
+    d, p = map(np.asarray, solve_bordered(maps, right, cyclic.Border(column, row, corner, value)))
+    after = np.roll(d, -1, axis=1) - np.einsum("ijmb,jmb->imb", maps, d)
+    np.testing.assert_allclose(after, right + p * column, atol=1e-9 * np.abs(d).max())
+    np.testing.assert_allclose((row * d).sum((0, 1)) + corner * p, value, atol=1e-9)
 
 
 def test_solve_cyclic_where_one_direction_grows_and_another_decays():

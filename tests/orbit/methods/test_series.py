@@ -136,7 +136,7 @@ def test_multipliers_interval_by_interval_are_those_of_the_whole():
     assert found.converged
     problem, _ = flatten(Problem(found.motion, found.load))
     orbit = series_orbits(problem, 1)[0]
-    matrix, log_scale, log_determinant = _monodromy_by_intervals((problem, orbit), parts=9)
+    matrix, log_scale, log_determinant = _monodromy_by_intervals(problem, orbit, parts=9)
     # The determinant knows nothing of the maps.
     sign, by_maps = np.linalg.slogdet(matrix[..., 0])
     assert sign == 1

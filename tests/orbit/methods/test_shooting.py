@@ -104,8 +104,8 @@ def plant(monkeypatch, mistake):
     """Have every pass over the period return what `mistake` makes of it."""
     original = shooting_method.newton_pass
 
-    def mistaken(given, steps):
-        return mistake(original(given, steps), int(steps.number))
+    def mistaken(problem, start, *, steps):
+        return mistake(original(problem, start, steps=steps), int(steps.number))
 
     monkeypatch.setattr(shooting_method, "newton_pass", mistaken)
 
