@@ -5,6 +5,7 @@ one by one. Cases of one kind have one shape, and so one program.
 """
 
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.linalg import expm
