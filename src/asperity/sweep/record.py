@@ -29,8 +29,12 @@ from asperity.sweep.plan.ratios import RATIOS
 from asperity.sweep.solve import SOLVES
 from asperity.units import KINDS
 
-#: Variables of every store besides numbers and outputs.
-_VARIABLES = ("outcome", "detail", "status", *TEXTS)
+#: Variables of every store with a number for each point, and with one for each chunk.
+OF_POINTS, OF_CHUNKS = ("outcome", "detail"), ("checksum", "status")
+#: Group of every store that has its attributes once more.
+ATTRIBUTES = "attributes"
+#: Names that no axis may have.
+_TAKEN = (*OF_POINTS, *OF_CHUNKS, ATTRIBUTES, *TEXTS)
 
 #: Rows that an axis may list: they are kept in memory and in the record.
 MOST_LISTED = 1_000_000
@@ -81,7 +85,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     if not mistakes:
         mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _twice(axes)
-        mistakes += _misnamed(axes, {*known, *outputs, *_VARIABLES})
+        mistakes += _misnamed(axes, {*known, *outputs, *_TAKEN})
     if mistakes:
         raise PlanError(mistakes)
     return {

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import InputError
+from asperity.outputs.json import json_content
 
 try:
     import fcntl
@@ -19,6 +20,9 @@ except ImportError:  # pragma: no cover  Windows: the age of the file decides
 
 #: Seconds after which a lock of another machine, which nothing has refreshed, counts as left over.
 STALE = 60.0
+
+#: What a lock file says of its holder.
+_HOLDER = {"token": str, "host": str, "process": int, "since": str}
 
 
 class StoreLock:
@@ -156,11 +160,11 @@ def is_held(path: Path) -> bool:
 
 def holder_of(path: Path) -> dict[str, Any]:
     """What the lock file says of its holder; empty where it says nothing."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    found = json_content(path)
+    if not isinstance(found, dict):
         return {}
-    return found if isinstance(found, dict) and "token" in found else {}
+    whole = all(isinstance(found.get(name), kind) for name, kind in _HOLDER.items())
+    return found if whole else {}
 
 
 def current_token(store: Path) -> str:
