@@ -70,14 +70,17 @@ def write_root(path: Path, attributes: Mapping[str, Any], arrays: Mapping[str, A
     """Write both copies of the attributes; they are on the disk when this returns."""
     kept = {n: v for n, v in attributes.items() if n not in (_RUNS, _SEAL)}
     _write(path / ATTRIBUTES, _group({**kept, _SEAL: _seal(kept, {})}))
-    whole = _group({**kept, _SEAL: _seal(kept, arrays), _RUNS: attributes.get(_RUNS, [])})
-    # As Zarr consolidates: readers open all arrays by one file.
-    gathered = {"kind": "inline", "must_understand": False, "metadata": dict(arrays)}
-    _write(path, {**whole, "consolidated_metadata": gathered})
+    whole = {**kept, _SEAL: _seal(kept, arrays), _RUNS: attributes.get(_RUNS, [])}
+    _write(path, _group(whole, arrays))
 
 
-def _group(attributes: Mapping[str, Any]) -> dict[str, Any]:
-    return {"attributes": attributes, "zarr_format": 3, "node_type": "group"}
+def _group(attributes: Any, arrays: Any = None) -> dict[str, Any]:
+    """A group as Zarr describes it; with `arrays` consolidated, so that readers open them by it."""
+    group = {"attributes": attributes, "zarr_format": 3, "node_type": "group"}
+    if arrays is None:
+        return group
+    gathered = {"kind": "inline", "must_understand": False, "metadata": arrays}
+    return {**group, "consolidated_metadata": gathered}
 
 
 def _write(folder: Path, content: Mapping[str, Any]) -> None:
@@ -124,13 +127,13 @@ def _sealed(content: Any) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Attributes and arrays that are as they were sealed; others may have been added to them."""
     try:
         attributes, seal = content["attributes"], content["attributes"][_SEAL]
+        gathered = content["consolidated_metadata"]["metadata"] if seal["arrays"] else None
         kept = {name: attributes[name] for name in seal["attributes"]}
-        gathered = content["consolidated_metadata"]["metadata"] if seal["arrays"] else {}
         arrays = {name: gathered[name] for name in seal["arrays"]}
         whole = (
-            (content["node_type"], content["zarr_format"]) == ("group", 3)
-            and kept[KIND] == FORMAT
+            content == _group(attributes, gathered)
             and _seal(kept, arrays) == seal
+            and kept[KIND] == FORMAT
         )
     except (TypeError, KeyError, ValueError, RecursionError):
         return None

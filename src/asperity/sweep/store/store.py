@@ -224,7 +224,7 @@ def _require_whole(path: Path, root: Root) -> None:
             f"store must be extended to its end, got '{path.name}', on which that is under way or "
             "was interrupted; wait, or repeat asperity sweep with its plan, --out and --extend"
         )
-    if not root.arrays:
+    if root.damage:
         raise _damaged(path, root.damage)
     for name, described in root.arrays.items():
         if json_content(path / name / "zarr.json") != described:
