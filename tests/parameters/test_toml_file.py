@@ -78,7 +78,7 @@ def test_what_a_person_writes_is_read_as_it_is(seed: int) -> None:
     text = "\n".join(
         [
             f"big = {draw.choice([2**63 - 1, -(2**63), 10**18])}",
-            f"title = \"{'See Fig. 3 [12]. ' * 200}\"",
+            f'title = "{"See Fig. 3 [12]. " * 200}"',
             f"path = '{'folder.d/' * 200}'",
             f"deep = {'[' * 12}1.5{']' * 12}",
             ".".join("abcdefghij") + " = 'x'",

@@ -1,4 +1,4 @@
-"""Strict JSON: arrays become lists, and numbers that are not finite become null; and files of it."""
+"""Strict JSON, in which arrays are lists and numbers that are not finite null, and its files."""
 
 from __future__ import annotations
 

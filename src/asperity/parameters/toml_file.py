@@ -21,7 +21,7 @@ _DEEPEST = 100
 _INTEGERS = range(-(2**63), 2**63)
 #: A key of so many parts, for which the parser takes a time that grows with their square.
 _LONG_KEY = re.compile(
-    r"(?<![\w-])(?:(?:[\w-]++|\"[^\"\n]*+\"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}" % _DEEPEST
+    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}"""
 )
 
 

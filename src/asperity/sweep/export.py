@@ -39,7 +39,8 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
     Raises
     ------
     InputError
-        If there is no store, it is damaged, `out` cannot be written, or pyarrow is missing for Parquet.
+        If there is no store, it is damaged, `out` cannot be written, or pyarrow is missing for
+        Parquet.
     """
     found = SweepStore(file_path(store, "store").resolve(), mode="r")
     target = output_file(out, example="results.nc")

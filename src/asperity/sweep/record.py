@@ -220,13 +220,17 @@ def _axis(
 
 
 def _listed(columns: Mapping[str, list[Any]]) -> dict[str, Any]:
-    length = len(next(iter(columns.values())))
+    _check_length(len(next(iter(columns.values()))))
+    return {"columns": dict(columns)}
+
+
+def _check_length(length: int) -> None:
+    """Refuse an axis without rows, or of more than are kept in memory."""
     if not 1 <= length <= MOST_LISTED:
         raise InputError(
             f"axis must have from 1 to {MOST_LISTED:,} rows, got {length:,}; draw them, or split "
             "the axis"
         )
-    return {"columns": dict(columns)}
 
 
 def _name(name: str, known: Mapping[str, Parameter]) -> str:
@@ -328,6 +332,7 @@ def _cases(cases: Sequence[Mapping[str, Any]], known: Mapping[str, Parameter]) -
     """Rows of all cases, each with every combination of its lists."""
     names = dict.fromkeys(_name(name, known) for case in cases for name in case)
     columns: dict[str, list[Any]] = {name: [] for name in names}
+    length = 0
     for case in cases:
         lists = {}
         for name, value in case.items():
@@ -336,6 +341,8 @@ def _cases(cases: Sequence[Mapping[str, Any]], known: Mapping[str, Parameter]) -
             else:
                 values = value if isinstance(value, list | tuple) else [value]
                 lists[_name(name, known)] = _column(name, values, known)
+        length += math.prod(map(len, lists.values()))
+        _check_length(length)
         for row in itertools.product(*lists.values()):
             own = dict(zip(lists, row, strict=True))
             for name in names:

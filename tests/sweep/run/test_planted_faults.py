@@ -1,4 +1,4 @@
-"""Faults planted in every kind of file of a finished store: repaired, or refused in one sentence."""
+"""Faults in the files of a finished store: repaired, or refused in one sentence."""
 
 import json
 import shutil
@@ -26,7 +26,7 @@ parameters.frequency = "120 Hz"
 values = [0.5, 1.5]
 [axes.sample]
 zip.epsilon = [0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.61, 0.62, 0.7, 0.8, 0.85, 0.9]
-zip.M = ["1 kg", "2 kg", "3 kg", "1 kg", "2 kg", "3 kg", "1 kg", "2 kg", "3 kg", "1 kg", "2 kg", "3 kg"]
+zip.M = ["1 g", "2 g", "3 g", "4 g", "5 g", "6 g", "7 g", "8 g", "9 g", "1 kg", "2 kg", "3 kg"]
 """
 POINTS = 24
 
@@ -247,9 +247,7 @@ def can_have(plant: Plant, file: str) -> bool:
 
 
 @pytest.mark.parametrize("plant", [*ANY, *DESCRIPTION])
-def test_a_planted_fault_is_repaired_or_refused(
-    whole: Whole, tmp_path: Path, plant: Plant
-) -> None:
+def test_a_planted_fault_is_repaired_or_refused(whole: Whole, tmp_path: Path, plant: Plant) -> None:
     seed = [*ANY, *DESCRIPTION].index(plant)
     draw = np.random.default_rng(seed)
     kinds: dict[str, list[str]] = {}

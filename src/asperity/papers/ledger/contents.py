@@ -9,8 +9,8 @@ from string import Formatter
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from asperity.errors import InputError
-from asperity.parameters.toml_file import parsed_toml
 from asperity.papers.ledger.claim import Entry
+from asperity.parameters.toml_file import parsed_toml
 
 
 class _Table(BaseModel):

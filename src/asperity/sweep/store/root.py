@@ -26,7 +26,7 @@ FORMAT = 2
 #: Attributes that change during a run, and what seals the others.
 _RUNS, _SEAL = "runs", "seal"
 #: What a run says of itself, when it begins and when it ends.
-_BEGUN = {name: str for name in ("started", "host", "workers", "asperity")}
+_BEGUN = dict.fromkeys(("started", "host", "workers", "asperity"), str)
 _ENDED = {"points_solved": int, "seconds": int | float}
 
 
@@ -60,7 +60,12 @@ class Root:
 
 
 def _is_run(run: Any) -> bool:
+    """Whether a record can be shown: runs are not sealed."""
     if not isinstance(run, dict):
+        return False
+    try:
+        json.dumps(run, ensure_ascii=False).encode()
+    except UnicodeEncodeError:  # half of a character
         return False
     needed = _BEGUN | (_ENDED if run.get("ended") else {})
     return all(isinstance(run.get(name), kind) for name, kind in needed.items())
@@ -127,11 +132,11 @@ def _sealed(content: Any) -> tuple[dict[str, Any], dict[str, Any]] | None:
     """Attributes and arrays that are as they were sealed; others may have been added to them."""
     try:
         attributes, seal = content["attributes"], content["attributes"][_SEAL]
-        gathered = content["consolidated_metadata"]["metadata"] if seal["arrays"] else None
+        gathered = content["consolidated_metadata"]["metadata"] if seal["arrays"] else {}
         kept = {name: attributes[name] for name in seal["attributes"]}
         arrays = {name: gathered[name] for name in seal["arrays"]}
         whole = (
-            content == _group(attributes, gathered)
+            content == _group(attributes, gathered if seal["arrays"] else None)
             and _seal(kept, arrays) == seal
             and kept[KIND] == FORMAT
         )

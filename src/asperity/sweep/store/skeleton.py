@@ -66,7 +66,6 @@ class _Arrays:
     def __init__(self) -> None:
         self._kept: dict[str, Any] = {}
         self._group = zarr.create_group(MemoryStore(self._kept), zarr_format=3)
-        self._kept.clear()
 
     def add(
         self,
@@ -95,10 +94,9 @@ class _Arrays:
 
     def files(self) -> Iterator[tuple[str, bytes]]:
         """Files since the last call."""
-        made = list(self._kept.items())
+        made = {path: v.to_bytes() for path, v in self._kept.items() if path != "zarr.json"}
         self._kept.clear()
-        for path, content in made:
-            yield path, content.to_bytes()
+        yield from made.items()
 
 
 def _axes(arrays: _Arrays, grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
