@@ -12,9 +12,10 @@ import pytest
 from asperity import materials
 from asperity.app.api.protocols import checked
 from asperity.errors import InputError
+from asperity.inference import read_table
 from asperity.inference.design.plan.file import read_plan
 from asperity.papers.ledger.contents import read_contents
-from asperity.parameters import toml_file
+from asperity.parameters import file_content
 from asperity.parameters.toml_file import parsed_toml
 from asperity.protocol import load_protocol
 from asperity.recording.recipe import load_recipe
@@ -89,12 +90,12 @@ def test_what_a_person_writes_is_read_as_it_is(seed: int) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="no such device")
 def test_files_without_an_end_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for reader in (load_plan, load_protocol, load_recipe, read_plan):
-        with pytest.raises(InputError, match="must be a file, got '/dev/zero', a device"):
+    for reader in (load_plan, load_protocol, load_recipe, read_plan, materials.load):
+        with pytest.raises(InputError, match="must be a readable TOML file, got '/dev/zero'"):
             reader(Path("/dev/zero"))
-    with pytest.raises(InputError, match="must be a readable TOML file"):
-        materials.load(Path("/dev/zero"))
-    monkeypatch.setattr(toml_file, "_LARGEST", 1000)
+    with pytest.raises(InputError, match="must be a readable table, got '/dev/zero': it is a dev"):
+        read_table("/dev/zero")
+    monkeypatch.setattr(file_content, "LARGEST", 1000)
     (tmp_path / "long.toml").write_text("title = 'x'\n" + "#" * 1000)
-    with pytest.raises(InputError, match="at most 1,000 bytes, got more"):
+    with pytest.raises(InputError, match="it has more than 1,000 bytes"):
         load_plan(tmp_path / "long.toml")

@@ -9,6 +9,9 @@ from pathlib import Path
 
 from asperity.errors import InputError
 
+#: Bytes of the longest name of a file, on all systems.
+_LONGEST = 255
+
 
 def output_file(
     path: str | os.PathLike[str],
@@ -40,6 +43,7 @@ def output_file(
     """
     target = _resolved(path, name, example)
     for file in (target, *_beside(target)):
+        require_short(file, target, name)
         kind = _not_a_file(file)
         if kind:
             raise InputError(
@@ -129,6 +133,22 @@ def _beside(target: Path) -> tuple[Path, ...]:
     partial = unfinished_name(target)
     record = record_name(target)
     return partial, record, fresh_name(record), fresh_name(target)
+
+
+def require_short(file: Path, target: Path, name: str = "out") -> None:
+    """Refuse a target beside which a file is written whose name no file system takes.
+
+    Raises
+    ------
+    InputError
+        Which calls the target `name`.
+    """
+    length, own = len(os.fsencode(file.name)), len(os.fsencode(target.name))
+    if length > _LONGEST:
+        raise InputError(
+            f"{name} must have a name of at most {_LONGEST - length + own} bytes, got {own}, which "
+            "leaves no room for the names of files beside it; choose a shorter one"
+        )
 
 
 def unfinished_name(target: Path) -> Path:

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.outputs.file import to_disk, writable
+from asperity.outputs.json import json_content
 from asperity.outputs.targets import fresh_name, record_name, unfinished_name
 
 _Result = TypeVar("_Result")
@@ -92,11 +93,11 @@ class UnfinishedOutput:
                 "go on with --resume, or delete it to start over"
             )
         try:
-            saved = json.loads(self.record.read_text(encoding="utf-8"))
+            saved = json_content(self.record)
             inputs, progress = dict(saved["inputs"]), dict(saved["progress"])
-        except (OSError, ValueError, KeyError, TypeError):
+            different = differences(inputs, self.inputs)
+        except (ValueError, KeyError, TypeError, RecursionError):
             raise self.damaged() from None
-        different = differences(inputs, self.inputs)
         if different:
             raise InputError(
                 f"{self.record} must belong to the same inputs, got {different}; "

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import stat
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,9 +11,8 @@ from typing import Any
 
 from asperity.errors import InputError, printable
 from asperity.parameters.arguments import file_path
+from asperity.parameters.file_content import file_content
 
-#: Bytes of a file: a plan with a million rows of several numbers has less.
-_LARGEST = 64 * 2**20
 #: Tables and lists in each other: what is written by hand has a tenth of it.
 _DEEPEST = 100
 #: Integers that TOML promises to keep.
@@ -41,16 +39,7 @@ def toml_content(path: str | os.PathLike[str], label: str) -> tuple[Path, dict[s
     """
     file = file_path(path, label)
     try:
-        with file.open("rb") as stream:
-            if stat.S_ISCHR(os.fstat(stream.fileno()).st_mode):
-                raise InputError(f"{label} must be a file, got '{path}', a device; give another")
-            content = stream.read(_LARGEST + 1)
-        if len(content) > _LARGEST:
-            raise InputError(
-                f"{label} must have at most {_LARGEST:,} bytes, got more in '{path}'; draw rows "
-                "in place of listing them, or give another file"
-            )
-        text = content.decode("utf-8-sig")
+        text = file_content(file).decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(
             f"{label} must be a file, got '{path}'; there is none, correct the path"

@@ -15,7 +15,7 @@ import numpy as np
 
 from asperity.parameters.arguments import file_path
 from asperity.sweep.solve.outcome import SweepOutcome, words
-from asperity.sweep.store.lock import holder_of, is_held
+from asperity.sweep.store.lock import holder_of, is_held, lock_file
 from asperity.sweep.store.skeleton import NOT_DONE
 from asperity.sweep.store.store import SweepStore
 
@@ -79,7 +79,7 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
         codes, counts = np.unique(found.read(chunk, ("outcome",))["outcome"], return_counts=True)
         outcomes.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
     names = words()
-    lock = found.path.with_name(found.path.name + ".lock")
+    lock = lock_file(found.path)
     holder = holder_of(lock)
     running = ""
     if holder and is_held(lock):

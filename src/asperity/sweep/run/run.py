@@ -19,8 +19,9 @@ from asperity.errors import InputError, listed
 from asperity.laws import get_law
 from asperity.materials import cited_works
 from asperity.orbit.processes import available_cores
-from asperity.outputs import differences, free_disk, require_disk, size_text
+from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
 from asperity.parameters.arguments import file_path, whole_number
+from asperity.parameters.file_content import file_content
 from asperity.sweep.grid import SweepGrid
 from asperity.sweep.load import load_plan
 from asperity.sweep.plan.model import SweepPlan
@@ -30,10 +31,10 @@ from asperity.sweep.run.executors import Workers, local_cluster, local_processes
 from asperity.sweep.run.numerics import numerics, package_version
 from asperity.sweep.run.tasks import Job
 from asperity.sweep.store.extend import extend, is_extension
-from asperity.sweep.store.lock import StoreLock
-from asperity.sweep.store.pieces import remove_pieces
+from asperity.sweep.store.lock import StoreLock, lock_file
+from asperity.sweep.store.pieces import pieces_folder, remove_pieces
 from asperity.sweep.store.root import read_root
-from asperity.sweep.store.store import SweepStore, create, lay_out
+from asperity.sweep.store.store import SweepStore, create, fresh_folder, lay_out
 
 #: Seconds between signs of life in the lock file.
 _REFRESH = 5.0
@@ -112,11 +113,14 @@ def run_sweep(
         If the plan has mistakes, the store has another plan or is in use, or the disk is full.
     """
     path = file_path(out, "out").resolve()
+    for beside in (fresh_folder(path), pieces_folder(path), lock_file(path)):
+        require_short(beside, path)
     log = log or _silent
     text = ""
     if not isinstance(plan, SweepPlan):
-        text = Path(plan).read_text(encoding="utf-8-sig") if Path(plan).is_file() else ""
-        plan = load_plan(plan)
+        file, plan = plan, load_plan(plan)
+        # A pipe has been read.
+        text = file_content(Path(file)).decode("utf-8-sig") if Path(file).is_file() else ""
     grid = SweepGrid.of(plan)
     pool = _workers(workers, cluster, address)
     with StoreLock(path) as lock, ExitStack() as stack:

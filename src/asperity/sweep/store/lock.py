@@ -44,7 +44,7 @@ class StoreLock:
     """
 
     def __init__(self, store: Path) -> None:
-        self.path = store.with_name(store.name + ".lock")
+        self.path = lock_file(store)
         self.token = uuid.uuid4().hex
         self._descriptor: int | None = None
 
@@ -134,6 +134,11 @@ class StoreLock:
         self.release()
 
 
+def lock_file(store: Path) -> Path:
+    """The lock file of a store."""
+    return store.with_name(store.name + ".lock")
+
+
 def is_held(path: Path) -> bool:
     """Whether a driver is at work: a killed one leaves its file, but not its lock."""
     holder = holder_of(path)
@@ -169,4 +174,4 @@ def holder_of(path: Path) -> dict[str, Any]:
 
 def current_token(store: Path) -> str:
     """Token of the driver that works on a store; empty where none does."""
-    return str(holder_of(store.with_name(store.name + ".lock")).get("token", ""))
+    return str(holder_of(lock_file(store)).get("token", ""))

@@ -258,6 +258,11 @@ def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
         sync_folder(file.parent)
 
 
+def fresh_folder(store: Path) -> Path:
+    """Where a store is made, until it is complete."""
+    return store.with_name(store.name + ".new")
+
+
 def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> SweepStore:
     """Make an empty store; it has its name when it is complete.
 
@@ -266,7 +271,7 @@ def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> SweepS
     InputError
         If the folder cannot be written.
     """
-    fresh = path.with_name(path.name + ".new")
+    fresh = fresh_folder(path)
     shutil.rmtree(fresh, ignore_errors=True)
     try:
         fresh.mkdir()
