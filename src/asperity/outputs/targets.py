@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from asperity.errors import InputError
@@ -42,8 +42,9 @@ def output_file(
         is one of the inputs.
     """
     target = _resolved(path, name, example)
-    for file in (target, *_beside(target)):
-        require_short(file, target, name)
+    files = (target, *_beside(target))
+    require_short(target, files, name)
+    for file in files:
         kind = _not_a_file(file)
         if kind:
             raise InputError(
@@ -135,15 +136,16 @@ def _beside(target: Path) -> tuple[Path, ...]:
     return partial, record, fresh_name(record), fresh_name(target)
 
 
-def require_short(file: Path, target: Path, name: str = "out") -> None:
-    """Refuse a target beside which a file is written whose name no file system takes.
+def require_short(target: Path, files: Iterable[Path], name: str = "out") -> None:
+    """Refuse a target beside which files are written of whose names one is too long.
 
     Raises
     ------
     InputError
         Which calls the target `name`.
     """
-    length, own = len(os.fsencode(file.name)), len(os.fsencode(target.name))
+    length = max(len(os.fsencode(file.name)) for file in files)
+    own = len(os.fsencode(target.name))
     if length > _LONGEST:
         raise InputError(
             f"{name} must have a name of at most {_LONGEST - length + own} bytes, got {own}, which "

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters
+from asperity.parameters.arguments import shown
 from asperity.sweep.plan.axis import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
 from asperity.sweep.plan.mistakes import PlanError
 from asperity.sweep.plan.model import SweepPlan
@@ -70,8 +71,8 @@ class SweepGrid:
         if grid.points > _MOST_POINTS:
             raise PlanError(
                 [
-                    f"axes must come to at most {_MOST_POINTS:.3g} points, got {grid.points:.3g} "
-                    f"of {' x '.join(f'{n:,}' for n in grid.shape)}; shorten them"
+                    f"axes must come to at most {_MOST_POINTS:.3g} points, got "
+                    f"{' x '.join(map(shown, grid.shape))}; shorten them"
                 ]
             )
         SOLVES[plan.solve].require_memory(math.prod(grid.chunks), grid.record)

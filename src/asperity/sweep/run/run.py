@@ -113,8 +113,7 @@ def run_sweep(
         If the plan has mistakes, the store has another plan or is in use, or the disk is full.
     """
     path = file_path(out, "out").resolve()
-    for beside in (fresh_folder(path), pieces_folder(path), lock_file(path)):
-        require_short(beside, path)
+    require_short(path, (fresh_folder(path), pieces_folder(path), lock_file(path)))
     log = log or _silent
     text = ""
     if not isinstance(plan, SweepPlan):
@@ -125,6 +124,7 @@ def run_sweep(
     pool = _workers(workers, cluster, address)
     with StoreLock(path) as lock, ExitStack() as stack:
         fresh = not path.exists()
+        _require_coordinates(grid, path.parent)
         with _writing(path):
             store = _opened(path, plan, text, grid, extend_store, retry_failed, log)
             swept = store.sweep_orphans()
@@ -239,6 +239,14 @@ def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
         "convention": "F/W0 = mean_friction + sum mu_n cos(n w t + phase_n), w(t) = W/W0",
         "references": [works[key] for key in sorted(works)],
     }
+
+
+def _require_coordinates(grid: SweepGrid, folder: Path) -> None:
+    """Refuse coordinates that the disk has no room for: they are written before all else."""
+    numbers = sum(axis.length * len(axis.names) for axis in grid.axes)
+    require_disk(
+        8.0 * numbers, folder, "axes", f"{numbers:.3g} numbers along them", "shorten them",
+    )  # fmt: skip
 
 
 def _bytes_left(store: SweepStore) -> float:
