@@ -130,7 +130,11 @@ def read_contents(file: Traversable) -> Contents:
             f"{file} must be a readable text, got {type(error).__name__}; write the claims there"
         ) from None
     try:
-        contents = Contents.model_validate(parsed_toml(text, "claims", f"'{file}'"))
+        content = parsed_toml(text, "claims")
+    except InputError as error:
+        raise InputError(f"{file} must be TOML, got: {error}") from None
+    try:
+        contents = Contents.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

@@ -134,12 +134,13 @@ def _sealed(content: Any) -> tuple[dict[str, Any], dict[str, Any]] | None:
         attributes, seal = content["attributes"], content["attributes"][_SEAL]
         gathered = content["consolidated_metadata"]["metadata"] if seal["arrays"] else {}
         kept = {name: attributes[name] for name in seal["attributes"]}
-        arrays = {name: gathered[name] for name in seal["arrays"]}
+        # In the order of the file, which is that of the dimensions for readers.
+        arrays = {name: array for name, array in gathered.items() if name in seal["arrays"]}
         whole = (
             content == _group(attributes, gathered if seal["arrays"] else None)
             and _seal(kept, arrays) == seal
             and kept[KIND] == FORMAT
         )
-    except (TypeError, KeyError, ValueError, RecursionError):
+    except (TypeError, KeyError, ValueError, AttributeError, RecursionError):
         return None
     return (attributes, arrays) if whole else None
