@@ -1,7 +1,9 @@
 """Where results go: checked first, complete or absent at the end, resumed when interrupted."""
 
+import contextlib
 import json
 import os
+import random
 import socket
 from pathlib import Path
 
@@ -192,6 +194,56 @@ def test_blocks_shorter_than_their_record_are_not_trusted(tmp_path: Path) -> Non
     first.data.write_text("ab")
     with pytest.raises(InputError, match="got a damaged one"):
         UnfinishedText(tmp_path / "out.csv", INPUTS).start(resume=True)
+
+
+def test_no_damage_of_finished_blocks_is_taken_for_them(tmp_path: Path) -> None:
+    """Of the blocks and of their record: any turned bit, any other text, nested deep as well."""
+    target = tmp_path / "out.csv"
+    first = UnfinishedText(target, INPUTS)
+    first.start(resume=False)
+    blocks = [f"{i},{i / 7!r}\n" for i in range(20)]
+    for block in blocks:
+        first.append(block, 1, failed=0)
+    whole = {file: file.read_bytes() for file in (first.data, first.record)}
+    draw = random.Random(3)
+    accepted = 0
+    for i in range(150):
+        for file, content in whole.items():
+            file.write_bytes(content)
+        file = draw.choice(list(whole))
+        damaged = bytearray(whole[file])
+        if i % 5:
+            damaged[draw.randrange(len(damaged))] ^= 1 << draw.randrange(8)
+        else:
+            deep = draw.choice([b"[", b'{"inputs": ', b'{"progress": {"length": '])
+            damaged = bytearray(deep * draw.randrange(1, 100_000))
+        file.write_bytes(damaged)
+        again = UnfinishedText(target, INPUTS)
+        # Blanks and the case of an exponent may change nothing.
+        with contextlib.suppress(InputError):
+            again.start(resume=True)
+            assert (again.rows, again.text()) == (20, "".join(blocks))
+            accepted += 1
+    assert accepted < 15
+
+
+def test_names_that_leave_no_room_for_those_beside_them_are_refused(tmp_path: Path) -> None:
+    """Whatever is accepted can be written, with all files beside it."""
+    for letter in "aé":
+        for length in range(225, 256, 2):
+            name = letter * ((length - 4) // len(letter.encode())) + ".csv"
+            if len(name.encode()) + len(".partial.new.json") > 255:
+                with pytest.raises(InputError, match="must have a name of at most 238 bytes"):
+                    output_file(tmp_path / name)
+                continue
+            target = output_file(tmp_path / name)
+            output = UnfinishedText(target, INPUTS)
+            output.start(resume=False)
+            output.append("x", 1)
+            with written_file(target) as file:
+                file.write_text("x")
+            output.finish()
+    assert any(len(f.name) > 230 for f in tmp_path.iterdir())
 
 
 def test_nothing_finished_leaves_nothing(tmp_path: Path) -> None:

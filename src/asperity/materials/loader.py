@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import os
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -16,6 +16,7 @@ from asperity.errors import InputError, closest
 from asperity.materials.number import Number
 from asperity.materials.record import Material
 from asperity.parameters.arguments import file_path
+from asperity.parameters.toml_file import parsed_toml, toml_content
 
 
 @cache
@@ -29,7 +30,13 @@ def load_material(name: str | PathLike[str]) -> Material:
     """See `asperity.materials.load`."""
     text = fspath(file_path(name, "material"))
     if not isinstance(name, str) or text.endswith(".toml") or Path(text).name != text:
-        return _parse(_read(Path(text)), Path(text).stem, text)
+        if not os.path.isfile(text):
+            raise InputError(
+                f"material.file must be a readable TOML file, got '{text}', which is none; give "
+                "the path of a material file"
+            )
+        file, content = toml_content(text, "material.file")
+        return _material(content, file.stem, text)
     try:
         resource = packaged()[text]
     except KeyError:
@@ -37,28 +44,11 @@ def load_material(name: str | PathLike[str]) -> Material:
             f"material must be a known material or the path of a .toml file, got '{text}'; "
             f"{closest(text, packaged())}"
         ) from None
-    return _parse(resource.read_text(encoding="utf-8"), text, text)
+    content = parsed_toml(resource.read_text(encoding="utf-8"), "material.file", f"'{text}'")
+    return _material(content, text, text)
 
 
-def _read(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise InputError(
-            f"material.file must be a readable TOML file, got '{path}' ({why}); "
-            "give the path of a material file"
-        ) from None
-
-
-def _parse(text: str, name: str, shown: str) -> Material:
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(
-            f"material.file must be valid TOML, got '{shown}' ({_one_line(str(error))}); "
-            "correct that line"
-        ) from None
+def _material(content: dict[str, Any], name: str, shown: str) -> Material:
     try:
         return Material.model_validate({"name": name} | content)
     except ValidationError as error:

@@ -14,7 +14,7 @@ from asperity.outputs.capacity import (
 )
 from asperity.outputs.file import written_file
 from asperity.outputs.folder import require_folder, written_folder
-from asperity.outputs.targets import output_file, output_files
+from asperity.outputs.targets import output_file, output_files, require_short
 from asperity.outputs.unfinished import (
     Interrupted,
     UnfinishedOutput,
@@ -35,6 +35,7 @@ __all__ = [
     "require_disk",
     "require_folder",
     "require_memory",
+    "require_short",
     "size_text",
     "undisturbed",
     "written_file",

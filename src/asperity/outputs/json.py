@@ -1,10 +1,11 @@
-"""Strict JSON: arrays become lists, and numbers that are not finite become null."""
+"""Strict JSON, in which arrays are lists and numbers that are not finite null, and its files."""
 
 from __future__ import annotations
 
 import json
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -37,3 +38,14 @@ def plain(value: Any) -> Any:
     if array.dtype.kind == "f" and not np.isfinite(array).all():
         return plain(array.tolist())
     return array.tolist()
+
+
+def json_content(file: Path) -> Any:
+    """What a JSON file of this package holds; None where there is none or it is damaged.
+
+    Devices and pipes have no end, and count as damaged.
+    """
+    try:
+        return json.loads(file.read_bytes()) if file.is_file() else None
+    except (OSError, ValueError, RecursionError):
+        return None

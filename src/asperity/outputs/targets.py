@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import os
 import stat
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 from asperity.errors import InputError
+
+#: Bytes of the longest name of a file, on all systems.
+_LONGEST = 255
 
 
 def output_file(
@@ -39,7 +42,9 @@ def output_file(
         is one of the inputs.
     """
     target = _resolved(path, name, example)
-    for file in (target, *_beside(target)):
+    files = (target, *_beside(target))
+    require_short(target, files, name)
+    for file in files:
         kind = _not_a_file(file)
         if kind:
             raise InputError(
@@ -129,6 +134,23 @@ def _beside(target: Path) -> tuple[Path, ...]:
     partial = unfinished_name(target)
     record = record_name(target)
     return partial, record, fresh_name(record), fresh_name(target)
+
+
+def require_short(target: Path, files: Iterable[Path], name: str = "out") -> None:
+    """Refuse a target beside which files are written of whose names one is too long.
+
+    Raises
+    ------
+    InputError
+        Which calls the target `name`.
+    """
+    length = max(len(os.fsencode(file.name)) for file in files)
+    own = len(os.fsencode(target.name))
+    if length > _LONGEST:
+        raise InputError(
+            f"{name} must have a name of at most {_LONGEST - length + own} bytes, got {own}, which "
+            "leaves no room for the names of files beside it; choose a shorter one"
+        )
 
 
 def unfinished_name(target: Path) -> Path:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import zlib
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -17,12 +18,16 @@ from typing import Any, TypeVar
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.outputs.file import to_disk, writable
+from asperity.outputs.json import json_content
 from asperity.outputs.targets import fresh_name, record_name, unfinished_name
 
 _Result = TypeVar("_Result")
 
 #: Differences of the inputs that a message lists.
 _LISTED = 3
+
+#: Bytes of finished blocks that are looked at together.
+_PART = 2**20
 
 
 class Interrupted(KeyboardInterrupt):
@@ -92,16 +97,19 @@ class UnfinishedOutput:
                 "go on with --resume, or delete it to start over"
             )
         try:
-            saved = json.loads(self.record.read_text(encoding="utf-8"))
+            saved = json_content(self.record)
             inputs, progress = dict(saved["inputs"]), dict(saved["progress"])
-        except (OSError, ValueError, KeyError, TypeError):
+            whole = saved["checksum"] == _checksum(progress)
+            different = differences(inputs, self.inputs)
+        except (ValueError, KeyError, TypeError, RecursionError):
             raise self.damaged() from None
-        different = differences(inputs, self.inputs)
         if different:
             raise InputError(
                 f"{self.record} must belong to the same inputs, got {different}; "
                 "repeat the earlier command, or delete it to start over"
             )
+        if not whole:
+            raise self.damaged()
         self.progress = progress
         return progress
 
@@ -121,14 +129,16 @@ class UnfinishedOutput:
             JSON values; doubles are read back as they are.
         """
         fresh = fresh_name(self.record)
+        progress = dict(progress)
+        saved = {"inputs": self.inputs, "progress": progress, "checksum": _checksum(progress)}
         with writable(self.target):
             to_disk(self.data)
             with fresh.open("w", encoding="utf-8") as stream:
-                json.dump({"inputs": self.inputs, "progress": dict(progress)}, stream)
+                json.dump(saved, stream)
                 stream.flush()
                 os.fsync(stream.fileno())
             fresh.replace(self.record)
-        self.progress = dict(progress)
+        self.progress = progress
 
     def finish(self) -> None:
         """Give the blocks their final name, and remove the record."""
@@ -151,22 +161,29 @@ class UnfinishedOutput:
 class UnfinishedText(UnfinishedOutput):
     """Finished blocks that are lines of text, one behind the other.
 
-    The progress holds ``length``, the bytes of the finished blocks, ``rows`` and whatever else is
-    counted.
+    The progress holds ``length``, the bytes of the finished blocks, ``crc32``, their checksum,
+    ``rows`` and whatever else is counted.
     """
 
     def start(self, resume: bool) -> dict[str, Any]:
         """As in `UnfinishedOutput`, and make an empty file where nothing is finished."""
         progress = super().start(resume)
         if progress:
-            whole = all(isinstance(progress.get(name), int) for name in ("length", "rows"))
-            if not whole or self.data.stat().st_size < progress["length"]:
+            if not self._whole():
                 self.progress = {}
                 raise self.damaged()
         else:
             with writable(self.target):
                 self.data.write_bytes(b"")
         return progress
+
+    def _whole(self) -> bool:
+        """Whether the finished blocks are those that were written."""
+        left, found = self.progress.get("length", 0), 0
+        with writable(self.target), self.data.open("rb") as stream:
+            while left > 0 and (part := stream.read(min(left, _PART))):
+                left, found = left - len(part), zlib.crc32(part, found)
+        return left == 0 and found == self.progress.get("crc32")
 
     @property
     def rows(self) -> int:
@@ -189,14 +206,19 @@ class UnfinishedText(UnfinishedOutput):
             stream.seek(length)
             stream.write(text.encode())
             length = stream.tell()
+        crc32 = zlib.crc32(text.encode(), self.progress.get("crc32", 0))
         added = {"rows": rows, **counts}
         summed = {name: self.progress.get(name, 0) + count for name, count in added.items()}
-        self.save({**self.progress, **summed, "length": length})
+        self.save({**self.progress, **summed, "length": length, "crc32": crc32})
 
     def text(self) -> str:
         """Return the finished blocks."""
         with self.data.open("rb") as stream:
             return stream.read(self.progress.get("length", 0)).decode()
+
+
+def _checksum(progress: Mapping[str, Any]) -> int:
+    return zlib.crc32(json.dumps(progress, sort_keys=True).encode())
 
 
 def undisturbed(work: Callable[[], _Result]) -> _Result:

@@ -1,14 +1,26 @@
-"""Files that a user writes as TOML."""
+"""The one reader of TOML: plans, protocols, recipes, materials, and claims of papers."""
 
 from __future__ import annotations
 
 import os
+import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from asperity.errors import InputError
+from asperity.errors import InputError, printable
 from asperity.parameters.arguments import file_path
+from asperity.parameters.file_content import file_content
+
+#: Tables and lists in each other: what is written by hand has a tenth of it.
+_DEEPEST = 100
+#: Integers that TOML promises to keep.
+_INTEGERS = range(-(2**63), 2**63)
+#: A key of so many parts, for which the parser takes a time that grows with their square.
+_LONG_KEY = re.compile(
+    rf"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){{{_DEEPEST}}}"""
+)
 
 
 def toml_content(path: str | os.PathLike[str], label: str) -> tuple[Path, dict[str, Any]]:
@@ -23,11 +35,11 @@ def toml_content(path: str | os.PathLike[str], label: str) -> tuple[Path, dict[s
     Raises
     ------
     InputError
-        If there is no such file, it cannot be read, or it is not TOML.
+        If there is no such file, it cannot be read, or as of `parsed_toml`.
     """
     file = file_path(path, label)
     try:
-        return file, tomllib.loads(file.read_text(encoding="utf-8-sig"))
+        text = file_content(file).decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(
             f"{label} must be a file, got '{path}'; there is none, correct the path"
@@ -37,8 +49,57 @@ def toml_content(path: str | os.PathLike[str], label: str) -> tuple[Path, dict[s
         raise InputError(
             f"{label} must be a readable TOML file, got '{path}' ({why}); give another"
         ) from None
+    return file, parsed_toml(text.replace("\r\n", "\n"), label, f"'{path}'")
+
+
+def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]:
+    """Content of a TOML text.
+
+    Parameters
+    ----------
+    text : str
+    label : str
+        What it is, for messages.
+    source : str
+        Where it is from, for messages.
+
+    Raises
+    ------
+    InputError
+        If it is not TOML, is nested deeper than anybody reads, or has an integer of more than
+        64 bits, which TOML does not promise to keep.
+    """
+    deep = InputError(
+        f"{label} must have at most {_DEEPEST} tables and lists in each other, got more in "
+        f"{source}; write fewer"
+    )
+    if _LONG_KEY.search(text):
+        raise deep
+    try:
+        content = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
+        what = printable(" ".join(str(error).split()))
         raise InputError(
-            f"{label} must be valid TOML, got '{path}' ({' '.join(str(error).split())}); "
-            "correct that line"
+            f"{label} must be valid TOML, got {source} ({what}); correct that line"
         ) from None
+    except RecursionError:
+        raise deep from None
+    except ValueError:
+        # Python reads no integer of more than some thousand digits.
+        raise _too_large(label, source) from None
+    level: list[Any] = [content]
+    for _ in range(_DEEPEST):
+        inner = [v for one in level for v in (one.values() if isinstance(one, Mapping) else one)]
+        if any(isinstance(v, int) and v not in _INTEGERS for v in inner):
+            raise _too_large(label, source)
+        level = [v for v in inner if isinstance(v, dict | list)]
+    if level:
+        raise deep
+    return content
+
+
+def _too_large(label: str, source: str) -> InputError:
+    return InputError(
+        f"{label} must have integers of at most 64 bits, got a larger one in {source}; write it "
+        "as a decimal number"
+    )

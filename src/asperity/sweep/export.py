@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +13,7 @@ from asperity.errors import InputError
 from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path
 from asperity.sweep.solve.outcome import words
-from asperity.sweep.store.store import NOT_DONE, SweepStore
+from asperity.sweep.store.store import SweepStore
 
 _FORMATS = (".nc", ".csv", ".parquet")
 
@@ -40,7 +39,8 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
     Raises
     ------
     InputError
-        If there is no store, `out` cannot be written, or pyarrow is missing for Parquet.
+        If there is no store, it is damaged, `out` cannot be written, or pyarrow is missing for
+        Parquet.
     """
     found = SweepStore(file_path(store, "store").resolve(), mode="r")
     target = output_file(out, example="results.nc")
@@ -57,12 +57,6 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
         return write(found, file)
 
 
-def _chunks(store: SweepStore) -> Iterator[int]:
-    for chunk in range(store.grid.chunk_count):
-        if store.failed_in(chunk) != NOT_DONE:
-            yield chunk
-
-
 def _netcdf(store: SweepStore, file: Path) -> int:
     import h5netcdf
 
@@ -70,10 +64,7 @@ def _netcdf(store: SweepStore, file: Path) -> int:
     with h5netcdf.File(file, "w") as out:
         for axis in store.grid.axes:
             out.dimensions[axis.name] = axis.length
-        stored: Any = store.group.arrays()
-        for name, array in stored:
-            if name == "status" or name in store.arrays:
-                continue
+        for name, array in store.labels.items():
             dims = tuple(array.metadata.dimension_names or ())
             if name == "law":
                 texts = np.asarray(array[...], dtype=object)
@@ -92,7 +83,7 @@ def _netcdf(store: SweepStore, file: Path) -> int:
             _attributes(variables[name], dict(array.attrs))
             # Where the others are is said for each variable: CF has no place for it in the file.
             variables[name].attrs["coordinates"] = store.attributes.get("coordinates", "")
-        for chunk in _chunks(store):
+        for chunk, _ in store.done():
             slices = store.grid.slices(chunk)
             for name, values in store.read(chunk).items():
                 variables[name][slices] = values
@@ -133,7 +124,7 @@ def _csv(store: SweepStore, file: Path) -> int:
     written = 0
     with file.open("w", encoding="utf-8", newline="") as stream:
         writer = csv.writer(stream, lineterminator="\n")
-        for chunk in _chunks(store):
+        for chunk, _ in store.done():
             columns = _rows(store, chunk)
             if not written:
                 writer.writerow(columns)
@@ -171,7 +162,7 @@ def _parquet(store: SweepStore, file: Path) -> int:
     )
     written = 0
     with parquet.ParquetWriter(file, schema) as writer:
-        for chunk in _chunks(store):
+        for chunk, _ in store.done():
             columns = _rows(store, chunk)
             arrays = [pyarrow.array(columns[n], type=schema.field(n).type) for n in schema.names]
             writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))

@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 
 from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters
+from asperity.parameters.arguments import shown
 from asperity.sweep.plan.axis import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
+from asperity.sweep.plan.mistakes import PlanError
 from asperity.sweep.plan.model import SweepPlan
 from asperity.sweep.plan.points import Points
 from asperity.sweep.plan.ratios import RATIOS
@@ -26,6 +28,9 @@ Slices = tuple[slice, ...]
 
 #: Laws of an axis that are more than this share chunks.
 _LAWS_APART = 64
+
+#: Points that can be counted in 64 bits.
+_MOST_POINTS = 2**63 - 1
 
 
 class SweepGrid:
@@ -58,9 +63,20 @@ class SweepGrid:
         Raises
         ------
         PlanError
-            If the plan means nothing that can be solved.
+            If the plan means nothing that can be solved, or has more points than can be counted.
+        InputError
+            If memory cannot hold the points of a chunk.
         """
-        return cls(plan_record(plan))
+        grid = cls(plan_record(plan))
+        if grid.points > _MOST_POINTS:
+            raise PlanError(
+                [
+                    f"axes must come to at most {_MOST_POINTS:.3g} points, got "
+                    f"{' x '.join(map(shown, grid.shape))}; shorten them"
+                ]
+            )
+        SOLVES[plan.solve].require_memory(math.prod(grid.chunks), grid.record)
+        return grid
 
     @property
     def points(self) -> int:

@@ -28,7 +28,7 @@ def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
     Raises
     ------
     InputError
-        If there is no store of a sweep.
+        If there is no store of a sweep, or it is damaged.
     """
     import xarray
 

@@ -29,8 +29,12 @@ from asperity.sweep.plan.ratios import RATIOS
 from asperity.sweep.solve import SOLVES
 from asperity.units import KINDS
 
-#: Variables of every store besides numbers and outputs.
-_VARIABLES = ("outcome", "detail", "status", *TEXTS)
+#: Variables of every store with a number for each point, and with one for each chunk.
+OF_POINTS, OF_CHUNKS = ("outcome", "detail"), ("checksum", "status")
+#: Group of every store that has its attributes once more.
+ATTRIBUTES = "attributes"
+#: Names that no axis may have.
+_TAKEN = (*OF_POINTS, *OF_CHUNKS, ATTRIBUTES, *TEXTS)
 
 #: Rows that an axis may list: they are kept in memory and in the record.
 MOST_LISTED = 1_000_000
@@ -81,7 +85,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     if not mistakes:
         mistakes += _missing(laws, axes, numbers, supplied)
         mistakes += _twice(axes)
-        mistakes += _misnamed(axes, {*known, *outputs, *_VARIABLES})
+        mistakes += _misnamed(axes, {*known, *outputs, *_TAKEN})
     if mistakes:
         raise PlanError(mistakes)
     return {
@@ -216,13 +220,17 @@ def _axis(
 
 
 def _listed(columns: Mapping[str, list[Any]]) -> dict[str, Any]:
-    length = len(next(iter(columns.values())))
+    _check_length(len(next(iter(columns.values()))))
+    return {"columns": dict(columns)}
+
+
+def _check_length(length: int) -> None:
+    """Refuse an axis without rows, or of more than are kept in memory."""
     if not 1 <= length <= MOST_LISTED:
         raise InputError(
             f"axis must have from 1 to {MOST_LISTED:,} rows, got {length:,}; draw them, or split "
             "the axis"
         )
-    return {"columns": dict(columns)}
 
 
 def _name(name: str, known: Mapping[str, Parameter]) -> str:
@@ -324,6 +332,7 @@ def _cases(cases: Sequence[Mapping[str, Any]], known: Mapping[str, Parameter]) -
     """Rows of all cases, each with every combination of its lists."""
     names = dict.fromkeys(_name(name, known) for case in cases for name in case)
     columns: dict[str, list[Any]] = {name: [] for name in names}
+    length = 0
     for case in cases:
         lists = {}
         for name, value in case.items():
@@ -332,6 +341,8 @@ def _cases(cases: Sequence[Mapping[str, Any]], known: Mapping[str, Parameter]) -
             else:
                 values = value if isinstance(value, list | tuple) else [value]
                 lists[_name(name, known)] = _column(name, values, known)
+        length += math.prod(map(len, lists.values()))
+        _check_length(length)
         for row in itertools.product(*lists.values()):
             own = dict(zip(lists, row, strict=True))
             for name in names:

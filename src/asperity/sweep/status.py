@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
 from collections import Counter
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,8 +15,9 @@ import numpy as np
 
 from asperity.parameters.arguments import file_path
 from asperity.sweep.solve.outcome import SweepOutcome, words
-from asperity.sweep.store.lock import holder_of, is_held
-from asperity.sweep.store.store import NOT_DONE, SweepStore
+from asperity.sweep.store.lock import holder_of, is_held, lock_file
+from asperity.sweep.store.skeleton import NOT_DONE
+from asperity.sweep.store.store import SweepStore
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,9 @@ class SweepStatus:
     title : str
     points, done, failed : int
         All points, those in chunks that are done, and those of these without a converged answer.
-    chunks, chunks_done : int
+    chunks, chunks_done, chunks_damaged : int
+        All, those that are done, and those that were and whose files are no longer what was
+        written: the next run solves them again.
     outcomes : dict of str to int
         Points of each outcome, of chunks that are done.
     running : str
@@ -47,6 +50,7 @@ class SweepStatus:
     failed: int
     chunks: int
     chunks_done: int
+    chunks_damaged: int
     outcomes: dict[str, int]
     running: str
     runs: list[dict[str, Any]]
@@ -59,17 +63,23 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
     Raises
     ------
     InputError
-        If there is no store of a sweep.
+        If there is no store of a sweep, or it is damaged.
     """
     found = SweepStore(file_path(store, "store").resolve(), mode="r")
     outcomes: Counter[int] = Counter()
-    chunks = done = failed = 0
-    for chunk, count in _done(found):
+    chunks = done = failed = damaged = 0
+    for chunk in range(found.grid.chunk_count):
+        count = found.failed_in(chunk)
+        if count == NOT_DONE:
+            continue
+        if found.is_damaged(chunk):
+            damaged += 1
+            continue
         chunks, done, failed = chunks + 1, done + found.grid.size(chunk), failed + count
         codes, counts = np.unique(found.read(chunk, ("outcome",))["outcome"], return_counts=True)
         outcomes.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
     names = words()
-    lock = found.path.with_name(found.path.name + ".lock")
+    lock = lock_file(found.path)
     holder = holder_of(lock)
     running = ""
     if holder and is_held(lock):
@@ -82,11 +92,22 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
         failed=failed,
         chunks=found.grid.chunk_count,
         chunks_done=chunks,
+        chunks_damaged=damaged,
         outcomes={names.get(code, str(code)): n for code, n in sorted(outcomes.items())},
         running=running,
-        runs=list(found.attributes.get("runs", [])),
-        bytes=sum(f.stat().st_size for f in found.path.rglob("*") if f.is_file()),
+        runs=found.root.runs,
+        bytes=_bytes_in(found.path),
     )
+
+
+def _bytes_in(path: Path) -> int:
+    """Bytes of all files; one that a worker removes meanwhile has none."""
+    total = 0
+    for folder, _, names in os.walk(path):
+        for name in names:
+            with contextlib.suppress(OSError):
+                total += Path(folder, name).stat().st_size
+    return total
 
 
 @dataclass
@@ -133,25 +154,17 @@ def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, flo
     Raises
     ------
     InputError
-        If there is no store of a sweep.
+        If there is no store of a sweep, or it is damaged.
     """
     found = SweepStore(file_path(store, "store").resolve(), mode="r")
     names = tuple(found.record["outputs"])
     moments = {name: _Moments() for name in names}
-    for chunk, _ in _done(found):
+    for chunk, _ in found.done():
         values = found.read(chunk, (*names, "outcome"))
         solved = values["outcome"] == SweepOutcome.CONVERGED
         for name in names:
             moments[name].add(values[name][solved])
     return {name: m.record() for name, m in moments.items()}
-
-
-def _done(store: SweepStore) -> Iterator[tuple[int, int]]:
-    """Chunks that are done, with their failed points."""
-    for chunk in range(store.grid.chunk_count):
-        failed = store.failed_in(chunk)
-        if failed != NOT_DONE:
-            yield chunk, failed
 
 
 def status_record(status: SweepStatus) -> dict[str, Any]:

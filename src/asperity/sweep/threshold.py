@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from asperity.errors import InputError
 from asperity.laws import Law
+from asperity.outputs import require_memory
 from asperity.parameters import DRIVE, law_parameters
 from asperity.parameters.arguments import number, pair, switch, whole_number
 from asperity.slider import Slider
@@ -18,6 +19,7 @@ from asperity.slider.named import slider_values
 from asperity.slider.problem import checked_slider
 from asperity.sweep.map.crossing import find_crossings
 from asperity.sweep.map.plane import PointResponses, solve_points
+from asperity.sweep.plan.points import POINT_BYTES
 from asperity.units import format_si
 
 Float = NDArray[np.float64]
@@ -137,6 +139,7 @@ def stiffness_threshold(
         "inertia": float(inertia),
     }
     count = eps.size
+    require_scan(count, scan, "scan")
     searched = search_thresholds(
         type(slider.law),
         {name: np.full(count, float(value)) for name, value in values.items()}
@@ -153,6 +156,20 @@ def stiffness_threshold(
         mode_frequency=searched.turn.reshape(eps.shape) * f,
         result=searched.result.reshape(eps.shape),
     )
+
+
+def require_scan(points: int, scan: int, name: str) -> None:
+    """Refuse more stiffnesses at each of some points than memory can hold.
+
+    Raises
+    ------
+    InputError
+        Which calls the number of stiffnesses `name`.
+    """
+    require_memory(
+        points * scan * POINT_BYTES, name, f"{scan:,} stiffnesses at each of {points:,} points",
+        "lower it",
+    )  # fmt: skip
 
 
 class SearchedThresholds(NamedTuple):

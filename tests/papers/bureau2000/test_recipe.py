@@ -164,6 +164,23 @@ def test_missing_measurements_are_refused(exact, change, message):
     assert message in str(raised.value)
 
 
+@pytest.mark.parametrize("seed", range(12))
+def test_bifurcations_beyond_doubles_are_refused(exact, seed):
+    columns, bifurcations = exact
+    draw = np.random.default_rng(seed)
+    # From one to all columns, of which no slider is made.
+    names = draw.permutation(["K_over_W0", "V", "K_over_W0_err", "frequency", "frequency_err"])
+    sizes = 10.0 ** (draw.choice([-1, 1], 5) * draw.uniform(150, 308, 5))
+    huge = {
+        name: np.full(2, size)
+        for name, size in zip(names[: draw.integers(1, 6)], sizes, strict=False)
+    }
+    with pytest.raises(InputError, match="must have bifurcations from which A, B and D0 follow"):
+        paper_procedure(
+            table_of(columns), Thresholds("huge", **{**bifurcations, **huge}), fixed=MACHINE
+        )
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

@@ -11,7 +11,7 @@ import asperity as asp
 from asperity.errors import InputError
 from asperity.operating_point import SourcedNumber, respond
 from asperity.orbit import Outcome
-from asperity.outputs import Interrupted
+from asperity.outputs import Interrupted, capacity
 from asperity.sweep.map import SHOWN, Axis, crossing, plane, response_map, write_map
 
 EPS = Axis("epsilon", 0.0, 0.4, 7)
@@ -249,3 +249,15 @@ def test_an_axis_of_another_modulation(numbers, pmma) -> None:
     lost = response_map("rice-ruina", numbers | {"epsilon2_phase": np.pi}, x=x, y=y)
     assert "lowest W/W0 of -0.1;" in str(lost["result"].values[1, 2])
     assert lost["converged"].sum() == 5
+
+
+def test_a_map_beyond_memory_is_refused_before_anything(numbers, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(capacity, "free_memory", lambda: 16e9)
+    draw = np.random.default_rng(0)
+    for _ in range(5):
+        columns = int(10 ** draw.uniform(0.5, 8))
+        x = Axis("epsilon", 0.0, 0.4, columns)
+        y = Axis("K", 1e5, 3e5, int(min(10**8, max(2, 10 ** draw.uniform(7.6, 9) / columns))))
+        with pytest.raises(InputError, match=r"axes must come to what there is room for, got .* x"):
+            write_map(tmp_path / "map.nc", "rice-ruina", numbers, x=x, y=y)
+    assert list(tmp_path.iterdir()) == []

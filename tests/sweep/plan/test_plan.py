@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import kstest
 
 from asperity.errors import InputError
-from asperity.sweep import SweepPlan, load_plan
+from asperity.outputs import capacity
+from asperity.sweep import SweepPlan, load_plan, run_sweep
 from asperity.sweep.grid import SweepGrid
 
 FIXED = {"law": "rice-ruina", "material": "bureau2000",
@@ -75,3 +76,48 @@ def test_a_file_says_its_units(tmp_path: Path) -> None:
     plan.write_text("law = [")
     with pytest.raises(InputError, match="must be valid TOML"):
         load_plan(plan)
+
+
+def spans(*counts: int) -> dict[str, object]:
+    names = ("K", "epsilon", "A", "B", "W0", "V0")
+    return {
+        name: {"from": 0.1, "to": 0.3, "count": count}
+        for name, count in zip(names, counts, strict=False)
+    }
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_plans_beyond_memory_are_refused_before_anything(
+    tmp_path: Path, seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A hundred gigabytes and more, by any of the ways in which a short plan asks for them."""
+    monkeypatch.setattr(capacity, "free_memory", lambda: 16e9)
+    monkeypatch.setattr(capacity, "free_disk", lambda folder: 1e12)
+    draw = np.random.default_rng(seed)
+    rows = [int(n) for n in draw.integers(60_000, 100_000, 4)]
+    lists = {n: (draw.uniform(0.1, 0.3, 1000)).tolist() for n in ("A", "B", "epsilon", "W0")}
+    drawn = {"draw": "random", "count": int(10 ** draw.uniform(11.5, 22)),
+             "over": {"epsilon": {"from": 0.1, "to": 0.2}}}  # fmt: skip
+    few = {"epsilon": {"values": (0.1, 0.2)}}
+    huge = int(10 ** draw.uniform(9, 18))
+    plans = {
+        "axes must come to at most": {"axes": spans(*rows)},
+        "axis must have from 1 to 1,000,000 rows": {"axes": {"case": {"cases": [lists]}}},
+        "axes must come to": {"axes": {"sample": drawn}},
+        "threshold.scan must come to what": {
+            "axes": few, "solve": "threshold", "threshold": {"scan": huge}
+        },
+        "chunk must come to what": {
+            "axes": {"epsilon": few["epsilon"], **spans(10**5, 1, 10**5)}, "chunk": huge
+        },
+    }  # fmt: skip
+    for message, fields in plans.items():
+        with pytest.raises(InputError, match=message):
+            run_sweep(SweepPlan(**{**FIXED, **fields}), tmp_path / "s.zarr", workers=1)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_plan_may_not_name_its_reader(tmp_path: Path) -> None:
+    (tmp_path / "plan.toml").write_text('self = 5\nlaw = "rice-ruina"\naxes.K.values = []\n')
+    with pytest.raises(InputError, match="self must be a known field"):
+        load_plan(tmp_path / "plan.toml")

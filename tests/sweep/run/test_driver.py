@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from concurrent.futures import Future
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -125,3 +126,27 @@ def test_a_cluster_that_ends_is_a_sentence(tmp_path: Path) -> None:
     ):
         run_sweep(plan_of(), tmp_path / "s.zarr", workers=Ended(set(), set()))
     assert store_status(tmp_path / "s.zarr").points == 60
+
+
+@pytest.mark.parametrize(
+    "error", [RuntimeError("Nanny failed to start."), TimeoutError(), OSError(9, "x")]
+)
+@pytest.mark.parametrize("step", ["LocalCluster", "Client"])
+def test_a_worker_of_dask_that_ends_while_it_starts_is_a_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, error: Exception
+) -> None:
+    distributed = pytest.importorskip("distributed")
+
+    def start(*args: Any, **options: Any) -> Any:
+        if step == "LocalCluster":
+            raise error
+        return nullcontext()
+
+    def connect(*args: Any, **options: Any) -> Any:
+        raise error
+
+    monkeypatch.setattr(distributed, "LocalCluster", start)
+    monkeypatch.setattr(distributed, "Client", connect)
+    with pytest.raises(InputError, match=r"some ended while they started.*repeat the command"):
+        run_sweep(plan_of(), tmp_path / "s.zarr", cluster=2)
+    assert list(tmp_path.iterdir()) == []

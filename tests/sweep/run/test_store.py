@@ -2,6 +2,7 @@
 
 import errno
 import json
+import shutil
 import subprocess
 import sys
 from collections.abc import Callable
@@ -251,6 +252,31 @@ def test_the_second_driver_is_refused(tmp_path: Path, closed_form: ClosedForm) -
     assert run(out).points == POINTS
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_lock_file_of_another_form_holds_nothing(
+    tmp_path: Path, closed_form: ClosedForm, seed: int
+) -> None:
+    """What a killed driver, another program or a full disk may leave in its place."""
+    out, lock = tmp_path / "s.zarr", tmp_path / "s.zarr.lock"
+    draw = np.random.default_rng(seed)
+    run(out, plan=plan_of(4, (1.0,)))
+    record = {"token": "x", "host": "h", "process": 3, "since": "now"}
+    others = [None, 7, 0.5, [], {}, ["x"], True]
+    texts = [b"", b"null", b"[" * 10**5, b"\xff\xfe", b"9" * 5000, b"{}", draw.bytes(40)]
+    for name in record:
+        left = {n: v for n, v in record.items() if n != name}
+        texts.append(json.dumps(left).encode())
+        # True is a number of a process as far as Python is concerned.
+        other = others[draw.integers(len(others) - (name == "process"))]
+        if not (name == "process" and other == 7):
+            texts.append(json.dumps({**record, name: other}).encode())
+    for text in texts:
+        lock.write_bytes(text)
+        assert store_status(out).running == ""
+        assert run(out, plan=plan_of(4, (1.0,))).solved == 0
+        assert not lock.exists()
+
+
 def test_a_worker_of_an_older_driver_writes_nothing(
     tmp_path: Path, closed_form: ClosedForm
 ) -> None:
@@ -328,6 +354,42 @@ def test_an_axis_whose_last_chunk_was_not_full_is_extended(
         assert np.array_equal(found["epsilon"], values)
         assert np.array_equal(found["mu1"][:, 0], values)
     assert store_status(out).done == 21
+
+
+def test_repairs_of_an_extension_keep_its_chunks(tmp_path: Path, closed_form: ClosedForm) -> None:
+    """Whatever is lost of an extended store but its answers, none is solved again."""
+    out, longer = tmp_path / "s.zarr", plan_of(20, (1.0, 2.0, 3.0, 4.0))
+    run(out)
+    run(out, plan=longer, extend_store=True)
+    whole = files_of(out)
+    for name in ("zarr.json", "attributes", "K", "epsilon/zarr.json", "mu1/zarr.json"):
+        file = out / name
+        shutil.rmtree(file) if file.is_dir() else file.unlink()
+        with pytest.raises(InputError, match=r"whole, got 's\.zarr', whose .*repeat asper"):
+            summary_statistics(out)
+        closed_form.solved.clear()
+        lines: list[str] = []
+        assert run(out, plan=longer, log=lines.append).solved == 0
+        assert closed_form.solved == set()
+        assert f"again: {name}" in lines[0]
+        assert files_of(out) == whole
+    runs = store_status(out).runs
+    assert runs[-1]["points_solved"] == 0
+
+
+def test_an_interrupted_extension_is_not_read(tmp_path: Path, closed_form: ClosedForm) -> None:
+    out, longer = tmp_path / "s.zarr", plan_of(20, (1.0, 2.0, 3.0, 4.0))
+    run(out)
+    with pytest.MonkeyPatch.context() as patch:
+        killed_at(3, patch)
+        with pytest.raises(Killed):
+            run(out, plan=longer, extend_store=True)
+    for answer in (store_status, summary_statistics, open_store):
+        with pytest.raises(InputError, match="must be extended to its end"):
+            answer(out)
+    run(out, plan=longer, extend_store=True)
+    run(tmp_path / "whole.zarr", plan=longer)
+    assert files_of(out) == files_of(tmp_path / "whole.zarr")
 
 
 def test_failed_points_are_tried_again_when_asked(tmp_path: Path, closed_form: ClosedForm) -> None:

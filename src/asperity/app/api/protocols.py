@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 import tempfile
-import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +16,7 @@ from asperity.errors import InputError, closest
 from asperity.laws import registered
 from asperity.materials.loader import packaged
 from asperity.outputs import size_text
+from asperity.parameters.toml_file import parsed_toml
 from asperity.protocol import (
     Protocol,
     ProtocolError,
@@ -38,16 +38,11 @@ Mistake = dict[str, Any]
 def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
     """The protocol, or its mistakes: ``sentence`` and ``line``, counted from 1, or None."""
     try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        content = parsed_toml(text, "protocol")
+    except InputError as error:
         line = re.search(r"at line (\d+)", str(error))
-        last = text.count("\n") + 1
-        what = " ".join(str(error).split())
-        sentence = f"protocol must be valid TOML, got: {what}; correct that line"
-        return None, [{"sentence": sentence, "line": int(line[1]) if line else last}]
-    except RecursionError:
-        sentence = "protocol must not be nested so deep, got more; write fewer blocks"
-        return None, [{"sentence": sentence, "line": None}]
+        last = text.count("\n") + 1 if "end of document" in str(error) else None
+        return None, [{"sentence": str(error), "line": int(line[1]) if line else last}]
     lines = _lines(text, content)
     refused = list(_files_named(content, lines))
     if refused:

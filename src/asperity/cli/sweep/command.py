@@ -161,6 +161,11 @@ def status(store: Path, as_json: bool) -> int:
         ("title", found.title),
         ("points", f"{found.done:,} of {found.points:,} ({done:.1%})"),
         ("chunks", f"{found.chunks_done:,} of {found.chunks:,}"),
+        *(
+            [("damaged", f"{found.chunks_damaged:,} chunks, which the next run solves again")]
+            if found.chunks_damaged
+            else []
+        ),
         ("failed", f"{found.failed:,}"),
         *((f"  {name}", f"{count:,}") for name, count in found.outcomes.items()),
         ("disk", size_text(found.bytes)),

@@ -21,6 +21,7 @@ from scipy.stats import chi2
 from asperity.errors import InputError
 from asperity.laws import registered
 from asperity.parameters import MODULATION, all_parameters, canonical_name
+from asperity.parameters.file_content import file_content
 from asperity.units import to_si
 
 Float = NDArray[np.float64]
@@ -150,7 +151,7 @@ def read_table(path: str | Path, given: Mapping[str, Any] | None = None) -> Lock
     """
     path = Path(path)
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = file_content(path).decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError, ValueError) as error:
         reason = getattr(error, "strerror", None) or "not text in UTF-8"
         raise InputError(
@@ -249,7 +250,7 @@ def _reading(shown: str, text: str) -> dict[str, Any]:
         for i, first in enumerate(joint["names"]):
             for j, second in enumerate(joint["names"][:i]):
                 columns[f"{second}_{first}_cov"] = float(joint["matrix"][i][j])
-    except (ValueError, KeyError, TypeError, IndexError, AttributeError):
+    except (ValueError, KeyError, TypeError, IndexError, AttributeError, RecursionError):
         raise wrong from None
     if not modulated:
         raise wrong

@@ -31,6 +31,7 @@ from asperity.inference import Fit, LockInTable, fit
 from asperity.inference.fitting.intervals import bounded_interval
 from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.materials import load as load_material
+from asperity.parameters.file_content import file_content
 
 Float = NDArray[np.float64]
 
@@ -92,7 +93,7 @@ def read_thresholds(path: str | Path) -> Thresholds:
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = file_content(path).decode("utf-8-sig")
     except (OSError, UnicodeDecodeError) as error:
         reason = getattr(error, "strerror", None) or "not text in UTF-8"
         raise InputError(
@@ -339,6 +340,8 @@ class _SteadyStateNumbers:
         return {"mu0": float(mu0), "A": A, "B": A + math.exp(weakening), "D0": math.exp(d)}
 
 
+# What leaves the range of doubles is refused at the end.
+@np.errstate(all="ignore")
 def _steady_and_threshold(
     steady: LockInTable, thresholds: Thresholds, V0: float, warnings: list[str]
 ) -> _SteadyStateNumbers:
@@ -360,16 +363,37 @@ def _steady_and_threshold(
             ]
         )
 
-    start = _start_of_least_squares(steady, log_v, thresholds)
-    solved = least_squares(residuals, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    try:
+        start = _start_of_least_squares(steady, log_v, thresholds)
+        solved = least_squares(residuals, start, x_scale="jac", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        covariance = np.linalg.inv(solved.jac.T @ solved.jac)
+        base = _SteadyStateNumbers((), solved.x, covariance)
+        base = replace(base, numbers=_numbers_of(base))
+        finite = all(math.isfinite(n.value) and 0 < n.se < math.inf for n in base.numbers)
+    except InputError:
+        raise
+    except (ArithmeticError, ValueError, np.linalg.LinAlgError):
+        finite = False
+    if not finite:
+        spans = [
+            f"{name} from {values.min():.3g} to {values.max():.3g} {unit}"
+            for name, values, unit in (
+                ("K_over_W0", thresholds.K_over_W0, "1/m"),
+                ("frequency", thresholds.frequency, "Hz"),
+            )
+        ]
+        raise InputError(
+            f"{thresholds.name} must have bifurcations from which A, B and D0 follow, got "
+            f"{' and '.join(spans)}, with which that cannot be computed; correct the cells, which "
+            "are in SI"
+        )
     dof = solved.fun.size - 4
     if dof > 0 and chi_squared.sf(float(solved.fun @ solved.fun), dof) < _MISFIT:
         warnings.append(
             f"steady sliding and bifurcations do not agree within their uncertainties: "
             f"chi-squared {solved.fun @ solved.fun:.3g} for {dof} degrees of freedom"
         )
-    base = _SteadyStateNumbers((), solved.x, np.linalg.inv(solved.jac.T @ solved.jac))
-    return replace(base, numbers=_numbers_of(base))
+    return base
 
 
 def _start_of_least_squares(steady: LockInTable, log_v: Float, thresholds: Thresholds) -> Float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from importlib.resources.abc import Traversable
 from string import Formatter
@@ -11,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from asperity.errors import InputError
 from asperity.papers.ledger.claim import Entry
+from asperity.parameters.toml_file import parsed_toml
 
 
 class _Table(BaseModel):
@@ -130,9 +130,11 @@ def read_contents(file: Traversable) -> Contents:
             f"{file} must be a readable text, got {type(error).__name__}; write the claims there"
         ) from None
     try:
-        contents = Contents.model_validate(tomllib.loads(text))
-    except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{file} must be TOML, got: {error}; correct that line") from None
+        content = parsed_toml(text, "claims")
+    except InputError as error:
+        raise InputError(f"{file} must be TOML, got: {error}") from None
+    try:
+        contents = Contents.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
         where = ".".join(str(part) for part in first["loc"])

@@ -14,7 +14,7 @@ from asperity.operating_point import (
     refuse_foreign,
     sourced_numbers,
 )
-from asperity.outputs import output_file, written_file
+from asperity.outputs import output_file, require_memory, written_file
 from asperity.parameters import MODULATION, point_parameters
 from asperity.parameters.arguments import function, instance, switch
 from asperity.sweep.map.axis import Axis
@@ -26,6 +26,10 @@ from asperity.units import KINDS
 
 if TYPE_CHECKING:
     import xarray
+
+#: Bytes that a point of a map takes, with its boundary and its file: 250 to 300 without these, from
+#: the largest resident memory at 250,000 to 2,250,000 points.
+_POINT_BYTES = 500.0
 
 
 def response_map(
@@ -163,6 +167,10 @@ def _plane(
         # What is not modulated needs no coordinate.
         if parameter.default is not None and name not in MODULATION
     }
+    require_memory(
+        x.count * y.count * _POINT_BYTES, "axes", f"{x.count:,} x {y.count:,} points",
+        "take fewer, or asperity sweep, which keeps none in memory",
+    )  # fmt: skip
     fixed = {n: s for n, s in (defaults | own).items() if n not in (x.name, y.name)}
     plane = MapPlane(get_law(law), {n: s.value for n, s in fixed.items()}, x, y)
     plane.values(plane.nodes()[:1])

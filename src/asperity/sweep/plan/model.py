@@ -239,7 +239,7 @@ class SweepPlan(BaseModel):
     title: str = ""
     folder: Path = Path()
 
-    def __init__(self, **fields: Any) -> None:
+    def __init__(self, /, **fields: Any) -> None:
         models: dict[str, type[BaseModel]] = {
             "": SweepPlan,
             "axes": AxisTable,

@@ -10,10 +10,10 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
-from asperity.errors import InputError
+from asperity.errors import InputError, printable
 from asperity.sweep.run.tasks import ENVIRONMENT
 
 #: Seconds after which the workers of a scheduler are counted again.
@@ -174,19 +174,32 @@ def local_cluster(count: int) -> Iterator[Workers]:
     distributed = _distributed("--cluster")
     import dask
 
-    with (
-        dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ENVIRONMENT)}),
-        # Without a limit: near one Dask pauses a worker, whose compiled programs no pause frees.
-        distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=None,
-            memory_limit=0,
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
-        yield from _using(client, f"Dask cluster on one machine with {count} workers")
+    with ExitStack() as stack:
+        stack.enter_context(
+            dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ENVIRONMENT)})
+        )
+        try:
+            # Without a limit: near one Dask pauses a worker, whose compiled programs no pause
+            # frees.
+            cluster = stack.enter_context(
+                distributed.LocalCluster(
+                    n_workers=count,
+                    threads_per_worker=1,
+                    processes=True,
+                    dashboard_address=None,
+                    memory_limit=0,
+                )
+            )
+            client = stack.enter_context(distributed.Client(cluster))
+            workers = DaskWorkers(client, f"Dask cluster on one machine with {count} workers")
+        # Dask raises one of these when a process ends, or does not answer, while it starts.
+        except (RuntimeError, OSError, TimeoutError, CancelledError) as error:
+            raise InputError(
+                f"--cluster must be workers that this machine can start, got {count}, of which "
+                f"some ended while they started ({printable(str(error), 200)}); repeat the "
+                "command, or take fewer"
+            ) from None
+        yield from _using(workers)
 
 
 @contextmanager
@@ -214,11 +227,10 @@ def scheduler(address: str) -> Iterator[Workers]:
                 f"--scheduler must have workers, got none at '{address}' within a minute; start "
                 "some with dask worker"
             ) from None
-        yield from _using(client, f"Dask scheduler at {address}")
+        yield from _using(DaskWorkers(client, f"Dask scheduler at {address}"))
 
 
-def _using(client: Any, about: str) -> Iterator[Workers]:
-    workers = DaskWorkers(client, about)
+def _using(workers: Workers) -> Iterator[Workers]:
     kill = True
     try:
         yield workers

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import platform
 import shutil
 import socket
 import time
-from collections.abc import Callable, Mapping
-from contextlib import AbstractContextManager, ExitStack, nullcontext
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from asperity._version import __version__
-from asperity.errors import InputError
+from asperity.errors import InputError, listed
 from asperity.laws import get_law
 from asperity.materials import cited_works
 from asperity.orbit.processes import available_cores
-from asperity.outputs import differences, free_disk, require_disk, size_text
+from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
 from asperity.parameters.arguments import file_path, whole_number
+from asperity.parameters.file_content import file_content
 from asperity.sweep.grid import SweepGrid
 from asperity.sweep.load import load_plan
 from asperity.sweep.plan.model import SweepPlan
@@ -31,9 +31,10 @@ from asperity.sweep.run.executors import Workers, local_cluster, local_processes
 from asperity.sweep.run.numerics import numerics, package_version
 from asperity.sweep.run.tasks import Job
 from asperity.sweep.store.extend import extend, is_extension
-from asperity.sweep.store.lock import StoreLock
-from asperity.sweep.store.pieces import remove_pieces
-from asperity.sweep.store.store import SweepStore, create
+from asperity.sweep.store.lock import StoreLock, lock_file
+from asperity.sweep.store.pieces import pieces_folder, remove_pieces
+from asperity.sweep.store.root import read_root
+from asperity.sweep.store.store import SweepStore, create, fresh_folder, lay_out
 
 #: Seconds between signs of life in the lock file.
 _REFRESH = 5.0
@@ -112,17 +113,22 @@ def run_sweep(
         If the plan has mistakes, the store has another plan or is in use, or the disk is full.
     """
     path = file_path(out, "out").resolve()
+    require_short(path, (fresh_folder(path), pieces_folder(path), lock_file(path)))
+    log = log or _silent
     text = ""
     if not isinstance(plan, SweepPlan):
-        text = Path(plan).read_text(encoding="utf-8-sig") if Path(plan).is_file() else ""
-        plan = load_plan(plan)
+        file, plan = plan, load_plan(plan)
+        # A pipe has been read.
+        text = file_content(Path(file)).decode("utf-8-sig") if Path(file).is_file() else ""
     grid = SweepGrid.of(plan)
     pool = _workers(workers, cluster, address)
     with StoreLock(path) as lock, ExitStack() as stack:
         fresh = not path.exists()
-        store = _opened(path, plan, text, grid, extend_store, retry_failed)
-        swept = store.sweep_orphans()
-        if swept and log is not None:
+        _require_coordinates(grid, path.parent)
+        with _writing(path):
+            store = _opened(path, plan, text, grid, extend_store, retry_failed, log)
+            swept = store.sweep_orphans()
+        if swept:
             log(f"{swept} files that killed writers had left half-written were removed")
         try:
             require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
@@ -160,10 +166,20 @@ def _workers(
     return local_processes(count)
 
 
+def _silent(line: str) -> None:
+    """No lines about what went wrong."""
+
+
 def _opened(
-    path: Path, plan: SweepPlan, text: str, grid: SweepGrid, extending: bool, retry: bool
+    path: Path,
+    plan: SweepPlan,
+    text: str,
+    grid: SweepGrid,
+    extending: bool,
+    retry: bool,
+    log: Callable[[str], None],
 ) -> SweepStore:
-    """The store of the plan: a new one, or one of the same plan."""
+    """The store of the plan: a new one, or one of the same plan, repaired."""
     if not path.exists() or (path.is_dir() and not any(path.iterdir())):
         if path.exists():
             path.rmdir()
@@ -174,25 +190,35 @@ def _opened(
             )
         remove_pieces(path)
         return create(path, grid, _attributes(plan, text, grid))
-    store = SweepStore(path)
-    made = store.attributes.get("numerics", {})
+    root = read_root(path)
+    made = root.attributes["numerics"]
     if made != numerics() and not retry:
         raise InputError(
             f"out must be continued by what began it, got '{path.name}' with "
             f"{differences(made, numerics())}, so that last digits may differ; finish it with "
             "those versions, or choose another store"
         )
-    pending = store.attributes.get("extending")
+    pending = root.attributes.get("extending")
     if pending:
-        store = extend(store, json.loads(pending))
-    if store.record == grid.record:
-        return store
-    if extending and is_extension(store.record, grid.record):
+        longer = SweepGrid(pending["record"], root.grid.chunks)
+        extend(path, root, longer, pending["attributes"])
+        root = read_root(path)
+    held = root.grid
+    if held.record == grid.record:
+        written = [root.damage] if root.damage else []
+        written += lay_out(path, held, {**root.attributes, "runs": root.runs})
+        if written:
+            log(
+                f"{len(written)} files of the store were missing or damaged and were written "
+                f"again: {listed(written, most=5)}"
+            )
+        return SweepStore(path)
+    if extending and is_extension(held.record, grid.record):
         remove_pieces(path)
-        store = extend(store, grid.record)
-        store.update_attributes(plan_text=text)
-        return store
-    changed = differences(store.record, grid.record)
+        grid = SweepGrid(grid.record, held.chunks)
+        extend(path, root, grid, _attributes(plan, text, grid))
+        return SweepStore(path)
+    changed = differences(held.record, grid.record)
     way = "its axes may only become longer" if extending else (
         "change the plan back, choose another store, or add points to the end of axes with --extend"
     )  # fmt: skip
@@ -212,8 +238,15 @@ def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
         "relative_tolerance": 1e-8,
         "convention": "F/W0 = mean_friction + sum mu_n cos(n w t + phase_n), w(t) = W/W0",
         "references": [works[key] for key in sorted(works)],
-        "runs": [],
     }
+
+
+def _require_coordinates(grid: SweepGrid, folder: Path) -> None:
+    """Refuse coordinates that the disk has no room for: they are written before all else."""
+    numbers = sum(axis.length * len(axis.names) for axis in grid.axes)
+    require_disk(
+        8.0 * numbers, folder, "axes", f"{numbers:.3g} numbers along them", "shorten them",
+    )  # fmt: skip
 
 
 def _bytes_left(store: SweepStore) -> float:
@@ -235,7 +268,7 @@ def _run(
     workers: Workers,
     job: Job,
     progress: Callable[[SweepProgress], None] | None,
-    log: Callable[[str], None] | None,
+    log: Callable[[str], None],
 ) -> SweepSummary:
     grid = store.grid
     counts = SweepProgress(total=grid.points, chunk_total=grid.chunk_count)
@@ -243,7 +276,7 @@ def _run(
         # Chunks of one size: counting files does not read them.
         share = sum(1 for _ in _status_files(store)) / grid.chunk_count
         counts.stored = round(share * grid.points)
-    runs = [*store.attributes.get("runs", []), _started(workers)]
+    runs = [*store.root.runs, _started(workers)]
     # With --retry-failed these may be others than before; the runs have them all.
     store.update_attributes(runs=runs, numerics=numerics())
     refreshed = time.monotonic()
@@ -257,21 +290,14 @@ def _run(
             progress(now)
 
     chunks = units_of(grid.chunk_count, grid.size)
-    driver = Driver(job, chunks, workers, counts, tick, log or (lambda _: None))
+    driver = Driver(job, chunks, workers, counts, tick, log)
     try:
-        driver.run()
+        with _writing(store.path, counts):
+            driver.run()
     except WorkersGoneError:
         raise InputError(
             f"workers must run until the sweep ends, got no answer any more ({workers.about}) "
             f"after {counts.points:,} of {counts.total:,} points; start a cluster and repeat the "
-            "command, which goes on from there"
-        ) from None
-    except OSError as error:
-        room = size_text(free_disk(store.path))
-        why = "the disk is full" if is_full(error) else (error.strerror or str(error)).lower()
-        raise InputError(
-            f"out must be a folder that can be written, got '{store.path.name}' ({why}, {room} "
-            f"free) after {counts.points:,} of {counts.total:,} points; make room and repeat the "
             "command, which goes on from there"
         ) from None
     finally:
@@ -288,6 +314,21 @@ def _run(
         memory=counts.memory,
         lost=counts.lost,
     )
+
+
+@contextmanager
+def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
+    """Turn an error of the file system into a sentence about the store."""
+    try:
+        yield
+    except OSError as error:
+        room = size_text(free_disk(path))
+        why = "the disk is full" if is_full(error) else (error.strerror or str(error)).lower()
+        done = f" after {counts.points:,} of {counts.total:,} points" if counts else ""
+        raise InputError(
+            f"out must be a folder that can be written, got '{path.name}' ({why}, {room} free)"
+            f"{done}; make room and repeat the command, which goes on from there"
+        ) from None
 
 
 def _started(workers: Workers) -> dict[str, Any]:

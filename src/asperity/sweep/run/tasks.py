@@ -139,7 +139,7 @@ def work(job: Job, units: tuple[Unit, ...], budget: float) -> Report:
     from asperity._jax import spare_mappings
 
     _register(job)
-    worker = _worker(job.store, job.digest, job.folder)
+    worker = _worker(job.store, job.digest, job.folder, job.token)
     report = Report(worker=f"{platform.node()}:{os.getpid()}")
     begin = time.perf_counter()
     for i, unit in enumerate(units):
@@ -201,7 +201,7 @@ def _register(job: Job) -> None:
 
     for place in job.laws:
         known_law(place)
-    for name in _worker(job.store, job.digest, job.folder).grid.record["laws"]:
+    for name in _worker(job.store, job.digest, job.folder, job.token).grid.record["laws"]:
         try:
             get_law(name)
         except InputError:
@@ -212,7 +212,8 @@ def _register(job: Job) -> None:
 
 
 @lru_cache(maxsize=1)
-def _worker(store: str, digest: str, folder: str) -> _Worker:
+def _worker(store: str, digest: str, folder: str, driver: str) -> _Worker:
+    """The store as the driver has opened it: the next one may have repaired or replaced it."""
     from asperity.sweep.store.store import SweepStore
 
     return _Worker(SweepStore(Path(store)), digest, folder)
@@ -249,11 +250,13 @@ class _Worker:
         begin = _clock()
         failed = self.store.failed_in(unit.chunk)
         again = job.retry and failed > 0
-        if failed >= 0 and not again and self.store.is_sound(unit.chunk):
-            size = self.grid.size(unit.chunk)
-            report.done.append((unit, -1.0, failed))
-            report.finished.append((unit.chunk, size, failed))
-            return
+        if failed >= 0 and not again:
+            if self.store.is_sound(unit.chunk):
+                size = self.grid.size(unit.chunk)
+                report.done.append((unit, -1.0, failed))
+                report.finished.append((unit.chunk, size, failed))
+                return
+            report.messages.append(f"chunk {unit.chunk} was damaged and is solved again")
         if again:
             self.pieces.drop(unit.chunk)
         points = self.grid.at(unit.chunk)

@@ -24,6 +24,7 @@ from asperity.parameters import (
     point_parameters,
 )
 from asperity.parameters.arguments import some_of
+from asperity.parameters.file_content import file_content
 from asperity.sweep.plan.model import FitTable, SweepPlan
 from asperity.sweep.plan.points import Points
 from asperity.sweep.solve.kind import Findings, SolveKind, laws_of
@@ -232,7 +233,7 @@ def _outputs(free: Sequence[str], known: Mapping[str, Parameter]) -> dict[str, O
 
 def _digest(path: Path) -> str:
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        return hashlib.sha256(file_content(path)).hexdigest()
     except OSError as error:
         raise InputError(
             f"data must be a readable table, got '{path}': {error.strerror}; give a CSV file"

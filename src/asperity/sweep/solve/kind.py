@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
+from asperity.outputs import require_memory
 from asperity.parameters import Output, Parameter
 from asperity.parameters.arguments import some_of
 from asperity.sweep.plan.model import SweepPlan
-from asperity.sweep.plan.points import Points
+from asperity.sweep.plan.points import POINT_BYTES, Points
 from asperity.sweep.solve.outcome import SweepOutcome
 
 Float = NDArray[np.float64]
@@ -136,6 +137,15 @@ class SolveKind(ABC):
                     f"write solve = '{other}' or remove it"
                 )
         return {}
+
+    def require_memory(self, points: int, record: Mapping[str, Any]) -> None:
+        """Refuse chunks of so many points where memory cannot hold them while they are solved."""
+        require_memory(
+            points * POINT_BYTES,
+            "chunk",
+            f"{points:,} points at a time",
+            "lower it or leave it out",
+        )
 
     @abstractmethod
     def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:

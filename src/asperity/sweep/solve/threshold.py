@@ -16,7 +16,7 @@ from asperity.sweep.plan.points import Points
 from asperity.sweep.solve.kind import Findings, SolveKind, laws_of
 from asperity.sweep.solve.outcome import SweepOutcome
 from asperity.sweep.solve.periodic import solvable
-from asperity.sweep.threshold import search_thresholds
+from asperity.sweep.threshold import require_scan, search_thresholds
 
 #: Codes of the bifurcations, in the order of `flag_meanings`.
 KINDS = ("fold", "period doubling", "Neimark-Sacker")
@@ -56,6 +56,11 @@ class ThresholdSolve(SolveKind):
                 f"{high:g}; write it like [0.3, 4.0]"
             )
         return {"between": [low, high], "scan": plan.threshold.scan}
+
+    def require_memory(self, points: int, record: Mapping[str, Any]) -> None:
+        """As in `SolveKind`, and for the stiffnesses of a batch."""
+        super().require_memory(points, record)
+        require_scan(min(points, self.batch), record["settings"]["scan"], "threshold.scan")
 
     def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
         """As in `SolveKind`."""

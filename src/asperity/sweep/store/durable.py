@@ -1,8 +1,10 @@
-"""Waiting until files and folders have reached the disk."""
+"""Files and folders that are whole, or not there, whenever the process ends."""
 
 from __future__ import annotations
 
 import os
+import shutil
+import uuid
 from pathlib import Path
 
 
@@ -23,3 +25,26 @@ def _sync(path: Path, flags: int) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def put(file: Path, content: bytes) -> None:
+    """Write a file that is whole at any moment; it is on the disk after `sync_file`."""
+    make_way(file)
+    file.parent.mkdir(parents=True, exist_ok=True)
+    fresh = file.with_name(f"{file.name}.{uuid.uuid4().hex}.partial")
+    try:
+        fresh.write_bytes(content)
+        os.replace(fresh, file)
+    finally:
+        fresh.unlink(missing_ok=True)
+
+
+def make_way(file: Path) -> None:
+    """Remove a folder that has the name of a file, or a file that has that of its folder."""
+    if file.is_dir() and not file.is_symlink():
+        shutil.rmtree(file)
+    folder = file.parent
+    while not folder.exists():
+        folder = folder.parent
+    if not folder.is_dir():
+        folder.unlink()

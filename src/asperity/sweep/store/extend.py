@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
-import zarr
 
 from asperity.sweep.grid import SweepGrid
-from asperity.sweep.store.store import SweepStore, write_coordinates
+from asperity.sweep.store.root import Root, write_root
+from asperity.sweep.store.store import lay_out, reset
 
 
 def is_extension(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
@@ -36,37 +36,31 @@ def _longer(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
     return False
 
 
-def extend(store: SweepStore, record: Mapping[str, Any]) -> SweepStore:
-    """The store with more points; can be repeated after an interruption at any moment.
+def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
+    """Give a store more points; can be repeated after an interruption at any moment.
 
     Chunks that get new points are no longer done; all others keep theirs.
 
     Parameters
     ----------
-    store : SweepStore
-    record : mapping
+    path : Path
+    root : Root
+        Of the store as it is.
+    grid : SweepGrid
         Of a plan for which `is_extension` holds.
+    attributes : mapping
+        Of the longer store, besides those that follow from its grid.
+
+    Returns
+    -------
+    list of str
+        As of `lay_out`.
     """
-    store.update_attributes(extending=json.dumps(record))
-    grid = SweepGrid(record, store.grid.chunks)
-    for chunk in _touched(store.grid, grid):
-        store.reset(chunk)
-    for array in store.arrays.values():
-        array.resize(grid.shape)
-    store.status.resize(grid.chunk_shape)
-    group = zarr.open_group(store.path, mode="r+", use_consolidated=False)
-    named = write_coordinates(group, grid)
-    group.attrs.update(
-        {
-            "plan": json.dumps(record),
-            "plan_sha256": grid.digest,
-            "coordinates": " ".join(named),
-            "extending": "",
-        }
-    )
-    fresh = SweepStore(store.path)
-    fresh.update_attributes()
-    return fresh
+    pending = {"record": grid.record, "attributes": dict(attributes)}
+    write_root(path, {**root.attributes, "extending": pending}, root.arrays)
+    for chunk in _touched(root.grid, grid):
+        reset(path, root.grid, chunk)
+    return lay_out(path, grid, {"runs": root.runs, **attributes})
 
 
 def _touched(old: SweepGrid, new: SweepGrid) -> list[int]:

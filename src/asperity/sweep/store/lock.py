@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from asperity.errors import InputError
+from asperity.outputs.json import json_content
 
 try:
     import fcntl
@@ -19,6 +20,9 @@ except ImportError:  # pragma: no cover  Windows: the age of the file decides
 
 #: Seconds after which a lock of another machine, which nothing has refreshed, counts as left over.
 STALE = 60.0
+
+#: What a lock file says of its holder.
+_HOLDER = {"token": str, "host": str, "process": int, "since": str}
 
 
 class StoreLock:
@@ -40,7 +44,7 @@ class StoreLock:
     """
 
     def __init__(self, store: Path) -> None:
-        self.path = store.with_name(store.name + ".lock")
+        self.path = lock_file(store)
         self.token = uuid.uuid4().hex
         self._descriptor: int | None = None
 
@@ -130,6 +134,11 @@ class StoreLock:
         self.release()
 
 
+def lock_file(store: Path) -> Path:
+    """The lock file of a store."""
+    return store.with_name(store.name + ".lock")
+
+
 def is_held(path: Path) -> bool:
     """Whether a driver is at work: a killed one leaves its file, but not its lock."""
     holder = holder_of(path)
@@ -156,13 +165,13 @@ def is_held(path: Path) -> bool:
 
 def holder_of(path: Path) -> dict[str, Any]:
     """What the lock file says of its holder; empty where it says nothing."""
-    try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    found = json_content(path)
+    if not isinstance(found, dict):
         return {}
-    return found if isinstance(found, dict) and "token" in found else {}
+    whole = all(isinstance(found.get(name), kind) for name, kind in _HOLDER.items())
+    return found if whole else {}
 
 
 def current_token(store: Path) -> str:
     """Token of the driver that works on a store; empty where none does."""
-    return str(holder_of(store.with_name(store.name + ".lock")).get("token", ""))
+    return str(holder_of(lock_file(store)).get("token", ""))

@@ -7,44 +7,28 @@ reached the disk.
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import shutil
-import warnings
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 import zarr
-from zarr.codecs import Crc32cCodec, ZstdCodec
 
 from asperity.errors import InputError
+from asperity.outputs.json import json_content
 from asperity.sweep.grid import SweepGrid
-from asperity.sweep.plan.axis import TEXTS
-from asperity.sweep.plan.ratios import RATIOS
-from asperity.sweep.solve import SOLVES, Findings
-from asperity.sweep.solve.outcome import SweepOutcome, flag_attributes
-from asperity.sweep.store.durable import sync_file, sync_folder
-
-#: What `status` holds for a chunk that is not done; otherwise its failed points.
-NOT_DONE = -1
-
-#: What the columns of texts are.
-_TEXTS_ARE = {"law": "friction law", "data": "file of the readings"}
-
-#: Attribute that says what kind of group this is.
-KIND = "asperity_sweep"
-_FORMAT = 1
-
-#: Coordinates that follow from ratios are stored where they have at most this many values.
-_MOST_DERIVED = 1_000_000
-
-#: A chunk of fill values would otherwise leave no file, like one that was never computed.
-_ALL_CHUNKS: Any = {"write_empty_chunks": True}
+from asperity.sweep.record import OF_CHUNKS, OF_POINTS
+from asperity.sweep.solve import Findings
+from asperity.sweep.store.durable import make_way, put, sync_file, sync_folder
+from asperity.sweep.store.root import FORMAT, KIND, Root, read_root, write_root
+from asperity.sweep.store.skeleton import ALL_CHUNKS, NOT_DONE, coordinates, skeleton
 
 #: Reading a damaged chunk raises one of these, by the codec that finds out.
-DAMAGED = (ValueError, RuntimeError, OSError, KeyError, TypeError)
+_DAMAGED = (ValueError, RuntimeError, OSError, KeyError, TypeError)
 
 
 class SweepStore:
@@ -54,61 +38,111 @@ class SweepStore:
     ----------
     path : Path
     mode : {"r", "r+"}
-        Whether it is only read.
+        Whether it is only read. Then all but the answers must be whole; a driver has repaired it
+        before workers write.
+
+    Attributes
+    ----------
+    root : Root
+    grid : SweepGrid
+    arrays, labels : dict of str to zarr.Array
+        Answers by name; columns of the axes, and numbers that are the same at every point.
 
     Raises
     ------
     InputError
-        If there is no store of a sweep.
+        If there is no store of a sweep, or it is to be read and is damaged.
     """
 
     def __init__(self, path: Path, mode: Literal["r", "r+"] = "r+") -> None:
         self.path = path
-        try:
-            self.group = zarr.open_group(path, mode=mode, use_consolidated=False)
-            attributes: dict[str, Any] = dict(self.group.attrs)
-        except (FileNotFoundError, ValueError, KeyError, OSError, TypeError):
-            attributes = {}
-        if attributes.get(KIND) != _FORMAT:
-            raise InputError(
-                f"store must be the folder of a sweep, got '{path}', which is none; give what "
-                "--out of asperity sweep named"
-            )
-        self.attributes = attributes
-        self.record: dict[str, Any] = json.loads(attributes["plan"])
-        self.grid = SweepGrid(self.record, attributes["chunk_shape"])
-        names = [*self.record["outputs"], "outcome", "detail"]
-        self.arrays: dict[str, Any] = {name: _writing_all(self.group[name]) for name in names}
-        self.status: Any = _writing_all(self.group["status"])
+        self.root = read_root(path)
+        self.grid = self.root.grid
+        self.record: dict[str, Any] = self.grid.record
+        if mode == "r":
+            _require_whole(path, self.root)
+        group = zarr.open_group(path, mode=mode, use_consolidated=False)
+        names = (*self.record["outputs"], *OF_POINTS)
+        self.arrays = {name: _array(group, name) for name in names}
+        self.checksum, self.status = (_array(group, name) for name in OF_CHUNKS)
+        labels = [name for name in self.root.arrays if name not in self._of_chunks]
+        self.labels = {name: _array(group, name) for name in labels}
+        if mode == "r":
+            self._require_labels()
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """The attributes of the store."""
+        return self.root.attributes
+
+    @property
+    def _of_chunks(self) -> tuple[str, ...]:
+        return (*self.arrays, *OF_CHUNKS)
+
+    def _require_labels(self) -> None:
+        """Refuse to read a store whose coordinates are not those that were written."""
+        for name, array in self.labels.items():
+            found = _checksum()
+            try:
+                for place in np.ndindex(*array.cdata_shape):
+                    found.update(chunk_file(self.path, name, place).read_bytes())
+            except OSError:
+                found = None
+            if found is None or found.hexdigest() != self.attributes["coordinate_checksums"][name]:
+                raise _damaged(self.path, f"coordinate '{name}'")
 
     # Chunks
 
-    def is_done(self, chunk: int) -> bool:
-        """Whether the status of a chunk says that it is done; False if that is damaged."""
-        try:
-            return bool(self.status[self.grid.place(chunk)] != NOT_DONE)
-        except DAMAGED:
-            return False
-
     def failed_in(self, chunk: int) -> int:
-        """Failed points of a chunk, -1 where it is not done."""
-        try:
-            return int(self.status[self.grid.place(chunk)])
-        except DAMAGED:
-            return NOT_DONE
+        """Failed points of a chunk, -1 where it is not done or its status is damaged."""
+        return self._of(self.status, chunk, NOT_DONE)
+
+    def is_done(self, chunk: int) -> bool:
+        """Whether the status of a chunk says that it is done."""
+        return self.failed_in(chunk) != NOT_DONE
 
     def is_sound(self, chunk: int) -> bool:
-        """Whether all files of a chunk are there and have their checksums."""
-        slices = self.grid.slices(chunk)
-        for array in self.arrays.values():
-            # Zarr reads a file that is missing as fill values.
-            if not self._file(array, chunk).is_file():
-                return False
-            try:
-                array[slices]
-            except DAMAGED:
-                return False
-        return True
+        """Whether all files of a chunk are those that were written together with its status."""
+        try:
+            return self._of(self.checksum, chunk, 0) == self._digest(chunk, self.failed_in(chunk))
+        except OSError:
+            return False
+
+    def done(self) -> Iterator[tuple[int, int]]:
+        """Chunks that are done, with their failed points.
+
+        Raises
+        ------
+        InputError
+            At one whose files are not those that were written.
+        """
+        for chunk in range(self.grid.chunk_count):
+            failed = self.failed_in(chunk)
+            if failed != NOT_DONE:
+                if self.is_damaged(chunk):
+                    raise _damaged(self.path, f"chunk {chunk}")
+                yield chunk, failed
+
+    def is_damaged(self, chunk: int) -> bool:
+        """Whether a chunk is said to be done and is not sound.
+
+        One that a driver writes just now may look so; looked at again it does not.
+        """
+        return all(self.is_done(chunk) and not self.is_sound(chunk) for _ in range(2))
+
+    def _of(self, array: Any, chunk: int, otherwise: int) -> int:
+        try:
+            return int(array[self.grid.place(chunk)])
+        except _DAMAGED:
+            return otherwise
+
+    def _digest(self, chunk: int, failed: int) -> int:
+        """Of the part of the grid, the failed points and the files of a chunk."""
+        found = _checksum(repr((self.grid.slices(chunk), failed)).encode())
+        for name in self.arrays:
+            content = self._file(name, chunk).read_bytes()
+            found.update(f"{name} {len(content)} ".encode() + content)
+        return int.from_bytes(found.digest(), "little", signed=True)
 
     def write(self, chunk: int, findings: Findings) -> None:
         """Write a chunk; when this returns it is on the disk and done.
@@ -126,35 +160,32 @@ class SweepStore:
             "outcome": findings.outcome,
             "detail": findings.detail,
         }
-        files = []
+        for name in self._of_chunks:
+            make_way(self._file(name, chunk))
         for name, array in self.arrays.items():
             array[slices] = values[name].reshape(shape)
-            files.append(self._file(array, chunk))
-        for file in files:
-            sync_file(file)
-        for folder in self._folders(files):
-            sync_folder(folder)
+        self.checksum[self.grid.place(chunk)] = self._digest(chunk, findings.failed)
+        self._sync([self._file(name, chunk) for name in (*self.arrays, "checksum")])
         self.status[self.grid.place(chunk)] = findings.failed
-        done = self._file(self.status, chunk)
-        sync_file(done)
-        for folder in self._folders([done]):
-            sync_folder(folder)
+        self._sync([self._file("status", chunk)])
 
     def reset(self, chunk: int) -> None:
         """Make a chunk not done."""
-        file = self._file(self.status, chunk)
-        if file.exists():
-            file.unlink()
-            sync_folder(file.parent)
+        reset(self.path, self.grid, chunk)
 
     def read(self, chunk: int, names: tuple[str, ...] | None = None) -> dict[str, Any]:
         """The variables of a chunk as arrays of its shape."""
         slices = self.grid.slices(chunk)
         return {n: self.arrays[n][slices] for n in names or tuple(self.arrays)}
 
-    def _file(self, array: Any, chunk: int) -> Path:
-        key = array.metadata.encode_chunk_key(self.grid.place(chunk))
-        return self.path / array.path / key
+    def _file(self, name: str, chunk: int) -> Path:
+        return chunk_file(self.path, name, self.grid.place(chunk))
+
+    def _sync(self, files: list[Path]) -> None:
+        for file in files:
+            sync_file(file)
+        for folder in self._folders(files):
+            sync_folder(folder)
 
     def _folders(self, files: list[Path]) -> Iterator[Path]:
         """Folders of the files, up to their arrays, each once and inner ones first."""
@@ -176,25 +207,60 @@ class SweepStore:
                     count += 1
         return count
 
-    # Counts
-
-    def counts(self) -> tuple[int, int, int]:
-        """Chunks that are done, their points, and the failed ones among these."""
-        chunks = points = failed = 0
-        for chunk in range(self.grid.chunk_count):
-            count = self.failed_in(chunk)
-            if count != NOT_DONE:
-                chunks, points = chunks + 1, points + self.grid.size(chunk)
-                failed += count
-        return chunks, points, failed
-
     # Attributes
 
     def update_attributes(self, **changed: Any) -> None:
         """Replace attributes of the store; the file is on the disk when this returns."""
-        self.group.attrs.update(changed)
         self.attributes.update(changed)
-        _consolidate(self.path)
+        write_root(self.path, self.attributes, self.root.arrays)
+
+
+def _require_whole(path: Path, root: Root) -> None:
+    """Refuse to read a store whose descriptions of arrays are not those that were written."""
+    if root.attributes.get("extending"):
+        raise InputError(
+            f"store must be extended to its end, got '{path.name}', on which that is under way or "
+            "was interrupted; wait, or repeat asperity sweep with its plan, --out and --extend"
+        )
+    if root.damage:
+        raise _damaged(path, root.damage)
+    for name, described in root.arrays.items():
+        if json_content(path / name / "zarr.json") != described:
+            raise _damaged(path, f"{name}/zarr.json")
+
+
+def _damaged(path: Path, what: str) -> InputError:
+    return InputError(
+        f"store must be whole, got '{path.name}', whose {what} is missing or damaged; repeat "
+        "asperity sweep with its plan and --out, which writes it again"
+    )
+
+
+def _checksum(content: bytes = b"") -> Any:
+    return hashlib.blake2b(content, digest_size=8)
+
+
+def _array(group: Any, name: str) -> Any:
+    """An array that writes every chunk, which is no part of its file."""
+    return group[name].with_config(ALL_CHUNKS)
+
+
+def chunk_file(path: Path, name: str, place: tuple[int, ...]) -> Path:
+    """File of a chunk of an array, by its position among the chunks."""
+    return path.joinpath(name, "c", *map(str, place))
+
+
+def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
+    """Make a chunk of a store not done."""
+    file = chunk_file(path, "status", grid.place(chunk))
+    if file.is_file():
+        file.unlink()
+        sync_folder(file.parent)
+
+
+def fresh_folder(store: Path) -> Path:
+    """Where a store is made, until it is complete."""
+    return store.with_name(store.name + ".new")
 
 
 def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> SweepStore:
@@ -205,14 +271,11 @@ def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> SweepS
     InputError
         If the folder cannot be written.
     """
-    fresh = path.with_name(path.name + ".new")
+    fresh = fresh_folder(path)
     shutil.rmtree(fresh, ignore_errors=True)
     try:
-        _fill(fresh, grid, attributes)
-        for folder, _, names in os.walk(fresh):
-            for name in names:
-                sync_file(Path(folder, name))
-            sync_folder(Path(folder))
+        fresh.mkdir()
+        lay_out(fresh, grid, attributes)
         fresh.rename(path)
         sync_folder(path.parent)
     except OSError as error:
@@ -224,127 +287,57 @@ def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> SweepS
     return SweepStore(path)
 
 
-def _fill(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
-    record = grid.record
-    group = zarr.create_group(path, zarr_format=3)
-    dims = [axis.name for axis in grid.axes]
-    known = SOLVES[record["solve"]].known_outputs(record)
-    for name in record["outputs"]:
-        _array(group, name, grid.shape, grid.chunks, dims, "float64", known[name].attributes)
-    _array(group, "outcome", grid.shape, grid.chunks, dims, "int16", flag_attributes(),
-           fill=int(SweepOutcome.NOT_COMPUTED))  # fmt: skip
-    about = {"units": "1", "long_name": "number in the sentence of the outcome"}
-    _array(group, "detail", grid.shape, grid.chunks, dims, "float64", about)
-    about = {"units": "1", "long_name": "failed points of the chunk; -1: not done"}
-    ones = (1,) * len(dims)
-    _array(group, "status", grid.chunk_shape, ones, [f"{d}_chunk" for d in dims], "int64", about,
-           fill=NOT_DONE)  # fmt: skip
-    named = write_coordinates(group, grid)
-    group.attrs.update(
+def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
+    """Give a store the arrays, coordinates and attributes of a plan; answers in it stay.
+
+    Parameters
+    ----------
+    path : Path
+        A folder, which may hold all of it already.
+    grid : SweepGrid
+    attributes : mapping
+        Those that do not follow from the grid.
+
+    Returns
+    -------
+    list of str
+        Files that were missing or differed, and were written.
+    """
+    written: list[str] = []
+    arrays: dict[str, Any] = {}
+    checksums: dict[str, Any] = {}
+    for name, content in skeleton(grid):
+        file, array = path / name, name.split("/")[0]
+        if file.name == "zarr.json":
+            arrays[array] = json.loads(content)
+        else:
+            checksums.setdefault(array, _checksum()).update(content)
+        if not _holds(file, content):
+            put(file, content)
+            sync_file(file)
+            sync_folder(file.parent)
+            written.append(name)
+    for folder in {(path / name).parents[1] for name in written}:
+        sync_folder(folder)
+    write_root(
+        path,
         {
-            KIND: _FORMAT,
-            "Conventions": "CF-1.11",
             **attributes,
-            "plan": json.dumps(record),
+            KIND: FORMAT,
+            "Conventions": "CF-1.11",
+            "plan": json.dumps(grid.record),
             "plan_sha256": grid.digest,
             "chunk_shape": list(grid.chunks),
-            "coordinates": " ".join(named),
-        }
+            "coordinates": " ".join(coordinates(arrays, grid)),
+            "coordinate_checksums": {name: c.hexdigest() for name, c in checksums.items()},
+        },
+        arrays,
     )
-    _consolidate(path)
+    return written
 
 
-def _array(
-    group: Any,
-    name: str,
-    shape: tuple[int, ...],
-    chunks: tuple[int, ...],
-    dims: list[str],
-    dtype: str,
-    attributes: Mapping[str, Any],
-    fill: Any = np.nan,
-) -> Any:
-    return group.create_array(
-        name,
-        shape=shape,
-        chunks=chunks,
-        dtype=dtype,
-        fill_value="" if dtype == "string" else fill,
-        dimension_names=dims,
-        # The checksum last, over what is on the disk: without it a turned bit is read as a number.
-        compressors=[ZstdCodec(level=1), Crc32cCodec()],
-        attributes=dict(attributes),
-        config=_ALL_CHUNKS,
-        overwrite=True,
-    )
-
-
-def _writing_all(array: Any) -> Any:
-    """The array with `_ALL_CHUNKS`, which is no part of its file."""
-    return array.with_config(_ALL_CHUNKS)
-
-
-def write_coordinates(group: Any, grid: SweepGrid) -> list[str]:
-    """Write the columns of the axes and the fixed numbers; names of those that label no dimension.
-
-    Drawn columns are written block by block.
-    """
-    named: list[str] = []
-    for axis, chunk in zip(grid.axes, grid.chunks, strict=True):
-        # Few and large: labels are read at once when the store is opened.
-        length = min(axis.length, max(chunk, 65_536))
-        for name in axis.names:
-            dtype = "string" if name in TEXTS else "float64"
-            about = (
-                {"units": "1", "long_name": _TEXTS_ARE[name]}
-                if name in TEXTS
-                else grid.known[name].attributes
-            )
-            array = _array(group, name, (axis.length,), (length,), [axis.name], dtype, about)
-            for start in range(0, axis.length, length):
-                stop = min(start + length, axis.length)
-                array[start:stop] = axis.rows(start, stop)[name]
-            if name != axis.name:
-                named.append(name)
-    for name, value in grid.record["numbers"].items():
-        about = dict(grid.known[name].attributes)
-        if name in grid.record["origins"]:
-            about["origin"] = grid.record["origins"][name]
-        _array(group, name, (), (), [], "float64", about)[...] = value
-        named.append(name)
-    if "law" not in {name for axis in grid.axes for name in axis.names}:
-        about = {"units": "1", "long_name": "friction law"}
-        _array(group, "law", (), (), [], "string", about)[...] = grid.record["laws"][0]
-        named.append("law")
-    return [*named, *_write_derived(group, grid)]
-
-
-def _write_derived(group: Any, grid: SweepGrid) -> Iterator[str]:
-    """Parameters that follow from ratios, along the axes that they depend on."""
-    varied = {name: i for i, axis in enumerate(grid.axes) for name in axis.names}
-    along: dict[str, set[int]] = {n: {i} for n, i in varied.items()}
-    present = {*varied, *grid.record["numbers"]}
-    for name, ratio in RATIOS.items():
-        if name not in present:
-            continue
-        axes = sorted(set().union(*(along.get(n, set()) for n in (name, *ratio.needs))))
-        along[ratio.target] = set(axes)
-        shape = tuple(grid.shape[i] for i in axes)
-        if np.prod(shape, dtype=float) > _MOST_DERIVED:
-            continue
-        whole = tuple(slice(0, axis.length if i in axes else 1) for i, axis in enumerate(grid.axes))
-        values = grid.between(whole).values[ratio.target].reshape(shape)
-        about = grid.known[ratio.target].attributes
-        dims = [grid.axes[i].name for i in axes]
-        _array(group, ratio.target, shape, shape, dims, "float64", about)[...] = values
-        yield ratio.target
-
-
-def _consolidate(path: Path) -> None:
-    """Gather the descriptions of all arrays in one file, which makes a store open at once."""
-    with warnings.catch_warnings():
-        # Readers that do not know this part of the file leave it out.
-        warnings.filterwarnings("ignore", message="Consolidated metadata")
-        zarr.consolidate_metadata(path)
-    sync_file(path / "zarr.json")
-    sync_folder(path)
+def _holds(file: Path, content: bytes) -> bool:
+    try:
+        return file.read_bytes() == content
+    except OSError:
+        return False
