@@ -31,6 +31,7 @@ from asperity.lock_in.reference import (
     window_basis,
 )
 from asperity.lock_in.retune import retuned_to_load
+from asperity.lock_in.settling import Settling, find_settlings, without
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ def lock_in(
     harmonics: int = 4,
     detrend: str = "linear",
     refine: bool = True,
+    settles: bool = False,
 ) -> LockInReading:
     """Measure the harmonics of a force against the phase of the load that modulates it.
 
@@ -65,6 +67,9 @@ def lock_in(
         Drift that is fitted together with the harmonics, for both channels.
     refine : bool
         Fit the frequency. If not, `frequency` is taken to be exact.
+    settles : bool
+        Let the force settle (`asperity.lock_in.settling`): its mean and harmonics are then those
+        that it settles to, with the uncertainty of that.
 
     Returns
     -------
@@ -102,13 +107,13 @@ def lock_in(
             basis = window_basis(time, 2 * np.pi * start, harmonics, degree)
             near = _check_finite(sums(basis, time, [load, force], blocks=BLOCKS, step=step))
             if (tuned := retuned_to_load(near)) is not None:
-                return read(tuned)
+                return read(tuned, settles=settles)
     basis = window_basis(time, 2 * np.pi * start, harmonics, degree)
     blocks = _check_finite(sums(basis, time, [load, force], blocks=BLOCKS, step=step))
-    return read(blocks, refine=refine)
+    return read(blocks, refine=refine, settles=settles)
 
 
-def read(blocks: BlockSums, *, refine: bool = True) -> LockInReading:
+def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> LockInReading:
     """The reading from the sums of load and force, in this order.
 
     Parameters
@@ -117,6 +122,8 @@ def read(blocks: BlockSums, *, refine: bool = True) -> LockInReading:
         Of one recording, or joined from its parts.
     refine : bool
         Correct the frequency to first order, from the sums.
+    settles : bool
+        As in `lock_in`.
     """
     basis, linear = blocks.basis, blocks.basis.linear
     gram, moments = blocks.totals()
@@ -130,8 +137,17 @@ def read(blocks: BlockSums, *, refine: bool = True) -> LockInReading:
         change = float(solution[linear])
         slope = -inner @ (gram @ frequency_direction(basis, beta[:, 1]))[:linear]
         beta = np.stack([solution[:linear], beta[:, 1] + slope * change], axis=1)
-    residual = residual_sums(blocks, _on_basis(basis, beta, change))
-    noise = local_noise(blocks, residual, _white(blocks, residual))
+    full = _on_basis(basis, beta, change)
+    settlings: tuple[Settling, ...] = ()
+    if settles:
+        white = float(_white(blocks, residual_sums(blocks, full))[1, 1])
+        settlings = find_settlings(blocks, 1, full[:, 1], inner, white)
+        settled = without(blocks, 1, settlings)
+        beta[:, 1] -= inner @ (moments - settled.totals()[1])[:linear, 1]
+        blocks, full = settled, _on_basis(basis, beta, change)
+    residual = residual_sums(blocks, full)
+    mean_settles = any(s.present and not s.order for s in settlings)
+    noise = local_noise(blocks, residual, _white(blocks, residual), mean_settles)
     plain = np.eye(basis.size)[:, :linear]
     disturbed = sum_covariance(basis, gram, noise, (own, plain))
     # Errors of (beta of the load, omega, beta of the force) are linear in the sums of the noise.
@@ -141,8 +157,13 @@ def read(blocks: BlockSums, *, refine: bool = True) -> LockInReading:
     if refine:
         errors[size:, :size] = np.outer(slope, outer[linear])
     covariance = errors @ disturbed @ errors.T
+    for settling in settlings:
+        beta[:, 1] += settling.shift
+        covariance[size:, size:] += settling.covariance
     omega = basis.omega + change
-    return reading_of(blocks, beta, omega, covariance, noise, residual, fitted=refine)
+    return reading_of(
+        blocks, beta, omega, covariance, noise, residual, fitted=refine, settlings=settlings
+    )
 
 
 def _own_columns(basis: Basis, load: Array, refine: bool) -> Array:

@@ -58,13 +58,34 @@ def residual_sums(blocks: BlockSums, beta: Array) -> Complex:
     -------
     complex array, (blocks, n + 1, channels)
     """
-    n, first = blocks.basis.harmonics, blocks.basis.drift
     left = blocks.moments - blocks.gram @ beta
-    cosine, sine = left[:, first : first + n], left[:, first + n : first + 2 * n]
-    return np.concatenate([left[:, :1].astype(complex), cosine - 1j * sine], axis=1)
+    orders = range(blocks.basis.harmonics + 1)
+    return np.stack([harmonic_sums(left, blocks.basis, k) for k in orders], axis=1)
 
 
-def local_noise(blocks: BlockSums, residual: Complex, white: Array) -> LocalNoise:
+def harmonic_sums(sums: Array, basis: Basis, order: int) -> Complex:
+    """Sums times e^(-i k phi), from sums times the columns.
+
+    Parameters
+    ----------
+    sums : array, (blocks, size, ...)
+    basis : Basis
+    order : int
+        k.
+
+    Returns
+    -------
+    complex array, (blocks, ...)
+    """
+    if not order:
+        return sums[:, 0].astype(complex)
+    at = basis.drift + order - 1
+    return np.asarray(sums[:, at] - 1j * sums[:, at + basis.harmonics])
+
+
+def local_noise(
+    blocks: BlockSums, residual: Complex, white: Array, settles: bool = False
+) -> LocalNoise:
     """Noise around each harmonic.
 
     Parameters
@@ -74,28 +95,46 @@ def local_noise(blocks: BlockSums, residual: Complex, white: Array) -> LocalNois
         From `residual_sums`.
     white : array, (channels, channels)
         Covariance of the residual, used where the window is too short to resolve lines.
+    settles : bool
+        Whether a settling of the mean was fitted too.
+    """
+    orders = range(blocks.basis.harmonics + 1)
+    found = [noise_around(k, blocks, residual[:, k], white, settles=settles) for k in orders]
+    spectra, dof = zip(*found, strict=True)
+    return LocalNoise(np.array(spectra), np.array(dof))
+
+
+def noise_around(
+    k: int, blocks: BlockSums, residual: Complex, white: Array, *, settles: bool
+) -> tuple[Complex, float]:
+    """Noise around one harmonic: its spectral matrix, and its degrees of freedom.
+
+    Parameters
+    ----------
+    k : int
+    blocks : BlockSums
+    residual : complex array, (blocks, channels)
+        Sums of the residual times e^(-i k phi).
+    white, settles
+        As in `local_noise`.
     """
     basis, samples = blocks.basis, float(blocks.count.sum())
     periods = basis.omega * basis.half_width / np.pi
     # Each block stands at its middle, in units of the window's length.
     at = (blocks.middle - basis.centre) / (2 * basis.half_width)
-    spectra = np.empty((basis.harmonics + 1, white.shape[0], white.shape[0]), dtype=complex)
-    dof = np.empty(basis.harmonics + 1)
-    for k in range(basis.harmonics + 1):
-        lines = free_lines(k, periods, basis, samples, blocks.count.size)
-        if lines.size < 2 * _FEWEST:
-            spectra[k], dof[k] = white, max(samples - basis.linear - 1, 1.0)
-            continue
-        angle = 2 * np.pi * (lines[:, None] - k * periods) * at
-        turned = (np.cos(angle) - 1j * np.sin(angle)) @ residual[:, k]
-        near = turned if k else turned[: 2 * _NEXT_TO_ZERO]
-        spectra[k] = near.T @ near.conj() / (near.shape[0] * samples)
-        # Two numbers per line; half-integer lines carry no independent information.
-        dof[k] = near.shape[0]
-        if not k:
-            grown = np.sqrt(_growth(lines, turned))
-            spectra[k] *= grown[:, None] * grown
-    return LocalNoise(spectra, dof)
+    taken = 1 + (basis.degree > 0) + settles
+    lines = free_lines(k, periods, basis, samples, blocks.count.size, taken)
+    if lines.size < 2 * _FEWEST:
+        return white.astype(complex), max(samples - basis.linear - 1, 1.0)
+    angle = 2 * np.pi * (lines[:, None] - k * periods) * at
+    turned = (np.cos(angle) - 1j * np.sin(angle)) @ residual
+    near = turned if k else turned[: 2 * _NEXT_TO_ZERO]
+    spectrum = near.T @ near.conj() / (near.shape[0] * samples)
+    if not k:
+        grown = np.sqrt(_growth(lines, turned))
+        spectrum = spectrum * grown[:, None] * grown
+    # Two numbers per line; half-integer lines carry no independent information.
+    return spectrum, float(near.shape[0])
 
 
 def _growth(lines: Array, turned: Complex) -> Array:
@@ -115,7 +154,9 @@ def _growth(lines: Array, turned: Complex) -> Array:
     return np.asarray((1 / 3.0) ** -exponent / np.mean(lowest**-exponent, axis=0))
 
 
-def free_lines(k: int, periods: float, basis: Basis, samples: float, blocks: int) -> Array:
+def free_lines(
+    k: int, periods: float, basis: Basis, samples: float, blocks: int, taken: int
+) -> Array:
     """Numbers of the spectral lines next to a harmonic that are free of fitted columns.
 
     Parameters
@@ -129,11 +170,13 @@ def free_lines(k: int, periods: float, basis: Basis, samples: float, blocks: int
         Number of samples; the Nyquist frequency is half of it.
     blocks : int
         Number of blocks; lines farther from the harmonic than an eighth of it are averaged out.
+    taken : int
+        Lines above zero that the slow columns take up.
     """
     wanted = _AROUND_HARMONIC if k else _ABOVE_ZERO
     # Most lines between harmonics are free, unless there are few periods.
     reach = min(blocks / 8, 3.0 * wanted + (2.0 * basis.harmonics * periods if periods < 64 else 0))
-    first = max(1.0 + (basis.degree > 0), k * periods - reach)
+    first = max(float(taken), k * periods - reach)
     last = min(samples / 2 - 1, k * periods + reach)
     # Half-integer lines too: a distant line such as hum leaks into these or the integer ones just
     # as it leaks into the harmonic or its derivative, and could vanish in either set alone.

@@ -12,6 +12,7 @@ from asperity.errors import InputError, closest
 from asperity.lock_in.blocks import BlockSums
 from asperity.lock_in.noise import LocalNoise
 from asperity.lock_in.phasor import Phasor
+from asperity.lock_in.settling import Settling
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -45,6 +46,8 @@ class LockInReading:
         Degrees of freedom of the noise near k f, k = 0..n.
     drift : array, (2, degree)
         Change of load and force from the first to the last sample, by each drift term.
+    drift_uncertainty : array, (2, degree)
+        Their standard uncertainties.
     start, end : float
         First and last time (s) of the window.
     samples : int
@@ -54,6 +57,8 @@ class LockInReading:
     blocks : BlockSums
     residual : complex array, (blocks, n + 1, 2)
         Sums of the residuals of load and force times e^(-ik phi), over each block.
+    settlings : tuple of Settling
+        Of the force, where it was let settle: what may be there, most of all what is.
     """
 
     W0: float
@@ -67,6 +72,7 @@ class LockInReading:
     covariance: Array
     dof: Array
     drift: Array
+    drift_uncertainty: Array
     start: float
     end: float
     samples: int
@@ -74,6 +80,17 @@ class LockInReading:
     noise: LocalNoise
     blocks: BlockSums
     residual: Complex
+    settlings: tuple[Settling, ...] = ()
+
+    @property
+    def settling(self) -> Settling | None:
+        """The settling of the mean force, if it is present."""
+        return next((s for s in self.settlings if s.present and not s.order), None)
+
+    def without_settling(self, time: Array, force: Array) -> Array:
+        """A force of the window without the settling of its mean; arrays (n,)."""
+        settling = self.settling
+        return force if settling is None else force - settling.at(time - self.start)
 
     @property
     def periods(self) -> float:
@@ -156,6 +173,7 @@ def reading_of(
     residual: Complex,
     *,
     fitted: bool,
+    settlings: tuple[Settling, ...] = (),
 ) -> LockInReading:
     """The reading that follows from the coefficients of load and force.
 
@@ -172,6 +190,7 @@ def reading_of(
         As in `LockInReading`.
     fitted : bool
         Whether omega was fitted.
+    settlings : tuple of Settling
     """
     basis = blocks.basis
     n, first, linear = basis.harmonics, basis.drift, basis.linear
@@ -195,6 +214,9 @@ def reading_of(
         *(f"load_{part}{k}" for k in range(2, n + 1) for part in ("re", "im")),
     )
     powers = np.arange(1, first)
+    across = (1 - (-1.0) ** powers)[:, None]
+    variances = np.diagonal(covariance).clip(min=0)
+    doubts = np.sqrt([variances[1:first], variances[linear + fitted :][1:first]]).T
     return LockInReading(
         W0=float(mean_load),
         epsilon=float(abs(relative[0, 0])),
@@ -206,7 +228,8 @@ def reading_of(
         names=names,
         covariance=jacobian @ covariance @ jacobian.T,
         dof=noise.dof,
-        drift=(beta[1:first] * (1 - (-1.0) ** powers)[:, None]).T,
+        drift=(beta[1:first] * across).T,
+        drift_uncertainty=(doubts * across).T,
         start=basis.centre - basis.half_width,
         end=basis.centre + basis.half_width,
         samples=int(blocks.count.sum()),
@@ -214,6 +237,7 @@ def reading_of(
         noise=noise,
         blocks=blocks,
         residual=residual,
+        settlings=settlings,
     )
 
 

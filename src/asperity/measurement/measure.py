@@ -16,7 +16,8 @@ from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
 from asperity.measurement.pauses import under_the_same_load
 from asperity.measurement.samples import Samples, about_window, usable
-from asperity.measurement.series import MeanLevel, block_means, mean_level, settled_from
+from asperity.measurement.series import MeanLevel, Rate, effective_dof, mean_level, rate_between
+from asperity.measurement.sliding.trend import bin_means, columns, fit_trend
 from asperity.measurement.verdicts import (
     checks,
     instrument,
@@ -24,12 +25,14 @@ from asperity.measurement.verdicts import (
     plausibility,
     steadiness,
 )
+from asperity.measurement.verdicts.checks import drift_rate
 from asperity.measurement.verdicts.shift import shifting_response
 from asperity.measurement.verdicts.verdict import Check, Verdict, worst
 from asperity.measurement.window import (
     LoadInterval,
     clean_run,
     settled,
+    settling_from,
     stretches,
     whole_periods,
 )
@@ -42,6 +45,12 @@ Array = NDArray[np.float64]
 
 #: A line this often above its background is a modulation.
 _LINE = 8.0
+#: A drift of so many standard uncertainties is one.
+_DRIFTS = 3.0
+#: Periods of the lines next to which a pause is looked at.
+_PAUSE_PERIODS = 64
+#: Samples of a pause that give a rate.
+_FEWEST = 64
 #: Pieces of a long recording that are searched for the modulation, and their samples.
 _PIECES, _PIECE = 32, 1 << 15
 
@@ -137,7 +146,8 @@ def measure(
     harmonics : int
     window : (float, float), optional
         First and last time (s) to read. None takes the longest modulated stretch, without what has
-        not settled, and away from gaps and saturation where the rest is long enough.
+        not settled where that leaves half of it, and away from gaps and saturation where the
+        longest run between them is long enough. What settles in the window is fitted.
     detrend : {"none", "linear", "quadratic"}
     only_whole_periods : bool
         Cut the window to whole periods. The fit does not need it.
@@ -266,10 +276,27 @@ def _measured(
         harmonics=harmonics,
         detrend=detrend,
         refine=recording.refine,
+        settles=True,
     )
+    chosen_by = "program" if window is None else "user"
     before, after = _around(samples, parts, chosen, reading.W0)
+    rates = _rates(samples, (before, after))
+    if after and before and rates[0] and rates[1]:
+        # A pause that drifts as the one before the modulation does not has not recovered from it.
+        change = rates[1].beyond(rates[0]) * (after[0].end - after[0].start)
+        if change > checks.LIMITS["transient"][0] * abs(after[0].value):
+            after = None
+    pauses = [rates[0]] if rates[0] else []
+    if before and after:
+        pauses.append(rate_between(before[0], after[0]))
     answers = (
-        *_asked(reading, time, samples.load[cut], force_values),
+        *_asked(
+            reading,
+            time,
+            samples.load[cut],
+            reading.without_settling(time, force_values),
+            checks.transient(reading, chosen_by, pauses),
+        ),
         *_about_the_instrument(reading, samples, parts, cut),
         checks.drift(reading, *(b[0] if b else None for b in (before, after))),
         *checks.findings(
@@ -278,9 +305,9 @@ def _measured(
             float(time[-1] - time[0]),
         ),
     )
-    static = _static_friction([b for b in (before, after) if b])
+    static = _static_friction(reading, [b for b in (before, after) if b], pauses)
     doubt = reading.uncertainty("mean_friction")
-    dof = _effective_dof([(doubt, float(reading.dof[0])), (static[1], static[2])])
+    dof = effective_dof([(doubt, float(reading.dof[0])), (static[1], static[2])])
     whole = float(np.hypot(doubt, static[1]))
     return Measurement(
         reading=reading,
@@ -294,19 +321,14 @@ def _measured(
         stretches=tuple(parts),
         samples=samples,
         window=(first, stop),
-        chosen_by="program" if window is None else "user",
+        chosen_by=chosen_by,
     )
 
 
-def _effective_dof(parts: list[tuple[float, float]]) -> float:
-    """Degrees of freedom of a sum of squared uncertainties (Welch and Satterthwaite)."""
-    whole = sum(doubt**2 for doubt, _ in parts)
-    each = sum(doubt**4 / max(dof, 1.0) for doubt, dof in parts)
-    return whole**2 / each if each > 0 else np.inf
-
-
-def _asked(reading: LockInReading, time: Array, load: Array, force: Array) -> tuple[Check, ...]:
-    """What is asked of every window."""
+def _asked(
+    reading: LockInReading, time: Array, load: Array, force: Array, transient: Check
+) -> tuple[Check, ...]:
+    """What is asked of every window; the force is that without its settling."""
     rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
     return (
         checks.modulation(reading),
@@ -320,7 +342,7 @@ def _asked(reading: LockInReading, time: Array, load: Array, force: Array) -> tu
         steadiness.steady_load(reading, time, load),
         steadiness.steady_force(reading, time, force),
         steadiness.steady_response(reading),
-        checks.transient(reading),
+        transient,
         checks.stick_slip(reading, time, force),
         checks.load_harmonics(reading),
         checks.resolution(reading, load, force),
@@ -405,26 +427,65 @@ def _around(
             stop = min(stop, first + 2 * most)
         else:
             first = max(first, stop - most)
-        if step > 0 or any(part.modulated for part in parts[: at - 1]):
-            # The force has to find back from the modulation before.
-            means = block_means(samples.force[first:stop], 100)
-            first += settled_from(means, 1) * max(1, (stop - first) // 100)
+        # The force has to find back from a modulation before.
+        recovers = step > 0 or any(part.modulated for part in parts[: at - 1])
+        if recovers:
+            time = samples.time[first:stop]
+            first += settled(time, samples.force[first:stop], _no_modulation(time), 1)
         first, stop = under_the_same_load(samples.load, first, stop, mean_load, before=step < 0)
         if stop - first < 16:
             sides.append(None)
             continue
         cut = slice(first, stop)
-        sides.append(
-            (
-                mean_level(samples.time[cut], samples.force[cut]),
-                mean_level(samples.time[cut], samples.load[cut]),
-            )
-        )
+        time, force = samples.time[cut], samples.force[cut]
+        level = _settled_level(time, force) if recovers else mean_level(time, force)
+        sides.append(level and (level, mean_level(time, samples.load[cut])))
     return sides[0], sides[1]
 
 
+def _no_modulation(time: Array) -> float:
+    """A frequency (Hz) far above what is slow in a pause."""
+    return _PAUSE_PERIODS / float(time[-1] - time[0])
+
+
+def _settled_level(time: Array, force: Array) -> MeanLevel | None:
+    """The level that the force of a pause settles to; None if that cannot be told."""
+    settling = settling_from(time, force, _no_modulation(time), 1)
+    if settling is None or not settling.possible:
+        return mean_level(time, force)
+    if settling.present:
+        force = force - settling.at(time - time[0])
+    level = mean_level(time, force)
+    if settling.present and not settling.told:
+        limit = checks.LIMITS["transient"][0]
+        if abs(settling.amplitude) > limit * abs(level.value):
+            return None
+    doubt = float(np.hypot(level.uncertainty, np.sqrt(settling.covariance[0, 0])))
+    return level._replace(value=level.value + float(settling.shift[0]), uncertainty=doubt)
+
+
+def _rates(
+    samples: Samples, sides: tuple[tuple[MeanLevel, MeanLevel] | None, ...]
+) -> list[Rate | None]:
+    """Rates at which the force changes in the pauses."""
+    found: list[Rate | None] = []
+    for side in sides:
+        found.append(None)
+        if side is None:
+            continue
+        first, stop = np.searchsorted(samples.time, [side[0].start, side[0].end])
+        if stop - first > _FEWEST:
+            at, means = bin_means(samples.time[first:stop], samples.force[first:stop])
+            fit = fit_trend(columns(at - at[0], 1), means)
+            doubt = float(np.sqrt(fit.variance * fit.inverse[1, 1]))
+            found[-1] = Rate(float(fit.beta[1]), doubt, float(fit.dof))
+    return found
+
+
 def _static_friction(
+    reading: LockInReading,
     sides: list[tuple[MeanLevel, MeanLevel]],
+    pauses: list[Rate],
 ) -> tuple[float, float, float]:
     """F(0)/W0, its standard uncertainty, drift between the sides included, and its dof."""
     if not sides:
@@ -433,7 +494,17 @@ def _static_friction(
     doubts = [force.uncertainty / abs(load.value) / len(sides) for force, load in sides]
     # A drift is somewhere between its ends: an even distribution about the mean.
     drifted = abs(ratios[-1] - ratios[0]) / np.sqrt(12)
-    dof = _effective_dof(
+    if len(sides) == 1:
+        # Its other end was not recorded, but the force drifts in the window or in the pause.
+        level, load = sides[0]
+        rates = list(pauses)
+        if reading.drift.shape[1]:
+            rates.append(drift_rate(reading))
+        rate = min(rates, key=lambda each: each.uncertainty, default=Rate(0.0, 0.0, 1.0))
+        if abs(rate.value) > _DRIFTS * rate.uncertainty:
+            away = (reading.start + reading.end - level.start - level.end) / 2
+            drifted = abs(rate.value * away / load.value) / np.sqrt(3)
+    dof = effective_dof(
         [*((d, f.dof) for d, (f, _) in zip(doubts, sides, strict=True)), (float(drifted), 30.0)]
     )
     return float(np.mean(ratios)), float(np.hypot(np.linalg.norm(doubts), drifted)), dof

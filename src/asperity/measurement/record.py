@@ -66,6 +66,16 @@ def modulated_record(found: Measurement) -> dict[str, Any]:
             "names": list(joint[0]),
             "matrix": joint[1].tolist(),
         },
+        "settlings": [
+            {
+                "order": settling.order,
+                "decay": settling.decay,
+                "amplitude": abs(settling.amplitude),
+                "ends_in_window": settling.told,
+            }
+            for settling in reading.settlings
+            if settling.present
+        ],
         "F0_before": _level(found.before),
         "F0_after": _level(found.after),
         "window": {

@@ -6,15 +6,15 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import stdtrit
 
 Array = NDArray[np.float64]
 
 #: Cosine transforms that say how noisy a mean is; twice the root of twice as many is its own doubt.
 _COSINES = 8
 _MOST_BLOCKS = 512
-#: A transient is left to decay for so many times the time that noise hid it after, of at most
-#: that share of the series.
-_FURTHER, _MOST = 1.8, 0.75
+#: Probability at which noise explains that two rates differ.
+_ACCIDENT = 3e-3
 
 
 class MeanLevel(NamedTuple):
@@ -25,6 +25,29 @@ class MeanLevel(NamedTuple):
     dof: float
     start: float
     end: float
+
+
+class Rate(NamedTuple):
+    """Change per second, with its standard uncertainty and degrees of freedom."""
+
+    value: float
+    uncertainty: float
+    dof: float
+
+    def beyond(self, other: Rate) -> float:
+        """Difference of two rates; 0 if noise explains it."""
+        parts = [(self.uncertainty, self.dof), (other.uncertainty, other.dof)]
+        quantile = float(stdtrit(effective_dof(parts), 1 - _ACCIDENT / 2))
+        away = abs(self.value - other.value)
+        return away if away > quantile * np.hypot(self.uncertainty, other.uncertainty) else 0.0
+
+
+def rate_between(first: MeanLevel, second: MeanLevel) -> Rate:
+    """Rate from one level to a later one."""
+    seconds = (second.start + second.end - first.start - first.end) / 2
+    parts = [(level.uncertainty / seconds, level.dof) for level in (first, second)]
+    doubt = float(np.hypot(parts[0][0], parts[1][0]))
+    return Rate((second.value - first.value) / seconds, doubt, effective_dof(parts))
 
 
 def block_means(values: Array, blocks: int) -> Array:
@@ -88,19 +111,14 @@ def steady_from(values: Array, degree: int) -> int:
     return int(np.argmax(error <= error.min() * (1 + 3 * np.sqrt(2 / n)) + 1e-300))
 
 
-def settled_from(values: Array, degree: int) -> int:
-    """Where what a series has of its beginning no longer biases its mean: index to start from.
-
-    At the cut of `steady_from` a transient is as large as the noise of one value, which is many
-    times the uncertainty of the mean of all. It took the samples before the cut to decay there,
-    and decays below that uncertainty in about as many more.
+def effective_dof(parts: list[tuple[float, float]]) -> float:
+    """Degrees of freedom of a sum of squared uncertainties (Welch and Satterthwaite).
 
     Parameters
     ----------
-    values : array, (n,)
-        About a hundred.
-    degree : int
-        Of the drift that is no transient.
+    parts : list of (float, float)
+        Standard uncertainties and their degrees of freedom.
     """
-    cut = steady_from(values, degree)
-    return max(cut, min(int(np.ceil(_FURTHER * cut)), int(_MOST * values.size)))
+    whole = sum(doubt**2 for doubt, _ in parts)
+    each = sum(doubt**4 / max(dof, 1.0) for doubt, dof in parts)
+    return whole**2 / each if each > 0 else np.inf

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.lock_in.reading import LockInReading
-from asperity.measurement.series import MeanLevel
+from asperity.measurement.series import MeanLevel, Rate
 from asperity.measurement.verdicts.oscillation import slow_line
 from asperity.measurement.verdicts.verdict import Check, judged
 from asperity.recording.finding import Finding
@@ -32,8 +32,6 @@ LIMITS: dict[str, tuple[float, float]] = {
     "uneven sampling": (20.0, 1000.0),
 }
 
-#: Decay times of transients that are tried, in windows.
-_DECAYS = (0.02, 0.05, 0.1, 0.2, 0.4)
 #: A line this often above its background is no accident of a spectrum of 1e5 lines.
 _LINE = 6.0
 
@@ -113,38 +111,52 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
     return judged("drift", abs(share), LIMITS["drift"], sentence, significant=significant)
 
 
-def transient(reading: LockInReading) -> Check:
-    """Whether the mean force is still settling."""
-    blocks = reading.blocks
-    together = max(1, blocks.count.size // 128)
-    cuts = np.arange(0, blocks.count.size, together)
-    count = np.add.reduceat(blocks.count, cuts)
-    left = np.add.reduceat(reading.residual[:, 0, 1].real, cuts) / count
-    at = np.add.reduceat(blocks.middle * blocks.count, cuts) / count
-    u = (at - reading.start) / (reading.end - reading.start)
-    drifts = np.polynomial.legendre.legvander(2 * u - 1, blocks.basis.degree)
-    best, height = 0.0, 0.0
-    mean = abs(reading.mean_force)
-    for decay in _DECAYS:
-        shape = np.exp(-u / decay)
-        inside = shape - drifts @ np.linalg.lstsq(drifts, shape)[0]
-        norm = float(inside @ inside)
-        if norm < 1e-12 * u.size:
-            continue
-        amplitude = float(inside @ left) / norm
-        rest = left - amplitude * inside
-        doubt = np.sqrt(rest @ rest / max(u.size - 4, 1) * _correlation(rest) / norm)
-        score = abs(amplitude) / max(float(doubt), 1e-300)
-        if score > best:
-            best, height = score, amplitude
-    number = float(abs(height)) / mean if mean else 0.0
-    return judged(
-        "transient",
-        number,
-        LIMITS["transient"],
-        f"a decay of {_percent(number)} of the mean force fits the beginning of the window best",
-        significant=best > 5.0,
+def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Check:
+    """Whether the mean force settles in the window, and whether it can be told to what.
+
+    A settling that ends in the window is part of the reading; a window of the user that holds one
+    is none of a steady state all the same. Over a fraction of its time constant a settling is a
+    drift, which the levels without modulation do not have.
+
+    Parameters
+    ----------
+    reading : LockInReading
+    chosen_by : {"program", "user"}
+        Who chose the window.
+    pauses : list of Rate
+        Rates at which the force changes without modulation.
+    """
+    settling, mean = reading.settling, max(abs(reading.mean_force), 1e-300)
+    length = reading.end - reading.start
+    if settling is not None:
+        number, lasts = abs(settling.amplitude) / mean, length / settling.decay
+        sentence = (
+            f"the force settles by {_percent(number)} of its mean, and the window holds "
+            f"{lasts:.2g} of its time constants; "
+        ) + (
+            "what it settles to is read"
+            if settling.told
+            else "what it settles to cannot be told, record a longer stretch"
+        )
+        seen = chosen_by == "user" or not settling.told
+        return judged("transient", number, LIMITS["transient"], sentence, significant=seen)
+    away = [drift_rate(reading).beyond(pause) for pause in pauses if reading.drift.shape[1]]
+    # A pause that recovers from a modulation may drift too: none of them may explain the window.
+    number = min(away, default=0.0) * length / mean
+    sentence = (
+        f"over the window the force moves by {_percent(number)} of its mean more than without "
+        "modulation: it still settles, to what cannot be told"
+        if number
+        else "no settling of the force stands out"
     )
+    return judged("transient", number, LIMITS["transient"], sentence)
+
+
+def drift_rate(reading: LockInReading) -> Rate:
+    """Rate of the fitted linear drift of the force."""
+    length = reading.end - reading.start
+    change, doubt = reading.drift[1, 0], reading.drift_uncertainty[1, 0]
+    return Rate(float(change / length), float(doubt / length), float(reading.dof[0]))
 
 
 def stick_slip(reading: LockInReading, time: Array, force: Array) -> Check:
@@ -214,14 +226,6 @@ def _finding(found: Finding, samples: int, span: float) -> Check:
         return judged(found.name, found.number, LIMITS[found.name], sentence)
     grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[found.severity]
     return judged(found.name, 1.0, grave, sentence)
-
-
-def _correlation(series: Array) -> float:
-    """Inflation of a variance by neighbours that resemble each other."""
-    power = float(series @ series)
-    neighbour = float(series[1:] @ series[:-1]) / power if power else 0.0
-    neighbour = min(max(neighbour, 0.0), 0.95)
-    return (1 + neighbour) / (1 - neighbour)
 
 
 def _nonzero(value: float) -> float:

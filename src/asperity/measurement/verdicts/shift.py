@@ -46,8 +46,9 @@ def shifting_response(reading: LockInReading, time: Array, force: Array) -> Chec
         found.append(complex(beta[2], -beta[3]))
     phasors = np.array(found)
     mean = phasors.mean()
-    # Amplitude over the window has half the variance of a complex phasor: two components a piece.
-    sigma = reading.phasor(1).amplitude_uncertainty * abs(reading.W0) * np.sqrt(pieces)
+    # Of noise alone: the uncertainty of a harmonic that settles is that of what it settles to.
+    # Amplitude over a piece has half the variance of a complex phasor: two components a piece.
+    sigma = np.sqrt(2 * reading.noise.spectra[1, 1, 1].real * pieces / reading.samples)
     squares = float(np.sum(np.abs(phasors - mean) ** 2)) / max(sigma**2, 1e-300)
     freedom = 2 * (pieces - 1)
     seen = squares > freedom + _BEYOND * np.sqrt(2 * freedom)

@@ -1,0 +1,318 @@
+"""Settling of a channel: exponentials of unknown time constant, profiled in the least squares.
+
+Where a modulation begins, the mean of the force and its harmonics approach what they settle to.
+Over a window of a few time constants that is a part of the model and no noise::
+
+    c_k(t) = drift or harmonic + amplitude e^(-(t - start)/tau),    k = 0, 1, ..., n
+
+For each tau the amplitude is linear. Within a block e^(-t/tau) is a straight line to second order
+of the block's length over tau, so the columns are combinations of those that the sums hold, and no
+second pass over the samples is needed.
+
+Whether there is a settling, and of which tau, is weighed by likelihood: Student's, since the noise
+is estimated from few lines. The correction of the reading is the mean over the weights, and its
+covariance holds that of the amplitude and the spread over tau.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.lock_in.blocks import BlockSums
+from asperity.lock_in.noise import harmonic_sums, noise_around
+from asperity.lock_in.normal_equations import inverted
+
+Array = NDArray[np.float64]
+
+#: Odds of a settling before the data are seen, times the Occam factor of its amplitude: of the mean
+#: and of a harmonic, which has two amplitudes. With a mean's, 3 to 10 of 1,000 steady recordings
+#: prefer a settling, in white and in AR(1) noise, and 99 of 100 keep their uncertainty to 10 %.
+_ODDS = (0.005, 0.0005)
+#: Time constants beyond this share of the window have no end in it: with a linear drift next to it
+#: the level that is settled to is an extrapolation.
+OPEN = 1 / 3
+#: Longest time constant, in windows; time constants tried at once; and the shortest of a harmonic,
+#: in periods: next to it other harmonics are no longer apart.
+_LONGEST, _TRIED, _SHORTEST = 2.0, 41, 4.0
+#: A gain below this many times the noise leaves everything as it is.
+_LEAST_GAIN = 4.0
+#: Log-likelihood below the best from which time constants count for nothing, and how many of those
+#: that count make the sum over them an integral.
+_NEGLIGIBLE, _ENOUGH = 12.0, 9
+#: Share of the noise of the step before that is no longer a fall.
+_STILL = 0.8
+_MOST_ZOOMS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Settling:
+    """The settling of one order of a channel.
+
+    Attributes
+    ----------
+    order : int
+        0 for the mean, k for harmonic k.
+    decay : float
+        Most likely time constant (s).
+    amplitude : complex
+        At the beginning of the window, in the channel's unit; real for the mean. Of a harmonic the
+        phase is that of the basis.
+    odds : float
+        Odds that there is one.
+    longest : float
+        Time constant (s) that it has less than at 95 %, if there is one.
+    unfinished : float
+        Probability that its time constant exceeds `OPEN` of the window, if there is one.
+    shift : array, (linear,)
+        What is to be added to the coefficients: of the sums without `removed` if the odds are above
+        one, of the sums as they are if not.
+    covariance : array, (linear, linear)
+        What is to be added to that of the coefficients.
+    removed : array, (blocks, size)
+        Sums of columns times the most likely settling.
+    noise : float
+        Variance of white noise as strong as that of this order.
+    gain : float
+        Squares that it explains, in units of `noise`.
+    """
+
+    order: int
+    decay: float
+    amplitude: complex
+    odds: float
+    longest: float
+    unfinished: float
+    shift: Array
+    covariance: Array
+    removed: Array
+    noise: float
+    gain: float
+
+    def at(self, since: Array) -> Array:
+        """The settling of a mean at times (s) since the window's beginning, (n,)."""
+        return np.asarray(self.amplitude.real * np.exp(-since / self.decay))
+
+    @property
+    def possible(self) -> bool:
+        """Whether it is worth a correction."""
+        return self.gain > _LEAST_GAIN
+
+    @property
+    def present(self) -> bool:
+        """Whether the odds are in favour of it."""
+        return self.odds > 1
+
+    @property
+    def told(self) -> bool:
+        """Whether its end lies in the window."""
+        return self.unfinished < 0.05
+
+
+def settling_of_mean(blocks: BlockSums) -> Settling | None:
+    """Settling of the mean of the only channel; None if the blocks are too few for one."""
+    linear = blocks.basis.linear
+    gram, moments = blocks.totals()
+    inner = inverted(gram[:linear, :linear])
+    fitted = np.zeros(blocks.basis.size)
+    fitted[:linear] = inner @ moments[:linear, 0]
+    left = (blocks.moments[:, 0, 0] - blocks.gram[:, 0] @ fitted) / np.sqrt(blocks.count)
+    # Where the blocks are too few for lines, what differs between them is noise.
+    white = float(left @ left) / max(blocks.count.size - linear, 1)
+    return _Profile(blocks, 0, fitted, inner, white, 0).settling()
+
+
+def find_settlings(
+    blocks: BlockSums, channel: int, fitted: Array, inner: Array, white: float
+) -> tuple[Settling, ...]:
+    """Settlings of a channel, of its mean and of each harmonic; those that are possible at all.
+
+    Parameters
+    ----------
+    blocks : BlockSums
+    channel : int
+    fitted : array, (size,)
+        Coefficients of the fit without settling.
+    inner : array, (linear, linear)
+        Inverse of the normal matrix.
+    white : float
+        Variance of the residual.
+    """
+    linear = blocks.basis.linear
+    found: dict[int, Settling] = {}
+    # The onset of one order is broad enough to look like a short settling of the next.
+    sweep = list(range(blocks.basis.harmonics + 1))
+    for _ in range(2):
+        for order in sweep:
+            found.pop(order, None)
+            cleaned = without(blocks, channel, tuple(found.values()))
+            left = (cleaned.moments - blocks.moments)[:, :linear, channel].sum(0)
+            coefficients = fitted.copy()
+            coefficients[:linear] += inner @ left
+            settling = _Profile(cleaned, channel, coefficients, inner, white, order).settling()
+            if settling is not None and settling.possible:
+                found[order] = settling
+        sweep = [order for order, settling in sorted(found.items()) if settling.present]
+        if len(sweep) < 2:
+            break
+    return tuple(found[order] for order in sorted(found))
+
+
+def without(blocks: BlockSums, channel: int, settlings: tuple[Settling, ...]) -> BlockSums:
+    """The sums without the settlings that are present in a channel."""
+    present = [settling.removed for settling in settlings if settling.present]
+    if not present:
+        return blocks
+    moments = blocks.moments.copy()
+    moments[:, :, channel] -= np.sum(present, axis=0)
+    return replace(blocks, moments=moments)
+
+
+class _Profile:
+    """Least squares of one order over the time constant."""
+
+    def __init__(
+        self,
+        blocks: BlockSums,
+        channel: int,
+        fitted: Array,
+        inner: Array,
+        white: float,
+        order: int,
+    ) -> None:
+        basis, n = blocks.basis, blocks.basis.harmonics
+        self._blocks, self._channel, self._order = blocks, channel, order
+        self._fitted, self._inner, self._white = fitted, inner, white
+        # Each column of a settling is a straight line in u times one of these.
+        level = np.array([0]) if not order else basis.drift + order - 1 + np.array([0, n])
+        self._columns = [level]
+        if order or basis.degree:
+            self._columns.append(level + (2 * n if order else 1))
+        span = 2 * basis.half_width
+        self._half = span * blocks.count / (2 * blocks.count.sum())
+        self._begun = blocks.middle - (basis.centre - basis.half_width)
+        self._u = (blocks.middle - basis.centre) / basis.half_width
+        periods = _SHORTEST if order else 1.0
+        shortest = max(4 * float(self._half.max()), periods * 2 * np.pi / basis.omega)
+        self._range = np.log([shortest, max(_LONGEST * span, 2 * shortest)])
+        self._left = blocks.moments[:, :, channel] - blocks.gram @ fitted
+
+    def settling(self) -> Settling | None:
+        """The settling of this order; None if the blocks are too few for one."""
+        if self._half.size < 8:
+            return None
+        begin, end = self._range
+        before = np.inf
+        for _ in range(_MOST_ZOOMS):
+            logs = np.linspace(begin, end, _TRIED)
+            gain, amplitude, schur, moved = self._solved(np.exp(logs))
+            best = int(np.argmax(gain))
+            removed = self._removed(np.exp(logs[best : best + 1]), amplitude[best])
+            beside = self._blocks.gram[:, :, : self._inner.shape[0]] @ moved[best] @ amplitude[best]
+            noise, dof = self._noise(self._left - removed + beside, settles=True)
+            fits = _log_likelihood(gain[best] - gain, noise, dof, self._columns[0].size)
+            counts = np.flatnonzero(fits > -_NEGLIGIBLE)
+            # What a coarse step leaves unexplained is taken for noise: it falls with the step.
+            if counts.size >= _ENOUGH and noise > _STILL * before:
+                break
+            before = noise
+            step = logs[1] - logs[0]
+            begin = max(self._range[0], logs[counts[0]] - step)
+            end = min(self._range[1], logs[counts[-1]] + step)
+        none = _log_likelihood(gain[best], noise, dof, self._columns[0].size)
+        # Before the data all time constants are equally likely on a logarithmic scale.
+        prior = _ODDS[min(self._order, 1)] * (logs[1] - logs[0]) / np.ptp(self._range)
+        weights = prior * np.exp(fits)
+        odds = float(np.exp(min(np.log(weights.sum()) - none, 700.0)))
+        chances = np.cumsum(weights) / weights.sum()
+        longest = float(np.exp(logs[int(np.searchsorted(chances, 0.95))]))
+        late = np.exp(logs) > OPEN * 2 * self._blocks.basis.half_width
+        unfinished = float(weights[late].sum() / weights.sum())
+        if odds < 1:
+            # What has no end in the window could be in any window.
+            weights[late] = 0.0
+        weights = np.append(weights, np.exp(none))
+        weights /= weights.sum()
+        # Changes of the coefficients: minus the amplitude times the coefficients of the column.
+        changes = np.zeros((weights.size, self._inner.shape[0]))
+        changes[:-1] = -np.einsum("tlq,tq->tl", moved, amplitude)
+        mean = weights @ changes
+        spread = (changes - mean).T * weights @ (changes - mean)
+        inverse = np.linalg.inv(schur) * noise
+        spread += np.einsum("t,tlq,tqp,tmp->lm", weights[:-1], moved, inverse, moved)
+        height = amplitude[best]
+        return Settling(
+            self._order,
+            float(np.exp(logs[best])),
+            complex(height[0], -height[1] if self._order else 0.0),
+            odds,
+            longest,
+            unfinished,
+            mean - changes[best] if odds > 1 else mean,
+            spread,
+            removed,
+            noise,
+            float(gain[best] / noise),
+        )
+
+    def _lines(self, decays: Array) -> list[Array]:
+        """Level, and slope in u, of e^(-t/tau) in each block; (decays, blocks) each."""
+        z = self._half / decays[:, None]
+        height = np.exp(-self._begun / decays[:, None])
+        small = z < 1e-2
+        safe = np.where(small, 1.0, z)
+        mean = np.where(small, 1 + z**2 / 6, np.sinh(safe) / safe)
+        bend = np.where(small, z / 3 + z**3 / 30, np.cosh(safe) / safe - np.sinh(safe) / safe**2)
+        level, slope = height * mean, -3 * height * bend / self._half
+        slope = slope * self._blocks.basis.half_width
+        if len(self._columns) == 1:
+            return [level]
+        return [level - slope * self._u, slope]
+
+    def _solved(self, decays: Array) -> tuple[Array, Array, Array, Array]:
+        """Gain, amplitudes, normal matrices and coefficients of the columns for each decay."""
+        gram, linear = self._blocks.gram, self._blocks.basis.linear
+        lines = self._lines(decays)
+        pairs = list(zip(lines, self._columns, strict=True))
+        # (decays, size, q): products of all columns with those of the settling.
+        across = np.sum([np.tensordot(line, gram[:, :, at], axes=1) for line, at in pairs], axis=0)
+        right = np.sum(
+            [np.tensordot(line, self._left[:, at], axes=1) for line, at in pairs], axis=0
+        )
+        square = np.sum(
+            [
+                np.tensordot(line * other, gram[:, at[:, None], to], axes=1)
+                for line, at in pairs
+                for other, to in pairs
+            ],
+            axis=0,
+        )
+        moved = self._inner @ across[:, :linear]
+        schur = square - across[:, :linear].transpose(0, 2, 1) @ moved
+        amplitude = np.linalg.solve(schur, right[..., None])[..., 0]
+        return (amplitude * right).sum(1), amplitude, schur, moved
+
+    def _removed(self, decay: Array, amplitude: Array) -> Array:
+        """Sums of all columns times a settling, (blocks, size)."""
+        gram = self._blocks.gram
+        made = np.zeros(gram.shape[:2])
+        for line, at in zip(self._lines(decay), self._columns, strict=True):
+            made += line[0][:, None] * (gram[:, :, at] @ amplitude)
+        return made
+
+    def _noise(self, left: Array, *, settles: bool) -> tuple[float, float]:
+        """Variance of white noise as strong as that of this order, and its degrees of freedom."""
+        white = np.array([[self._white]])
+        around = harmonic_sums(left, self._blocks.basis, self._order)[:, None]
+        spectrum, dof = noise_around(self._order, self._blocks, around, white, settles=settles)
+        # Rounding of the channel is noise too, where there is no other.
+        rounding = np.finfo(float).eps * float(np.abs(self._fitted).max())
+        least = np.finfo(float).tiny
+        return max(float(spectrum[0, 0].real), rounding**2, least), dof
+
+
+def _log_likelihood(loss: Array | float, noise: float, dof: float, amplitudes: int) -> Array:
+    """Student's log-likelihood of a loss of squares, relative to none."""
+    return np.asarray(-(dof + amplitudes) / 2 * np.log1p(np.asarray(loss) / noise / dof))
