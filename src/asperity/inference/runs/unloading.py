@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from asperity.errors import InputError
 from asperity.inference.runs.noise import fitted
 from asperity.inference.unknowns import Prior
+from asperity.measurement.channels import compressive
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
@@ -195,7 +196,8 @@ def _load(trace: Trace, load: str, time: Float, unit: str) -> tuple[Float, str]:
     if not good.any():
         return np.ones_like(time), ""
     order = np.argsort(trace.time[good], kind="stable")
-    W = np.interp(time, trace.time[good][order], channel.values[good][order])
+    borne = compressive(channel.values[good], channel.values[good])[0]
+    W = np.interp(time, trace.time[good][order], borne[order])
     if not (W > 0).all():
         raise InputError(
             f"span must be under a positive load, got {W.min():.4g} {unit}; give another one"

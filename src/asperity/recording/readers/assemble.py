@@ -58,10 +58,11 @@ def assemble(
     try:
         clock = settle_time(values, known, roles, rate, recorded)
     except InputError as error:
+        refused = error
         if any(f.name == "truncated" for f in findings) and "time" not in roles:
             left = listed(map(repr, names))
-            error = refuse_truncated(path, f"which is cut so that no time but {left} is left")
-        raise with_cause(error, findings) from None
+            refused = refuse_truncated(path, f"which is cut so that no time but {left} is left")
+        raise with_cause(refused, findings) from None
     findings += clock.findings
     dropped = [n for n in names if n not in numbers and n != clock.column]
     if dropped:
