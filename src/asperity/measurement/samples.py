@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from asperity.errors import InputError
 from asperity.measurement.channels import compressive, shear_channel
 from asperity.recording.checks import check
+from asperity.recording.rounded_time import even_times
 from asperity.recording.spikes import spikes
 
 if TYPE_CHECKING:
@@ -98,7 +99,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     turned_load, turned_force, turned = compressive(W.values, F.values)
     findings = (*findings, *turned)
     two = replace(two, findings=findings)
-    time, values = trace.time, (turned_load, turned_force)
+    time, values = even_times(trace.time), (turned_load, turned_force)
     names_found = {finding.name for finding in findings}
     keep = None
     if names_found & {"nan", "infinite", "backward time", "repeated time"}:

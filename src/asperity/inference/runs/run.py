@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -23,6 +23,7 @@ from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.readers import read
+from asperity.recording.rounded_time import even_times
 
 Float = NDArray[np.float64]
 
@@ -196,6 +197,7 @@ def recorded_run(
         is not positive.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
+    trace = replace(trace, time=even_times(trace.time))
     shown = name or str(trace.provenance.get("file", "") or "run")
     shown = Path(shown).stem if name is None else name
     signals = sliding_signals(trace, load, force, window)

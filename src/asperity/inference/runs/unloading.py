@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.readers import read
+from asperity.recording.rounded_time import even_times
 
 Float = NDArray[np.float64]
 
@@ -119,6 +120,7 @@ def measured_stiffness(
     compliance that is measured is 1/K + lambda/W, machine and contact in series.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
+    trace = replace(trace, time=even_times(trace.time))
     low, high = span
     if not low < high:
         raise InputError(

@@ -17,6 +17,7 @@ from asperity.measurement.channels import (
     shear_channel,
 )
 from asperity.recording.roles import candidates, words
+from asperity.recording.rounded_time import even_times
 
 if TYPE_CHECKING:
     from asperity.recording.finding import Finding
@@ -98,7 +99,7 @@ def sliding_signals(
     read = [*read, *([] if moved is None else [moved])]
     names = tuple(key for key, c in trace.channels.items() if any(c is used for used in read))
     name = "" if moved is None else moved.recorded_name or names[-1]
-    time = trace.time
+    time = even_times(trace.time)
     use = np.isfinite(time) & np.isfinite(friction)
     if motion is not None:
         use &= np.isfinite(motion)
