@@ -84,10 +84,6 @@ def coarse_load(time, load, force):
     return time, np.round(2 * load) / 2, force
 
 
-def stamps_of_a_millisecond(time, load, force):
-    return np.round(time, 3), load, force
-
-
 #: Defect, the checks that name it, and the verdict of the gravest.
 DOUBTS = {
     "columns exchanged": (swapped, {"friction", "response", "load harmonics", "mains"}, "bad"),
@@ -106,7 +102,6 @@ DOUBTS = {
     "dropped bits": (dropped_bits, {"spike", "dropouts"}, "suspicious"),
     "sparks of two samples": (sparks, {"spike"}, "bad"),
     "steps of the load": (coarse_load, {"resolution", "leakage"}, "suspicious"),
-    "stamps too coarse": (stamps_of_a_millisecond, {"repeated time"}, "bad"),
 }
 
 
@@ -136,8 +131,6 @@ def test_numbers_of_the_doubts_are_those_planted(made, trace) -> None:
     wave = 0.1 / np.sqrt(12) * np.sqrt(2) / 2.8
     assert number("steady force", irregular_stick_slip) == pytest.approx(wave, rel=0.1)
     assert number("resolution", coarse_load) == pytest.approx(0.5 / 1.68, rel=0.05)
-    # Two stamps of a millisecond each: one of two samples is left out, for each that is kept.
-    assert number("repeated time", stamps_of_a_millisecond) == pytest.approx(1.0, rel=0.01)
 
 
 def test_a_force_of_zero_has_a_verdict(made, trace) -> None:

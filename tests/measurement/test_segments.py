@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from asperity.errors import InputError
 from asperity.measurement.sliding.measure import measure_sliding
@@ -153,3 +154,49 @@ def test_the_noise_of_a_displacement_is_found(sliding_trace) -> None:
     # A recorder's step of 1 um has the standard deviation 1/sqrt(12) um.
     coarse = np.round(clean, 6)
     assert displacement_noise(time, coarse) == pytest.approx(1e-6 / np.sqrt(12), rel=1e-6)
+
+
+def white(rng, size, rate):
+    return rng.standard_normal(size)
+
+
+def gauge(rng, size, rate):
+    """Correlated over 5 to 200 ms, as behind a filter."""
+    keep = np.exp(-1 / (rate * 10 ** rng.uniform(-2.3, -0.7)))
+    made = lfilter([np.sqrt(1 - keep**2)], [1, -keep], rng.standard_normal(size + 4000))
+    return made[4000:] + 0.3 * rng.standard_normal(size)
+
+
+def hum(rng, size, rate):
+    wave = np.sin(2 * np.pi * rng.uniform(5, 60) * np.arange(size) / rate)
+    return wave + 0.3 * rng.standard_normal(size)
+
+
+def wanders(rng, size, rate):
+    """A few standard deviations within a minute."""
+    return 0.5 * np.cumsum(rng.standard_normal(size)) / np.sqrt(rate) + rng.standard_normal(size)
+
+
+@pytest.mark.parametrize("kind", [white, gauge, hum, wanders])
+@pytest.mark.parametrize("seed", range(8))
+def test_a_stop_is_one_whatever_the_noise_of_the_displacement(sliding_trace, kind, seed) -> None:
+    """Random velocities with stops of seconds between; noise of 5 nm to 0.5 um."""
+    rng = np.random.default_rng(seed)
+    rate, noise = 1000.0, 10 ** rng.uniform(-8.3, -6.3)
+    # A stop is seen if it moves by 60 standard deviations less than its surroundings.
+    fast = max(60 * noise / 2, 1e-6) * 10 ** rng.uniform(0, 1.5)
+    factor = 10 ** (rng.choice([-1, 1]) * rng.uniform(0.3, 0.9))
+    velocities = (fast, 0.0, fast, max(fast * factor, 60 * noise / 5), 0.0, fast)
+    spans = [rng.uniform(2, 8) if v == 0 else rng.uniform(5, 15) for v in velocities]
+    lengths = [v * s if v else s for v, s in zip(velocities, spans, strict=True)]
+    time, slip, friction, truth = stepped(velocities, lengths, (rate,) * 6, resolution=0, seed=seed)
+    slip = slip + noise * kind(rng, time.size, rate)
+    # At 1 kHz the difference of two samples is some 10 um/s at rest.
+    found = measure_sliding(sliding_trace(time, friction, slip))
+    assert [s.hold for s in found.segments] == [v == 0 for v in velocities]
+    assert [s.start for s in found.segments[1:]] == pytest.approx(truth.tolist(), abs=0.5)
+    for segment, velocity, span in zip(found.segments, velocities, spans, strict=True):
+        assert segment.velocity == pytest.approx(velocity, abs=6 * noise / span + 0.01 * velocity)
+    (step,) = found.steps
+    assert step.velocity_before * step.velocity_after > 0
+    assert len(found.holds) == 2

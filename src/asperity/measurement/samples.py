@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
+from asperity.measurement.channels import compressive, shear_channel
 from asperity.recording.checks import check
+from asperity.recording.rounded_time import even_times
 from asperity.recording.spikes import spikes
 
 if TYPE_CHECKING:
@@ -29,6 +31,7 @@ class Samples:
     Attributes
     ----------
     time, load, force : array, (n,)
+        The load positive in compression.
     unit : str
         SI unit of load and force; empty where the file has none.
     names : (str, str)
@@ -73,8 +76,8 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
 
     Notes
     -----
-    Where a friction coefficient is recorded in place of the shear force, the force is that times
-    the load, and is called so.
+    Where a friction coefficient is recorded in place of a shear force of the load's dimension, the
+    force is that times the load, and is called so.
     """
     W = trace.channel(load)
     F, name = _force(trace, force, W)
@@ -93,8 +96,10 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     findings = about_channels(trace, names)
     unread = len(trace.findings) - len(findings)
     findings = findings or check(two)
+    turned_load, turned_force, turned = compressive(W.values, F.values)
+    findings = (*findings, *turned)
     two = replace(two, findings=findings)
-    time, values = trace.time, (W.values, F.values)
+    time, values = even_times(trace.time), (turned_load, turned_force)
     names_found = {finding.name for finding in findings}
     keep = None
     if names_found & {"nan", "infinite", "backward time", "repeated time"}:
@@ -118,15 +123,7 @@ def about_window(samples: Samples, start: float, end: float) -> list[Finding]:
 
 
 def _force(trace: Trace, name: str, load: Channel) -> tuple[Channel, str]:
-    try:
-        channel = trace.channel(name)
-    except InputError as missing:
-        if name != "F":
-            raise
-        try:
-            channel = trace.channel("friction")
-        except InputError:
-            raise missing from None
+    channel, _ = shear_channel(trace, name, load)
     recorded = _name(trace, channel)
     if channel.kind != "dimensionless" or load.kind in (None, "dimensionless"):
         return channel, recorded

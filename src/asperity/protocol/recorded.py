@@ -9,6 +9,7 @@ import numpy as np
 from asperity.errors import InputError, closest
 from asperity.loads import Follow
 from asperity.recording import read
+from asperity.recording.rounded_time import even_times
 
 #: What a recording can prescribe: the role of its channel, and the kind that it must be of.
 _CHANNELS = {"load": ("W", "force"), "velocity": ("velocity", "velocity")}
@@ -67,4 +68,4 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
             f"follow must have a number in every row, got none in row {row} of '{path.name}'; "
             "cut or fill the recording first"
         )
-    return Follow(trace.time, values.get("load"), values.get("velocity"))
+    return Follow(even_times(trace.time), values.get("load"), values.get("velocity"))

@@ -27,6 +27,7 @@ CHECKED = frozenset(
         "infinite",
         "nan",
         "repeated time",
+        "rounded time",
         "saturation",
         "spike",
         "uneven sampling",
@@ -45,9 +46,10 @@ def check(trace: Trace) -> tuple[Finding, ...]:
     Returns
     -------
     tuple of Finding
-        ``"backward time"``, ``"repeated time"``, ``"gap"``, ``"uneven sampling"``, ``"nan"``,
-        ``"infinite"``, ``"constant"``, ``"spike"`` and ``"saturation"``; at most one of a name for
-        time and for each channel. Empty when nothing was found.
+        ``"backward time"``, ``"repeated time"``, ``"rounded time"``, ``"gap"``,
+        ``"uneven sampling"``, ``"nan"``, ``"infinite"``, ``"constant"``, ``"spike"`` and
+        ``"saturation"``; at most one of a name for time and for each channel. Empty when nothing
+        was found.
 
     Notes
     -----

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 #: Findings on time, which belong to no channel.
-_OF_TIME = frozenset({"backward time", "repeated time", "gap", "uneven sampling"})
+_OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
 
 
 def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from asperity.errors import printable
+from asperity.errors import InputError, printable
 
 Severity = Literal["note", "warning", "error"]
+
+#: Findings on a file whose columns are not all that was recorded, or not under their names.
+_COLUMNS = frozenset(
+    {"truncated", "damaged", "heading mismatch", "other length", "short column", "text column"}
+)
 
 
 @dataclass(frozen=True)
@@ -43,3 +49,17 @@ class Finding:
 
     def __str__(self) -> str:
         return f"{self.severity}: {self.name} ({self.where}): {self.sentence}"
+
+
+def with_cause(error: InputError, findings: Iterable[Finding]) -> InputError:
+    """An error about a column that is not in a file, with what is wrong with the file's columns.
+
+    Parameters
+    ----------
+    error : InputError
+        It stays as it is where nothing is wrong with them.
+    findings : iterable of Finding
+        What the reader noticed.
+    """
+    said = [f.sentence.rstrip(".") for f in findings if f.name in _COLUMNS]
+    return InputError(f"{error} ({'; '.join(said)})") if said else error

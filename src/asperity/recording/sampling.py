@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.recording.finding import Finding
+from asperity.recording.rounded_time import RoundedGrid, rounded_grid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -25,7 +26,7 @@ _CHUNK = 100_000
 
 
 def even_rate(time: Array) -> float | None:
-    """Samples per second where all steps agree within 1 % or one digit of the stamps, else None.
+    """Samples per second where all steps agree within 1 % or are even but for rounding, else None.
 
     Parameters
     ----------
@@ -41,9 +42,10 @@ def even_rate(time: Array) -> float | None:
         return None
     steps = np.diff(time)
     # Written so that NaN is uneven.
-    if not steps.min() > 0 or not _are_even(steps, time):
-        return None
-    return float((time.size - 1) / (time[-1] - time[0]))
+    if steps.min() > 0 and _are_even(steps, time):
+        return float((time.size - 1) / (time[-1] - time[0]))
+    grid = rounded_grid(time)
+    return None if grid is None or grid.gaps else 1 / grid.step
 
 
 def check_sampling(time: Array) -> list[Finding]:
@@ -57,7 +59,14 @@ def check_sampling(time: Array) -> list[Finding]:
         # The usual case: as even as the sharpest measure asks, so that no median is needed.
         return []
     rows = np.flatnonzero(np.isfinite(time))
-    found = _backward_and_repeated(steps, clean, rows)
+    grid = rounded_grid(time)
+    rounded: list[Finding] = []
+    if grid is not None:
+        clean = grid.time
+        steps = np.diff(clean)
+        if grid.quantum > _EVEN * grid.step:
+            rounded = [_rounded(grid)]
+    found = rounded + _backward_and_repeated(steps, clean, rows)
     forward = steps > 0
     steps, starts = (steps, rows) if forward.all() else (steps[forward], rows[:-1][forward])
     if not steps.size:
@@ -156,6 +165,17 @@ def _uneven(steps: Array, starts: NDArray[np.intp], time: Array) -> Finding:
         f"time, row {row}, t = {time[row]:.10g} s",
         f"Steps of time run from {steps.min():.4g} s to {steps.max():.4g} s with a median of "
         f"{median:.4g} s; there is no one sampling rate.",
+    )
+
+
+def _rounded(grid: RoundedGrid) -> Finding:
+    return Finding(
+        "rounded time",
+        "note",
+        grid.quantum / grid.step,
+        "time",
+        f"Time stamps are rounded to {grid.quantum:.3g} s; they were read as the even grid that "
+        f"they stand for, of {1 / grid.step:.8g} samples per second.",
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from asperity.errors import InputError, listed
 from asperity.parameters.display import Displayed, SummaryLine, count_text, number_line
 from asperity.recording.checks import CHECKED, check, even_rate
-from asperity.recording.finding import Finding
+from asperity.recording.finding import Finding, with_cause
 from asperity.recording.roles import find_channel
 from asperity.units import from_si, to_si
 
@@ -120,13 +120,17 @@ class Trace(Displayed):
         Raises
         ------
         InputError
-            If no channel, or more than one, can be meant; the message names them.
+            If no channel, or more than one, can be meant; the message names them, and says what is
+            wrong with the columns of the file.
         """
         recorded = [c for c in self.channels.values() if c.recorded_name == name]
         if len(recorded) == 1 and name not in self.channels:
             return recorded[0]
         kinds = {key: c.kind for key, c in self.channels.items()}
-        return self.channels[find_channel(name, kinds, self.roles)]
+        try:
+            return self.channels[find_channel(name, kinds, self.roles)]
+        except InputError as error:
+            raise with_cause(error, self.findings) from None
 
     @property
     def sample_rate(self) -> float | None:

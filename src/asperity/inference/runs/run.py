@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -18,10 +18,12 @@ from scipy.stats import norm
 from asperity.errors import InputError
 from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.velocities import constant_velocities
+from asperity.measurement.channels import compressive, load_channel, shear_channel
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.readers import read
+from asperity.recording.rounded_time import even_times
 
 Float = NDArray[np.float64]
 
@@ -195,6 +197,7 @@ def recorded_run(
         is not positive.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
+    trace = replace(trace, time=even_times(trace.time))
     shown = name or str(trace.provenance.get("file", "") or "run")
     shown = Path(shown).stem if name is None else name
     signals = sliding_signals(trace, load, force, window)
@@ -211,7 +214,8 @@ def recorded_run(
         [0.0, *cut_times, times[-1]],
         np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
     )
-    doubts += clipped(trace, force, window)
+    doubts += [finding.sentence for finding in signals.signs]
+    doubts += clipped(trace, load, force, window)
     doubts += strange_friction(friction)
     if signals.left_out:
         doubts.append(
@@ -248,13 +252,13 @@ def _cut_uncertainty(time: Float, cuts: Sequence[Cut]) -> tuple[float, ...]:
     return tuple(uncertain)
 
 
-def clipped(trace: Trace, force: str, window: tuple[float, float] | None) -> list[str]:
+def clipped(trace: Trace, load: str, force: str, window: tuple[float, float] | None) -> list[str]:
     """A sentence on a gauge at the end of its range: too many equal samples in a row there.
 
     Parameters
     ----------
     trace : Trace
-    force : str
+    load, force : str
     window : (float, float), optional
 
     Notes
@@ -262,10 +266,7 @@ def clipped(trace: Trace, force: str, window: tuple[float, float] | None) -> lis
     How many are too many follows from how often neighbours are equal elsewhere, which they are in
     a recording of coarse resolution. A recording that begins or ends at its extreme is at rest.
     """
-    try:
-        values = trace.channel(force).values
-    except InputError:
-        values = trace.channel("friction").values
+    values = shear_channel(trace, force, load_channel(trace, load))[0].values
     low, high = window or (-np.inf, np.inf)
     use = (trace.time >= low) & (trace.time <= high) & np.isfinite(values)
     time, y = trace.time[use], values[use]
@@ -337,7 +338,7 @@ def _load(
         return 1.0, "", False, ends, np.ones(2)
     good = np.isfinite(channel.values) & np.isfinite(trace.time)
     good &= (trace.time >= time[0]) & (trace.time <= time[-1])
-    t, W = trace.time[good], channel.values[good]
+    t, W = trace.time[good], compressive(channel.values[good], channel.values[good])[0]
     if t.size < 2:
         return 1.0, "", False, ends, np.ones(2)
     if not (W > 0).all():

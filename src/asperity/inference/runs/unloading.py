@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,12 @@ from numpy.typing import NDArray
 from asperity.errors import InputError
 from asperity.inference.runs.noise import fitted
 from asperity.inference.unknowns import Prior
+from asperity.measurement.channels import compressive
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
 from asperity.recording.readers import read
+from asperity.recording.rounded_time import even_times
 
 Float = NDArray[np.float64]
 
@@ -118,6 +120,7 @@ def measured_stiffness(
     compliance that is measured is 1/K + lambda/W, machine and contact in series.
     """
     trace = recording if isinstance(recording, Trace) else read(recording)
+    trace = replace(trace, time=even_times(trace.time))
     low, high = span
     if not low < high:
         raise InputError(
@@ -195,7 +198,8 @@ def _load(trace: Trace, load: str, time: Float, unit: str) -> tuple[Float, str]:
     if not good.any():
         return np.ones_like(time), ""
     order = np.argsort(trace.time[good], kind="stable")
-    W = np.interp(time, trace.time[good][order], channel.values[good][order])
+    borne = compressive(channel.values[good], channel.values[good])[0]
+    W = np.interp(time, trace.time[good][order], borne[order])
     if not (W > 0).all():
         raise InputError(
             f"span must be under a positive load, got {W.min():.4g} {unit}; give another one"

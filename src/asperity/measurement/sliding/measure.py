@@ -206,7 +206,7 @@ def measure_sliding(
         doubts.append(f"no segments without motion: {signals.no_motion}")
     checks = _checks(signals, segments, read_steps, doubts)
     about = about_channels(trace, signals.names)
-    checks += findings(list(about), len(trace), float(time[-1] - time[0]))
+    checks += findings([*about, *signals.signs], len(trace), float(time[-1] - time[0]))
     borne = signals.load
     return SlidingMeasurement(
         friction=mean_level(time, friction),

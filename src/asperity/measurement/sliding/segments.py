@@ -17,6 +17,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+#: Parts of a recording of which a quarter is quiet, and spans of the longest difference in a part.
+_QUIET_PARTS, _PER_PART = 16, 6
 #: Slip of a cell, in standard deviations of the displacement's noise; 12 tell its velocity to 12 %.
 _CELL_NOISE = 12.0
 _CELLS = 4000
@@ -118,8 +120,9 @@ def partition(time: Array, displacement: Array | None, friction: Array) -> Parti
     pieces = list(pairwise([0, *(c.sample for c in cuts), time.size]))
     speeds = [_velocity(time, displacement, *p) for p in pieces]
     doubts = settled + _small_changes(time, pieces, speeds)
-    holds, unsure = _holds(time, displacement, pieces, speeds, noise)
+    # What moves by no more than noise is a stop, however slow the pieces next to it are.
     speeds = _without_rounding(time, pieces, speeds, noise)
+    holds, unsure = _holds(time, displacement, pieces, speeds, noise)
     return Partition(tuple(cuts), tuple(speeds), tuple(holds), tuple(doubts + unsure))
 
 
@@ -149,18 +152,38 @@ def displacement_noise(time: Array, displacement: Array) -> float:
     """Standard deviation of a displacement's noise (m), its resolution included.
 
     From second differences at even steps of time, which velocity does not touch and its changes
-    hardly.
+    hardly. Noise of a gauge is correlated over many samples, hums and wanders: neighbours are
+    nearer to each other than samples far apart. Differences are therefore taken over 1, 2, 4, ...
+    samples, and the largest counts, each in the quietest parts of the recording, where the motion
+    is even or rests.
     """
-    steps = np.diff(time)
-    even = np.abs(steps[1:] - steps[:-1]) < 0.05 * steps[1:]
-    second = np.diff(displacement, 2)[even]
     moved = np.abs(np.diff(displacement))
     smallest = float(moved[moved > 0].min()) if moved.any() else 0.0
-    spread = float(np.median(np.abs(second))) * 1.4826 / np.sqrt(6) if second.size else 0.0
+    spread, lag = 0.0, 1
+    while True:
+        spread = max(spread, _spread_over(time, displacement, lag))
+        lag *= 2
+        if lag * _QUIET_PARTS * _PER_PART > time.size:
+            break
     # Of a coarse recorder most differences are zero: its step is the noise.
     stands = moved.size and float(np.mean(moved == 0)) > 0.2
     floor = 1e-9 * float(np.ptp(displacement)) + 1e-300
     return max(spread, smallest / np.sqrt(12) if stands else 0.0, floor)
+
+
+def _spread_over(time: Array, displacement: Array, lag: int) -> float:
+    """Standard deviation of samples so far apart about even motion, in the quietest parts."""
+    t, x = (values[:: max(1, lag // 4)] for values in (time, displacement))
+    k = min(lag, 4)
+    if t.size <= 2 * k:
+        return 0.0
+    before, after = t[k:-k] - t[: -2 * k], t[2 * k :] - t[k:-k]
+    second = np.abs(x[2 * k :] - 2 * x[k:-k] + x[: -2 * k])[np.abs(after - before) < 0.05 * after]
+    if not second.size:
+        return 0.0
+    parts = np.array_split(second, max(1, min(_QUIET_PARTS, second.size // (4 * _PER_PART))))
+    usual = np.sort([np.median(part) for part in parts])
+    return float(usual[usual.size // 4]) * 1.4826 / np.sqrt(6)
 
 
 def _cells(time: Array, displacement: Array, noise: float) -> NDArray[np.intp]:
@@ -257,6 +280,7 @@ def _without_transitions(
             continue
         ratios = np.array([_log_ratio(a, b) for a, b in pairwise(speeds)])
         ratios[_of_ripple(ratios, path)] = 0.0
+        ratios[_of_one_stop(np.array(speeds), duration, noise)] = 0.0
         least = int(np.argmin(ratios))
         if ratios[least] >= np.log(_RATIO):
             break
@@ -271,6 +295,22 @@ def _of_ripple(ratios: Array, path: Array) -> NDArray[np.bool_]:
     group = np.concatenate([[0], np.cumsum(~unclear)])
     share = path / np.maximum(np.bincount(group, path)[group], 1e-300)
     return np.asarray(unclear & (np.minimum(share[1:], share[:-1]) < _RIPPLE))
+
+
+def _of_one_stop(speeds: Array, duration: Array, noise: float) -> NDArray[np.bool_]:
+    """Changes within one stop: noise moves both pieces, or a gauge that wanders to and fro.
+
+    What wanders is slow as a hold is: the next faster pieces on both sides say.
+    """
+    speed = np.abs(speeds)
+    still = speed * duration <= 2 * _STILL * noise
+    one = still[1:] & still[:-1]
+    for k in np.flatnonzero((still[1:] | still[:-1] | (speeds[1:] * speeds[:-1] < 0)) & ~one):
+        fastest = max(speed[k], speed[k + 1])
+        sides = (side[side > fastest] for side in (speed[:k][::-1], speed[k + 2 :]))
+        faster = [float(side[0]) for side in sides if side.size]
+        one[k] = bool(faster) and fastest < _HOLD * min(faster)
+    return np.asarray(one)
 
 
 def _share_of_ramp(

@@ -10,9 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
+from asperity.measurement.channels import (
+    compressive,
+    load_channel,
+    refuse_contradiction,
+    shear_channel,
+)
 from asperity.recording.roles import candidates, words
+from asperity.recording.rounded_time import even_times
 
 if TYPE_CHECKING:
+    from asperity.recording.finding import Finding
     from asperity.recording.trace import Channel, Trace
 
 Array = NDArray[np.float64]
@@ -35,7 +43,7 @@ class SlidingSignals:
     displacement : array, (n,), or None
         Metres, as recorded or as the integral of the velocity; None where neither is recorded.
     load : array, (m,), or None
-        Load at the samples where it is a number.
+        Load at the samples where it is a number, positive in compression.
     load_unit : str
         SI unit of the load.
     motion : str
@@ -45,7 +53,9 @@ class SlidingSignals:
     names : tuple of str
         Channels that were read.
     turned : bool
-        Whether the recorded friction was multiplied by -1.
+        Whether the friction was multiplied by -1.
+    signs : tuple of Finding
+        What is read with another sign than recorded, besides the friction.
     left_out : int
         Samples within the window at which something is no number or time does not go on.
     """
@@ -59,6 +69,7 @@ class SlidingSignals:
     no_motion: str
     names: tuple[str, ...]
     turned: bool
+    signs: tuple[Finding, ...]
     left_out: int
 
 
@@ -82,13 +93,13 @@ def sliding_signals(
     """
     if window is not None:
         _check_window(window, trace)
-    friction, weight, unit, read = _friction(trace, load, force)
+    friction, weight, unit, read, signs = _friction(trace, load, force)
     moved, is_velocity, no_motion = _motion(trace)
     motion = None if moved is None else moved.values
     read = [*read, *([] if moved is None else [moved])]
     names = tuple(key for key, c in trace.channels.items() if any(c is used for used in read))
     name = "" if moved is None else moved.recorded_name or names[-1]
-    time = trace.time
+    time = even_times(trace.time)
     use = np.isfinite(time) & np.isfinite(friction)
     if motion is not None:
         use &= np.isfinite(motion)
@@ -122,6 +133,7 @@ def sliding_signals(
         no_motion=no_motion,
         names=names,
         turned=turned,
+        signs=tuple(signs),
         left_out=left_out,
     )
 
@@ -136,39 +148,30 @@ def _check_window(window: tuple[float, float], trace: Trace) -> None:
 
 def _friction(
     trace: Trace, load: str, force: str
-) -> tuple[Array, Array | None, str, list[Channel]]:
-    """Friction, load, the load's unit, and the channels that they come from."""
-    weight, unit = None, ""
-    read: list[Channel] = []
-    try:
-        W = trace.channel(load)
-        weight, unit, read = W.values, W.unit, [W]
-    except InputError as missing:
-        if load != "W":
-            raise
-        no_load = missing
-    try:
-        F = trace.channel(force)
-    except InputError as missing:
-        if force != "F":
-            raise
-        try:
-            friction = trace.channel("friction")
-            return friction.values, weight, unit, [*read, friction]
-        except InputError:
-            raise missing from None
-    if F.kind == "dimensionless":
-        return F.values, weight, unit, [*read, F]
-    if weight is None:
-        raise no_load
-    if trace.channel(load).kind != F.kind:
-        raise InputError(
-            f"measure.force must have the dimension of the load, got '{F.unit}' for '{force}' and "
-            f"'{unit}' for '{load}'; name the units when reading"
-        )
+) -> tuple[Array, Array | None, str, list[Channel], list[Finding]]:
+    """Friction, load, the load's unit, the channels that they come from, and what was turned."""
+    W = load_channel(trace, load)
+    F, is_friction = shear_channel(trace, force, W)
+    if W is None:
+        if not is_friction:
+            # It raises, and says which columns there are.
+            trace.channel(load)
+        return F.values, None, "", [F], []
+    unit, read = W.unit, [W, F]
     # NaN where undefined; the caller leaves these samples out.
     with np.errstate(invalid="ignore", over="ignore"):
-        return F.values / np.where(weight == 0, np.nan, weight), weight, unit, [*read, F]
+        if is_friction:
+            borne, _, turned = compressive(W.values, F.values * W.values)
+            return F.values, borne, unit, read, turned
+        if W.kind != F.kind:
+            raise InputError(
+                f"measure.force must have the dimension of the load, got '{F.unit}' for '{force}' "
+                f"and '{unit}' for '{load}'; name the units when reading"
+            )
+        borne, shear, turned = compressive(W.values, F.values)
+        friction = shear / np.where(borne == 0, np.nan, borne)
+    refuse_contradiction(trace, force, F, friction)
+    return friction, borne, unit, read, turned
 
 
 def _motion(trace: Trace) -> tuple[Channel | None, bool, str]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from asperity.errors import InputError, closest, listed, printable
 from asperity.recording.checks import check
-from asperity.recording.finding import Finding
+from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
 from asperity.recording.readers.labels import split_labels
 from asperity.recording.readers.raw import refuse_truncated
@@ -46,20 +46,23 @@ def assemble(
     names = _unique([printable(name, _LONGEST_NAME) for name, _ in split], findings)
     texts = dict(zip(names, map(_unit_text, recorded.columns, split), strict=True))
     labels = {c.label: name for c, name in zip(recorded.columns, names, strict=True)}
-    roles = _chosen_roles(columns or {}, names, labels)
-    known = _known_units(texts, _by_name(units or {}, names, labels, roles), findings)
+    try:
+        roles = _chosen_roles(columns or {}, names, labels)
+        given = _by_name(units or {}, names, labels, roles)
+    except InputError as error:
+        raise with_cause(error, findings) from None
+    known = _known_units(texts, given, findings)
     _check_kinds(roles, known)
     values = {name: c.values for name, c in zip(names, recorded.columns, strict=True)}
     numbers = {name: v for name, v in values.items() if v.dtype.kind in "iufb"}
     try:
         clock = settle_time(values, known, roles, rate, recorded)
-    except InputError:
+    except InputError as error:
+        refused = error
         if any(f.name == "truncated" for f in findings) and "time" not in roles:
             left = listed(map(repr, names))
-            raise refuse_truncated(
-                path, f"which is cut so that no time but {left} is left"
-            ) from None
-        raise
+            refused = refuse_truncated(path, f"which is cut so that no time but {left} is left")
+        raise with_cause(refused, findings) from None
     findings += clock.findings
     dropped = [n for n in names if n not in numbers and n != clock.column]
     if dropped:

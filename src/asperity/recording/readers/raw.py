@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.errors import InputError, closest
-from asperity.recording.finding import Finding
+from asperity.recording.finding import Finding, with_cause
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -105,7 +105,10 @@ def unit_of(attributes: Mapping[str, Any]) -> str | None:
 
 
 def one_table(
-    groups: Mapping[str, list[RawColumn]], path: Path, chosen: str | None
+    groups: Mapping[str, list[RawColumn]],
+    path: Path,
+    chosen: str | None,
+    noticed: Sequence[Finding] = (),
 ) -> tuple[list[RawColumn], list[Finding]]:
     """The columns of one length that make the recording, and what was left out of it.
 
@@ -117,6 +120,8 @@ def one_table(
         The file, for messages.
     chosen : str or None
         The group to read; without it all, if their longest columns are of one length.
+    noticed : sequence of Finding
+        What is wrong with the file: a cut is why columns are missing.
 
     Raises
     ------
@@ -124,13 +129,16 @@ def one_table(
         If there is nothing to read, or more than one recording.
     """
     filled = {name: columns for name, columns in groups.items() if columns}
+    if not filled and any(f.name in ("truncated", "damaged") for f in noticed):
+        raise with_cause(refuse_truncated(path, "of which no column is left"), noticed)
     if chosen is not None:
         wanted = chosen.strip("/")
         if wanted not in filled:
-            raise InputError(
+            refused = InputError(
                 f"read.group must be a group with columns, got '{chosen}'; "
                 + (closest(wanted, filled) if filled else f"'{path.name}' has none")
             )
+            raise with_cause(refused, noticed)
         filled = {wanted: filled[wanted]}
     if not filled:
         raise InputError(

@@ -56,7 +56,7 @@ def load(path: Path, group: str | None = None) -> RawRecording:
     if missing:
         groups, finding = _whole_rows(path, groups, missing)
         findings.append(finding)
-    columns, left_out = one_table(groups, path, group)
+    columns, left_out = one_table(groups, path, group, findings)
     used = channels[group.strip("/")] if group else [c for f in channels.values() for c in f]
     start, step = _clock([c.properties for c in used], path)
     provenance = {

@@ -45,7 +45,7 @@ def load(path: Path, group: str | None = None) -> RawRecording:
     groups: dict[str, list[RawColumn]] = {}
     steps: list[float | None] = []
     _visit({k: v for k, v in variables.items() if not k.startswith("__")}, "", groups, steps)
-    columns, left_out = one_table(groups, path, group)
+    columns, left_out = one_table(groups, path, group, findings)
     step = next((s for s in steps if s is not None), None)
     provenance = {"format": "matlab 5", "group": group or ""}
     return RawRecording(columns, findings + left_out, provenance, step=step)
