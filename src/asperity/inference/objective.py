@@ -119,7 +119,9 @@ class DataTerm(Protocol):
         """Try the slower method at every call."""
         ...
 
-    def warnings(self, residuals: Residuals, information: Float) -> Sequence[str]:
+    def warnings(
+        self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
+    ) -> Sequence[str]:
         """What a reader must know of these data.
 
         Parameters
@@ -128,6 +130,8 @@ class DataTerm(Protocol):
             At the estimate.
         information : array, shape (coordinates, coordinates)
             Of all data and priors there.
+        outliers : sequence of int
+            Rows of a table without which the law describes it.
         """
         ...
 
@@ -156,7 +160,8 @@ class Objective:
     fixed: Mapping[str, Any]
     tolerance: float = 1e-10
     unsolved: int = field(default=0, init=False, repr=False)
-    _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, repr=False)
+    # Of this objective alone: `dataclasses.replace` leaves it out.
+    _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, init=False, repr=False)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -19,7 +19,6 @@ from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.residuals import residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import (
@@ -30,6 +29,7 @@ from asperity.inference.tables.term import (
 )
 from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law, registered
+from asperity.materials import Material
 from asperity.parameters import law_parameters
 
 #: Called with how many laws are done, parts of one included.
@@ -171,10 +171,11 @@ def compare(
         )
         for name in dict.fromkeys(laws)
     }
+    # Each law takes its part of these; an empty mapping and None are one thing, no numbers.
     given = {
-        key: options.pop(key)
+        key: options.pop(key, None) or {}
         for key in ("fixed", "start", "prior")
-        if options.get(key) and isinstance(options[key], Mapping)
+        if not isinstance(options.get(key), Material)
     }
     not_compared: dict[str, str] = {}
 
@@ -271,11 +272,7 @@ def _freed(found: Comparison) -> str:
 
 def _common_outliers(fits: Mapping[str, Fit]) -> list[int]:
     """Rows without which some law describes the data: the fewest that do."""
-    lists = [
-        outlying_rows(f.residuals[0])
-        for f in fits.values()
-        if f.converged and len(f.residuals) == 1 and isinstance(f.objective.terms[0], LockInTerm)
-    ]
+    lists = [list(f.outliers) for f in fits.values() if f.converged and len(f.residuals) == 1]
     if not lists or any(
         f.converged and (f.dof <= 0 or f.p_value >= _DESCRIBED) for f in fits.values()
     ):

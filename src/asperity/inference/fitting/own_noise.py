@@ -33,7 +33,7 @@ def under_drift(objective: Objective) -> Objective:
     for term in terms:
         if isinstance(term, RunTerm):
             term.expect_slow_noise()
-    return replace(objective, terms=terms, _last=None)
+    return replace(objective, terms=terms)
 
 
 def with_noise(

@@ -82,6 +82,9 @@ class Fit(Displayed):
     warnings : tuple of str
     objective : Objective
         Data, law and free parameters: the function that was minimised.
+    outliers : tuple of int
+        Rows of the table without which the law describes it, from 0; at most a tenth of them, or
+        two of eight and more.
     """
 
     law: str
@@ -101,6 +104,7 @@ class Fit(Displayed):
     optima: tuple[Optimum, ...]
     warnings: tuple[str, ...]
     objective: Objective
+    outliers: tuple[int, ...] = ()
 
     @property
     def values(self) -> dict[str, float]:

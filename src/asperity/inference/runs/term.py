@@ -460,7 +460,9 @@ class RunTerm:
             return np.full(self.run.time.size, np.nan)
         return np.asarray(self.run.friction + raw[0] + self._columns @ self._coefficients(raw[0]))
 
-    def warnings(self, residuals: Residuals, information: Float) -> list[str]:
+    def warnings(
+        self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
+    ) -> list[str]:
         """What the residual says about the noise."""
         said = []
         if self._whiteness < _NOT_WHITE:
