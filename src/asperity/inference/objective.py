@@ -176,6 +176,33 @@ class Objective:
         """Coordinates of values by name."""
         return np.array([float(k.to_coordinate(values[k.name])) for k in self.unknowns])
 
+    def ordered(self, u: Float) -> Float:
+        """The same point with parameters that the law may exchange by rising first ones.
+
+        As it is where they are not all free, differ in their priors, or cannot have each other's
+        values.
+        """
+        sets = self.law.exchangeable
+        known = {k.name: k for k in self.unknowns}
+        if not sets or not all(n in known for names in sets for n in names):
+            return u
+        same = [zip(sets[0], names, strict=True) for names in sets[1:]]
+        if any(known[a].prior != known[b].prior for pairs in same for a, b in pairs):
+            return u
+        values = self.named(u)
+        ranked = sorted(sets, key=lambda names: values[names[0]])
+        moved = values | {
+            new: values[old]
+            for names, others in zip(sets, ranked, strict=True)
+            for new, old in zip(names, others, strict=True)
+        }
+        changed = [n for names in sets for n in names]
+        if any(moved[n] <= 0 and known[n].logarithmic for n in changed):
+            return u
+        found = self.coordinates(moved)
+        low, high = np.array([k.bounds for k in self.unknowns]).T
+        return found if ((found >= low) & (found <= high)).all() else u
+
     def data_residuals(self, u: Float, *, search: bool | None = None) -> list[Residuals] | None:
         """Residuals of each term, with the Jacobian to the coordinates; None without a solution."""
         values = self.named(u)

@@ -143,7 +143,8 @@ def compare(
     -----
     The rule, fixed beforehand: a law is excluded if its chi-squared has a probability below 0.001
     while that of another law has not and its AICc is lower by 4 or more, or if its AICc exceeds
-    the lowest by 10 or more. If no law describes the data, their uncertainties may be too small:
+    the lowest by 10 or more. Of recordings, whose noise is estimated from what the law leaves, the
+    second alone counts. If no law describes the data, their uncertainties may be too small:
     chi-squared is divided by that of the best law per degree of freedom before the second
     comparison; and the simplest law that would describe a table with another stiffness than the
     given one is named with it. Rows that alone keep every law from describing the data are left
@@ -382,6 +383,14 @@ def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
 def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:
     if found is best:
         return False, ""
+    behind = found.aicc - best.aicc
+    if not found.judged_by_chi2:
+        if behind < LARGEST_AICC_DIFFERENCE:
+            return False, ""
+        return True, (
+            f"its log-likelihood is {best.log_likelihood - found.log_likelihood:.4g} lower than "
+            f"that of {best.law}, noise included, and its AICc {behind:.4g} above"
+        )
     worst = max(
         found.observables,
         key=lambda n: found.observables[n][0] - best.observables.get(n, (0.0, 0))[0],
@@ -391,7 +400,6 @@ def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple
         f"the worst observable is {worst} with chi-squared {chi2:.4g} for {n} data, where "
         f"{best.law} has {rival:.4g}"
     )
-    behind = found.aicc - best.aicc
     misfit = found.dof > 0 and found.p_value < _IMPOSSIBLE
     if misfit and describes and behind >= _AS_GOOD:
         return True, (

@@ -12,7 +12,7 @@ from scipy.stats import chi2 as chi_squared
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from asperity.inference.fitting.intervals import LEVELS, bounded_interval
+from asperity.inference.fitting.intervals import LEVELS, Interval, bounded_interval
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.parabola import (
     UNDETERMINED,
@@ -26,6 +26,7 @@ from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
 from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.term import LockInTerm, any_searched
+from asperity.inference.unknowns import Unknown
 
 Float = NDArray[np.float64]
 
@@ -103,6 +104,8 @@ def described_fit(
     described : callable, optional
         Called with the number of parameters whose intervals are known so far.
     """
+    # Those that differ in the order of exchangeable parameters are one.
+    minima = [(objective.ordered(u), value) for u, value in minima]
     at = parabola_of(objective, *minima[0])
     if at is None:
         return _fit_at_the_next(objective, minima, profile=profile, described=described)
@@ -220,8 +223,23 @@ def _ends(
             ends.append((low, high))
         else:
             sd = wider * float(at.sd[i])
-            ends.append(bounded_interval(at.unbounded[i], sd, level, low, high))
+            ends.append(_normal(objective.unknowns[i], at, i, sd, level))
     return ends
+
+
+def _normal(unknown: Unknown, at: Parabola, i: int, sd: float, level: float) -> Interval:
+    """An interval of the normal approximation, which holds the estimate.
+
+    Where it leaves the range in which the parameter is looked for, the data do not bound it.
+    """
+    low, high = unknown.bounds
+    u = float(at.u[i])
+    begin, end = bounded_interval(float(at.unbounded[i]), sd, level, low, high)
+    begin, end = min(begin, u), max(end, u)
+    if unknown.nuisance:
+        return begin, end
+    first, last = unknown.range_about(u, float(at.sd[i]))
+    return low if begin < first else begin, high if end > last else end
 
 
 def _estimate(

@@ -19,7 +19,10 @@ def fit_record(found: Fit) -> dict[str, Any]:
         "law": found.law,
         "converged": found.converged,
         "message": found.message,
-        "parameters": {name: _estimate(p) for name, p in found.parameters.items()},
+        "parameters": {
+            name: {**_estimate(p), "determined": name not in found.undetermined}
+            for name, p in found.parameters.items()
+        },
         "fixed": _fixed(found),
         "correlation": {
             "names": list(found.parameters),

@@ -107,6 +107,15 @@ class Fit(Displayed):
     outliers: tuple[int, ...] = ()
 
     @property
+    def judged_by_chi2(self) -> bool:
+        """Whether chi-squared judges the law.
+
+        It does not where all noise is estimated from what the law leaves, as that of recordings is:
+        the likelihood, noise included, then compares laws.
+        """
+        return any(term.profiled == 0 for term in self.objective.terms)
+
+    @property
     def values(self) -> dict[str, float]:
         """Estimates by name, in SI."""
         return {name: p.value for name, p in self.parameters.items()}
