@@ -117,7 +117,7 @@ def _estimates(fits: Mapping[str, Fit]) -> str:
             UNDETERMINED if name in own.undetermined else "",
         )
         for law, own in fits.items()
-        for name, p in own.parameters.items()
+        for name, p in {**own.parameters, **own.over_load}.items()
     ]
     warned = "".join(
         f"<li>{escape(law)}: {escape(said)}</li>"

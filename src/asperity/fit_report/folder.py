@@ -139,7 +139,7 @@ def _estimates(found: Fit) -> str:
             p.unit,
             UNDETERMINED if n in found.undetermined else "",
         )
-        for n, p in found.parameters.items()
+        for n, p in {**found.parameters, **found.over_load}.items()
     ]
     return table(("", "estimate", "standard error", "68 %", "95 %", "unit", ""), rows)
 

@@ -193,7 +193,7 @@ def fit_text(found: Fit) -> str:
     if not found.converged:
         return f"{found.law}: {found.message}"
     rows = [("", "estimate", "std. error", "95 % interval", "", "")]
-    for name, p in found.parameters.items():
+    for name, p in {**found.parameters, **found.over_load}.items():
         notes = "at its bound" if p.at_bound else ""
         if name in found.undetermined:
             notes = "not determined by these data"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection
 from functools import partial
 
@@ -51,35 +52,39 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
     """
     rows = np.unique(residuals.row[residuals.row >= 0])
     most = max(1, int(_SHARE * rows.size), min(2, rows.size // (1 + _OTHERS_EACH)))
-    if _described(residuals, ()):
+    if not _p_value(residuals, ()) < _DESCRIBED:
         return []
     refit = refit or partial(_linear_refit, residuals)
-    now: Residuals | None = residuals
-    for _ in range(_REWEIGHTED):
-        now = refit(np.maximum(_distances(now), 1.0) ** -0.5)
-        if now is None:
-            return []
-    out: set[int] = set()
-    for _ in range(_CONCENTRATED):
-        farthest = set(rows[np.argsort(-_distances(now)[rows])[:most]].tolist())
-        if farthest == out:
-            break
-        out = farthest
-        now = refit(_without(residuals, out))
-        if now is None:
-            return []
-    while out:
-        chance = {row: _chance(now, row, out) * rows.size for row in out}
-        near = {row for row in out if chance[row] > _CHANCE}
-        if not near:
-            break
-        out -= near
-        now = refit(_without(residuals, out))
-        if now is None:
-            return []
-    if not _described(now, out):
+
+    def fitted(weights: Float) -> Residuals:
+        found = refit(weights)
+        if found is None:
+            raise _NoFitError
+        return found
+
+    try:
+        now = residuals
+        for _ in range(_REWEIGHTED):
+            now = fitted(np.maximum(_distances(now), 1.0) ** -0.5)
+        out: set[int] = set()
+        for _ in range(_CONCENTRATED):
+            farthest = set(rows[np.argsort(-_distances(now)[rows])[:most]].tolist())
+            if farthest == out:
+                break
+            out = farthest
+            now = fitted(_without(residuals, out))
+        while near := {row for row in out if _chance(now, row, out) * rows.size > _CHANCE}:
+            out -= near
+            now = fitted(_without(residuals, out))
+    except _NoFitError:
+        return []
+    if not _p_value(now, out) >= _DESCRIBED:
         return []
     return sorted(out, key=lambda row: -_distances(now)[row])
+
+
+class _NoFitError(Exception):
+    """The law has no solution with the rows that are left."""
 
 
 def _linear_refit(residuals: Residuals, weights: Float) -> Residuals | None:
@@ -108,11 +113,11 @@ def _without(residuals: Residuals, out: Collection[int]) -> Float:
     return weights
 
 
-def _described(residuals: Residuals, out: Collection[int]) -> bool:
-    """Whether chi-squared of the rows that are kept is as it should be."""
+def _p_value(residuals: Residuals, out: Collection[int]) -> float:
+    """Probability of chi-squared of the rows that are kept; NaN without degrees of freedom."""
     kept = ~np.isin(residuals.row, list(out))
     dof = int(kept.sum()) - int(residuals.jacobian.any(0).sum())
-    return dof <= 0 or float(chi2.sf(np.sum(residuals.values[kept] ** 2), dof)) >= _DESCRIBED
+    return float(chi2.sf(np.sum(residuals.values[kept] ** 2), dof)) if dof > 0 else math.nan
 
 
 def _chance(residuals: Residuals, row: int, out: Collection[int]) -> float:
