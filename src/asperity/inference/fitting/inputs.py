@@ -270,11 +270,19 @@ def require_motion(
 
 
 def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
-    """Refuse fewer data than free parameters."""
+    """Refuse no more data than free parameters; one datum for one parameter is an inversion.
+
+    As many data as parameters have a valley of minima where some of the parameters are not seen,
+    and nothing is left to judge the law by.
+
+    Raises
+    ------
+    InputError
+    """
     count = int(sum(np.isfinite(v).sum() for v in table.values.values()))
     needed = sum(1 for u in unknowns if u.prior is None)
-    if count < max(needed, 1):
+    if count < max(needed + (needed > 1), 1):
         raise InputError(
-            f"{table.name} must hold at least as many data as free parameters, got {count} for "
+            f"{table.name} must hold more data than free parameters, got {count} for "
             f"{len(unknowns)} ({', '.join(u.name for u in unknowns)}); free fewer or measure more"
         )

@@ -20,6 +20,7 @@ from scipy.stats import chi2
 
 from asperity.errors import InputError
 from asperity.laws import registered
+from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
 from asperity.units import to_si
 
@@ -149,6 +150,7 @@ def read_table(path: str | Path, given: Mapping[str, Any] | None = None) -> Lock
         negative, or a row occurs twice.
     """
     path = Path(path)
+    require_rereadable(path, "data")
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError, ValueError) as error:
