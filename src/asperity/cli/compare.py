@@ -49,7 +49,7 @@ def compare(
     from asperity import inference
     from asperity.cli.progress import bar
     from asperity.cli.report import aligned, to_json
-    from asperity.inference.comparison.record import comparison_record
+    from asperity.inference.comparison.record import comparison_record, laws_table
 
     if windows is not None:
         raise InputError(
@@ -69,7 +69,6 @@ def compare(
             progress=lambda done, total: update(round(100 * done / total), 100),
             **options,
         )
-    without = found.not_compared
     if report is not None and any(j.fit.converged for j in found.laws.values()):
         from asperity.fit_report import write_comparison
 
@@ -77,23 +76,7 @@ def compare(
     if as_json:
         click.echo(to_json(comparison_record(found)))
     else:
-        rows = [("law", "chi-squared", "dof", "p", "AICc - lowest", "")]
-        lowest = min((j.fit.aicc for j in found.laws.values() if j.fit.converged), default=0.0)
-        for name, j in found.laws.items():
-            if not j.fit.converged:
-                rows.append((name, "", "", "", "", j.fit.message))
-                continue
-            rows.append(
-                (
-                    name,
-                    f"{j.fit.chi2:.4g}",
-                    str(j.fit.dof),
-                    f"{j.fit.p_value:.2g}",
-                    f"{j.fit.aicc - lowest:.4g}",
-                    "excluded" if j.excluded else "",
-                )
-            )
-        rows += [(name, "", "", "", "", f"not compared: {why}") for name, why in without.items()]
-        click.echo(aligned(rows))
+        head, rows = laws_table(found)
+        click.echo(aligned([head, *rows]))
         click.echo(found.verdict)
     return 0 if all(j.fit.converged for j in found.laws.values()) else 1

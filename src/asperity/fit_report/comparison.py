@@ -3,19 +3,24 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
 from asperity.errors import InputError
 from asperity.fit_report.bands import bands_of
-from asperity.fit_report.folder import RUN_CAPTION, data_tables, material_text, provenance
+from asperity.fit_report.folder import (
+    RUN_CAPTION,
+    UNDETERMINED,
+    data_tables,
+    material_text,
+    provenance,
+)
 from asperity.fit_report.page import document, figure, table
 from asperity.fit_report.pictures import laws_figure, run_figure
 from asperity.inference import Fit
 from asperity.inference.comparison.compare import Comparison
-from asperity.inference.comparison.record import comparison_record
+from asperity.inference.comparison.record import comparison_record, laws_table
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.outputs.folder import written_folder
@@ -63,7 +68,7 @@ def page(found: Comparison, fits: Mapping[str, Fit]) -> str:
     first = next(iter(fits.values()))
     names = " and ".join(term.name for term in first.objective.terms)
     sections = {
-        "Verdict": f"<p>{escape(found.verdict)}</p>" + _laws(found),
+        "Verdict": f"<p>{escape(found.verdict)}</p>" + table(*laws_table(found)),
         "Data and laws": _figures(fits),
         "Estimates": _estimates(fits),
         "Data": data_tables(first),
@@ -72,36 +77,6 @@ def page(found: Comparison, fits: Mapping[str, Fit]) -> str:
         ),
     }
     return document(f"Laws compared on {names}", "A comparison", f"Laws on {names}", sections)
-
-
-def _laws(found: Comparison) -> str:
-    converged = [j.fit.aicc for j in found.laws.values() if j.fit.converged]
-    lowest = min(converged)
-    rows: list[tuple[str, ...]] = []
-    for name, j in found.laws.items():
-        own = j.fit
-        if not own.converged:
-            rows.append((name, "", "", "", "", "", "", own.message))
-            continue
-        evidence = f"{j.evidence.log:.2f}" if j.evidence else ""
-        # Of excluded laws among searched orbits it is the normal approximation's.
-        if j.evidence and math.isfinite(j.evidence.standard_error):
-            evidence += f" +- {j.evidence.standard_error:.2g}"
-        rows.append(
-            (
-                name,
-                f"{own.chi2:.4g}",
-                str(own.dof),
-                f"{own.p_value:.2g}",
-                f"{own.aicc - lowest:.4g}",
-                f"{j.weight:.2g}",
-                evidence,
-                f"excluded: {j.why}" if j.excluded else "",
-            )
-        )
-    rows += [(name, *[""] * 6, f"not compared: {why}") for name, why in found.not_compared.items()]
-    head = ("law", "chi-squared", "dof", "p", "AICc - lowest", "weight", "ln evidence", "")
-    return table(head, rows)
 
 
 def _figures(fits: Mapping[str, Fit]) -> str:
@@ -139,14 +114,15 @@ def _estimates(fits: Mapping[str, Fit]) -> str:
             f"{p.se:.2g}",
             f"{p.interval_95[0]:.5g} to {p.interval_95[1]:.5g}",
             p.unit,
+            UNDETERMINED if name in own.undetermined else "",
         )
         for law, own in fits.items()
-        for name, p in own.parameters.items()
+        for name, p in {**own.parameters, **own.over_load}.items()
     ]
     warned = "".join(
         f"<li>{escape(law)}: {escape(said)}</li>"
         for law, own in fits.items()
         for said in own.warnings
     )
-    found = table(("law", "", "estimate", "standard error", "95 %", "unit"), rows)
+    found = table(("law", "", "estimate", "standard error", "95 %", "unit", ""), rows)
     return found + (f"<ul>{warned}</ul>" if warned else "")

@@ -27,6 +27,8 @@ RUN_CAPTION = (
     "Friction of the recording, thinned where it has many samples, and the motion of the law with "
     "offset and trend of the gauge; below, what is left."
 )
+#: Of a parameter whose numbers say nothing.
+UNDETERMINED = "not determined by these data"
 
 
 def write_report(folder: Path, found: Fit, posterior: Posterior | None = None) -> None:
@@ -112,7 +114,7 @@ def _verdict(found: Fit, posterior: Posterior | None) -> str:
         f"{found.p_value:.3g}: the law {'describes' if good else 'does not describe'} these data "
         "within their uncertainties."
     ]
-    if any(isinstance(term, RunTerm) for term in found.objective.terms):
+    if not found.judged_by_chi2:
         lines = [
             "The noise of a recording is estimated from what the law leaves, so that chi-squared "
             f"does not judge the law; AICc {found.aicc:.6g} compares it with others."
@@ -135,10 +137,11 @@ def _estimates(found: Fit) -> str:
             f"{p.interval_68[0]:.5g} to {p.interval_68[1]:.5g}",
             f"{p.interval_95[0]:.5g} to {p.interval_95[1]:.5g}",
             p.unit,
+            UNDETERMINED if n in found.undetermined else "",
         )
-        for n, p in found.parameters.items()
+        for n, p in {**found.parameters, **found.over_load}.items()
     ]
-    return table(("", "estimate", "standard error", "68 %", "95 %", "unit"), rows)
+    return table(("", "estimate", "standard error", "68 %", "95 %", "unit", ""), rows)
 
 
 def _posterior(found: Posterior) -> str:

@@ -119,7 +119,9 @@ class DataTerm(Protocol):
         """Try the slower method at every call."""
         ...
 
-    def warnings(self, residuals: Residuals, information: Float) -> Sequence[str]:
+    def warnings(
+        self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
+    ) -> Sequence[str]:
         """What a reader must know of these data.
 
         Parameters
@@ -128,6 +130,8 @@ class DataTerm(Protocol):
             At the estimate.
         information : array, shape (coordinates, coordinates)
             Of all data and priors there.
+        outliers : sequence of int
+            Rows of a table without which the law describes it.
         """
         ...
 
@@ -156,7 +160,8 @@ class Objective:
     fixed: Mapping[str, Any]
     tolerance: float = 1e-10
     unsolved: int = field(default=0, init=False, repr=False)
-    _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, repr=False)
+    # Of this objective alone: `dataclasses.replace` leaves it out.
+    _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, init=False, repr=False)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -170,6 +175,33 @@ class Objective:
     def coordinates(self, values: Mapping[str, float]) -> Float:
         """Coordinates of values by name."""
         return np.array([float(k.to_coordinate(values[k.name])) for k in self.unknowns])
+
+    def ordered(self, u: Float) -> Float:
+        """The same point with parameters that the law may exchange by rising first ones.
+
+        As it is where they are not all free, differ in their priors, or cannot have each other's
+        values.
+        """
+        sets = self.law.exchangeable
+        known = {k.name: k for k in self.unknowns}
+        if not sets or not all(n in known for names in sets for n in names):
+            return u
+        same = [zip(sets[0], names, strict=True) for names in sets[1:]]
+        if any(known[a].prior != known[b].prior for pairs in same for a, b in pairs):
+            return u
+        values = self.named(u)
+        ranked = sorted(sets, key=lambda names: values[names[0]])
+        moved = values | {
+            new: values[old]
+            for names, others in zip(sets, ranked, strict=True)
+            for new, old in zip(names, others, strict=True)
+        }
+        changed = [n for names in sets for n in names]
+        if any(moved[n] <= 0 and known[n].logarithmic for n in changed):
+            return u
+        found = self.coordinates(moved)
+        low, high = np.array([k.bounds for k in self.unknowns]).T
+        return found if ((found >= low) & (found <= high)).all() else u
 
     def data_residuals(self, u: Float, *, search: bool | None = None) -> list[Residuals] | None:
         """Residuals of each term, with the Jacobian to the coordinates; None without a solution."""

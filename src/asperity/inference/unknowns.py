@@ -47,6 +47,10 @@ _USUAL = {
 _LEAST_SCALE = 1e-3
 #: A positive parameter is looked for within this factor of its starts.
 _FARTHEST = 1e6
+#: Factor of a logarithmic range beyond the usual values, and of the highest one of others.
+_LOGARITHMIC, _LINEAR = 10.0, 3.0
+#: Standard deviations about an estimate that the range reaches at least.
+_REACH = 10.0
 #: Never free: only its product with others is seen.
 REFERENCES = ("V0",)
 
@@ -138,6 +142,28 @@ class Unknown:
             low, high = self.start[0] / _FARTHEST, min(self.start[1] * _FARTHEST, self.upper)
             return math.log(low), math.log(high)
         return self.lower / self.scale, self.upper / self.scale
+
+    def range_about(self, u: float, sd: float) -> tuple[float, float]:
+        """Range of the coordinate in which it is looked for, about an estimate with its deviation.
+
+        It is that of the prior of posteriors and evidence: ten standard deviations of a prior, or a
+        tenth of the lowest to ten times the highest usual value where the coordinate is the
+        logarithm, and zero to three times the highest elsewhere; ten deviations of the estimate
+        at least, of one that is determined.
+        """
+        low, high = self.bounds
+        if self.prior is not None:
+            first, last = (self.prior.mean + s * _REACH * self.prior.sd for s in (-1, 1))
+            if self.logarithmic:
+                return low, min(high, math.log(last))
+            return max(low, first / self.scale), min(high, last / self.scale)
+        if self.logarithmic:
+            usual = math.log(self.start[0] / _LOGARITHMIC), math.log(self.start[1] * _LOGARITHMIC)
+        else:
+            top = _LINEAR * abs(self.start[1]) / self.scale
+            usual = (max(low, -top), top)
+        reach = _REACH * min(sd, 1.0)
+        return max(low, min(usual[0], u - reach)), min(high, max(usual[1], u + reach))
 
     def end(self, u: float) -> float:
         """Value at the end of an interval; 0 or infinite where the search ended before."""

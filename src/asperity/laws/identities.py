@@ -14,6 +14,7 @@ and is checked too.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 from collections.abc import Callable
 from typing import Any
 
@@ -24,6 +25,7 @@ from jax import Array
 from jax.test_util import check_grads
 
 from asperity.laws.law import Law
+from asperity.parameters import law_parameters
 
 #: Round-off, with room for the cancellation of terms some 1e3 times the result.
 EXACT = 1e-12
@@ -107,6 +109,8 @@ def check_law(
     }
     if law.rate_dependent:
         checks["inverse"] = lambda: inverse(law)
+    if law.exchangeable:
+        checks["exchange"] = lambda: exchange(law)
     if slope is not None:
         checks["slope"] = lambda: slope_of_steady_friction(law, slope)
     if load_step is not None:
@@ -235,6 +239,35 @@ def units(law: Law) -> None:
         strict=True,
     ):
         np.testing.assert_allclose(there, converted(here, "frequency"), rtol=1e-9)
+
+
+def exchange(law: Law) -> None:
+    """Parameters that are declared exchangeable change nothing, in some order of the states."""
+    v, state, w = sample(law)
+    friction, rates = law.friction(v, state, w), law.state_rate(v, 1.5 * v, state, w)
+    fields = {n: p.path.rsplit(".", 1)[-1] for n, p in law_parameters(type(law)).items()}
+    unknown = {n for names in law.exchangeable for n in names} - set(fields)
+    assert not unknown, f"exchangeable names {', '.join(sorted(unknown))}, which are no parameters"
+    values = {f.name: getattr(law, f.name) for f in dataclasses.fields(law)}
+    for first, second in itertools.combinations(law.exchangeable, 2):
+        pairs = [(fields[a], fields[b]) for a, b in zip(first, second, strict=True)]
+        other = type(law)(
+            **values | {a: values[b] for a, b in pairs} | {b: values[a] for a, b in pairs}
+        )
+        for order in itertools.permutations(range(len(state))):
+            moved = tuple(state[i] for i in order)
+            changed = other.state_rate(v, 1.5 * v, moved, w)
+            here = (other.friction(v, moved, w), *changed)
+            if all(
+                np.allclose(a, b, rtol=1e-9)
+                for a, b in zip(here, (friction, *(rates[i] for i in order)), strict=True)
+            ):
+                break
+        else:
+            raise AssertionError(
+                f"{', '.join(first)} exchanged with {', '.join(second)} is another law in every "
+                "order of the states"
+            )
 
 
 def slope_of_steady_friction(law: Law, slope: Slope) -> None:

@@ -42,6 +42,10 @@ class Law(Displayed, eqx.Module):
         that no step of a solver can make them cross zero.
     equations : tuple of str
         The equations in LaTeX, for people to read; () for none.
+    exchangeable : tuple of tuple of str
+        Sets of parameters that may be exchanged, with their states, without a change of the law,
+        such as (("D0", "B"), ("D2", "B2")); () for none. A fit reports them by rising first
+        parameter.
     rate_dependent : bool
         False for a law whose force does not depend on velocity; it then has no dynamics of its own.
     """
@@ -50,6 +54,7 @@ class Law(Displayed, eqx.Module):
     source: ClassVar[str]
     state_names: ClassVar[tuple[str, ...]]
     equations: ClassVar[tuple[str, ...]] = ()
+    exchangeable: ClassVar[tuple[tuple[str, ...], ...]] = ()
     rate_dependent: ClassVar[bool] = True
 
     def summary(self) -> tuple[str, list[SummaryLine]]:

@@ -42,6 +42,7 @@ class TwoState(RuinaSlip):
         r"\dot\phi_2=-\frac{\dot x}{D_2}\left(\phi_2+\ln\frac{\dot x}{V_0}\right)",
     )
     state_names: ClassVar[tuple[str, ...]] = ("log_age", "log_age2")
+    exchangeable: ClassVar[tuple[tuple[str, ...], ...]] = (("D0", "B"), ("D2", "B2"))
 
     B2: ArrayLike = parameter(
         "law.B2",

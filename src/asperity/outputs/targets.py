@@ -45,7 +45,7 @@ def output_file(
     files = (target, *_beside(target))
     require_short(target, files, name)
     for file in files:
-        kind = _not_a_file(file)
+        kind = not_a_file(file)
         if kind:
             raise InputError(
                 f"{name} must be the name of a file, got '{path}', which is {kind}; "
@@ -171,7 +171,22 @@ def fresh_name(target: Path) -> Path:
     return target.with_name(f"{target.stem}.new{target.suffix}")
 
 
-def _not_a_file(path: Path) -> str:
+def require_rereadable(path: Path, label: str) -> None:
+    """Refuse pipes and devices, which would be waited for, or never end.
+
+    Raises
+    ------
+    InputError
+        If there is something at the path that is no regular file.
+    """
+    other = not_a_file(path)
+    if other:
+        raise InputError(
+            f"{label} must be a regular file, got '{path}', {other}; write the data to a file"
+        )
+
+
+def not_a_file(path: Path) -> str:
     """What a path is if it is no regular file; empty if it is one, or nothing."""
     try:
         mode = path.stat().st_mode

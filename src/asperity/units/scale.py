@@ -32,8 +32,9 @@ _LONGEST_UNIT = 60
 
 
 def normalised(unit: str) -> str:
-    """One spelling of micro (two code points look alike) and single blanks."""
-    return " ".join(unit.replace("µ", "u").replace("μ", "u").split())
+    """One spelling of micro (two code points look alike) and of ``/um``, and single blanks."""
+    text = " ".join(unit.replace("µ", "u").replace("μ", "u").split())
+    return f"1/{text[1:].lstrip()}" if text.startswith("/") else text
 
 
 @lru_cache(maxsize=1024)

@@ -1,14 +1,17 @@
 """Verdicts on synthetic readings of a known law, with errors, outliers and runs of every kind."""
 
+import json
 import math
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.integrate import quad
 
 from asperity import Slider, periodic_response
+from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.inference import compare, fit, table_of
 from asperity.inference.comparison.compare import judge
@@ -21,6 +24,8 @@ EPSILON = np.tile(np.linspace(0.05, 0.5, 8), 2)
 MEAN, HARMONIC = 1e-3, 2e-5
 LAWS = ("rice-ruina", "linker-dieterich", "elasto-plastic")
 FREE = ("lambda", "alpha", "eps_ratio", "A")
+#: Of these, those of one law alone.
+SPECIAL = {"linker-dieterich": ("alpha",), "elasto-plastic": ("lambda",)}
 
 
 @pytest.fixture(scope="module")
@@ -217,3 +222,64 @@ def test_a_law_without_a_free_parameter_is_compared_as_it_stands(made, pmma):
     assert bare.fit.observables["delta_mu"] == (pytest.approx(away @ away, rel=1e-6), V.size)
     assert bare.fit.dof == 5 * V.size
     assert bare.evidence.log == bare.fit.log_likelihood
+
+
+def spoiled_table(made, seed, *, outliers):
+    """A table of 8 to 16 rows of a random law, with errors of 8 to 60 standard errors in rows."""
+    random = np.random.default_rng([17, seed])
+    law = LAWS[seed % len(LAWS)]
+    table = made(law, seed)
+    kept = random.permutation(V.size)[: (8, 12, 16)[seed % 3]]
+    table = table.without(~np.isin(np.arange(V.size), kept))
+    rows = np.sort(random.choice(table.rows, outliers, replace=False))
+    for row in rows:
+        size = math.exp(random.uniform(math.log(8), math.log(60)))
+        name = ("delta_mu", "mu1")[random.integers(2)]
+        table.values[name][row] += size * table.errors[name][row]
+    return law, table, rows.tolist()
+
+
+@pytest.mark.parametrize("outliers", [1, 2])
+def test_outliers_that_hide_each_other_are_named_and_left_out(made, pmma, outliers):
+    right = 0
+    for seed in range(6):
+        law, table, rows = spoiled_table(made, seed, outliers=outliers)
+        free = [p for p in FREE if p in ("eps_ratio", "A") or p in SPECIAL.get(law, ())]
+        found = fit(table, law, free, material=pmma, check_stiffness=False)
+        right += sorted(found.outliers) == rows
+        # The names of the table are told.
+        (said,) = [w for w in found.warnings if "chi-squared would be as it should be" in w] or [""]
+        assert all((str(table.row_names[row]) in said) for row in found.outliers)
+    # Of 40 with two outliers 39 were named, of 70 with one 68; a row may be one that the fit can
+    # follow.
+    assert right >= 5
+
+
+def test_clean_tables_have_no_outliers_even_under_a_wrong_law(made, pmma):
+    for seed in range(6):
+        _, table, _ = spoiled_table(made, seed, outliers=0)
+        for other in LAWS:
+            free = [p for p in FREE if p in ("eps_ratio", "A") or p in SPECIAL.get(other, ())]
+            found = fit(table, other, free, material=pmma, check_stiffness=False)
+            assert found.outliers == ()
+
+
+@pytest.mark.parametrize("start", [(), ("--start", "eps_ratio=0.5", "--start", "lambda=0.6 um")])
+def test_the_command_leaves_outliers_out(made, tmp_path, start):
+    """Options of the command line go to the second round of fits, as to the first."""
+    law, table, rows = spoiled_table(made, 2, outliers=2)
+    columns = {"V": table.points["V"], "epsilon": table.points["epsilon"]}
+    columns["frequency"] = table.points["frequency"]
+    for name in table.values:
+        columns |= {name: table.values[name], f"{name}_err": table.errors[name]}
+    path = tmp_path / "readings.csv"
+    text = np.column_stack(list(columns.values()))
+    np.savetxt(path, text, delimiter=",", header=",".join(columns), comments="", fmt="%.17g")
+    free = ("--free", "lambda,eps_ratio,A", "--material", "bureau2000", "--json")
+    laws = ("--laws", "rice-ruina,elasto-plastic")
+    done = CliRunner().invoke(main, ["compare", str(path), *laws, *free, *start])
+    assert done.exit_code == 0, done.output
+    record = json.loads(done.stdout)
+    assert record["left_out"] == [f"row {row + 1}" for row in rows]
+    assert record["best"] == law == "elasto-plastic"
+    assert not record["laws"][law]["excluded"]

@@ -37,7 +37,7 @@ def test_others_do_not_follow_a_delay_beyond_its_bound():
     # Three standard deviations off.
     bound = float(unknowns[at].to_value(u[at] + 3 * free.sd[at]))
     unknowns[at] = replace(unknowns[at], lower=bound, upper=1.05 * bound)
-    narrow = replace(objective, unknowns=tuple(unknowns), _last=None)
+    narrow = replace(objective, unknowns=tuple(unknowns))
     u, chi2 = narrow.minimise(u)
     held = parabola_of(narrow, u, chi2)
     assert chi2 > free.chi2 + 8

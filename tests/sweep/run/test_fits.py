@@ -75,7 +75,7 @@ def test_fits_over_files_and_a_fixed_number_are_linear_regressions(tmp_path: Pat
     # Fewer data than parameters are no estimate.
     assert store_status(out).outcomes == {"converged": 4, "refused": 2}
     assert np.isnan(found["B_fit"].sel(data="short.csv")).all()
-    assert "must hold at least as many data as free parameters" in told[0]
+    assert "must hold more data than free parameters" in told[0]
     # Other readings in a file of the same name are another plan.
     write(tmp_path / "b.csv", 5)
     with pytest.raises(InputError, match=r"same plan, got settings\.files\.b\.csv = "):

@@ -193,7 +193,7 @@ def fit_text(found: Fit) -> str:
     if not found.converged:
         return f"{found.law}: {found.message}"
     rows = [("", "estimate", "std. error", "95 % interval", "", "")]
-    for name, p in found.parameters.items():
+    for name, p in {**found.parameters, **found.over_load}.items():
         notes = "at its bound" if p.at_bound else ""
         if name in found.undetermined:
             notes = "not determined by these data"
@@ -218,8 +218,15 @@ def fit_text(found: Fit) -> str:
         filled = [tuple(row) + ("",) * (width - len(row)) for row in matrix]
         lines += ["correlations", aligned([("", *names[:-1]), *filled], "  ")]
     lines += [
-        f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom, p = {found.p_value:.3g}",
-        aligned(fits, "  "),
+        *(
+            (
+                f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom, "
+                f"p = {found.p_value:.3g}",
+                aligned(fits, "  "),
+            )
+            if found.judged_by_chi2
+            else ("the noise is estimated from what the law leaves: chi-squared judges nothing",)
+        ),
         *_runs(found),
         f"log-likelihood {found.log_likelihood:.6g}, AICc {found.aicc:.6g}, BIC {found.bic:.6g}",
     ]

@@ -206,7 +206,9 @@ class FitData:
 def is_table(path: Path) -> bool:
     """Whether a file holds readings rather than a recording: it has a column of an observable."""
     from asperity.inference.tables.table import OBSERVABLES
+    from asperity.outputs.targets import require_rereadable
 
+    require_rereadable(path, "data")
     if path.suffix.lower() == ".json":
         return True
     try:

@@ -49,7 +49,9 @@ class PosteriorOptions:
                     )
             return
         from asperity.inference.posterior import require_bayes
+        from asperity.inference.posterior.sampling import require_sizes
 
+        require_sizes(self.chains, self.draws)
         require_bayes()
         if self.out is not None:
             if self.out.suffix.lower() != ".nc":

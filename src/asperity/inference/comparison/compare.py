@@ -19,7 +19,6 @@ from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.residuals import residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import (
@@ -30,6 +29,7 @@ from asperity.inference.tables.term import (
 )
 from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law, registered
+from asperity.materials import Material
 from asperity.parameters import law_parameters
 
 #: Called with how many laws are done, parts of one included.
@@ -143,7 +143,8 @@ def compare(
     -----
     The rule, fixed beforehand: a law is excluded if its chi-squared has a probability below 0.001
     while that of another law has not and its AICc is lower by 4 or more, or if its AICc exceeds
-    the lowest by 10 or more. If no law describes the data, their uncertainties may be too small:
+    the lowest by 10 or more. Of recordings, whose noise is estimated from what the law leaves, the
+    second alone counts. If no law describes the data, their uncertainties may be too small:
     chi-squared is divided by that of the best law per degree of freedom before the second
     comparison; and the simplest law that would describe a table with another stiffness than the
     given one is named with it. Rows that alone keep every law from describing the data are left
@@ -171,10 +172,11 @@ def compare(
         )
         for name in dict.fromkeys(laws)
     }
+    # Each law takes its part of these; an empty mapping and None are one thing, no numbers.
     given = {
-        key: options.pop(key)
+        key: options.pop(key, None) or {}
         for key in ("fixed", "start", "prior")
-        if options.get(key) and isinstance(options[key], Mapping)
+        if not isinstance(options.get(key), Material)
     }
     not_compared: dict[str, str] = {}
 
@@ -271,11 +273,7 @@ def _freed(found: Comparison) -> str:
 
 def _common_outliers(fits: Mapping[str, Fit]) -> list[int]:
     """Rows without which some law describes the data: the fewest that do."""
-    lists = [
-        outlying_rows(f.residuals[0])
-        for f in fits.values()
-        if f.converged and len(f.residuals) == 1 and isinstance(f.objective.terms[0], LockInTerm)
-    ]
+    lists = [list(f.outliers) for f in fits.values() if f.converged and len(f.residuals) == 1]
     if not lists or any(
         f.converged and (f.dof <= 0 or f.p_value >= _DESCRIBED) for f in fits.values()
     ):
@@ -385,6 +383,14 @@ def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
 def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:
     if found is best:
         return False, ""
+    behind = found.aicc - best.aicc
+    if not found.judged_by_chi2:
+        if behind < LARGEST_AICC_DIFFERENCE:
+            return False, ""
+        return True, (
+            f"its log-likelihood is {best.log_likelihood - found.log_likelihood:.4g} lower than "
+            f"that of {best.law}, noise included, and its AICc {behind:.4g} above"
+        )
     worst = max(
         found.observables,
         key=lambda n: found.observables[n][0] - best.observables.get(n, (0.0, 0))[0],
@@ -394,7 +400,6 @@ def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple
         f"the worst observable is {worst} with chi-squared {chi2:.4g} for {n} data, where "
         f"{best.law} has {rival:.4g}"
     )
-    behind = found.aicc - best.aicc
     misfit = found.dof > 0 and found.p_value < _IMPOSSIBLE
     if misfit and describes and behind >= _AS_GOOD:
         return True, (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from asperity.inference.comparison.compare import Comparison
@@ -31,6 +32,46 @@ def comparison_record(found: Comparison) -> dict[str, Any]:
         "best": found.best,
         "verdict": found.verdict,
     }
+
+
+def laws_table(found: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Laws in the order of the comparison, as texts for people: columns' names and rows.
+
+    What decides stands in it: chi-squared where uncertainties are given, the logarithm of the
+    likelihood where the noise is estimated.
+    """
+    fits = [j.fit for j in found.laws.values() if j.fit.converged]
+    lowest = min((f.aicc for f in fits), default=0.0)
+    by_chi2 = any(f.judged_by_chi2 for f in fits)
+    numbers = ("chi-squared", "dof", "p") if by_chi2 else ("log-likelihood",)
+    head = ("law", *numbers, "AICc - lowest", "weight", "ln evidence", "")
+    nothing = ("",) * (len(head) - 2)
+    rows = []
+    for name, j in found.laws.items():
+        f = j.fit
+        if not f.converged:
+            rows.append((name, *nothing, f.message))
+            continue
+        shown = (f"{f.chi2:.4g}", str(f.dof), f"{f.p_value:.2g}")
+        evidence = f"{j.evidence.log:.2f}" if j.evidence else ""
+        # Of excluded laws among searched orbits it is the normal approximation's.
+        if j.evidence and math.isfinite(j.evidence.standard_error):
+            evidence += f" +- {j.evidence.standard_error:.2g}"
+        notes = ["excluded"] if j.excluded else []
+        if f.undetermined:
+            notes.append(f"{', '.join(f.undetermined)} not determined")
+        rows.append(
+            (
+                name,
+                *(shown if by_chi2 else (f"{f.log_likelihood:.2f}",)),
+                f"{f.aicc - lowest:.4g}",
+                f"{j.weight:.2g}",
+                evidence,
+                "; ".join(notes),
+            )
+        )
+    rows += [(name, *nothing, f"not compared: {why}") for name, why in found.not_compared.items()]
+    return head, rows
 
 
 def _evidence(found: Evidence | None) -> dict[str, Any] | None:

@@ -12,7 +12,7 @@ from scipy.stats import chi2 as chi_squared
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from asperity.inference.fitting.intervals import LEVELS, bounded_interval
+from asperity.inference.fitting.intervals import LEVELS, Interval, bounded_interval
 from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.parabola import (
     UNDETERMINED,
@@ -24,7 +24,9 @@ from asperity.inference.fitting.parabola import (
 from asperity.inference.fitting.profile import Profile, ProfileAtEdgeError
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
-from asperity.inference.tables.term import any_searched
+from asperity.inference.tables.outliers import outlying_rows
+from asperity.inference.tables.term import LockInTerm, any_searched
+from asperity.inference.unknowns import Unknown
 
 Float = NDArray[np.float64]
 
@@ -48,6 +50,8 @@ _NEAR = 0.5
 _MISFIT = 0.01
 #: Standard deviations between data and a prior that are worth a warning.
 _CONTRADICTED = 3.0
+#: Relative change of the coordinates that ends a fit with rows left out, and its evaluations.
+_REFITTED, _EVALUATIONS = 1e-6, 20
 #: A bound is reached if the estimate is nearer to it than this share of its standard error.
 _AT_BOUND = 1e-3
 
@@ -100,6 +104,8 @@ def described_fit(
     described : callable, optional
         Called with the number of parameters whose intervals are known so far.
     """
+    # Those that differ in the order of exchangeable parameters are one.
+    minima = [(objective.ordered(u), value) for u, value in minima]
     at = parabola_of(objective, *minima[0])
     if at is None:
         return _fit_at_the_next(objective, minima, profile=profile, described=described)
@@ -217,8 +223,23 @@ def _ends(
             ends.append((low, high))
         else:
             sd = wider * float(at.sd[i])
-            ends.append(bounded_interval(at.unbounded[i], sd, level, low, high))
+            ends.append(_normal(objective.unknowns[i], at, i, sd, level))
     return ends
+
+
+def _normal(unknown: Unknown, at: Parabola, i: int, sd: float, level: float) -> Interval:
+    """An interval of the normal approximation, which holds the estimate.
+
+    Where it leaves the range in which the parameter is looked for, the data do not bound it.
+    """
+    low, high = unknown.bounds
+    u = float(at.u[i])
+    begin, end = bounded_interval(float(at.unbounded[i]), sd, level, low, high)
+    begin, end = min(begin, u), max(end, u)
+    if unknown.nuisance:
+        return begin, end
+    first, last = unknown.range_about(u, float(at.sd[i]))
+    return low if begin < first else begin, high if end > last else end
 
 
 def _estimate(
@@ -433,13 +454,12 @@ def _with_warnings(found: Fit, said: list[str]) -> Fit:
             f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom is too small: the "
             "uncertainties are too large, and so are the intervals"
         )
-    u = found.objective.coordinates(
-        {k.name: found.values[k.name] for k in found.objective.unknowns}
-    )
+    u = _coordinates(found)
     slopes = [r.jacobian for r in found.residuals] + [found.objective.prior_residuals(u)[1]]
     information = np.sum([J.T @ J for J in slopes], axis=0)
+    outliers = _outliers(found)
     for term, residuals in zip(found.objective.terms, found.residuals, strict=True):
-        said += term.warnings(residuals, information)
+        said += term.warnings(residuals, information, outliers)
     for name in found.undetermined:
         said.append(_why_undetermined(found, name))
     for name, estimate in found.parameters.items():
@@ -454,7 +474,52 @@ def _with_warnings(found: Fit, said: list[str]) -> Fit:
             "intervals hold both where the data allow both; measure at other operating points to "
             "tell them apart"
         )
-    return replace(found, warnings=tuple(said))
+    return replace(found, warnings=tuple(said), outliers=outliers)
+
+
+def _coordinates(found: Fit) -> Float:
+    return found.objective.coordinates(
+        {k.name: found.values[k.name] for k in found.objective.unknowns}
+    )
+
+
+def _outliers(found: Fit) -> tuple[int, ...]:
+    """Rows of the table without which the law describes it.
+
+    Beside recordings, of which a fit takes minutes, predictions count as linear.
+    """
+    objective = found.objective
+    tables = [
+        (term, residuals)
+        for term, residuals in zip(objective.terms, found.residuals, strict=True)
+        if isinstance(term, LockInTerm)
+    ]
+    if not tables:
+        return ()
+    term, residuals = tables[0]
+    if len(objective.terms) > 1:
+        return tuple(outlying_rows(residuals))
+    u = _coordinates(found)
+
+    def whole(u: Float) -> Residuals | None:
+        data = objective.data_residuals(u)
+        if data is None:
+            return None
+        values, slopes = objective.prior_residuals(u)
+        return data[0]._replace(
+            values=np.concatenate([data[0].values, values]),
+            jacobian=np.vstack([data[0].jacobian, slopes]),
+            row=np.concatenate([data[0].row, np.full(values.size, -1)]),
+        )
+
+    def refit(weights: Float) -> Residuals | None:
+        nonlocal u
+        weighted = replace(objective, terms=(term.weighted(weights),))
+        u, _ = weighted.minimise(u, tolerance=_REFITTED, evaluations=_EVALUATIONS)
+        return whole(u)
+
+    now = whole(u)
+    return () if now is None else tuple(outlying_rows(now, refit))
 
 
 def _excess(chi2: float, n: int) -> float:

@@ -19,6 +19,7 @@ from asperity.inference.fitting.free_stiffness import stiffness_that_describes
 from asperity.inference.fitting.inputs import (
     fixed_values,
     free_by_default,
+    of_the_table,
     require_enough,
     require_free,
     require_motion,
@@ -285,6 +286,8 @@ def _objective(
     priors = material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
     begun = start_values(law, free, start, material, runs=recordings)
     constants = fixed_values(law, table, free, fixed, material, runs=recordings)
+    if table is not None and not recordings:
+        begun, priors = of_the_table(begun, priors, constants)
     if recordings:
         published = material is not None and "mu0" in material and material["mu0"].value is not None
         require_calibrated(

@@ -78,7 +78,6 @@ def _freed(found: Fit, progress: Callable[[int, int], None] | None) -> Fit | Non
         terms=(LockInTerm(term.table, forward),),
         unknowns=(*objective.unknowns, own),
         fixed=fixed,
-        _last=None,
     )
     # Special cases and drawn starts as in any fit, and the estimate with the given stiffness.
     minima = minima_of(freed, 0, progress, simpler=[{**found.values, **start}])

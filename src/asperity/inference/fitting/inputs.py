@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from asperity.errors import InputError
+from asperity.inference.runs.assembly import over_load
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.unknowns import (
@@ -19,7 +21,7 @@ from asperity.inference.unknowns import (
 )
 from asperity.laws import Law
 from asperity.materials import Material
-from asperity.parameters import MODULATION, law_parameters, point_parameters
+from asperity.parameters import MACHINE, MODULATION, law_parameters, point_parameters
 
 #: Parameters of laws that have no influence under a constant load.
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
@@ -95,6 +97,37 @@ def start_values(
     return known
 
 
+def of_the_table(
+    start: Mapping[str, Any], priors: Mapping[str, Prior], constants: Mapping[str, Any]
+) -> tuple[dict[str, Any], dict[str, Prior]]:
+    """Start and prior of K in N/m, also where they are given over the load.
+
+    Raises
+    ------
+    InputError
+        If the load is no single number, or the prior is of a stress.
+    """
+    start, priors = dict(start), dict(priors)
+    prior, text = priors.get("K"), start.get("K")
+    load = np.unique(constants.get("W0", math.nan))
+    over = over_load(text)
+    elsewhere = prior is not None and prior.unit not in ("", "N/m")
+    if (over is not None or elsewhere) and not (load.size == 1 and math.isfinite(load[0])):
+        raise InputError(
+            "K over the load must come with one fixed W0, got several or none; give K in N/m"
+        )
+    if text is not None:
+        start["K"] = MACHINE["K"].check(text, "start.K") if over is None else over * float(load[0])
+    if prior is not None and elsewhere:
+        if prior.unit != "1/m":
+            raise InputError(
+                f"prior of K must be in N/m or 1/m for a table, got {prior.unit}; convert it"
+            )
+        W0 = float(load[0])
+        priors["K"] = Prior(prior.mean * W0, prior.sd * W0, prior.source)
+    return start, priors
+
+
 def fixed_values(
     law: type[Law],
     table: LockInTable | None,
@@ -145,7 +178,8 @@ def fixed_values(
         if name in free or name == "inertia":
             continue
         if name in given:
-            found[name] = _checked(law, name, given[name])
+            over = over_load(given[name]) if name == "K" else None
+            found[name] = _checked(law, name, given[name]) if over is None else over
         elif name in points and np.isfinite(points[name]).all():
             found[name] = points[name]
         elif material is not None and name in material and material[name].value is not None:
@@ -161,6 +195,13 @@ def fixed_values(
             f"{law.name} must have all its numbers, got none for {', '.join(missing)}; free or fix "
             "them, add columns, or name a material"
         )
+    if over_load(given.get("K")) is not None:
+        if "W0" not in found:
+            raise InputError(
+                f"K over the load must come with a fixed W0, got '{given['K']}' and W0 free; give "
+                "K as a stiffness, or fix W0"
+            )
+        found["K"] = found["K"] * found["W0"]
     if "eps_ratio" not in free:
         found["eps_ratio"] = ratio = float(_checked(law, "eps_ratio", given.get("eps_ratio", 1.0)))
         largest = ratio * float(np.max(points.get("epsilon", 0.0)))
@@ -229,11 +270,19 @@ def require_motion(
 
 
 def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
-    """Refuse fewer data than free parameters."""
+    """Refuse no more data than free parameters; one datum for one parameter is an inversion.
+
+    As many data as parameters have a valley of minima where some of the parameters are not seen,
+    and nothing is left to judge the law by.
+
+    Raises
+    ------
+    InputError
+    """
     count = int(sum(np.isfinite(v).sum() for v in table.values.values()))
     needed = sum(1 for u in unknowns if u.prior is None)
-    if count < max(needed, 1):
+    if count < max(needed + (needed > 1), 1):
         raise InputError(
-            f"{table.name} must hold at least as many data as free parameters, got {count} for "
+            f"{table.name} must hold more data than free parameters, got {count} for "
             f"{len(unknowns)} ({', '.join(u.name for u in unknowns)}); free fewer or measure more"
         )

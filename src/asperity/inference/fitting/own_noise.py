@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from asperity.inference.fitting.minima import distinct
 from asperity.inference.objective import Objective
 from asperity.inference.runs.term import NoiseState, RunTerm
+from asperity.inference.runs.wrong_samples import largest_by_chance
 
 Float = NDArray[np.float64]
 #: Minima, best first, and whether noise and parameters agree at the best.
@@ -33,7 +34,7 @@ def under_drift(objective: Objective) -> Objective:
     for term in terms:
         if isinstance(term, RunTerm):
             term.expect_slow_noise()
-    return replace(objective, terms=terms, _last=None)
+    return replace(objective, terms=terms)
 
 
 def with_noise(
@@ -147,7 +148,8 @@ class _End(NamedTuple):
     """A minimum under its own noise."""
 
     u: Float
-    #: Twice the negative logarithm of likelihood and priors, and twice the parameters of the noise.
+    #: Twice the negative logarithm of likelihood and priors, twice the parameters of the noise, and
+    #: what chance may gain by samples and jumps that are chosen among all.
     deviance: float
     states: list[NoiseState]
     agreed: bool
@@ -172,4 +174,7 @@ def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _En
     priors = objective.prior_residuals(u)[0]
     deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
     deviance += 2 * sum(term.profiled for term in noisy)
-    return _End(u, deviance, [term.noise_state() for term in noisy], agreed)
+    states = [term.noise_state() for term in noisy]
+    # The largest of all samples' departures lowers chi-squared by so much where there is none.
+    deviance += _taken_off(states) * largest_by_chance(objective.residuals(u)[0].size) ** 2
+    return _End(u, deviance, states, agreed)

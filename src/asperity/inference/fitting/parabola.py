@@ -19,6 +19,8 @@ Float = NDArray[np.float64]
 UNDETERMINED = 1.0
 #: A delay that is nearer to its bound, as a share of its range, is there.
 _AT_BOUND = 1e-3
+#: Standard deviations from a bound within which a gradient towards it is held by the bound.
+_NEAR_BOUND = 0.1
 #: Decrease of chi-squared that must not be left at a minimum: a third of a standard error.
 _STOPPED = 0.1
 
@@ -43,7 +45,7 @@ class Parabola:
     freedom : array, shape (n,)
         Degrees of freedom of its diagonal.
     unbounded : array, shape (n,)
-        Minimum of the parabola without the bounds of the coordinates.
+        Minimum of the parabola without the bounds that hold coordinates of the minimum.
     undetermined : tuple of str
         Parameters of which the data say nothing.
     stopped : bool
@@ -121,7 +123,7 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         missing=missing,
         total=total,
         freedom=freedom,
-        unbounded=u - covariance @ (J.T @ r),
+        unbounded=u - covariance @ _pressure(objective, u, covariance, J.T @ r),
         undetermined=undetermined,
         stopped=is_of_tables(objective) and objective.expected_decrease(u) > _STOPPED,
         fitted=len(objective.unknowns) + sum(term.profiled for term in objective.terms),
@@ -138,6 +140,19 @@ def _held(objective: Objective, u: Float) -> NDArray[np.bool_]:
     linear = np.array([k.nuisance and not k.logarithmic for k in objective.unknowns], bool)
     room = np.where(np.isfinite(high - low), high - low, 1.0)
     return np.asarray(linear & (np.minimum(u - low, high - u) < _AT_BOUND * room))
+
+
+def _pressure(objective: Objective, u: Float, covariance: Float, gradient: Float) -> Float:
+    """The gradient in coordinates that a bound holds, 0 in others.
+
+    There it is zero at a minimum. In a valley that is all but flat a minimisation leaves some,
+    which says nothing about where the minimum is.
+    """
+    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
+    sd = np.sqrt(np.diag(covariance))
+    at_low = (gradient > 0) & (u - low < _NEAR_BOUND * sd)
+    at_high = (gradient < 0) & (high - u < _NEAR_BOUND * sd)
+    return np.where(at_low | at_high, gradient, 0.0)
 
 
 def _with_estimated_noise(

@@ -19,7 +19,11 @@ def fit_record(found: Fit) -> dict[str, Any]:
         "law": found.law,
         "converged": found.converged,
         "message": found.message,
-        "parameters": {name: _estimate(p) for name, p in found.parameters.items()},
+        "parameters": {
+            name: {**_estimate(p), "determined": name not in found.undetermined}
+            for name, p in found.parameters.items()
+        },
+        "over_load": {name: _estimate(p) for name, p in found.over_load.items()},
         "fixed": _fixed(found),
         "correlation": {
             "names": list(found.parameters),

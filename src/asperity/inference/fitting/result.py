@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference.fitting.intervals import Interval
 from asperity.inference.objective import Objective, Residuals
+from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import Prior
 from asperity.parameters.display import Displayed, SummaryLine
 
 Float = NDArray[np.float64]
+
+
+#: Loads of recordings that differ by less, as a share, are one.
+_ONE_LOAD = 1e-3
 
 
 @dataclass(frozen=True)
@@ -82,6 +88,9 @@ class Fit(Displayed):
     warnings : tuple of str
     objective : Objective
         Data, law and free parameters: the function that was minimised.
+    outliers : tuple of int
+        Rows of the table without which the law describes it, from 0; at most a tenth of them, or
+        two of eight and more.
     """
 
     law: str
@@ -101,6 +110,46 @@ class Fit(Displayed):
     optima: tuple[Optimum, ...]
     warnings: tuple[str, ...]
     objective: Objective
+    outliers: tuple[int, ...] = ()
+
+    @property
+    def judged_by_chi2(self) -> bool:
+        """Whether chi-squared judges the law.
+
+        It does not where all noise is estimated from what the law leaves, as that of recordings is:
+        the likelihood, noise included, then compares laws.
+        """
+        return any(term.profiled == 0 for term in self.objective.terms)
+
+    @property
+    def over_load(self) -> dict[str, Estimate]:
+        """Stiffnesses over the load by name, K/W0 or K[run]/W0, where the load is one number.
+
+        In 1/um, as rock laboratories give them.
+        """
+        loads: dict[str, list[float]] = {}
+        for term in self.objective.terms:
+            if isinstance(term, RunTerm):
+                name = next((n for n in (f"K[{term.name}]", "K") if n in self.parameters), "")
+                loads.setdefault(name, []).append(term.run.W0 if term.run.load_unit else math.nan)
+        if not loads and "K" in self.parameters:
+            loads["K"] = list(np.unique(self.objective.fixed.get("W0", math.nan)))
+        found = {}
+        for name, several in loads.items():
+            if not name or not np.ptp(several) <= _ONE_LOAD * several[0]:
+                continue
+            p, load = self.parameters[name], 1e6 * float(np.mean(several))
+            found[f"{name}/W0"] = replace(
+                p,
+                name=f"{name}/W0",
+                unit="1/um",
+                value=p.value / load,
+                se=p.se / load,
+                interval_68=(p.interval_68[0] / load, p.interval_68[1] / load),
+                interval_95=(p.interval_95[0] / load, p.interval_95[1] / load),
+                prior=None,
+            )
+        return found
 
     @property
     def values(self) -> dict[str, float]:
@@ -120,7 +169,7 @@ class Fit(Displayed):
                 + (", at its bound" if p.at_bound else "")
                 + (", not determined by these data" if name in self.undetermined else ""),
             )
-            for name, p in self.parameters.items()
+            for name, p in {**self.parameters, **self.over_load}.items()
         ]
         lines.append(SummaryLine("chi2", f"{self.chi2:.6g}", f"{self.dof} degrees of freedom"))
         lines.append(SummaryLine("p_value", f"{self.p_value:.3g}", "probability of a larger chi2"))

@@ -20,11 +20,6 @@ from asperity.inference.unknowns import Unknown
 
 Float = NDArray[np.float64]
 
-#: Factor of a logarithmic range beyond the usual values, and of the highest one of others.
-_LOGARITHMIC, _LINEAR = 10.0, 3.0
-#: Standard deviations about an estimate that the range reaches at least.
-_REACH = 10.0
-
 
 @dataclass(frozen=True, eq=False)
 class PriorDensity:
@@ -51,7 +46,9 @@ class PriorDensity:
     @classmethod
     def about(cls, unknowns: Sequence[Unknown], u: Float, sd: Float) -> PriorDensity:
         """The prior, with ranges that reach an estimate u with standard deviations sd."""
-        low, high = np.array([_range(k, x, s) for k, x, s in zip(unknowns, u, sd, strict=True)]).T
+        low, high = np.array(
+            [k.range_about(x, s) for k, x, s in zip(unknowns, u, sd, strict=True)]
+        ).T
         mean = np.array([k.prior.mean if k.prior else 0.0 for k in unknowns])
         sds = np.array([k.prior.sd if k.prior else math.inf for k in unknowns])
         log_norm = 0.0
@@ -95,23 +92,3 @@ class PriorDensity:
                     "high": float(k.to_value(self.high[i])),
                 }
         return found
-
-
-def _range(unknown: Unknown, u: float, sd: float) -> tuple[float, float]:
-    """Range of a coordinate, within its bounds."""
-    low, high = unknown.bounds
-    if unknown.prior is not None:
-        first, last = (unknown.prior.mean + s * _REACH * unknown.prior.sd for s in (-1, 1))
-        if unknown.logarithmic:
-            return low, min(high, math.log(last))
-        return max(low, first / unknown.scale), min(high, last / unknown.scale)
-    if unknown.logarithmic:
-        usual = (
-            math.log(unknown.start[0] / _LOGARITHMIC),
-            math.log(unknown.start[1] * _LOGARITHMIC),
-        )
-    else:
-        top = _LINEAR * abs(unknown.start[1]) / unknown.scale
-        usual = (max(low, -top), top)
-    reach = _REACH * min(sd, 1.0)
-    return max(low, min(usual[0], u - reach)), min(high, max(usual[1], u + reach))

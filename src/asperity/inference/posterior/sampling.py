@@ -44,6 +44,8 @@ Float = NDArray[np.float64]
 _OVERDISPERSED = 2.0
 #: Tries for a first position at which the law has a solution.
 _TRIES = 100
+#: Most draws of all chains, warm-up included: of ten parameters they take 320 MB.
+_MOST_DRAWS = 4_000_000
 #: Time (s) between two calls of `progress` while no block ends.
 _ASK = 0.5
 #: One thread for XLA and for linear algebra in each process.
@@ -102,9 +104,7 @@ def sample_posterior(
         )
     if not found.parameters:
         raise InputError("posterior must be of free parameters, got none; free one, such as A")
-    for name, value, least in (("chains", chains, 2), ("draws", draws, 100)):
-        if value < least:
-            raise InputError(f"{name} must be at least {least}, got {value}; ask for more")
+    require_sizes(chains, draws)
     whitened = whitened_posterior(found)
     blocks = WARM_UP + -(-draws // BLOCK)
     report = progress or (lambda done, total: None)
@@ -143,6 +143,24 @@ def sample_posterior(
     posterior = posterior_of(found, whitened, [r.kept[WARM_UP:] for r in runs], seed=seed)
     store.discard()
     return posterior
+
+
+def require_sizes(chains: int, draws: int) -> None:
+    """Refuse too few chains and draws, and more than can be computed and kept.
+
+    Raises
+    ------
+    InputError
+    """
+    for name, value, least in (("chains", chains, 2), ("draws", draws, 100)):
+        if value < least:
+            raise InputError(f"{name} must be at least {least}, got {value}; ask for more")
+    blocks = WARM_UP + -(-draws // BLOCK)
+    if chains * blocks * BLOCK > _MOST_DRAWS:
+        raise InputError(
+            f"chains times draws must be {_MOST_DRAWS} at most, those of the warm-up included, "
+            f"got {chains} chains of {blocks * BLOCK}; ask for fewer"
+        )
 
 
 def whitened_posterior(found: Fit) -> Whitened:

@@ -76,14 +76,18 @@ def stiffness(run: RecordedRun) -> Parameter:
 
 def stiffness_in(run: RecordedRun, value: Any, label: str = "K") -> float:
     """A stiffness, or one over the load as ``"0.003 1/um"``, in the unit of the run."""
-    parameter = stiffness(run)
-    if run.load_unit and isinstance(value, str):
-        try:
-            over_load = replace(parameter, kind="per_length").check(value, label)
-            return float(over_load) * run.W0
-        except InputError:
-            pass
-    return float(parameter.check(value, label))
+    over = over_load(value, label) if run.load_unit else None
+    return float(stiffness(run).check(value, label)) if over is None else over * run.W0
+
+
+def over_load(value: Any, label: str = "K") -> float | None:
+    """A stiffness over the load (1/m) as rock laboratories give it; None of another text."""
+    if not isinstance(value, str):
+        return None
+    try:
+        return float(replace(MACHINE["K"], kind="per_length").check(value, label))
+    except InputError:
+        return None
 
 
 def usual_ranges(runs: Sequence[RecordedRun]) -> dict[str, tuple[float, float]]:

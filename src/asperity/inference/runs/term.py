@@ -271,9 +271,12 @@ class RunTerm:
         if raw is None:
             return False
         # After fewer steps the noise is not yet known well enough to judge what is none.
+        earlier = list(self._jumps)
         while True:
             for _ in range(_NOISE_STEPS):
                 self._estimate_noise(*raw)
+            if self._forget_jump(earlier, *raw):
+                continue
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             white = self._whitened(left[:, None])[:, 0]
             if not self._take_something_off(white, raw[1]):
@@ -397,6 +400,32 @@ class RunTerm:
         self._prepare()
         return True
 
+    def _forget_jump(self, earlier: list[int], difference: Float, jacobian: Float) -> bool:
+        """Forget one of the jumps of other values that chance allows here: it was a misfit there.
+
+        Each is judged once, and is none of the earlier ones any more.
+        """
+        if not earlier:
+            return False
+        curves = np.column_stack([jacobian[:, np.any(jacobian, axis=0)], self._columns])
+        white = self._whitened(np.column_stack([curves, difference]))
+        white, target = white[:, :-1], white[:, -1]
+        size = np.sqrt(np.einsum("ij,ij->j", white, white))
+        inverse = np.linalg.pinv((white / size).T @ (white / size), hermitian=True)
+        away = inverse @ ((white / size).T @ target) / np.sqrt(np.diag(inverse))
+        first = curves.shape[1] - self._columns.shape[1]
+        limit = largest_by_chance(target.size)
+        while earlier:
+            k = earlier.pop()
+            step = np.arange(target.size) >= k
+            column = int(np.flatnonzero((self._columns == step[:, None]).all(0))[0])
+            if abs(away[first + column]) < limit:
+                self._columns = np.delete(self._columns, column, axis=1)
+                self._jumps.remove(k)
+                self._prepare()
+                return True
+        return False
+
     def _add_line(self, white: Float) -> bool:
         """Remove the strongest line that the innovations hold, if there is one."""
         if len(self._lines) >= _LINES:
@@ -460,7 +489,9 @@ class RunTerm:
             return np.full(self.run.time.size, np.nan)
         return np.asarray(self.run.friction + raw[0] + self._columns @ self._coefficients(raw[0]))
 
-    def warnings(self, residuals: Residuals, information: Float) -> list[str]:
+    def warnings(
+        self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
+    ) -> list[str]:
         """What the residual says about the noise."""
         said = []
         if self._whiteness < _NOT_WHITE:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,8 @@ Float = NDArray[np.float64]
 #: A segment stands still that moves by less than so many standard deviations of the displacement's
 #: noise, or by less than this share of the fastest velocity.
 _STILL_NOISE, _STILL_SHARE = 6.0, 5e-3
+#: Fewest samples between two steps, or a step and an end: a velocity needs them.
+_SAMPLES = 3
 #: A given velocity that differs by this share from that of the displacement is contradicted.
 _OTHER_VELOCITY = 0.05
 
@@ -91,6 +94,8 @@ def _given_or_measured(
 ) -> tuple[Partition, list[float], list[bool]]:
     """The cuts, the signed velocities between them, and which segments are holds."""
     time, displacement = signals.time, signals.displacement
+    if steps is not None:
+        _require_segments(time, steps, name)
     if velocities is not None:
         if steps is None or len(velocities) != len(steps) + 1:
             raise InputError(
@@ -118,6 +123,24 @@ def _given_or_measured(
         for hold, v, t in zip(found.holds, speeds, spans, strict=True)
     ]
     return found, speeds, holds
+
+
+def _require_segments(time: Float, steps: Sequence[float], name: str) -> None:
+    """Refuse steps that leave no samples between them.
+
+    Raises
+    ------
+    InputError
+    """
+    edges = [float(time[0]), *map(float, steps), float(time[-1])]
+    for begin, end in pairwise(edges):
+        count = int(np.sum((time >= begin) & (time <= end))) if end > begin else 0
+        if count < _SAMPLES:
+            raise InputError(
+                f"{name}.steps must rise, with {_SAMPLES} samples or more between them and the "
+                f"ends of the recording ({edges[0]:.6g} to {edges[-1]:.6g} s), got {count} between "
+                f"{begin:.6g} and {end:.6g} s; correct the steps, or the window"
+            )
 
 
 def contradicted_velocities(given: Sequence[float], measured: Sequence[float]) -> list[str]:

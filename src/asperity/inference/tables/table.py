@@ -20,6 +20,7 @@ from scipy.stats import chi2
 
 from asperity.errors import InputError
 from asperity.laws import registered
+from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
 from asperity.parameters.file_content import file_content
 from asperity.units import to_si
@@ -150,6 +151,7 @@ def read_table(path: str | Path, given: Mapping[str, Any] | None = None) -> Lock
         negative, or a row occurs twice.
     """
     path = Path(path)
+    require_rereadable(path, "data")
     try:
         lines = file_content(path).decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError, ValueError) as error:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from asperity.inference.objective import Residuals
-from asperity.inference.tables.outliers import outlying_rows, standardised
+from asperity.inference.tables.outliers import standardised
 from asperity.inference.tables.residuals import (
     Prediction,
     Weights,
@@ -102,6 +102,14 @@ class LockInTerm:
         forward.fixed = {n: v[kept] for n, v in self.forward.fixed.items()}
         return LockInTerm(forward.table, forward)
 
+    def weighted(self, weights: Float) -> LockInTerm:
+        """The same with the residuals of each row multiplied by a weight, shape (rows,)."""
+        found, own = LockInTerm(self.table, self.forward), self.weights
+        found._weights = own._replace(
+            matrix=own.matrix * weights[:, None, None], target=own.target * weights[:, None]
+        )
+        return found
+
     def chi2_of_many(
         self, unknowns: Sequence[Unknown], u: Float, *, near: bool = False, least: float = 1.0
     ) -> Float:
@@ -138,10 +146,11 @@ class LockInTerm:
         """Search for the orbits that the fast method does not find, at every call."""
         self.forward.search_from_now_on()
 
-    def warnings(self, residuals: Residuals, information: Float) -> list[str]:
+    def warnings(
+        self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
+    ) -> list[str]:
         """Outliers, and amplitudes without a phase that are small beside their uncertainty."""
         said = list(self.table.remarks)
-        outliers = outlying_rows(residuals)
         if outliers:
             named = " and ".join(str(self.table.row_names[row]) for row in outliers)
             said.append(

@@ -15,6 +15,7 @@ from typing import TextIO
 from asperity.errors import InputError
 from asperity.laws import get_law
 from asperity.operating_point import known_parameters
+from asperity.outputs.targets import require_rereadable
 from asperity.parameters import required
 from asperity.sweep.table.cells import Row
 from asperity.sweep.table.columns import check_header
@@ -107,6 +108,7 @@ def open_table(path: Path, law: str | None, filled: Mapping[str, object]) -> Tab
 @contextmanager
 def _opened(path: Path) -> Iterator[TextIO]:
     """The table as text; any failure to read it becomes an `InputError`."""
+    require_rereadable(path, "table")
     try:
         # utf-8-sig: spreadsheets put a byte-order mark in front.
         with path.open(encoding="utf-8-sig", newline="") as stream:
