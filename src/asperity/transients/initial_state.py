@@ -41,8 +41,9 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
     Raises
     ------
     InputError
-        If steady sliding is asked for at rest, states have the wrong number or are not finite, or
-        there is no contact at the beginning.
+        If steady sliding is asked for at rest, states have the wrong number, they or their rates
+        are not finite, the interface force is negative and the law is not defined there, or there
+        is no contact at the beginning.
     """
     require_contact(programme, float(motion.slider.W0))
     if isinstance(initial, str):
@@ -70,7 +71,7 @@ def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) ->
     names = (*motion.mechanical, *motion.slider.law.state_names, "displacement")
     lost = [name for name, rate in zip(names, rates, strict=True) if not np.isfinite(rate)]
     if lost:
-        steady = ", ".join(f"{s:.4g}" for s in np.asarray(motion.steady()))
+        steady = ", ".join(f"{s + 0.0:.4g}" for s in np.asarray(motion.steady()))
         raise InputError(
             f"initial must be states whose rates are numbers, got {_listed(states)}, of which that "
             f"of {lost[0]} is not finite; begin nearer to steady sliding, at {steady}"
