@@ -78,6 +78,32 @@ def test_columns_and_units_are_corrected_by_hand(measured, modulated):
     assert "--load Ft" in lines[-1]["result"]["command"]
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_channels_without_a_finite_value_do_not_matter(modulated, tmp_path, seed):
+    """A recorder writes columns of inputs to which nothing is connected."""
+    draw = np.random.default_rng(seed)
+    lines = modulated.decode().splitlines()
+    spare = draw.integers(1, 30)
+    places = draw.integers(0, 4, spare)
+    words = draw.choice(["nan", "", "inf", "-inf", "NaN"], spare)
+    head, *rows = [line.split(",") for line in lines]
+    for k, (place, word) in enumerate(zip(places, words, strict=True)):
+        head.insert(place, f"spare {k} (V)")
+        for row in rows:
+            row.insert(place, word)
+    path = tmp_path / "0123.csv"
+    path.write_text("\n".join(",".join(row) for row in [head, *rows]) + "\n")
+    source = {"columns": {"time": "time", "W": "Fn", "F": "Ft"}}
+    source = recordings.Source.model_validate(source).model_dump()
+    argument = {"path": str(path), "name": "mine.csv", "source": source, "options": {}}
+    sent = []
+    result = recordings.measure(argument, lambda **message: sent.append(message))
+    assert result["measured"]["record"]["mu1"] == pytest.approx(MU1, rel=0.01)
+    channels = next(m["recording"]["channels"] for m in sent if "recording" in m)
+    assert sum(c["not_finite"] == 6000 for c in channels) == spare
+    assert {c["name"] for c in channels if "mean" in c} == {"Fn", "Ft"}
+
+
 @pytest.mark.parametrize(
     "name",
     [

@@ -46,6 +46,17 @@ def test_workers_know_the_laws_that_the_server_was_given(with_jobs):
     assert {"rice-ruina", "composite"} <= set(last["result"])
 
 
+def test_a_worker_that_is_killed_leaves_its_files_to_the_server(with_jobs, tmp_path):
+    async def work(jobs):
+        jobs = Jobs(preload="unruly_jobs", folder=tmp_path)
+        try:
+            return await messages(jobs, "place")
+        finally:
+            await jobs.close()
+
+    assert with_jobs(work)[-1]["result"] == str(tmp_path)
+
+
 def test_a_job_that_takes_too_much_is_ended(with_jobs):
     async def work(jobs):
         return [

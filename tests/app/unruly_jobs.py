@@ -1,5 +1,7 @@
 """Jobs that do not listen, for the processes that have to end them; see `test_jobs`."""
 
+import tempfile
+
 from asperity.app.api import recordings
 from asperity.laws import registered
 
@@ -28,6 +30,11 @@ def laws(argument, report):
     return list(registered())
 
 
+def place(argument, report):
+    """Where the worker keeps temporary files."""
+    return tempfile.gettempdir()
+
+
 # Workers run what is in the rooms of the page only.
-for job in (spin, hoard, answer, laws):
+for job in (spin, hoard, answer, laws, place):
     setattr(recordings, job.__name__, job)

@@ -26,7 +26,15 @@ from asperity.app.interactive import Busy, Lane, Superseded
 from asperity.app.jobs import processes
 from asperity.app.jobs.processes import Jobs
 from asperity.app.preparation import Preparation
-from asperity.app.security import BODY_LIMIT, BodyTooLarge, BodyTooSlow, Guard, sentence, too_large
+from asperity.app.security import (
+    BODY_LIMIT,
+    BodyTooLarge,
+    BodyTooSlow,
+    Guard,
+    sentence,
+    too_large,
+    too_slow,
+)
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError
 from asperity.outputs.json import to_json
@@ -73,7 +81,9 @@ def build(
             elif isinstance(endpoint, Job):
                 # A job with limits has a process for itself, which need not know any orbits.
                 own = endpoint.job.partition(":")[0] if endpoint.limits else "asperity.orbit"
-                jobs = lanes.setdefault(endpoint.lane, Jobs(preload=own, laws=laws))
+                jobs = lanes.setdefault(
+                    endpoint.lane, Jobs(preload=own, laws=laws, folder=uploads.folder)
+                )
                 warm[endpoint.lane] = warm.get(endpoint.lane) or endpoint.warm
                 handler = _job(endpoint, jobs, uploads)
                 limits[path] = endpoint.largest or BODY_LIMIT
@@ -200,7 +210,7 @@ def _refusing(handle: Callable[[Request], Any], limit: int) -> Callable[[Request
         except BodyTooLarge:
             return too_large(limit)
         except BodyTooSlow:
-            return sentence(408, "the rest of the request did not come; send it again")
+            return too_slow()
         except ClientDisconnect:
             return Response(status_code=499)
         return response

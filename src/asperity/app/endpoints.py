@@ -122,6 +122,13 @@ async def asked(request: Request, kind: type[Question]) -> Any:
     body = await request.body()
     try:
         value = json.loads(body, parse_constant=_no_constant)
+        # Half a surrogate pair is JSON and no text: nothing can write it again.
+        json.dumps(value, ensure_ascii=False).encode()
+    except UnicodeEncodeError:
+        raise InputError(
+            "request.body must hold texts of whole characters, got half a surrogate pair; leave it "
+            "out"
+        ) from None
     except (ValueError, RecursionError):
         raise InputError("request.body must be JSON, got something else; send JSON") from None
     if not isinstance(value, dict):

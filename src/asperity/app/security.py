@@ -9,6 +9,7 @@ this server's own.
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Iterable
 from typing import Any
 
@@ -17,8 +18,9 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 #: Largest body of a request (bytes) where its endpoint names no other limit.
 BODY_LIMIT = 64 * 1024
-#: Longest time (s) between two pieces of a body.
-BODY_PAUSE = 10.0
+#: Longest time (s) to wait for a piece of a body, and bytes a second that a body must come with on
+#: average: this machine sends to itself.
+BODY_PAUSE, BODY_RATE = 10.0, 64 * 1024
 
 #: Names by which this machine's own address goes.
 _NAMES = ("127.0.0.1", "localhost", "[::1]")
@@ -93,7 +95,7 @@ class Guard:
         if scope["path"].startswith("/api/") and site not in ("same-origin", "none"):
             return sentence(403, "a request must come from the page itself, not from another site")
         length = next(_values(scope["headers"], b"content-length"), "0")
-        if not length.isdecimal() or int(length) > limit:
+        if not length.isdecimal() or len(length) > 20 or int(length) > limit:
             return too_large(limit)
         return None
 
@@ -107,31 +109,46 @@ class BodyTooSlow(Exception):  # noqa: N818
 
 
 class _LimitedBody:
-    """`receive` that counts the bytes of the body, for senders that do not say how many follow."""
+    """`receive` that counts the bytes of the body, and the time in which they come.
+
+    Senders need not say how many bytes follow. Each byte allows to wait for more, so that neither
+    a pause nor drops without end hold a connection.
+    """
 
     def __init__(self, receive: Receive, limit: int) -> None:
         self.receive = receive
         self.left = limit
+        self.patience = BODY_PAUSE
         self.complete = False
 
     async def __call__(self) -> Message:
         if self.complete:  # waiting for the end of the connection may take as long as it takes
             return await self.receive()
+        begin = time.monotonic()
         try:
-            message = await asyncio.wait_for(self.receive(), BODY_PAUSE)
+            message = await asyncio.wait_for(self.receive(), self.patience)
         except TimeoutError:
             raise BodyTooSlow from None
         if message["type"] == "http.request":
-            self.left -= len(message.get("body", b""))
+            size = len(message.get("body", b""))
+            waited = time.monotonic() - begin
+            self.patience = min(self.patience - waited + size / BODY_RATE, BODY_PAUSE)
+            self.left -= size
             self.complete = not message.get("more_body", False)
             if self.left < 0:
                 raise BodyTooLarge
         return message
 
 
-def sentence(status: int, text: str) -> JSONResponse:
+def sentence(status: int, text: str, headers: dict[str, str] | None = None) -> JSONResponse:
     """An answer that says in one sentence why there is no other."""
-    return JSONResponse({"error": text}, status_code=status)
+    return JSONResponse({"error": text}, status_code=status, headers=headers)
+
+
+def too_slow() -> JSONResponse:
+    """The answer to a body that does not come; the connection ends with it."""
+    text = "the rest of the request did not come; send it again"
+    return sentence(408, text, {"connection": "close"})
 
 
 def too_large(limit: int) -> JSONResponse:

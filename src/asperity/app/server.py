@@ -114,6 +114,7 @@ def server_on(
     import uvicorn
 
     from asperity.app.application import build
+    from asperity.app.connections import HEAD_PAUSE, Connection
 
     config = uvicorn.Config(
         build(listening.getsockname()[1], in_notebook=in_notebook, prepare=prepare, laws=laws),
@@ -123,9 +124,10 @@ def server_on(
         log_level="warning",
         server_header=False,
         date_header=False,
+        http=Connection,
         ws="none",
         lifespan="on",
-        timeout_keep_alive=30,
+        timeout_keep_alive=HEAD_PAUSE,
         timeout_graceful_shutdown=2,
         limit_concurrency=256,
         h11_max_incomplete_event_size=32 * 1024,

@@ -1,5 +1,7 @@
 """Files that the page sends: in one temporary folder, under names of the server's own.
 
+The folder is removed when the server ends, or by the next server after one that was killed.
+
 A file is known by a random name that only who sent it knows. What the sender calls it is a text for
 messages and never becomes part of a path; of its ending, one of a list is kept, since some formats
 are recognised by it.
@@ -7,15 +9,19 @@ are recognised by it.
 
 from __future__ import annotations
 
+import os
 import re
 import secrets
+import shutil
 import tempfile
+import weakref
 from collections import OrderedDict
 from dataclasses import dataclass
 from pathlib import Path
 
 from asperity.errors import InputError, printable
 from asperity.outputs import free_disk, size_text
+from asperity.outputs.folder import held_folder
 
 #: Largest file (bytes), and all files together.
 LARGEST, TOGETHER = 512 * 1024**2, 2 * 1024**3
@@ -23,6 +29,7 @@ LARGEST, TOGETHER = 512 * 1024**2, 2 * 1024**3
 _MOST_FILES = 200
 #: Room (bytes) that is left on the disk.
 _SPARE = 256 * 1024**2
+_PREFIX = "asperity-uploads-"
 _ENDINGS = ("csv", "txt", "dat", "tsv", "h5", "hdf5", "nc", "mat", "tdms", "json", "gz", "look")
 
 
@@ -49,11 +56,31 @@ class Upload:
 
 
 class Uploads:
-    """The files of a server; the folder is removed with its content when the server ends."""
+    """The files of a server, and what its workers write meanwhile.
+
+    The folder is removed with its content when the server ends; those of servers that were killed
+    are removed first.
+
+    Parameters
+    ----------
+    together : int
+        Largest size of all files (bytes).
+
+    Attributes
+    ----------
+    folder : Path
+    """
 
     def __init__(self, together: int = TOGETHER) -> None:
         self._together = together
-        self._folder: tempfile.TemporaryDirectory[str] | None = None
+        try:
+            self.folder, lock = held_folder(Path(tempfile.gettempdir()), _PREFIX)
+        except OSError as error:
+            raise InputError(
+                "the folder for temporary files must be one that can be written, got none "
+                f"({error.strerror}); set TMPDIR"
+            ) from None
+        self._end = weakref.finalize(self, _remove, self.folder, lock)
         self._files: OrderedDict[str, Upload] = OrderedDict()
 
     def begin(self, name: str) -> Upload:
@@ -64,20 +91,17 @@ class Uploads:
         InputError
             If the disk is full.
         """
-        if self._folder is None:
-            self._folder = tempfile.TemporaryDirectory(prefix="asperity-page-")
-        folder = Path(self._folder.name)
         self._make_room()
-        if free_disk(folder) < LARGEST + _SPARE:
+        if free_disk(self.folder) < LARGEST + _SPARE:
             raise InputError(
                 f"the disk must have {size_text(LARGEST + _SPARE)} free for a file of the page, "
-                f"got {size_text(free_disk(folder))}; make room"
+                f"got {size_text(free_disk(self.folder))}; make room"
             )
         key = secrets.token_hex(16)
         ending = re.search(r"\.(\w{1,5})$", name)
         known = ending is not None and ending[1].lower() in _ENDINGS
         suffix = f".{ending[1].lower()}" if ending is not None and known else ""
-        upload = Upload(key, folder / f"{key}{suffix}", _shown(name))
+        upload = Upload(key, self.folder / f"{key}{suffix}", _shown(name))
         self._files[key] = upload
         return upload
 
@@ -106,9 +130,7 @@ class Uploads:
     def close(self) -> None:
         """Delete all files and their folder."""
         self._files.clear()
-        if self._folder is not None:
-            self._folder.cleanup()
-            self._folder = None
+        self._end()
 
     def _make_room(self) -> None:
         """Delete the files that were used longest ago where there are too many."""
@@ -119,6 +141,12 @@ class Uploads:
 
     def _size(self) -> int:
         return sum(f.path.stat().st_size for f in self._files.values() if f.path.is_file())
+
+
+def _remove(folder: Path, lock: int | None) -> None:
+    shutil.rmtree(folder, ignore_errors=True)
+    if lock is not None:
+        os.close(lock)
 
 
 def _shown(name: str) -> str:

@@ -65,23 +65,39 @@ def _staging(folder: Path, name: str) -> tuple[Path, int | None]:
         place = folder
         while not place.exists():
             place = place.parent
-        # Nobody else may take a folder for abandoned between its creation and its lock.
-        guard = _locked(place, wait=True)
-        try:
-            if guard is not None:
-                _remove_abandoned(place)
-            staging = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=place))
-            return staging, _locked(staging)
-        finally:
-            if guard is not None:
-                os.close(guard)
+        return held_folder(place, _PREFIX)
     except OSError as error:
         raise _unwritable(folder, name, error) from None
 
 
-def _remove_abandoned(place: Path) -> None:
+def held_folder(place: Path, prefix: str) -> tuple[Path, int | None]:
+    """A new temporary folder, and the descriptor that holds its lock where there are locks.
+
+    Folders of the same prefix that killed processes have left are removed; those of running
+    processes stay.
+
+    Parameters
+    ----------
+    place : Path
+        Where it is made.
+    prefix : str
+        With which its name begins.
+    """
+    # Nobody else may take a folder for abandoned between its creation and its lock.
+    guard = _locked(place, wait=True)
+    try:
+        if guard is not None:
+            _remove_abandoned(place, prefix)
+        made = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
+        return made, _locked(made)
+    finally:
+        if guard is not None:
+            os.close(guard)
+
+
+def _remove_abandoned(place: Path, prefix: str) -> None:
     """Remove temporary folders that no running process holds."""
-    for left in place.glob(f"{_PREFIX}*"):
+    for left in place.glob(f"{prefix}*"):
         if left.is_symlink() or not left.is_dir():
             continue
         lock = _locked(left)

@@ -8,6 +8,7 @@ from typing import Any
 
 from asperity.laws import registered
 from asperity.operating_point import known_parameters
+from asperity.parameters.arguments import shown
 from asperity.parameters.toml_file import toml_content
 from asperity.protocol.mistakes import ProtocolError
 from asperity.protocol.protocol import Protocol
@@ -35,13 +36,30 @@ def load_protocol(path: str | os.PathLike[str]) -> Protocol:
         An `InputError` that lists all mistakes, with file, step and a valid example.
     """
     file, content = toml_content(path, "protocol")
+    return protocol_of({"folder": file.parent, **content}, str(path))
+
+
+def protocol_of(content: Mapping[str, Any], source: str = "") -> Protocol:
+    """The protocol that the content of a file describes, with the rules of a file.
+
+    Parameters
+    ----------
+    content : mapping
+    source : str
+        The file, for messages.
+
+    Raises
+    ------
+    ProtocolError
+        As `load_protocol`.
+    """
     mistakes = list(_without_unit(content))
     try:
-        protocol = Protocol(**{"folder": file.parent, **content})
+        protocol = Protocol(**content)
     except ProtocolError as error:
-        raise ProtocolError((*mistakes, *error.mistakes), str(path)) from None
+        raise ProtocolError((*mistakes, *error.mistakes), source) from None
     if mistakes:
-        raise ProtocolError(mistakes, str(path))
+        raise ProtocolError(mistakes, source)
     return protocol
 
 
@@ -65,6 +83,7 @@ def _without_unit(content: Mapping[str, Any]) -> list[str]:
             if unit and isinstance(value, int | float) and not isinstance(value, bool):
                 example = KINDS[names[name]].example
                 found.append(
-                    f"{table}.{name} must carry a unit, got {value!r}; write it like '{example}'"
+                    f"{table}.{name} must carry a unit, got {shown(value)}; "
+                    f"write it like '{example}'"
                 )
     return found

@@ -8,6 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from asperity.errors import InputError, MistakesError, closest
+from asperity.parameters.arguments import shown
 
 
 class ProtocolError(MistakesError):
@@ -67,4 +68,4 @@ def _shown(mistake: Any) -> str:
     value = mistake["input"]
     if isinstance(value, Mapping):
         return f"a table of {len(value)} fields"
-    return f"a list of {len(value)}" if isinstance(value, list | tuple) else repr(value)
+    return shown(value)

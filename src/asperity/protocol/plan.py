@@ -10,6 +10,7 @@ from typing import Any
 from asperity.errors import InputError
 from asperity.loads import ProgrammeStep, StepLoad
 from asperity.loads.programme.steps import LoadAndVelocity
+from asperity.parameters.arguments import shown
 from asperity.protocol.grammar import REPEAT, REPEAT_EXAMPLE, parse_step
 
 #: Steps that a protocol may have with all repetitions: a misprint must not fill the memory.
@@ -81,7 +82,7 @@ def _one(given: Any, place: str, folder: Path, mistakes: list[str]) -> list[Plan
     block = _planned(inner, f"{place}.", folder, mistakes)
     if times * len(block) > MOST:
         raise InputError(
-            f"{place} must come to at most {MOST} steps, got {times} times {len(block)}; "
+            f"{place} must come to at most {MOST} steps, got {shown(times)} times {len(block)}; "
             "repeat it less often"
         )
     return block * times
@@ -90,7 +91,7 @@ def _one(given: Any, place: str, folder: Path, mistakes: list[str]) -> list[Plan
 def _repetition(line: str, place: str) -> tuple[int, list[str]]:
     match = REPEAT.fullmatch(line)
     inner = [part.strip() for part in match["steps"].split(";")] if match else []
-    if match is None or not match["times"].isdecimal() or int(match["times"]) < 1:
+    if match is None or not match["times"].isdecimal() or _count(match["times"]) < 1:
         raise InputError(
             f"{place} must say how often what is repeated, got '{line}'; write it like "
             f"'{REPEAT_EXAMPLE}'"
@@ -101,4 +102,9 @@ def _repetition(line: str, place: str) -> tuple[int, list[str]]:
             "one as a table, like { repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }"
         )
     # A line may end in a semicolon.
-    return int(match["times"]), [part for i, part in enumerate(inner) if part or i == 0]
+    return _count(match["times"]), [part for i, part in enumerate(inner) if part or i == 0]
+
+
+def _count(digits: str) -> int:
+    """The number, or one beyond `MOST` of digits that are too many to be read."""
+    return int(digits) if len(digits) < 1000 else 10**1000

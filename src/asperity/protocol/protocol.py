@@ -148,7 +148,7 @@ class Protocol(BaseModel):
     _planned: list[PlannedStep] = PrivateAttr(default_factory=list)
     _numbers: dict[str, SourcedNumber] = PrivateAttr(default_factory=dict)
 
-    def __init__(self, **fields: Any) -> None:
+    def __init__(self, /, **fields: Any) -> None:
         try:
             super().__init__(**fields)
         except ValidationError as error:
@@ -224,7 +224,8 @@ class Protocol(BaseModel):
         """What a recording of the run is made with, None without a tribometer."""
         if self.tribometer is None:
             return None
-        return setup_of(self.tribometer, self.solver.sampling, self._numbers["K"].value)
+        K = self._numbers.get("K")  # none where another mistake has left no numbers
+        return setup_of(self.tribometer, self.solver.sampling, np.nan if K is None else K.value)
 
     @property
     def integration(self) -> dict[str, Any]:

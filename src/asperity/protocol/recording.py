@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError, closest
+from asperity.parameters.arguments import shown
 from asperity.recording.roles import candidates
 from asperity.recording.trace import Trace
 from asperity.tribometer.sensors import (
@@ -87,7 +88,9 @@ def setup_of(
     rest = dict(table)
     seed, described = rest.pop("seed", 0), rest.pop("sensors", {})
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise InputError(f"tribometer.seed must be a whole number from 0, got {seed!r}; correct it")
+        raise InputError(
+            f"tribometer.seed must be a whole number from 0, got {shown(seed)}; correct it"
+        )
     if not isinstance(described, Mapping) or not described:
         raise InputError(
             "tribometer.sensors must have a table for each channel, got none; write it like "
@@ -139,16 +142,16 @@ def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
     place = f"tribometer.sensors.{channel}"
     rest = dict(fields) if isinstance(fields, Mapping) else {}
     name = rest.pop("type", None)
-    if name not in SENSORS:
+    if not isinstance(name, str) or name not in SENSORS:
         raise InputError(
-            f"{place}.type must be a sensor, got {name!r}; {closest(str(name), SENSORS)}"
+            f"{place}.type must be a sensor, got {shown(name)}; {closest(str(name), SENSORS)}"
         )
     made, measurable = SENSORS[name]
     given = rest.pop("measures", None)
     measured = measurable[0] if given is None else given
     if measured not in measurable:
         raise InputError(
-            f"{place}.measures must be something that a {name} can measure, got {measured!r}; "
+            f"{place}.measures must be something that a {name} can measure, got {shown(measured)}; "
             f"choose {' or '.join(map(repr, measurable))}"
         )
     claimed = next((_CLAIMS[r] for r in _CLAIMS if candidates(r, {channel: None})), measured)
@@ -166,14 +169,14 @@ def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
         if name not in known:
             advice = closest(name, known)
             raise InputError(
-                f"{place}.{name} must be a known field, got {fields[name]!r}; {advice}"
+                f"{place}.{name} must be a known field, got {shown(fields[name])}; {advice}"
             )
         if isinstance(fields[name], list) or (
             isinstance(fields[name], Mapping) and name != "ranges"
         ):
             raise InputError(
-                f"{place}.{name} must be one value, got {fields[name]!r}; give a number or a text "
-                "with its unit"
+                f"{place}.{name} must be one value, got {shown(fields[name])}; give a number or a "
+                "text with its unit"
             )
     for name, field in known.items():
         needed = field.default is field.default_factory is dataclasses.MISSING

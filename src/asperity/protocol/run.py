@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity import materials
+from asperity.errors import InputError
 from asperity.outputs import (
     Interrupted,
     UnfinishedOutput,
@@ -109,6 +110,11 @@ def run_protocol(
         if unstable := stability_statement(protocol):
             attributes["unstable_start"] = unstable
         undisturbed(partial(_close, output, attributes))
+    except InputError as error:
+        # A protocol calls the argument `initial` of a transient otherwise.
+        if not str(error).startswith("initial "):
+            raise
+        raise InputError(f"start.states{str(error).removeprefix('initial')}") from None
     except KeyboardInterrupt:
         total = protocol.programme.duration
         raise Interrupted(

@@ -117,15 +117,18 @@ class _BlockWriter:
 
     def write(self, part: SegmentPart, times: np.ndarray) -> None:
         """Evaluate a segment part at `times` (s of the programme)."""
-        # Contact lost at a break point itself leaves no steps.
-        if len(times) == 0 or len(part.dense_output.begin) == 0:
+        none, over = len(part.dense_output.begin) == 0, part.termination
+        # At a break point that takes the contact away there is no motion to evaluate.
+        if len(times) == 0 or (none and over is not None and over.kind == "loss of contact"):
             return
         checkpoint, (W0, K, V) = part.checkpoint, self._scales
         t = np.clip(times - part.start, 0.0, part.end)
-        Y = part.dense_output.evaluate(t)
+        # Where no step was accurate there is the state before it.
+        Y = checkpoint.states[:, None] if none else part.dense_output.evaluate(t)
         now = motion_samples(part.system, t, Y)
-        self._columns.append(
-            [
+        # Of a slider that runs away the velocity may leave the range of doubles.
+        with np.errstate(over="ignore"):
+            columns = [
                 times,
                 now.force * W0,
                 now.load * W0,
@@ -134,7 +137,7 @@ class _BlockWriter:
                 Y[-1] * W0 / K,
                 Y[:-1].T,
             ]
-        )
+        self._columns.append(columns)
         self._count += len(t)
         # A block that ends within a segment part is resumed from its last sample.
         self.reached = Checkpoint(

@@ -44,6 +44,16 @@ class SegmentEquations(eqx.Module):
         """Excitation at the time `t` (s) of the segment."""
         return self.segment.at(t, self.motion.slider.W0, self.motion.V)
 
+    def friction(self, at: Excitation, states: Array) -> Array:
+        """F_i/W of the motion's states."""
+        motion = self.motion
+        if isinstance(motion, QuasiStatic):
+            return motion.friction(states, at)
+        if "friction" in motion.mechanical:
+            return states[motion.mechanical.index("friction")]
+        v = motion.V * motion.slider_velocity(states, at)
+        return motion.slider.law.friction(v, motion.law_state(states), at.w)
+
     def motion_rates(self, at: Excitation, Y: Array) -> tuple[Array, Array]:
         """Rates of the motion's states, and of x K / W0; no rate depends on x."""
         motion = self.motion
@@ -110,14 +120,8 @@ class MotionSamples(NamedTuple):
 
 def _read(system: SegmentEquations, t: Array, Y: Array) -> Array:
     motion, at, states = system.motion, system.at(t), Y[:-1]
-    law = motion.slider.law
     velocity = motion.slider_velocity(states, at)
-    if isinstance(motion, QuasiStatic):
-        friction = motion.friction(states, at)
-    elif "friction" in motion.mechanical:
-        friction = states[motion.mechanical.index("friction")]
-    else:
-        friction = law.friction(motion.V * velocity, motion.law_state(states), at.w)
+    friction = system.friction(at, states)
     elastic = isinstance(motion, QuasiStatic) or "friction" in motion.mechanical
     slip = motion.slip_velocity(friction, states, at) if elastic else velocity
     speed = jnp.where(at.pull > 0, at.pull, jnp.nan)

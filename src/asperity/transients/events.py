@@ -74,7 +74,9 @@ class EventDetector:
         V = float(motion.V)
 
         def log_speed(velocity: np.ndarray, threshold: float) -> np.ndarray:
-            return np.log(np.maximum(velocity * V, 1e-300) / threshold)
+            # Of a slider that runs away the velocity may leave the range of doubles.
+            with np.errstate(over="ignore"):
+                return np.log(np.maximum(velocity * V, 1e-300)) - np.log(threshold)
 
         self._slip: Distance = lambda r: log_speed(r.slip, thresholds.slip)
         self._runaway: Distance = lambda r: log_speed(r.slip, thresholds.runaway)

@@ -41,8 +41,9 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
     Raises
     ------
     InputError
-        If steady sliding is asked for at rest, states have the wrong number or are not finite, or
-        there is no contact at the beginning.
+        If steady sliding is asked for at rest, states have the wrong number, they or their rates
+        are not finite, the interface force is negative and the law is not defined there, or there
+        is no contact at the beginning.
     """
     require_contact(programme, float(motion.slider.W0))
     if isinstance(initial, str):
@@ -59,7 +60,40 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
             f"initial must be {motion.size} finite states ({names}), got {states.tolist()}; "
             "take them from a trajectory or begin in steady sliding"
         )
+    _require_motion(motion, programme, states)
     return Checkpoint(0, 0.0, np.append(states, 0.0))
+
+
+def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) -> None:
+    """Refuse states from which the equations of motion give no motion."""
+    first = SegmentEquations(motion, programme.segments[0])
+    rates, friction = (np.asarray(a) for a in _rates_and_friction(first, np.append(states, 0.0)))
+    names = (*motion.mechanical, *motion.slider.law.state_names, "displacement")
+    lost = [name for name, rate in zip(names, rates, strict=True) if not np.isfinite(rate)]
+    if lost:
+        steady = ", ".join(f"{s + 0.0:.4g}" for s in np.asarray(motion.steady()))
+        raise InputError(
+            f"initial must be states whose rates are numbers, got {_listed(states)}, of which that "
+            f"of {lost[0]} is not finite; begin nearer to steady sliding, at {steady}"
+        )
+    # Where ln v is a state the slider goes forwards whatever the law says of so small a velocity.
+    if friction < 0 and not (motion.signed or "log_velocity" in motion.mechanical):
+        raise InputError(
+            f"initial must leave an interface force that is not negative, got {_listed(states)} "
+            f"and F_i/W = {friction:.4g}, for which '{motion.slider.law.name}' is not defined; "
+            "take a law that is, such as 'regularised'"
+        )
+
+
+def _listed(states: np.ndarray) -> str:
+    return f"[{', '.join(f'{s:.4g}' for s in states)}]"
+
+
+@jax.jit
+def _rates_and_friction(first: SegmentEquations, Y: Array) -> tuple[Array, Array]:
+    """Rates (1/s) and F_i/W at the beginning of a segment."""
+    at = first.at(jnp.zeros(()))
+    return first.rates(at, Y), first.friction(at, Y[:-1])
 
 
 def require_contact(programme: Programme, W0: float) -> None:

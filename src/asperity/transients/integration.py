@@ -268,11 +268,12 @@ def _contact(segment: ProgrammeSegment, W0: float) -> tuple[float, float | None]
     spacing = segment.longest_step / 16
     first = segment.surely_above(floor)
     last = duration if segment.period is None else min(duration, 2 * segment.period)
-    begin = first
+    begin, rounds = first, 0
     while begin < last:
-        if first > 0 and begin - first > 100 * 4096 * spacing:
+        if first > 0 and rounds > 100:
             # Doubles no longer tell the phases apart: the envelope decides.
             return first, first
+        rounds += 1
         times = np.minimum(begin + spacing * np.arange(4097), duration)
         low = np.flatnonzero(load(times) <= floor)
         begin += 4096 * spacing

@@ -15,6 +15,9 @@ from asperity.transients.equations import SegmentEquations
 #: Factor by which a rejected step is shortened at least.
 _SAFETY = 0.9
 
+#: Steps that a compiled program tries before it returns, so that Ctrl-C is heard.
+_TRIALS = 4 * STEPS
+
 
 class TrialStep(NamedTuple):
     """A step that may be accepted or rejected.
@@ -88,7 +91,7 @@ def run_steps(
     memory: Any,
     limits: LengthLimits,
 ) -> AcceptedSteps:
-    """Integrate from `t` towards `end`, at most `STEPS` accepted steps.
+    """Integrate from `t` towards `end`: at most `STEPS` accepted steps of `_TRIALS` that are tried.
 
     Parameters
     ----------
@@ -107,7 +110,9 @@ def run_steps(
     """
 
     def unfinished(run: AcceptedSteps) -> Array:
-        return (run.t < end) & (run.taken < STEPS) & (run.status == GOING_ON)
+        tried = run.taken + run.rejected
+        room = (run.taken < STEPS) & (tried < _TRIALS)
+        return (run.t < end) & room & (run.status == GOING_ON)
 
     def body(run: AcceptedSteps) -> AcceptedSteps:
         t, i = run.t, run.taken
@@ -120,7 +125,8 @@ def run_steps(
         factor = jnp.clip(trial.factor, limits.shrink, limits.grow)
         factor = jnp.where(jnp.isfinite(trial.error), factor, limits.shrink)
         h_next = h * jnp.where(good, factor, jnp.minimum(factor, _SAFETY))
-        lost = ~good & (t + h_next <= t)
+        # Neither does a length that is no number go on.
+        lost = ~good & ~(t + h_next > t)
 
         def accepted(new: Array, old: Array) -> Array:
             return jnp.where(good, new, old)

@@ -307,3 +307,77 @@ def test_hdf5_reads_no_other_file(tmp_path, way):
             sent.create_virtual_dataset("F", layout)
     with pytest.raises(InputError, match="whose 'F' lies in another file"):
         read(path)
+
+
+def links_without_end(file, planted, seed):
+    """The planted recording in one of many groups, each of which has links to many others."""
+    draw = np.random.default_rng(seed)
+    groups = [file]
+    for k in range(40):
+        inside = groups[draw.integers(len(groups))] if draw.random() < 0.5 else groups[-1]
+        groups.append(inside.create_group(f"group {k}"))
+    h5_datasets(groups[draw.integers(1, len(groups))], planted)
+    for k in range(200):
+        group, other = (groups[i] for i in draw.integers(len(groups), size=2))
+        group[f"link {k}"] = other if draw.random() < 0.5 else h5py.SoftLink(other.name)
+    file["nowhere"] = h5py.SoftLink("/not there")
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_groups_with_links_to_one_another_are_read_once(tmp_path, planted, seed):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        links_without_end(file, planted, seed)
+    assert_planted(read(path), planted)
+
+
+def test_a_group_goes_by_each_of_its_names(tmp_path, planted):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        h5_datasets(file.create_group("runs/fast"), planted)
+        half = type(planted)(*(v[::2] for v in planted))
+        h5_datasets(file.create_group("runs/slow"), half)
+        file["last"], file["runs/up"] = file["runs/fast"], file["/"]
+        file["best"] = h5py.SoftLink("/runs/slow")
+    for name in ("last", "runs/fast", "/last/", "runs/up/last"):
+        assert_planted(read(path, group=name), planted)
+    assert len(read(path, group="best")) == 200
+
+
+def test_a_dataset_with_many_names_is_read_once(tmp_path, planted, monkeypatch):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        h5_datasets(file, planted)
+        big = file.create_dataset("image", data=np.zeros((3, 300, 300)))
+        for k in range(50):
+            file.create_group(f"group {k}")["image"] = big
+    whole = h5py.Dataset.__getitem__
+    taken = []
+    monkeypatch.setattr(
+        h5py.Dataset, "__getitem__", lambda d, key: taken.append(d.name) or whole(d, key)
+    )
+    assert_planted(read(path), planted)
+    assert sum(name.endswith("image") for name in taken) == 1
+
+
+@pytest.mark.parametrize("depth", [50, 1200])
+def test_groups_as_deep_as_one_likes(tmp_path, planted, depth):
+    path = tmp_path / "a.h5"
+    with h5py.File(path, "w") as file:
+        group = file
+        for _ in range(depth):
+            group = group.create_group("g")
+        h5_datasets(group, planted)
+    assert_planted(read(path), planted)
+    assert_planted(read(path, group="/".join("g" * depth)), planted)
+
+
+def test_cells_of_matlab_that_hold_themselves(tmp_path, planted):
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w") as file:
+        h5_datasets(file, planted)
+        cells = [file.create_dataset(f"cell {k}", (2,), dtype=h5py.ref_dtype) for k in range(40)]
+        for k, cell in enumerate(cells):
+            cell.attrs["MATLAB_class"] = np.bytes_("cell")
+            cell[0] = cell[1] = cells[(k + 1) % len(cells)].ref
+    assert_planted(read(path), planted)

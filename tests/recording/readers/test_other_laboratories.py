@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import gzip
 import io
+import random
 import struct
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ import scipy.io
 
 from asperity.errors import InputError
 from asperity.recording import read
+from asperity.recording.readers import compressed
+from asperity.recording.readers.compressed import unpacked
 
 ROWS = 60
 TIME = np.arange(ROWS) / 1000
@@ -149,6 +153,42 @@ def test_gzip_that_is_damaged_is_named(tmp_path):
     assert "truncated" in {f.name for f in trace.findings}
     with pytest.raises(InputError, match="whole file"):
         read(written(tmp_path, bytes(packed[:9])))
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_gzip_in_any_pieces_unpacks_to_what_was_packed(tmp_path, seed):
+    draw = random.Random(seed)
+    text = PLAIN.encode() * draw.choice([1, 1, 40])
+    cuts = sorted(draw.randrange(len(text)) for _ in range(draw.choice([0, 1, 5, 2000])))
+    ends = zip([0, *cuts], [*cuts, len(text)], strict=True)
+    pads = [0, 1, 50_000] if len(cuts) < 10 else [0, 1]
+    pieces = [gzip.compress(text[a:b]) + b"\0" * draw.choice(pads) for a, b in ends]
+    path = tmp_path / "a.csv.gz"
+    path.write_bytes(b"".join(pieces))
+    assert unpacked(path) == (text, "")
+    path.write_bytes(path.read_bytes() + draw.choice([b"x", b"no more", b"\x1fx"]))
+    assert unpacked(path) == (text, "")
+
+
+def test_gzip_that_unpacks_without_end_is_refused_while_it_is_unpacked(tmp_path, monkeypatch):
+    limit = 2**22
+    monkeypatch.setattr(compressed, "LARGEST", limit)
+    row = b"1.5,2.5,3.5\n"
+    for size, members in ((limit, 1), (limit + len(row), 1), (2**28, 1), (2**28, 2000)):
+        packed = gzip.compress(row * (size // len(row) // members)) * members
+        path = tmp_path / "a.csv.gz"
+        path.write_bytes(packed)
+        tracemalloc.start()
+        try:
+            if size <= limit:
+                assert len(unpacked(path)[0]) <= limit
+                continue
+            with pytest.raises(InputError, match=r"must unpack to at most 4 MB.*'a.csv.gz'"):
+                read(path)
+            # A piece of a thousandth of what comes out of it is unpacked at once.
+            assert tracemalloc.get_traced_memory()[1] < 16 * limit
+        finally:
+            tracemalloc.stop()
 
 
 def test_a_binary_format_that_is_packed_is_refused_with_what_to_do(tmp_path):

@@ -20,12 +20,12 @@ from asperity.parameters.toml_file import parsed_toml
 from asperity.protocol import (
     Protocol,
     ProtocolError,
-    load_protocol,
     outline,
     record_run,
     write_csv,
 )
 from asperity.protocol import run_protocol as run_to_file
+from asperity.protocol.load import protocol_of
 
 #: Rows of a motion (bytes in its file).
 _LARGEST_MOTION = 256 * 1024**2
@@ -48,17 +48,13 @@ def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
     if refused:
         return None, refused
     try:
-        with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
-            path = Path(folder) / "protocol.toml"
-            path.write_text(text, encoding="utf-8")
-            protocol = load_protocol(path)
-            _ = protocol.rows  # what the solver's table says is read here
-            return protocol, []
+        protocol = protocol_of(content)
+        _ = protocol.rows  # what the solver's table says is read here
+        return protocol, []
     except ProtocolError as error:
         return None, [{"sentence": m, "line": _line_of(m, lines, text)} for m in error.mistakes]
     except InputError as error:
-        sentence = str(error).replace(str(path), "the protocol")
-        return None, [{"sentence": sentence, "line": _line_of(sentence, lines, text)}]
+        return None, [{"sentence": str(error), "line": _line_of(str(error), lines, text)}]
 
 
 def run(text: str, out: Path, report: Callable[..., None]) -> dict[str, Any]:

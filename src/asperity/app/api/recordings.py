@@ -35,7 +35,9 @@ LARGEST_TABLE = 1024**2
 
 Name = Annotated[str, Field(max_length=60)]
 Text = Annotated[str, Field(max_length=200)]
-Seconds = Annotated[float | int, Field(allow_inf_nan=False)]
+Seconds = (
+    Annotated[float, Field(allow_inf_nan=False)] | Annotated[int, Field(ge=-(10**15), le=10**15)]
+)
 
 
 class Source(Question):
@@ -142,16 +144,17 @@ def _described(trace: Any, name: str, source: Mapping[str, Any]) -> dict[str, An
     channels = []
     for number, (channel_name, channel) in enumerate(trace.channels.items()):
         finite = channel.values[np.isfinite(channel.values)]
-        some = {"least": finite.min(), "mean": finite.mean(), "largest": finite.max()}
-        curve = {}
-        if number < _MOST_CHANNELS:
+        some = curve = {}
+        if finite.size:
+            some = {"least": finite.min(), "mean": finite.mean(), "largest": finite.max()}
+        if finite.size and number < _MOST_CHANNELS:
             curve = {"curve": extremes(trace.time, channel.values, 120)}
         channels.append(
             {
                 "name": channel_name, "recorded_name": channel.recorded_name,
                 "recorded_unit": channel.recorded_unit, "unit": channel.unit, "kind": channel.kind,
                 "not_finite": int(channel.values.size - finite.size),
-                **(some if finite.size else {}), **curve,
+                **some, **curve,
             }
         )  # fmt: skip
     provenance = {

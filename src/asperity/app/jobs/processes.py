@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import json
+import os
 import sys
 from collections.abc import AsyncGenerator, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 #: Longest message of a worker (bytes).
@@ -34,6 +36,8 @@ class Jobs:
         Module that a worker imports before its first job comes.
     laws : sequence of str
         Places of laws outside the package, which it registers.
+    folder : Path, optional
+        Where workers keep temporary files: one that is killed leaves them to whoever has it.
     """
 
     def __init__(
@@ -42,8 +46,10 @@ class Jobs:
         most: int = 20,
         preload: str = "asperity.orbit",
         laws: Sequence[str] = (),
+        folder: Path | None = None,
     ) -> None:
         self._most = most
+        self._folder = folder
         self._preload = (preload, *laws)
         self._free = asyncio.Semaphore(workers)
         self._waiting = 0
@@ -125,7 +131,7 @@ class Jobs:
         finished = False
         superseded = asyncio.ensure_future(newer.wait())
         try:
-            worker = self._idle_one() or await _Worker.start(self._preload)
+            worker = self._idle_one() or await _Worker.start(self._preload, self._folder)
             self._alive.add(worker)
             await worker.send({"job": job, "argument": argument, "limits": dict(limits or {})})
             end = asyncio.get_running_loop().time() + seconds
@@ -180,7 +186,7 @@ class Jobs:
 
     async def prepare(self, warm: str | None = None) -> None:
         """Start a worker for the first job, and let it run `warm` without waiting for its end."""
-        worker = await _Worker.start(self._preload)
+        worker = await _Worker.start(self._preload, self._folder)
         self._alive.add(worker)
         self._idle.append(worker)
         if warm is not None:
@@ -214,8 +220,9 @@ class _Worker:
         self._reader = asyncio.get_running_loop().create_task(self._read_lines())
 
     @classmethod
-    async def start(cls, preload: Sequence[str]) -> _Worker:
+    async def start(cls, preload: Sequence[str], folder: Path | None) -> _Worker:
         """Start a process that imports a module, and laws, before its first job."""
+        place = {} if folder is None else {"TMPDIR": str(folder)}
         return cls(
             await asyncio.create_subprocess_exec(
                 sys.executable,
@@ -225,6 +232,7 @@ class _Worker:
                 stdin=asyncio.subprocess.PIPE,
                 stdout=asyncio.subprocess.PIPE,
                 limit=_LONGEST,
+                env={**os.environ, **place},
             )
         )
 

@@ -119,12 +119,12 @@ class HarmonicSegment(ProgrammeSegment):
         level, duration = float(self.load1), float(self.duration)
         if float(self.load_rate) != 0 or rise <= 0 or abs(end) <= abs(begin) or begin * end < 0:
             return 0.0
-        low, high = 0.0, min(rise, duration)
-        for _ in range(60):
-            x = 0.5 * (low + high) / rise
+        low, high = 0.0, min(rise, duration) / rise
+        while low < (x := 0.5 * (low + high)) < high:  # until doubles are exhausted
             epsilon = begin + (end - begin) * x**3 * (10 - 15 * x + 6 * x**2)
             above = level * (1 - abs(epsilon)) > load
-            low, high = (x * rise, high) if above else (low, x * rise)
+            low, high = (x, high) if above else (low, x)
+        low *= rise
         return low if level * (1 - abs(begin)) > load else 0.0
 
     @property

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import io
 import json
 import zlib
 from pathlib import Path
+from typing import Any, BinaryIO
 
 from asperity.errors import InputError
 
@@ -19,7 +22,11 @@ _ARCHIVES = {
 }
 #: A window of zlib that expects the header of gzip.
 _WINDOW = 31
-_PIECE = 1 << 16
+#: Bytes that are unpacked at a time; of zeros, a thousand times as many come out.
+_PIECE = 1 << 14
+#: Bytes that a packed text may hold: at 40 a row, seven hours at 1 kHz. What is not packed may be
+#: of any size.
+LARGEST = 1 << 30
 
 
 def refuse_archive(head: bytes, path: Path) -> None:
@@ -83,34 +90,49 @@ def unpacked(path: Path) -> tuple[bytes, str]:
     -------
     (bytes, str)
         What could be unpacked, and a sentence that is empty for a whole file.
+
+    Raises
+    ------
+    InputError
+        As soon as more comes out of it than `LARGEST`.
     """
-    rest, parts = path.read_bytes(), []
-    while rest.startswith(GZIP):
-        stream = zlib.decompressobj(_WINDOW)
+    whole = io.BytesIO()
+    with path.open("rb") as file:
+        why = _unpack(file, whole, path)
+    return whole.getvalue(), why
+
+
+def _unpack(file: BinaryIO, whole: io.BytesIO, path: Path) -> str:
+    """Unpack piece by piece into `whole`; what is wrong, in a sentence."""
+    stream, piece = zlib.decompressobj(_WINDOW), file.read(_PIECE)
+    while True:
+        before = stream.copy()
         try:
-            parts.append(stream.decompress(rest))
+            whole.write(stream.decompress(piece))
         except zlib.error:
-            return b"".join([*parts, _until_damage(rest)]), "its packed contents are damaged."
+            _until_damage(before, piece, whole)
+            return "its packed contents are damaged."
+        if whole.tell() > LARGEST:
+            raise InputError(
+                f"recording.path must unpack to at most {LARGEST // 1024**2} MB, got "
+                f"'{path.name}', which goes on; unpack it, and see what it holds"
+            )
         if not stream.eof:
-            return b"".join(parts), "its packed contents end too early."
+            piece = file.read(_PIECE)
+            if not piece:
+                return "its packed contents end too early."
+            continue
         # Files may be packed piece by piece; zeros behind them pad a tape.
-        rest = stream.unused_data.lstrip(b"\0")
-    return b"".join(parts), ""
+        piece = stream.unused_data.lstrip(b"\0")
+        while len(piece) < len(GZIP) and (more := file.read(_PIECE)):
+            piece = (piece + more).lstrip(b"\0")
+        if not piece.startswith(GZIP):
+            return ""
+        stream = zlib.decompressobj(_WINDOW)
 
 
-def _until_damage(packed: bytes) -> bytes:
-    """What comes out of a damaged stream before the damage."""
-    stream = zlib.decompressobj(_WINDOW)
-    parts = []
-    for at in range(0, len(packed), _PIECE):
-        piece, before = packed[at : at + _PIECE], stream.copy()
-        try:
-            parts.append(stream.decompress(piece))
-        except zlib.error:
-            # Byte by byte, as a piece that fails gives nothing.
-            try:
-                for byte in piece:
-                    parts.append(before.decompress(bytes([byte])))
-            except zlib.error:
-                break
-    return b"".join(parts)
+def _until_damage(stream: Any, packed: bytes, whole: io.BytesIO) -> None:
+    """Unpack what comes before the damage, byte by byte, as a piece that fails gives nothing."""
+    with contextlib.suppress(zlib.error):
+        for byte in packed:
+            whole.write(stream.decompress(bytes([byte])))

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,9 @@ from asperity.recording.readers.raw import (
     one_table,
     refuse_truncated,
 )
+
+#: Where a group lies: the place of the group that it lies in, and its name; None for the root.
+_Place = tuple[Any, str] | None
 
 
 def load(path: Path, group: str | None = None) -> RawRecording:
@@ -33,36 +37,89 @@ def load(path: Path, group: str | None = None) -> RawRecording:
 
     try:
         with h5py.File(path, "r") as file:
-            _refuse_other_files(file, path)
-            matlab = any("MATLAB_class" in item.attrs for item in file.values())
-            groups, step = _walk(file, matlab)
+            _refuse_links_out(file, path)
+            matlab = any(item and "MATLAB_class" in item.attrs for item in file.values())
+            found = _contents(file, path, matlab)
+            if group is not None:
+                chosen = file.get(group.strip("/") or "/")
+                if isinstance(chosen, h5py.Group):
+                    group = found.names.get(_address(chosen), group)
     except InputError:
         raise
     # The library raises whatever the damage makes of the data.
     except Exception as refused:
         raise _unreadable(path, refused) from None
-    columns, findings = one_table(groups, path, group)
+    columns, findings = one_table(found.columns, path, group)
     provenance = {"format": "matlab 7.3" if matlab else "hdf5", "group": group or ""}
-    return RawRecording(columns, findings, provenance, step=step)
+    return RawRecording(columns, findings, provenance, step=found.step)
 
 
-def _refuse_other_files(file: Any, path: Path) -> None:
-    """Refuse links and datasets that lead to other files, before one of them is opened."""
+def _refuse_links_out(file: Any, path: Path) -> None:
+    """Refuse links that lead to other files, before one of them is followed.
+
+    Soft links are left alone: what they lead to in this file has a hard link too.
+    """
     import h5py
 
-    def outside(name: str, item: Any) -> str | None:
-        if isinstance(item, h5py.ExternalLink):
-            return name
-        stored = isinstance(item, h5py.Dataset) and (item.external or item.is_virtual)
-        return name if stored else None
+    def is_hard(node: Any, key: str) -> bool:
+        return isinstance(node.get(key, getlink=True), h5py.HardLink)
 
-    # The first name that is returned ends the visit; an exception would be lost in the library.
-    found = file.visititems_links(outside) or file.visititems(outside)
-    if found:
-        raise InputError(
-            f"recording.path must hold its data itself, got '{path.name}', whose {found!r} lies in "
-            "another file; copy the data into one file"
-        )
+    for place, node in _groups(file, is_hard):
+        for key in node:
+            if isinstance(node.get(key, getlink=True), h5py.ExternalLink):
+                raise _elsewhere(path, _path((place, key)))
+
+
+def _elsewhere(path: Path, name: str) -> InputError:
+    return InputError(
+        f"recording.path must hold its data itself, got '{path.name}', whose {name!r} lies in "
+        "another file; copy the data into one file"
+    )
+
+
+def _groups(file: Any, followed: Callable[[Any, str], bool]) -> list[tuple[_Place, Any]]:
+    """Every group once, with the first place that leads to it; inner groups before outer ones.
+
+    A group may lie in itself, and as deep as the file is long: there is no recursion, and each
+    group is opened from the one that it lies in.
+
+    Parameters
+    ----------
+    file : h5py.File
+    followed : callable
+        Whether to follow the link of a group with a name.
+    """
+    import h5py
+
+    root = file["/"]
+    left: list[tuple[_Place, Any]] = [(None, root)]
+    known, found = {_address(root)}, []
+    while left:
+        place, node = left.pop()
+        found.append((place, node))
+        for key in node:
+            item = node.get(key) if followed(node, key) else None
+            if isinstance(item, h5py.Group) and _address(item) not in known:
+                known.add(_address(item))
+                left.append(((place, key), item))
+    return found[::-1]
+
+
+def _path(place: _Place) -> str:
+    """The path of a group, without a slash at its ends; empty for the root."""
+    keys = []
+    while place is not None:
+        place, key = place
+        keys.append(key)
+    return "/".join(reversed(keys))
+
+
+def _address(item: Any) -> int:
+    """Where an object lies in the file: one number for all of its names."""
+    import h5py
+
+    address: int = h5py.h5o.get_info(item.id).addr
+    return address
 
 
 def _unreadable(path: Path, refused: Exception) -> InputError:
@@ -76,34 +133,51 @@ def _unreadable(path: Path, refused: Exception) -> InputError:
     return refuse_truncated(path, "which HDF5 cannot open as it is damaged or not whole")
 
 
-def _walk(file: Any, matlab: bool) -> tuple[dict[str, list[RawColumn]], float | None]:
-    """Columns of every group by its path, and an interval if one is stated."""
+class _Contents(NamedTuple):
+    """Columns of every group that has some, an interval if one is stated, and names of groups.
+
+    A group has the name under which it is in `columns` by each of its names.
+    """
+
+    columns: dict[str, list[RawColumn]]
+    step: float | None
+    names: dict[int, str]
+
+
+def _contents(file: Any, path: Path, matlab: bool) -> _Contents:
     import h5py
 
+    reader = _Reader(file, path, matlab)
     groups: dict[str, list[RawColumn]] = {}
+    names: dict[int, str] = {}
     intervals = [interval_of(dict(file.attrs))]
-
-    def visit(node: Any, name: str) -> None:
+    for place, node in _groups(file, lambda _, key: not _is_of_matlab(key)):
         arrays: dict[str, Any] = {}
         attributes: dict[str, dict[str, Any]] = {}
         for key, item in node.items():
-            if key.startswith("#"):
-                # References and the subsystem of MATLAB.
+            if _is_of_matlab(key):
                 continue
             if isinstance(item, h5py.Group):
-                arrays[key] = _texts_of(item, matlab)
-                visit(item, f"{name}/{key}".strip("/"))
-            elif item.shape is not None and not _is_bare_dimension(item):
-                arrays[key] = _values(file, item, matlab)
+                arrays[key] = reader.texts(item)
+            elif _holds_values(item) and not _is_bare_dimension(item):
+                arrays[key] = reader.values(item)
                 attributes[key] = dict(item.attrs)
                 intervals.append(interval_of(attributes[key]))
         intervals.append(interval_of(dict(node.attrs)))
         columns, step = group_columns(arrays, attributes)
-        groups[name] = columns
+        if columns:
+            groups[_path(place)] = columns
+            names[_address(node)] = _path(place)
         intervals.append(step)
+    step = next((step for step in intervals if step is not None), None)
+    return _Contents(groups, step, names)
 
-    visit(file, "")
-    return groups, next((step for step in intervals if step is not None), None)
+
+def _holds_values(item: Any) -> bool:
+    """Whether an item of a group is a dataset that is not empty by its type."""
+    import h5py
+
+    return isinstance(item, h5py.Dataset) and item.shape is not None
 
 
 def _is_bare_dimension(item: Any) -> bool:
@@ -113,29 +187,82 @@ def _is_bare_dimension(item: Any) -> bool:
     return name.startswith("This is a netCDF dimension but not a netCDF variable")
 
 
-def _values(file: Any, item: Any, matlab: bool) -> Any:
-    import h5py
-
-    if matlab and item.attrs.get("MATLAB_class") == b"char":
-        return "".join(map(chr, np.asarray(item[()]).reshape(-1, order="F")))
-    if h5py.check_ref_dtype(item.dtype) is not None:
-        # Cells of MATLAB are references to their contents.
-        return [_values(file, file[r], matlab) for r in np.asarray(item[()]).reshape(-1, order="F")]
-    if h5py.check_string_dtype(item.dtype) is not None:
-        return np.asarray(item.asstr()[()])
-    return item[()]
+def _is_one_text(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.kind in "OU" and value.size == 1
 
 
-def _texts_of(group: Any, matlab: bool) -> dict[str, Any]:
-    """The texts of a group, which can be the units of the arrays beside it."""
-    import h5py
+def _is_of_matlab(key: str) -> bool:
+    """Whether a name is that of MATLAB's references and subsystem."""
+    return key.startswith("#")
 
-    found = {}
-    for key, item in group.items():
-        if isinstance(item, h5py.Dataset) and item.shape is not None and item.size < 1000:
-            value = _values(group.file, item, matlab)
-            if isinstance(value, str):
-                found[key] = value
-            elif isinstance(value, np.ndarray) and value.dtype.kind in "OU" and value.size == 1:
-                found[key] = str(value.reshape(-1)[0])
-    return found
+
+class _Reader:
+    """Reads datasets; one with several names is read once.
+
+    Parameters
+    ----------
+    file : h5py.File
+    path : Path
+        For messages.
+    matlab : bool
+        Whether MATLAB has written the file.
+    """
+
+    def __init__(self, file: Any, path: Path, matlab: bool) -> None:
+        self._file, self._path, self._matlab = file, path, matlab
+        self._shared: dict[int, Any] = {}
+        self._texts: dict[int, dict[str, Any]] = {}
+
+    def values(self, item: Any) -> Any:
+        """Values of a dataset: an array, a text, or a list of the contents of MATLAB's cells."""
+        import h5py
+
+        info = h5py.h5o.get_info(item.id)
+        if info.rc <= 1:
+            return self._values(item)
+        if info.addr not in self._shared:
+            self._shared[info.addr] = self._values(item)
+        return self._shared[info.addr]
+
+    def _values(self, item: Any) -> Any:
+        import h5py
+
+        if item.external or item.is_virtual:
+            raise _elsewhere(self._path, item.name.strip("/"))
+        if self._matlab and item.attrs.get("MATLAB_class") == b"char":
+            return "".join(map(chr, np.asarray(item[()]).reshape(-1, order="F")))
+        if h5py.check_ref_dtype(item.dtype) is not None:
+            return self._cells(np.asarray(item[()]).reshape(-1, order="F"))
+        if h5py.check_string_dtype(item.dtype) is not None:
+            return np.asarray(item.asstr()[()])
+        return item[()]
+
+    def _cells(self, references: Any) -> list[Any]:
+        """Contents of MATLAB's cells, each read once; None for cells in cells, without end."""
+        import h5py
+
+        contents: dict[int, Any] = {}
+        places = []
+        for reference in references:
+            item: Any = self._file[reference] if reference else None
+            if not _holds_values(item) or h5py.check_ref_dtype(item.dtype) is not None:
+                places.append(-1)
+                continue
+            places.append(_address(item))
+            if places[-1] not in contents:
+                contents[places[-1]] = self.values(item)
+        return [contents.get(place) for place in places]
+
+    def texts(self, group: Any) -> dict[str, Any]:
+        """The texts of a group, which can be the units of the arrays next to it."""
+        address = _address(group)
+        if address not in self._texts:
+            texts = self._texts[address] = {}
+            for key, item in group.items():
+                if _holds_values(item) and item.size < 1000:
+                    value = self.values(item)
+                    if isinstance(value, str):
+                        texts[key] = value
+                    elif _is_one_text(value):
+                        texts[key] = str(value.reshape(-1)[0])
+        return self._texts[address]

@@ -48,7 +48,8 @@ def load(path: Path, delimiter: str | None = None, decimal: str | None = None) -
         if file.read(2) == GZIP:
             text, why = unpacked(path)
             if not text:
-                raise refuse_truncated(path, f"of which nothing can be unpacked: {why.rstrip('.')}")
+                why = why.rstrip(".") or "it is empty"
+                raise refuse_truncated(path, f"of which nothing can be unpacked: {why}")
             if not is_text(text[: 1 << 12]):
                 raise InputError(
                     f"recording.path must hold a text if it is packed, got '{path.name}' with "
