@@ -12,6 +12,7 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+from jax.tree_util import register_static
 from numpy.polynomial import Polynomial
 from numpy.polynomial.legendre import Legendre, leggauss, legvander
 from numpy.typing import NDArray
@@ -75,6 +76,7 @@ def _power_basis() -> Float:
     return matrix
 
 
+@register_static
 @dataclass(frozen=True, eq=False)
 class CollocationScheme:
     """A collocation method on [0, 1].

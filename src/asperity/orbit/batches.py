@@ -21,7 +21,7 @@ Indices = NDArray[np.intp]
 #: Points in a block of the fast method; no power of two, at which arrays share cache lines.
 FAST_BLOCK = 240
 
-#: Points in a chunk of orbits on meshes, for up to two states and for more.
+#: Points in a chunk of orbits on meshes, for up to three states and for more.
 _MESH_CHUNKS = (24, 8)
 
 
@@ -78,4 +78,4 @@ def run_chunks(
 
 def mesh_chunk(size: int) -> int:
     """Points in a call that works on orbits with `size` states on meshes."""
-    return _MESH_CHUNKS[size > 2]
+    return _MESH_CHUNKS[size > 3]

@@ -20,8 +20,8 @@ from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
 
-#: Intervals that are condensed in a call.
-_INTERVALS = 576
+#: Intervals that are condensed in a call, of few and of many.
+_FEW, _MANY = 576, 1728
 
 _condense = jit_large(condense)
 
@@ -99,19 +99,20 @@ def condensed(
 def condensed_jacobian(jacobian: Float, right: Float, orbit: Orbit) -> tuple[Float, Float]:
     """`condense` of NumPy arrays (..., intervals, points) on the mesh of an orbit."""
     a, shape = np.asarray(orbit.scheme.a), orbit.widths.shape
-    jacobian, right, widths = _flat(jacobian), _flat(right), _flat(orbit.widths)
+    block = _FEW if shape[0] * shape[1] <= _FEW else _MANY
+    jacobian, right, widths = (_flat(a, block) for a in (jacobian, right, orbit.widths))
     solved = []
-    for start in range(0, widths.shape[-1], _INTERVALS):
-        at = slice(start, start + _INTERVALS)
+    for start in range(0, widths.shape[-1], block):
+        at = slice(start, start + block)
         solved.append(_condense(jacobian[..., at], right[..., at], widths[at], a))
     response, constant = (_joined(parts, shape) for parts in zip(*solved, strict=True))
     return response, constant
 
 
-def _flat(array: Float) -> Float:
+def _flat(array: Float, block: int) -> Float:
     """Intervals and points along one axis, filled up to whole blocks with the last interval."""
     flat = np.reshape(array, (*array.shape[:-2], -1))
-    missing = -flat.shape[-1] % _INTERVALS
+    missing = -flat.shape[-1] % block
     if not missing:
         return flat
     filling = np.broadcast_to(flat[..., -1:], (*flat.shape[:-1], missing))

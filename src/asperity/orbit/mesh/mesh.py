@@ -5,9 +5,8 @@ A mesh is an array (intervals + 1, points) that rises from 0 to 2 pi for each op
 
 from __future__ import annotations
 
-import dataclasses
+from typing import NamedTuple
 
-import equinox as eqx
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
@@ -21,7 +20,7 @@ Float = NDArray[np.float64]
 _EVEN_SHARE = 0.3
 
 
-class Orbit(eqx.Module):
+class Orbit(NamedTuple):
     """A piecewise polynomial `PeriodicOrbit` of every operating point.
 
     Attributes
@@ -40,7 +39,7 @@ class Orbit(eqx.Module):
     centre: Array
     nodes: Array
     slopes: Array
-    scheme: CollocationScheme = eqx.field(static=True)
+    scheme: CollocationScheme
 
     @classmethod
     def empty(cls, scheme: CollocationScheme, size: int, intervals: int, points: int) -> Orbit:
@@ -65,8 +64,7 @@ class Orbit(eqx.Module):
 
     def piece(self, start: int, stop: int) -> Orbit:
         """Its intervals from `start` to before `stop`."""
-        return dataclasses.replace(
-            self,
+        return self._replace(
             mesh=self.mesh[start : stop + 1],
             nodes=self.nodes[:, start:stop],
             slopes=self.slopes[:, :, start:stop],
@@ -74,7 +72,7 @@ class Orbit(eqx.Module):
 
     def moved(self, **parts: Array) -> Orbit:
         """The same with other arrays."""
-        return dataclasses.replace(self, **parts)
+        return self._replace(**parts)
 
     @property
     def widths(self) -> Array:

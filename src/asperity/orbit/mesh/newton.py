@@ -16,6 +16,7 @@ until no exponent and no logarithmic state changes by more than a few units.
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from typing import NamedTuple
 
 import jax
@@ -166,7 +167,6 @@ def newton_step(
         linear equations: the tangent of a branch.
     """
     nodes, slopes = (orbit.nodes, orbit.slopes) if closed else (0 * orbit.nodes, 0 * orbit.slopes)
-    linear = np.isin(np.arange(len(nodes)), system.linear)
     points = nodes.shape[-1]
     step = _step(
         equations.response,
@@ -176,10 +176,17 @@ def newton_step(
         plane,
         np.full(points, value),
         (np.asarray(orbit.scheme.a), np.asarray(orbit.scheme.b)),
-        linear,
+        np.array(_linear(type(system), len(nodes))),
         least_swing(system, points),
     )
     return jax.tree.map(np.asarray, step)
+
+
+@cache
+def _linear(motion: type[Motion], size: int) -> tuple[bool, ...]:
+    """Which of the states are no logarithms."""
+    mechanical = [not logarithm for logarithm in motion.logarithmic]
+    return (*mechanical, *[False] * (size - len(mechanical)))
 
 
 def least_swing(system: Motion, points: int) -> Float:
