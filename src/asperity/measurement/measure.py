@@ -51,8 +51,9 @@ _DRIFTS = 3.0
 _PAUSE_PERIODS = 64
 #: Samples of a pause that give a rate.
 _FEWEST = 64
-#: Pieces of a long recording that are searched for the modulation, and their samples.
-_PIECES, _PIECE = 32, 1 << 15
+#: Pieces of a long recording that are searched for the modulation, their samples, and the periods
+#: that one must hold for its line to be apart from what is slower.
+_PIECES, _PIECE, _FEWEST_PERIODS = 32, 1 << 15, 8.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -378,9 +379,12 @@ def modulation_line(time: Array, load: Array, near: float | None = None) -> Spec
     if time.size > 2 * _PIECE:
         for at in np.linspace(0, time.size - _PIECE, _PIECES).astype(int):
             piece = slice(at, at + _PIECE)
+            span = float(time[at + _PIECE - 1] - time[at])
             # A slow modulation that fits no piece is found in the whole.
-            if near is None or near * (time[at + _PIECE - 1] - time[at]) > 4:
-                lines.append(strongest_line(time[piece], load[piece], between=around(near)))
+            if near is None or near * span > _FEWEST_PERIODS:
+                line = strongest_line(time[piece], load[piece], between=around(near))
+                if line.frequency * span > _FEWEST_PERIODS:
+                    lines.append(line)
     return max(lines, key=lambda line: line.amplitude)
 
 
@@ -445,7 +449,7 @@ def _around(
 
 def _no_modulation(time: Array) -> float:
     """A frequency (Hz) far above what is slow in a pause."""
-    return _PAUSE_PERIODS / float(time[-1] - time[0])
+    return min(_PAUSE_PERIODS, time.size / 8) / float(time[-1] - time[0])
 
 
 def _settled_level(time: Array, force: Array) -> MeanLevel | None:
