@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from asperity.errors import InputError
+from asperity.errors import ConstantLoadError, InputError
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
@@ -236,7 +236,7 @@ def _prepared(
     line = modulation_line(samples.time, samples.load, frequency)
     require_modulated(line, samples.load)
     if frequency is None and line.amplitude < _LINE * line.background:
-        raise InputError(
+        raise ConstantLoadError(
             f"measure.load must be modulated, got its strongest line, at {line.frequency:.4g} Hz, "
             f"at {line.amplitude / line.background:.2g} times its surroundings; give the frequency "
             "if you know it, or measure without modulation"
