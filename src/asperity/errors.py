@@ -16,6 +16,10 @@ class InputError(ValueError):
     """Input that cannot be used; the message names field, rule, value and the way out."""
 
 
+class ConstantLoadError(InputError):
+    """A recording that is to have a modulated load has a constant one."""
+
+
 class MistakesError(InputError):
     """Several mistakes in one file or object, in one message.
 

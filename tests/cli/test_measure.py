@@ -1,10 +1,14 @@
 """`asperity measure` on recordings that the tests write."""
 
+import csv
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+
+import asperity as asp
+from asperity.errors import InputError
 
 F, EPSILON, MU1, PHASE1 = 40.02, 0.2, 2e-3, -1.4
 
@@ -157,6 +161,49 @@ def test_a_velocity_step(asperity, step) -> None:
     assert "um/s" in text
 
 
+@pytest.mark.parametrize("load", [True, False])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_constant_load_is_noticed(asperity, tmp_path, load, seed) -> None:
+    """Steps and holds are read without --no-modulation, and stderr says so."""
+    rng = np.random.default_rng(seed)
+    at, velocities = rng.uniform(50, 70), rng.permutation([2.0, 7.0])
+    time = np.arange(0, 120, 0.05)
+    after = np.clip(time - at, 0, None)
+    slip = velocities[0] * np.minimum(time, at) + velocities[1] * after
+    friction = 0.6 - 0.004 * (time >= at) + 4e-4 * rng.standard_normal(time.size)
+    names, columns = ["Time(s)", "Displ(microns)", "Friction"], [time, slip, friction]
+    if load:
+        names.append("Normal_stress(MPa)")
+        columns.append(20 + 1e-3 * rng.standard_normal(time.size))
+    path = tmp_path / "step.txt"
+    np.savetxt(path, np.stack(columns, 1), "%.6f", "\t", header="\t".join(names), comments="")
+    chosen = asperity("measure", path, "--no-modulation", "--json")
+    noticed = asperity("measure", path, "--json")
+    assert len(record(chosen)["steps"]) == 1
+    assert (noticed.stdout, noticed.exit_code) == (chosen.stdout, chosen.exit_code)
+    extra = noticed.stderr.removesuffix(chosen.stderr)
+    assert extra.startswith("asperity: read as with --no-modulation, since ")
+    assert extra.count("\n") == 1
+    assert asp.measure(path).steps == asp.measure(path, modulated=False).steps
+    # What the user says of it is not set aside.
+    for options in (("--frequency", "5 Hz"), ("--amplitudes",)):
+        assert asperity("measure", path, *options).exit_code == 2
+    with pytest.raises(InputError):
+        asp.measure(path, modulated=True)
+
+
+def test_a_table_of_modulated_and_unmodulated_files(asperity, recording, step, tmp_path) -> None:
+    out = tmp_path / "campaign.csv"
+    result = asperity("measure", recording, step, "--out", out, "--jobs", 1)
+    assert result.exit_code == 0, result.output
+    assert "1 of 2 files have a constant load" in result.stderr
+    with out.open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["kind"] for row in rows] == ["amplitude", "step"]
+    assert not any(row["reason"] for row in rows)
+    assert abs(float(rows[1]["change"]) + 0.003) < 5 * float(rows[1]["change_uncertainty"])
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -262,13 +309,16 @@ def test_the_interval_of_delta_mu_is_in_the_json(asperity, recording) -> None:
     assert 1.9 < half / found["uncertainties"]["delta_mu"] < 13
 
 
-def test_amplitudes_and_a_table(asperity, recording, step, tmp_path) -> None:
+def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
     result = asperity("measure", recording, "--amplitudes", "--json")
     (row,) = record(result)["amplitudes"]
     assert row["epsilon"] == pytest.approx(EPSILON, rel=1e-3)
     assert "delta_mu" in asperity("measure", recording, "--amplitudes").stdout
     out = tmp_path / "table.csv"
-    result = asperity("measure", recording, step, "--out", out, "--jobs", "1", "--json")
+    constant = tmp_path / "constant.csv"
+    rows = [f"{i * 1e-3:.3f},7,{2.8 + 0.01 * (i % 7)}" for i in range(500)]
+    constant.write_text("time (s),W (N),F (N)\n" + "\n".join(rows))
+    result = asperity("measure", recording, constant, "--out", out, "--jobs", "1", "--json")
     assert result.exit_code == 1
     assert record(result) == {"files": 2, "rows": 2, "failed": 1, "out": str(out)}
     assert "the column 'reason'" in result.stderr

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import ConstantLoadError, InputError
 from asperity.lock_in.basis import Basis
 from asperity.lock_in.blocks import even_step, sums
 from asperity.lock_in.normal_equations import solved
@@ -88,11 +88,11 @@ def require_modulated(line: SpectralLine, load: Array) -> None:
 
     Raises
     ------
-    InputError
+    ConstantLoadError
         If the line is rounding error.
     """
     if not line.amplitude > 1e-13 * abs(float(load[0])):
-        raise InputError(
+        raise ConstantLoadError(
             f"lock_in.load must be modulated, got a constant of {float(load[0]):.6g}; name another "
             "column, or measure without modulation"
         )

@@ -30,6 +30,8 @@ Row = dict[str, Any]
 
 #: Columns that stand first; the others follow in the order of their first row.
 _FIRST = ("file", "part", "kind", "start", "end", "verdict", "reason")
+#: What rows without modulation are of.
+_SLIDING_KINDS = ("step", "hold", "level")
 #: Columns of steps and holds that the table has, besides their uncertainties.
 _STEP = (
     "velocity_before",
@@ -65,14 +67,16 @@ class CampaignSummary:
 
     Attributes
     ----------
-    files, rows, failed : int
-        Files measured, rows of the table, and rows without result among them.
+    files, rows, failed, sliding : int
+        Files measured, rows of the table, rows without result among them, and files that were read
+        without modulation.
     out : Path
     """
 
     files: int
     rows: int
     failed: int
+    sliding: int
     out: Path
 
 
@@ -137,7 +141,9 @@ def run_campaign(
         raise Interrupted(f"{done} of {len(files)} files" if done else "") from None
     finally:
         unfinished.discard_if_empty()
-    return CampaignSummary(len(files), len(table), sum(bool(r["reason"]) for r in table), out)
+    failed = sum(bool(row["reason"]) for row in table)
+    sliding = {row["file"] for row in table if row["kind"] in _SLIDING_KINDS}
+    return CampaignSummary(len(files), len(table), failed, len(sliding), out)
 
 
 def _stamp(path: Path) -> str:

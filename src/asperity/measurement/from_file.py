@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
 
-from asperity.errors import InputError
+from asperity.errors import ConstantLoadError, InputError
 from asperity.measurement.measure import Measurement, measure
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
 from asperity.parameters.arguments import number, one_of, pair, switch, whole_number
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
+Read = TypeVar("Read")
+
 
 def measure_recording(
     recording: Trace | str | os.PathLike[str],
     *,
-    modulated: bool = True,
+    modulated: bool | None = None,
     load: str = "W",
     force: str = "F",
     frequency: float | str | None = None,
@@ -36,7 +38,8 @@ def measure_recording(
     recording : Trace or path
         What `asperity.read` returns, or a file that it reads without further arguments.
     modulated : bool
-        Whether the load was modulated. If not, velocity steps and holds are measured.
+        Whether the load was modulated. If not, velocity steps and holds are measured; by default
+        they are if the load is constant, or not recorded, and there are some.
     load, force : str
         Channels, by name or role.
     frequency : float or str, optional
@@ -62,12 +65,13 @@ def measure_recording(
     InputError
         If the file cannot be read, the recording lacks a channel, or an argument does not fit.
     """
-    modulated = switch(modulated, "modulated")
+    if modulated is not None:
+        modulated = switch(modulated, "modulated")
     one_of(detrend, ("none", "linear", "quadratic"), "detrend")
-    if modulated and (steps is not None or holds is not None):
+    if modulated is not False and (steps is not None or holds is not None):
         raise InputError(
-            "steps and holds must go with modulated=False, got them for a modulated recording; "
-            "leave them out or say so"
+            "steps and holds must go with modulated=False, got them without; leave them out or say "
+            "so"
         )
     between = None
     if window is not None:
@@ -75,16 +79,79 @@ def measure_recording(
         between = (number(first, "window", "time"), number(last, "window", "time"))
     trace = recording if isinstance(recording, Trace) else read(recording)
     common: dict[str, Any] = {"load": load, "force": force, "window": between, "detrend": detrend}
-    if not modulated:
+    if modulated is False:
         return measure_sliding(trace, steps=steps, holds=holds, **common)
-    start = None
+    lock_in: dict[str, Any] = {
+        "frequency": None,
+        "harmonics": whole_number(harmonics, "harmonics", least=1),
+        "only_whole_periods": switch(only_whole_periods, "only_whole_periods"),
+        "refine": switch(refine, "refine"),
+    }
     if frequency is not None:
-        start = number(frequency, "frequency", "frequency", "positive")
-    return measure(
+        lock_in["frequency"] = number(frequency, "frequency", "frequency", "positive")
+    if modulated or frequency is not None:
+        return measure(trace, **lock_in, **common)
+    return modulated_or_sliding(
         trace,
-        frequency=start,
-        harmonics=whole_number(harmonics, "harmonics", least=1),
-        only_whole_periods=switch(only_whole_periods, "only_whole_periods"),
-        refine=switch(refine, "refine"),
-        **common,
-    )
+        lambda: measure(trace, **lock_in, **common),
+        lambda: measure_sliding(trace, **common),
+        load=load,
+    )[0]
+
+
+def modulated_or_sliding(
+    trace: Trace,
+    modulated: Callable[[], Read],
+    sliding: Callable[[], SlidingMeasurement],
+    *,
+    load: str = "W",
+    plain: bool = False,
+) -> tuple[Read | SlidingMeasurement, str]:
+    """Measure a recording as what it is.
+
+    Parameters
+    ----------
+    trace : Trace
+    modulated : callable
+        Measures a modulated recording.
+    sliding : callable
+        Measures one of which the load is constant, or not recorded.
+    load : str
+        Channel, by name or role.
+    plain : bool
+        Whether sliding at one velocity counts; if not, velocity steps or holds are needed.
+
+    Returns
+    -------
+    measurement : Measurement or SlidingMeasurement
+        Or what else `modulated` returns.
+    reason : str
+        Why it was not read as modulated; empty if it was.
+
+    Raises
+    ------
+    InputError
+        If it is neither.
+    """
+    try:
+        return modulated(), ""
+    except InputError as error:
+        constant = isinstance(error, ConstantLoadError)
+        if not constant and _recorded(trace, load):
+            raise
+        reason = error
+    try:
+        found = sliding()
+    except InputError as error:
+        raise (error if constant and plain else reason) from None
+    if not (plain or found.steps or found.holds):
+        raise reason
+    return found, str(reason)
+
+
+def _recorded(trace: Trace, name: str) -> bool:
+    try:
+        trace.channel(name)
+    except InputError:
+        return False
+    return True

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from asperity.errors import InputError
+from asperity.errors import ConstantLoadError, InputError
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
@@ -51,8 +51,9 @@ _DRIFTS = 3.0
 _PAUSE_PERIODS = 64
 #: Samples of a pause that give a rate.
 _FEWEST = 64
-#: Pieces of a long recording that are searched for the modulation, and their samples.
-_PIECES, _PIECE = 32, 1 << 15
+#: Pieces of a long recording that are searched for the modulation, their samples, and the periods
+#: that one must hold for its line to be apart from what is slower.
+_PIECES, _PIECE, _FEWEST_PERIODS = 32, 1 << 15, 8.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -235,7 +236,7 @@ def _prepared(
     line = modulation_line(samples.time, samples.load, frequency)
     require_modulated(line, samples.load)
     if frequency is None and line.amplitude < _LINE * line.background:
-        raise InputError(
+        raise ConstantLoadError(
             f"measure.load must be modulated, got its strongest line, at {line.frequency:.4g} Hz, "
             f"at {line.amplitude / line.background:.2g} times its surroundings; give the frequency "
             "if you know it, or measure without modulation"
@@ -378,9 +379,12 @@ def modulation_line(time: Array, load: Array, near: float | None = None) -> Spec
     if time.size > 2 * _PIECE:
         for at in np.linspace(0, time.size - _PIECE, _PIECES).astype(int):
             piece = slice(at, at + _PIECE)
+            span = float(time[at + _PIECE - 1] - time[at])
             # A slow modulation that fits no piece is found in the whole.
-            if near is None or near * (time[at + _PIECE - 1] - time[at]) > 4:
-                lines.append(strongest_line(time[piece], load[piece], between=around(near)))
+            if near is None or near * span > _FEWEST_PERIODS:
+                line = strongest_line(time[piece], load[piece], between=around(near))
+                if line.frequency * span > _FEWEST_PERIODS:
+                    lines.append(line)
     return max(lines, key=lambda line: line.amplitude)
 
 
@@ -445,7 +449,7 @@ def _around(
 
 def _no_modulation(time: Array) -> float:
     """A frequency (Hz) far above what is slow in a pause."""
-    return _PAUSE_PERIODS / float(time[-1] - time[0])
+    return min(_PAUSE_PERIODS, time.size / 8) / float(time[-1] - time[0])
 
 
 def _settled_level(time: Array, force: Array) -> MeanLevel | None:

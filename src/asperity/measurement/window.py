@@ -15,9 +15,11 @@ from asperity.lock_in.settling import Settling, settling_of_mean
 
 Array = NDArray[np.float64]
 
-#: Periods in a block of the envelope, and blocks of a whole recording at most.
+#: Periods in a block of the envelope, blocks of a whole recording at most, and blocks of one period
+#: where there would be fewer: edges are the exception among so many. Samples in a block.
 _PERIODS = 4
-_MOST_BLOCKS = 1000
+_MOST_BLOCKS, _FEW_BLOCKS = 1000, 64
+_SAMPLES = 8
 #: A part is modulated above this share of the recording's largest amplitude.
 _ON = 0.005
 #: A change of amplitude beyond this share of it is another stretch.
@@ -26,8 +28,8 @@ _SAME = 0.1
 #: scatter is this share of the largest amplitude, or few are left.
 _SCATTERS = 6.0
 _SMOOTH, _FEWEST = 0.015, 16
-#: Harmonics next to a settling.
-_HARMONICS = 2
+#: Harmonics next to a settling, up to this share of the sampling rate.
+_HARMONICS, _RESOLVED = 2, 0.45
 #: A settling is forgotten where it biases the mean by this share of its uncertainty. A part whose
 #: beginning makes it so many times noisier than its later half loses one of so many pieces of it:
 #: the ratio of two noises of twelve degrees of freedom exceeds that once in 1,000 times.
@@ -80,6 +82,9 @@ def stretches(time: Array, load: Array, frequency: float) -> list[LoadInterval]:
     found = []
     for a, b in pairwise(bounds):
         first, stop = a + (a > 0), b - (b < amplitude.size)
+        if b - a == 1 and not on[a]:
+            # Of a short pause the only block is as good as free of modulation.
+            first, stop = a, b
         if stop - first < 1:
             continue
         height = float(np.median(amplitude[first:stop])) if on[a] else 0.0
@@ -115,10 +120,12 @@ def _scatter(series: Array) -> float:
 
 
 def local(time: Array, channels: list[Array], frequency: float) -> BlockSums:
-    """Sums over short blocks of some periods each."""
+    """Sums over short blocks of a period or some."""
     half = float(time[-1] - time[0]) / 2
     basis = Basis(2 * np.pi * frequency, 1, 1, float(time[0]) + half, half)
-    wanted = int(min(_MOST_BLOCKS, max(1, 2 * half * frequency / _PERIODS)))
+    periods = 2 * half * frequency
+    wanted = max(periods / _PERIODS, min(periods, _FEW_BLOCKS, time.size / _SAMPLES))
+    wanted = int(min(_MOST_BLOCKS, max(1, wanted)))
     step = even_step(time, basis.omega)
     return merged(sums(basis, time, channels, blocks=wanted, step=step), wanted)
 
@@ -188,10 +195,12 @@ def settling_from(time: Array, force: Array, frequency: float, degree: int) -> S
     degree : int
         Of the drift.
     """
-    if time.size < 64:
+    per_period = 1 / (frequency * float(np.median(np.diff(time[: 1 << 14]))))
+    harmonics = int(min(_HARMONICS, _RESOLVED * per_period))
+    if time.size < 64 or not harmonics:
         return None
-    basis = window_basis(time, 2 * np.pi * frequency, _HARMONICS, degree)
-    step = even_step(time, basis.omega * _HARMONICS)
+    basis = window_basis(time, 2 * np.pi * frequency, harmonics, degree)
+    step = even_step(time, basis.omega * harmonics)
     return settling_of_mean(sums(basis, time, [force], blocks=_MOST_BLOCKS, step=step))
 
 

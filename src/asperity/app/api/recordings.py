@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import Field
@@ -23,6 +23,9 @@ from asperity.app.endpoints import Question
 from asperity.errors import InputError, printable
 from asperity.parameters import OUTPUTS
 from asperity.recording.roles import ROLES, candidates
+
+if TYPE_CHECKING:
+    from asperity.measurement.sliding.measure import SlidingMeasurement
 
 #: Address space (bytes) and processor time (s) of a process that reads a recording.
 LIMITS = {"memory": 6 * 1024**3, "seconds": 240}
@@ -176,30 +179,27 @@ def _described(trace: Any, name: str, source: Mapping[str, Any]) -> dict[str, An
 def _measured(
     trace: Any, argument: Mapping[str, Any], report: Callable[..., None]
 ) -> dict[str, Any]:
+    from asperity.measurement.from_file import modulated_or_sliding
+
     options = Options.model_validate(argument["options"])
     name = argument["name"]
-    note = ""
+    found: dict[str, Any] | SlidingMeasurement
     report(stage="measuring")
-    if options.mode != "sliding":
-        try:
-            return {
-                "measured": _modulated(trace, options, name),
-                **_recipes(name, argument["source"], options, modulated=True),
-            }
-        except InputError as error:
-            # One channel for both roles is a mistake of the choice, whatever was recorded.
-            if options.mode == "modulated" or "another channel" in str(error):
-                raise
-            note = str(error)
-    try:
-        return {
-            "measured": {**_sliding(trace, options, name), "note": note},
-            **_recipes(name, argument["source"], options, modulated=False),
-        }
-    except InputError as error:
-        if options.mode == "auto" and "modulated" not in note:
-            raise InputError(note) from None
-        raise error from None
+    if options.mode == "modulated":
+        found, note = _modulated(trace, options, name), ""
+    elif options.mode == "sliding":
+        found, note = _sliding(trace, options), ""
+    else:
+        found, note = modulated_or_sliding(
+            trace,
+            lambda: _modulated(trace, options, name),
+            lambda: _sliding(trace, options),
+            plain=True,
+        )
+    modulated = isinstance(found, dict)
+    measured = found if isinstance(found, dict) else {**_sliding_record(found, name), "note": note}
+    recipes = _recipes(name, argument["source"], options, modulated=modulated)
+    return {"measured": measured, **recipes}
 
 
 def _modulated(trace: Any, options: Options, name: str) -> dict[str, Any]:
@@ -239,16 +239,20 @@ def _modulated(trace: Any, options: Options, name: str) -> dict[str, Any]:
     }
 
 
-def _sliding(trace: Any, options: Options, name: str) -> dict[str, Any]:
-    from asperity.measurement.campaign import sliding_rows
-    from asperity.measurement.record import sliding_record
+def _sliding(trace: Any, options: Options) -> SlidingMeasurement:
     from asperity.measurement.sliding.measure import measure_sliding
 
     window = None if options.window is None else (options.window[0], options.window[1])
     holds = None if options.holds is None else [(a, b) for a, b in options.holds]
-    found = measure_sliding(
+    return measure_sliding(
         trace, window=window, detrend=options.detrend, steps=options.steps, holds=holds
     )
+
+
+def _sliding_record(found: SlidingMeasurement, name: str) -> dict[str, Any]:
+    from asperity.measurement.campaign import sliding_rows
+    from asperity.measurement.record import sliding_record
+
     return {
         "record": sliding_record(found),
         "rows": sliding_rows(Path(name), found),

@@ -62,7 +62,9 @@ in place of numbers; 2: bad input.
     help="Drift that is fitted together with the harmonics.",
 )
 @click.option(
-    "--no-modulation", is_flag=True, help="A recording without it: velocity steps and holds."
+    "--no-modulation",
+    is_flag=True,
+    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
 )
 @click.option(
     "--steps",
@@ -117,7 +119,7 @@ def measure(
     are measured into one table with --out.
     """
     options = ReadingOptions(
-        modulated=not no_modulation,
+        modulated=False if no_modulation else None,
         frequency=_frequency(frequency, exact_frequency),
         exact_frequency=exact_frequency,
         harmonics=harmonics,
@@ -158,7 +160,10 @@ def measure(
         _check_picture(plot, recording)
     with naming_options():
         trace = source.read(recording)
-        found = options.measure(trace)
+        found, reason = options.measure(trace)
+    if reason:
+        why = in_options(reason).partition(";")[0]
+        click.echo(f"asperity: read as with --no-modulation, since {why}", err=True)
     _print(found, recording, trace.provenance, as_json)
     if plot is not None:
         _plot(found, plot)
@@ -211,6 +216,12 @@ def _campaign(
     if as_json:
         numbers = {"files": done.files, "rows": done.rows, "failed": done.failed}
         click.echo(to_json({**numbers, "out": str(out)}))
+    if done.sliding and options.modulated is None:
+        click.echo(
+            f"asperity: {done.sliding} of {done.files} files have a constant load: their velocity "
+            "steps and holds are in the table, as with --no-modulation",
+            err=True,
+        )
     if done.failed:
         click.echo(
             f"asperity: {done.failed} of {done.rows} rows have no numbers; the column 'reason' of "

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from asperity.cli.measure.source import RecordingSource
 from asperity.cli.measure.words import in_options, naming_options
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from asperity.measurement.sliding.measure import SlidingMeasurement
     from asperity.recording.trace import Trace
 
+Read = TypeVar("Read")
+
 
 @dataclass(frozen=True)
 class ReadingOptions:
@@ -22,7 +25,8 @@ class ReadingOptions:
 
     Attributes
     ----------
-    modulated : bool
+    modulated : bool or None
+        Whether the load is; None reads velocity steps and holds where it is constant.
     frequency : float or None
         Hz; None finds it.
     exact_frequency : bool
@@ -37,7 +41,7 @@ class ReadingOptions:
         Seconds.
     """
 
-    modulated: bool
+    modulated: bool | None
     frequency: float | None
     exact_frequency: bool
     harmonics: int
@@ -47,13 +51,34 @@ class ReadingOptions:
     steps: list[float] | None = None
     holds: list[tuple[float, float]] | None = None
 
-    def measure(self, trace: Trace) -> Measurement | SlidingMeasurement:
-        """Measure a recording: its longest modulated stretch, or its sliding."""
-        if self.modulated:
-            from asperity.measurement.measure import measure
+    def measure(self, trace: Trace) -> tuple[Measurement | SlidingMeasurement, str]:
+        """Measure a recording: its longest modulated stretch, or its sliding.
 
-            return measure(trace, window=self.window, **self._lock_in())
-        return self.sliding(trace)
+        Returns
+        -------
+        measurement : Measurement or SlidingMeasurement
+        reason : str
+            Why the program reads it as sliding, where the options leave that to it.
+        """
+        from asperity.measurement.measure import measure
+
+        return self.either(trace, lambda: measure(trace, window=self.window, **self._lock_in()))
+
+    def either(self, trace: Trace, modulated: Callable[[], Read]) -> tuple[Any, str]:
+        """What `modulated` reads, or the sliding, as the options or the recording say.
+
+        Parameters
+        ----------
+        trace : Trace
+        modulated : callable
+        """
+        from asperity.measurement.from_file import modulated_or_sliding
+
+        if self.modulated is False:
+            return self.sliding(trace), ""
+        if self.modulated or self.frequency is not None:
+            return modulated(), ""
+        return modulated_or_sliding(trace, modulated, lambda: self.sliding(trace))
 
     def sliding(self, trace: Trace) -> SlidingMeasurement:
         """Measure a recording without modulation."""
@@ -105,10 +130,9 @@ class FileRows:
         try:
             with naming_options():
                 trace = self.source.read(path)
-                if self.options.modulated:
-                    rows = modulated_rows(path, self.options.amplitudes(trace))
-                else:
-                    rows = sliding_rows(path, self.options.sliding(trace))
+                found, _ = self.options.either(trace, lambda: self.options.amplitudes(trace))
+                several = isinstance(found, list)
+                rows = modulated_rows(path, found) if several else sliding_rows(path, found)
         except InputError as error:
             return [failed_row(path, 1, str(error))]
         except Exception as error:  # one damaged file must not cost the others

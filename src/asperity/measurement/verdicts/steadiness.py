@@ -34,8 +34,8 @@ def leakage(reading: LockInReading) -> Check:
         "leakage",
         number,
         LIMITS["leakage"],
-        f"sidebands of the load hold {_percent(number)} of its amplitude; the rest of the load is "
-        "no steady line of one frequency if that is much",
+        f"sidebands of the load hold {_percent(number)} of its amplitude; if much, it is no "
+        "steady line of one frequency: choose a window in which it is",
         significant=beyond > 3.0,
     )
 
