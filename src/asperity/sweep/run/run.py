@@ -209,8 +209,8 @@ def _opened(
         written += lay_out(path, held, {**root.attributes, "runs": root.runs})
         if written:
             log(
-                f"{len(written)} files of the store were missing or damaged and were written "
-                f"again: {listed(written, most=5)}"
+                "missing or damaged files of the store were written again: "
+                + listed(written, most=5)
             )
         return SweepStore(path)
     if extending and is_extension(held.record, grid.record):
