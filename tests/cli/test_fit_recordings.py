@@ -1,6 +1,7 @@
 """``asperity fit`` of a recording: a file in, numbers out; bad options in one sentence."""
 
 import json
+import os
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from benchmarks.coverage import CASES, runs_of
 from click.testing import CliRunner
 
 from asperity.cli.main import main
+from asperity.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -129,3 +131,75 @@ def test_a_slope_by_a_gauge_of_unknown_gain_is_refused(with_unloading):
     more = ["--stiffness-from", "-10:-0.05", "--window", "0:140", "--prior", "gain=1+-0.02"]
     found = fit_of_steps(with_unloading, *more)
     assert "must be without a prior of gain" in found.output + str(found.exception)
+
+
+@pytest.fixture(scope="module")
+def under_stress(tmp_path_factory):
+    """A recording with its normal stress, and the stress in MPa."""
+    run = next(runs_of(CASES["steps"], 1))
+    stress = 20.0
+    path = tmp_path_factory.mktemp("fit") / "stress.csv"
+    rows = [run.time, 1e6 * run.slip, run.friction, np.full(run.time.size, stress)]
+    header = "time (s),load point displacement (um),friction,normal stress (MPa)"
+    np.savetxt(path, np.column_stack(rows), delimiter=",", header=header, comments="", fmt="%.9g")
+    return path, stress
+
+
+def test_a_stiffness_over_the_stress_is_taken_and_shown(under_stress, tmp_path):
+    path, stress = under_stress
+    common = [path, "--law", "rice-ruina", "--start", "A=0.009", "--start", "B=0.0105"]
+    common += ["--start", "D0=6.5 um"]
+
+    def record(*more):
+        found = run_fit(*common, *more, "--json")
+        assert found.exit_code == 0, found.output
+        return json.loads(found.stdout)
+
+    free = record("--report", tmp_path / "report")
+    K, over = free["parameters"]["K"], free["over_load"]["K/W0"]
+    assert (K["unit"], over["unit"]) == ("Pa/m", "1/um")
+    for key in ("value", "se"):
+        assert over[key] == pytest.approx(K[key] / (stress * 1e6) / 1e6)
+    assert over["interval_95"] == pytest.approx([x / (stress * 1e12) for x in K["interval_95"]])
+    # That of the spring of the recording.
+    assert over["interval_95"][0] < 4e-3 < over["interval_95"][1]
+    assert "K/W0" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
+    # As rock laboratories write it, and as the same number of pascals.
+    fixed = [record("--fix", f"K={text}") for text in ("4e-3/um", "0.004 1/um", "0.08 MPa/um")]
+    for name in ("A", "B", "D0"):
+        values = [r["parameters"][name]["value"] for r in fixed]
+        assert values == pytest.approx([values[0]] * 3, rel=1e-9)
+    shown = run_fit(*common)
+    (line,) = [t for t in shown.output.splitlines() if t.strip().startswith("K/W0")]
+    assert line.split()[1] == f"{over['value']:.6g}"
+    assert line.rstrip().endswith("1/um")
+    assert "chi-squared judges nothing" in shown.output
+
+
+@pytest.mark.parametrize(
+    ("more", "said"),
+    [
+        (["--steps", "40,40"], "steps.steps must rise, with 3 samples or more between them"),
+        (["--steps", "40,40.1"], "got 2 between 40 and 40.1 s"),
+        (["--steps", "40,500"], "steps.steps must rise"),
+        (["--posterior", "--chains", "1000000"], "must be 4000000 at most"),
+        (["--posterior", "--draws", "100000000"], "must be 4000000 at most"),
+        (["--posterior", "--chains", "1"], "chains must be at least 2"),
+    ],
+)
+def test_what_would_not_end_is_refused_before_computing(recording, more, said, monkeypatch):
+    monkeypatch.setattr("asperity.inference.fit", lambda *_, **__: pytest.fail("it is computed"))
+    found = run_fit(recording, "--law", "rice-ruina", "--free", "A", *more)
+    assert found.exit_code == 2 or isinstance(found.exception, InputError)
+    assert said in found.output + str(found.exception)
+
+
+@pytest.mark.parametrize("command", ["fit", "response"])
+def test_a_pipe_is_no_table(tmp_path, command):
+    """Nobody writes to it: reading would wait for ever."""
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    where = [pipe] if command == "fit" else ["--table", pipe, "--out", tmp_path / "out.csv"]
+    found = CliRunner().invoke(main, [command, *map(str, where), "--law", "rice-ruina"])
+    assert "must be a regular file, got" in found.output + str(found.exception)
+    assert "a pipe" in found.output + str(found.exception)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.coverage import CASES, runs_of
 from click.testing import CliRunner
 from scipy.integrate import quad
 
@@ -17,6 +18,7 @@ from asperity.inference import compare, fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.cross_validation import leave_one_run_out
 from asperity.inference.comparison.evidence import evidence_of
+from asperity.inference.comparison.record import laws_table
 from asperity.inference.tables.outliers import outlying_rows
 
 V = np.repeat([1e-6, 1e-5], 8)
@@ -283,3 +285,20 @@ def test_the_command_leaves_outliers_out(made, tmp_path, start):
     assert record["left_out"] == [f"row {row + 1}" for row in rows]
     assert record["best"] == law == "elasto-plastic"
     assert not record["laws"][law]["excluded"]
+
+
+def test_laws_of_a_recording_are_judged_by_the_likelihood_that_decides():
+    """Its noise is estimated from what a law leaves: chi-squared is that of noise for every law."""
+    run = next(runs_of(CASES["holds"], 1))
+    found = compare(run, ["rice-ruina", "ruina-slip"], ["A", "B", "D0"], evidence=False)
+    assert found.best == "rice-ruina"
+    (out,) = [j for j in found.laws.values() if j.excluded]
+    lower = found.laws["rice-ruina"].fit.log_likelihood - out.fit.log_likelihood
+    assert out.why.startswith(f"its log-likelihood is {lower:.4g} lower than that of rice-ruina")
+    assert "chi-squared" not in found.verdict
+    head, rows = laws_table(found)
+    assert head[:3] == ("law", "log-likelihood", "AICc - lowest")
+    assert [row[-1] for row in rows] == ["", "excluded"]
+    undetermined = replace(out.fit, undetermined=("B", "c"))
+    (row,) = laws_table(judge({"ruina-slip": undetermined}))[1]
+    assert row[-1] == "B, c not determined"

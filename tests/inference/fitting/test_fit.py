@@ -293,3 +293,34 @@ def test_more_parameters_than_data_are_refused(pmma):
     columns = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0, "mu1": 1e-3, "mu1_err": 1e-5}
     with pytest.raises(InputError, match="more data than free parameters"):
         fit(table_of(columns), "elasto-plastic", ("A", "B"), material=pmma)
+
+
+def test_a_stiffness_over_the_load_of_a_table_is_one_of_the_table(readings, pmma):
+    """K/W0 of 2e5 N/m and 7 N, as a fixed number, a start and a prior."""
+    table, over = readings(3), 2e5 / 7.0
+    given = {"material": pmma, "starts": 1}
+    free = ("A", "eps_ratio")
+    text = f"{over * 1e-6!r}/um"
+    one = fit(table, "elasto-plastic", free, fixed={"K": text, "W0": "7 N"}, **given)
+    other = fit(table, "elasto-plastic", free, fixed={"K": "0.2 N/um", "W0": "7 N"}, **given)
+    assert one.values == pytest.approx(other.values, rel=1e-9)
+    priors = [Prior(over, 0.01 * over, "", "1/m"), Prior(2e5, 2e3, "", "N/m")]
+    with_prior = [
+        fit(table, "elasto-plastic", (*free, "K"), prior={"K": p}, start={"K": s}, **given)
+        for p, s in zip(priors, (text, "0.2 N/um"), strict=True)
+    ]
+    assert with_prior[0].values == pytest.approx(with_prior[1].values, rel=1e-6)
+    shown = with_prior[0].over_load["K/W0"]
+    assert shown.value == pytest.approx(with_prior[0].values["K"] / pmma.W0 * 1e-6)
+    with pytest.raises(InputError, match="prior of K must be in N/m or 1/m for a table"):
+        fit(table, "elasto-plastic", ("A", "K"), prior={"K": Prior(1, 1, "", "Pa/m")}, **given)
+
+
+def test_one_row_with_as_many_parameters_as_data_is_refused(pmma):
+    columns = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0, "mean_friction": 0.45, "mu1": 1e-2}
+    columns |= {"mean_friction_err": 1e-3, "mu1_err": 1e-5}
+    with pytest.raises(InputError, match="more data than free parameters, got 2 for 2"):
+        fit(table_of(columns), "elasto-plastic", ("A", "B"), material=pmma)
+    # One of each is an inversion.
+    del columns["mean_friction"], columns["mean_friction_err"]
+    assert fit(table_of(columns), "rice-ruina", ("eps_ratio",), material=pmma, starts=1).converged

@@ -38,8 +38,11 @@ class Formula(LockInTerm):
     def search_from_now_on(self):
         self.searching = True
 
-    def warnings(self, residuals, information):
+    def warnings(self, residuals, information, outliers=()):
         return []
+
+    def weighted(self, weights):
+        return Weighted(self, weights)
 
     def residuals(self, values, *, search=None):
         x = math.log(values["D0"])
@@ -50,6 +53,20 @@ class Formula(LockInTerm):
         return Residuals(
             r, (slope / values["D0"])[:, None], np.full(n, "mu1"), np.arange(n), log_scale=0.0
         )
+
+
+class Weighted(Formula):
+    """Those of another term, each multiplied by the weight of its row."""
+
+    def __init__(self, term, weights):
+        self.term, self.factors = term, weights
+
+    def residuals(self, values, *, search=None):
+        found = self.term.residuals(values, search=search)
+        if found is None:
+            return None
+        w = self.factors[found.row]
+        return found._replace(values=w * found.values, jacobian=w[:, None] * found.jacobian)
 
 
 def objective_of(values, start, edge=math.inf):

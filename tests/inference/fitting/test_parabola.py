@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from benchmarks.coverage import CASES, TRUE, runs_of
 
 from asperity.inference import fit
+from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.parabola import nowhere_negative, parabola_of
 
 
@@ -44,3 +46,63 @@ def test_others_do_not_follow_a_delay_beyond_its_bound():
     others = np.arange(u.size) != at
     off = (held.unbounded - u)[others] / held.sd[others]
     assert np.abs(off).max() < 0.05
+
+
+def test_a_valley_that_is_all_but_flat_leaves_each_estimate_in_its_interval():
+    """Where a minimisation has stopped on the way along it, the parabola's minimum is far off."""
+    (run,) = runs_of(CASES["steps"], 1)
+    term = fit(run, "nagata", ["A", "B", "D0", "c"], start={**TRUE, "c": 3.0}, starts=1)
+    objective, u = term.objective, term.objective.coordinates(term.values)
+    random = np.random.default_rng(7)
+    for _ in range(5):
+        # Along the direction that the data know least, where c and with it A and B are larger.
+        values, vectors = np.linalg.eigh(np.linalg.pinv(_information(objective, u)))
+        along = vectors[:, -1] * np.sign(vectors[list(objective.names).index("c"), -1])
+        moved = u + random.uniform(0.5, 3.0) * np.sqrt(values[-1]) * along
+        moved[list(objective.names).index("c")] = abs(moved[list(objective.names).index("c")])
+        found = described_fit(objective, [(moved, objective.chi2(moved))], profile=False)
+        for unknown in objective.unknowns:
+            p = found.parameters[unknown.name]
+            for low, high in (p.interval_68, p.interval_95):
+                assert low <= p.value <= high
+                if not unknown.nuisance:
+                    # Ends beyond the range in which it is looked for are open.
+                    sd = p.se / abs(unknown.slope(p.value))
+                    first, last = unknown.range_about(float(unknown.to_coordinate(p.value)), sd)
+                    assert low in (0.0, -np.inf) or low >= unknown.to_value(first) * 0.999
+                    assert high == np.inf or high <= unknown.to_value(last) * 1.001
+
+
+def _information(objective, u):
+    _, jacobian = objective.residuals(u)
+    return jacobian.T @ jacobian
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_exchangeable_states_are_one_minimum_in_order(seed):
+    random = np.random.default_rng(seed)
+    (run,) = runs_of(CASES["steps"], 1, seed=seed)
+    free = ["A", "B", "D0", "B2", "D2"]
+    begin = {**TRUE, "B2": 0.1 * TRUE["B"], "D2": random.uniform(5, 15) * TRUE["D0"]}
+    objective = fit(run, "two-state", free, start=begin, starts=1).objective
+    u = objective.ordered(objective.coordinates({k.name: k.middle for k in objective.unknowns}))
+    for name, value in begin.items():
+        u[list(objective.names).index(name)] = float(
+            objective.unknowns[list(objective.names).index(name)].to_coordinate(value)
+        )
+    values = objective.named(u)
+    mirrored = values | {"B": values["B2"], "D0": values["D2"]}
+    mirrored |= {"B2": values["B"], "D2": values["D0"]}
+    v = objective.coordinates(mirrored)
+    # The law is the same: so are the residuals.
+    np.testing.assert_allclose(objective.residuals(v)[0], objective.residuals(u)[0], atol=1e-3)
+    np.testing.assert_allclose(objective.ordered(v), u, rtol=1e-12)
+    found = described_fit(
+        objective, [(v, objective.chi2(v)), (u, objective.chi2(u))], profile=False
+    )
+    assert found.values["D0"] == pytest.approx(values["D0"])
+    assert found.values["B2"] == pytest.approx(values["B2"])
+    assert found.optima == ()
+    # A second state that weakens cannot be the first one.
+    negative = objective.coordinates(mirrored | {"B2": -0.001, "D2": 1e-7})
+    np.testing.assert_array_equal(objective.ordered(negative), negative)

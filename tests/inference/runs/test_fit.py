@@ -455,3 +455,42 @@ def test_a_gain_under_a_changing_load_wants_the_friction(found):
 def test_an_air_layer_of_a_recording_is_refused(found, name):
     with pytest.raises(InputError, match=f"got '{name}' of an air layer: a layer has one share"):
         fit(found.objective.terms[0].run, "rice-ruina", [*FREE, name])
+
+
+def slow_noise(correlation, size):
+    """AR(1) noise of a standard deviation, correlated over so many samples."""
+
+    def noise(random, n, rate):
+        a = np.exp(-1 / correlation)
+        steps = size * np.sqrt(1 - a * a) * random.normal(size=n)
+        return lfilter([1.0], [1.0, -a], steps, zi=[a * size * random.normal()])[0]
+
+    return noise
+
+
+@pytest.mark.parametrize("correlation", [3.0, 30.0, 100.0, 300.0])
+def test_jumps_are_told_from_slow_noise_and_judged_again(correlation):
+    """By the innovations: one of ten of their deviations is a jump, noise of any length is none."""
+    noise = slow_noise(correlation, 4e-4)
+    for run in runs_of(CASE, 2, seed=int(correlation), noise=noise):
+        term = RunTerm(run, RiceRuina, {"mu0": 0.6, "V0": run.velocity})
+        term.update_noise(TRUE)
+        assert term.jumps == ()
+        # One that was added at other values, where the misfit of the law was one.
+        state = term.noise_state()
+        k = int(np.random.default_rng(1).integers(100, 1300))
+        step = (np.arange(run.time.size) >= k).astype(float)
+        columns = np.column_stack([state.columns, step])
+        term.restore_noise(state._replace(columns=columns, jumps=(k,)))
+        term.update_noise(TRUE)
+        assert term.jumps == ()
+        assert term.profiled == len(state.columns.T) + term.models[0].order + 1
+        size = 10 * term.models[0].innovation
+        moved = replace(run, friction=run.friction + size * (run.time > 110))
+        term = RunTerm(moved, RiceRuina, {"mu0": 0.6, "V0": run.velocity})
+        term.update_noise(TRUE)
+        (at,) = term.jumps
+        assert at == pytest.approx(110, abs=0.3)
+        # It stays where it is one.
+        term.update_noise(TRUE)
+        assert term.jumps == (at,)

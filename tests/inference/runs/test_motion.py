@@ -96,3 +96,27 @@ def test_a_motion_that_runs_away_is_no_motion():
     motion = RunMotion(get_law("rice-ruina"), 3e-6)
     # A twentieth of the critical stiffness (B - A)/D0.
     assert motion({**VALUES, "K": 12.0}, ("A",), drive, TIMES) is None
+
+
+@pytest.mark.parametrize("name", ["regularised", "linker-dieterich", "rice-ruina"])
+def test_derivatives_of_steady_sliding_do_not_grow_from_their_rounding(name):
+    """However long it is, steps stay where the integrator is stable: F/W is mu_ss there."""
+    for seed in range(6):
+        random = np.random.default_rng(seed)
+        V, A = 10 ** random.uniform(-6, -5), random.uniform(0.006, 0.012)
+        # At V0 = V the states are exact, and no error of the motion limits a step.
+        V0 = V if seed % 2 else 1.3e-6
+        values = {"mu0": 0.6, "V0": V0, "A": A, "B": 0.0105, "D0": 6.5e-6, "alpha": 0.2}
+        values |= {"K": random.uniform(2e3, 2e4), "W0": 1.0}
+        # In units of A W / (K V), after which a slider on a spring has forgotten.
+        length = random.uniform(50, 400) * A / (values["K"] * V)
+        nothing, load = np.zeros(2), np.ones(2)
+        edges = length * np.array([0.0, 1.0, 1.2])
+        drive = Drive(edges, np.array([1.0, 3.0]), nothing, load, nothing)
+        times = np.linspace(0, edges[-1], 300)
+        found = RunMotion(get_law(name), V)(values, ("A", "B", "D0", "K"), drive, times)
+        steady = times < length
+        slope = np.log(V / values["V0"])
+        expected = np.broadcast_to([slope, -slope, 0.0, 0.0], found.derivatives[steady].shape)
+        scale = [A, values["B"], values["D0"], values["K"]]
+        np.testing.assert_allclose(found.derivatives[steady] * scale, expected * scale, atol=2e-6)

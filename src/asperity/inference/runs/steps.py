@@ -28,6 +28,10 @@ Float = NDArray[np.float64]
 
 #: Relative and absolute local error of a step, of states of order 1.
 _RELATIVE, _ABSOLUTE = 1e-7, 1e-9
+#: Squarings towards the largest eigenvalue, which they leave within 2 %.
+_SQUARINGS = 8
+#: Steps in the first piece take this share of the room at most, as its inverse.
+_SHARE_STEADY = 4.0
 #: Steps that are differentiated side by side.
 _SIDE_BY_SIDE = 64
 #: Dormand and Prince: nodes, coefficients of the stages, error of the step.
@@ -198,10 +202,17 @@ def _steps_taken(
     pieces = drive.pull.shape[0]
     y0 = _first_states(motion, values)
     end = drive.edges[-1]
+    # Steady sliding has no error that would limit a step. Where steps are beyond the region of
+    # stability, derivatives grow from their rounding.
+    longest = jnp.maximum(
+        1 / _fastest_rate(motion, drive, values, y0),
+        _SHARE_STEADY * (drive.edges[1] - drive.edges[0]) / room,
+    )
 
     def body(carry: Any) -> Any:
         t, h, y, piece, n, tries, kept, curve = carry
         edge = drive.edges[piece + 1]
+        h = jnp.where(piece == 0, jnp.minimum(h, longest), h)
         last = t + 1.01 * h >= edge
         step = jnp.where(last, edge - t, h)
         new, error, rows = _stepped(motion, drive, values, piece, t, step, y)
@@ -239,6 +250,19 @@ def _steps_taken(
     start = drive.edges[0], 1e-3 * (drive.edges[1] - drive.edges[0]), y0, zero, zero, zero
     *_, piece, n, _, kept, curve = jax.lax.while_loop(going, body, (*start, kept, curve))
     return kept, curve, n, piece >= pieces
+
+
+def _fastest_rate(motion: Motion, drive: Drive, values: Mapping[str, Array], y: Array) -> Array:
+    """Largest size of an eigenvalue of the motion at the beginning (1/s), by repeated squaring."""
+    at = excitation(drive, values, jnp.asarray(0), drive.edges[0])
+    power = jax.jacfwd(lambda state: motion.rates(state, at))(y)
+    logarithm = jnp.asarray(0.0)
+    for k in range(_SQUARINGS):
+        size = jnp.maximum(jnp.linalg.norm(power), 1e-300)
+        logarithm += jnp.log(size) / 2.0**k
+        power = power / size
+        power = power @ power
+    return jnp.exp(logarithm)
 
 
 def _combined(weights: Float, rates: Sequence[Array]) -> Array:
