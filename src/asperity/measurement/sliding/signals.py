@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
+from asperity.measurement.samples import require_computable
 from asperity.recording.roles import candidates, words
 
 if TYPE_CHECKING:
@@ -111,12 +112,18 @@ def sliding_signals(
         if is_velocity:
             mean = (slip[1:] + slip[:-1]) / 2
             slip = np.concatenate([[0.0], np.cumsum(mean * np.diff(time))])
+    if weight is not None:
+        weight = weight[use & np.isfinite(weight)]
+        weight = weight if weight.size else None
+    optional = {"load": weight, "displacement": slip}
+    given = {name: values for name, values in optional.items() if values is not None}
+    require_computable(time=time - time[0], friction=friction, **given)
     turned = bool(np.median(friction) < 0)
     return SlidingSignals(
         time=time,
         friction=-friction if turned else friction,
         displacement=slip,
-        load=None if weight is None else weight[use & np.isfinite(weight)],
+        load=weight,
         load_unit=unit,
         motion=name,
         no_motion=no_motion,
@@ -167,8 +174,9 @@ def _friction(
             f"'{unit}' for '{load}'; name the units when reading"
         )
     # NaN where undefined; the caller leaves these samples out.
+    known = np.isfinite(weight) & (weight != 0)
     with np.errstate(invalid="ignore", over="ignore"):
-        return F.values / np.where(weight == 0, np.nan, weight), weight, unit, [*read, F]
+        return F.values / np.where(known, weight, np.nan), weight, unit, [*read, F]
 
 
 def _motion(trace: Trace) -> tuple[Channel | None, bool, str]:
