@@ -23,6 +23,10 @@ Array = NDArray[np.float64]
 #: A step of this many median steps is a gap.
 _GAP = 1.5
 
+#: Largest size of a value, and one over the smallest of a channel's largest: fits take squares of
+#: squares of ratios, which doubles must hold.
+_LARGEST = 1e30
+
 
 @dataclass(frozen=True, eq=False)
 class Samples:
@@ -110,9 +114,33 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
             f"measure.trace must hold at least 16 usable samples, got {time.size}; give a longer "
             "recording or window"
         )
+    require_computable(time=time - time[0], **dict(zip(names, values, strict=True)))
     defects = _defects(time, values, names_found, keep)
     dropped = len(trace) - time.size
     return Samples(time, *values, W.unit, names, defects, findings, dropped, unread, two)
+
+
+def require_computable(**channels: Array) -> None:
+    """Refuse values whose squares are too large or too small to be computed with.
+
+    Parameters
+    ----------
+    **channels : array
+        Finite values by the name of their channel; all of them may be zero.
+
+    Raises
+    ------
+    InputError
+        Which names the channel and its largest value.
+    """
+    for name, values in channels.items():
+        largest = float(np.abs(values).max(initial=0.0))
+        if largest and not 1 / _LARGEST < largest < _LARGEST:
+            raise InputError(
+                f"measure.trace must hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size, got "
+                f"{largest:.4g} as the largest of '{name}'; correct its unit, or cut damaged rows "
+                "out with a window"
+            )
 
 
 def about_window(samples: Samples, start: float, end: float) -> list[Finding]:

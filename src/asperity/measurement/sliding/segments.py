@@ -426,6 +426,8 @@ def _refined(
             left = left[: left.size // _MEANS * _MEANS].reshape(_MEANS, -1).mean(axis=1)
         lines.append((slope, float(x.mean()) - slope * middle, float(left.std()), low, high))
     (v1, c1, s1, low, _), (v2, c2, s2, _, high) = lines
+    if v1 == v2:
+        return Cut(float(time[cut]), cut)
     at = (c1 - c2) / (v2 - v1)
     if not time[low] < at < time[high - 1]:
         at = float(time[cut])

@@ -16,6 +16,7 @@ from asperity.measurement.channels import (
     refuse_contradiction,
     shear_channel,
 )
+from asperity.measurement.samples import require_computable
 from asperity.recording.roles import candidates, words
 from asperity.recording.rounded_time import even_times
 
@@ -122,12 +123,18 @@ def sliding_signals(
         if is_velocity:
             mean = (slip[1:] + slip[:-1]) / 2
             slip = np.concatenate([[0.0], np.cumsum(mean * np.diff(time))])
+    if weight is not None:
+        weight = weight[use & np.isfinite(weight)]
+        weight = weight if weight.size else None
+    optional = {"load": weight, "displacement": slip}
+    given = {name: values for name, values in optional.items() if values is not None}
+    require_computable(time=time - time[0], friction=friction, **given)
     turned = bool(np.median(friction) < 0)
     return SlidingSignals(
         time=time,
         friction=-friction if turned else friction,
         displacement=slip,
-        load=None if weight is None else weight[use & np.isfinite(weight)],
+        load=weight,
         load_unit=unit,
         motion=name,
         no_motion=no_motion,
@@ -169,7 +176,8 @@ def _friction(
                 f"and '{unit}' for '{load}'; name the units when reading"
             )
         borne, shear, turned = compressive(W.values, F.values)
-        friction = shear / np.where(borne == 0, np.nan, borne)
+        known = np.isfinite(borne) & (borne != 0)
+        friction = shear / np.where(known, borne, np.nan)
     refuse_contradiction(trace, force, F, friction)
     return friction, borne, unit, read, turned
 

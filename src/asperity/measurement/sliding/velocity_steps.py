@@ -157,6 +157,8 @@ def read_step(
     for window in windows:
         first = _windowed(earlier, -window[0], 0.0)
         second = _windowed(later, 0.0, window[1])
+        if first is None or second is None:
+            continue
         decays, settled = _transient(first, second, shorter, window[1], degree)
         settling = settling or settled
         left = fit_trend(columns(first.slip, degree), first.friction)
@@ -174,8 +176,11 @@ def read_step(
     return _result(time, before, after, found, settling, known, degree)
 
 
-def _windowed(side: _Side, low: float, high: float) -> _Side:
+def _windowed(side: _Side, low: float, high: float) -> _Side | None:
+    """Bin means of a part; None where there are no two samples, as next to a gap."""
     inside = (side.slip >= low) & (side.slip <= high)
+    if inside.sum() < 2:
+        return None
     return _Side(*bin_means(side.slip[inside], side.friction[inside]))
 
 
@@ -262,7 +267,7 @@ def _result(
     for kind in set(kinds.tolist()):
         same = kinds == kind
         trusted[same] = np.maximum(noise[same], np.median(noise[same]))
-    weight = 1 / np.maximum(trusted, 1e-300) ** 2
+    weight = 1 / np.maximum(trusted, 1e-150) ** 2
     weight /= weight.sum()
     mean = float(weight @ change)
     from_noise = float(weight @ trusted)
