@@ -96,8 +96,10 @@ def _mean_cycle(reading: LockInReading, time: Array, values: Array, channel: int
     phasors = (reading.load_harmonics, reading.harmonics)[channel] * reading.W0
     order = np.arange(1, phasors.size + 1)
     fitted = np.zeros_like(values)
-    for n, phasor in zip(order, phasors, strict=True):
-        fitted += (phasor * np.exp(2j * np.pi * n * cycles)).real
+    turn, power = np.exp(2j * np.pi * cycles), 1.0
+    for phasor in phasors:
+        power = power * turn
+        fitted += (phasor * power).real
     left = values - fitted
     whole = int(max(1, min((cycles[-1] - cycles[0]) / _PERIODS, values.size / _SAMPLES)))
     edges = np.linspace(0, values.size, whole + 1).astype(int)[:-1]
