@@ -26,6 +26,7 @@ from asperity.measurement.verdicts import (
     steadiness,
 )
 from asperity.measurement.verdicts.checks import drift_rate
+from asperity.measurement.verdicts.flat_top import flat_top
 from asperity.measurement.verdicts.shift import shifting_response
 from asperity.measurement.verdicts.verdict import Check, Verdict, worst
 from asperity.measurement.window import (
@@ -358,7 +359,7 @@ def _about_the_instrument(
         *instrument.made_force(reading, samples, time, load, force),
         instrument.held_samples(reading, load, force),
         instrument.dropouts(load, force),
-        instrument.flat_top(reading, time, load),
+        flat_top(reading, time, load, force),
         interference.mains(reading, samples, parts),
         *interference.lines_in_the_pauses(reading, samples, parts),
         interference.hum(reading, time, force),

@@ -1,4 +1,4 @@
-"""Faults of the instrument: held samples, dropouts, rounded tops, a force that was made."""
+"""Faults of the instrument: held samples, dropouts, a force that was made."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ Array = NDArray[np.float64]
 LIMITS: dict[str, tuple[float, float]] = {
     "held samples": (0.01, 0.1),
     "dropouts": (0.0, 0.01),
-    "flat top": (0.11, 0.16),
     "made force": (0.3, -1.0),
 }
 
@@ -30,8 +29,6 @@ _REPEATED, _STEPS = 0.1, 4.0
 _REGULAR, _OFTEN, _FAR = 0.9, 0.3, 10.0
 #: Zeros count where the channel is usually this many scatters away from zero.
 _AWAY = 5.0
-#: Phases into which a period is folded, and how near its extreme counts as the top.
-_PHASES, _NEAR = 128, 0.01
 
 
 def held_samples(reading: LockInReading, load: Array, force: Array) -> Check:
@@ -92,37 +89,6 @@ def dropouts(load: Array, force: Array) -> Check:
             "is usual: the signal was lost there"
         )
     return judged("dropouts", number, LIMITS["dropouts"], sentence)
-
-
-def flat_top(reading: LockInReading, time: Array, load: Array) -> Check:
-    """Whether the load's waveform is flat at its top or bottom, as an amplifier clips it.
-
-    What is clipped before noise is added has no two equal samples. Folded over the period, a
-    sine is within 1 % of its height of its top over 6 % of the period, a clipped one over more.
-    """
-    phase = np.mod(reading.frequency * (time - time[0]), 1.0)
-    index = np.minimum((phase * _PHASES).astype(int), _PHASES - 1)
-    count = np.bincount(index, minlength=_PHASES)
-    line = np.polynomial.Polynomial.fit(time, load, 1)
-    rest = load - line(time)
-    number, sentence, seen = 0.0, "the load's waveform has too few samples for its shape", False
-    if count.min() >= 4:
-        folded = np.bincount(index, rest, minlength=_PHASES) / count
-        square = np.bincount(index, (rest - folded[index]) ** 2, minlength=_PHASES) / count
-        height = float(np.ptp(folded))
-        doubt = float(np.sqrt(np.max(square / count)))
-        seen = height > 0 and doubt < _NEAR * height / 3
-        shares = {
-            "top": float(np.mean(folded > folded.max() - _NEAR * height)),
-            "bottom": float(np.mean(folded < folded.min() + _NEAR * height)),
-        }
-        side = max(shares, key=shares.__getitem__)
-        number = shares[side]
-        sentence = (
-            f"the load stays within {_NEAR:.0%} of its {side} for {number:.2g} of the period, "
-            "where a sine does for 0.064; a longer stay is clipping, or a waveform that is no sine"
-        )
-    return judged("flat top", number, LIMITS["flat top"], sentence, significant=seen)
 
 
 def made_force(
