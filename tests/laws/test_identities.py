@@ -517,3 +517,15 @@ def test_planted_mistake_in_the_kinematics_is_caught(mistake):
     assert isinstance(wrong, eqx.Module)
     with pytest.raises(AssertionError):
         check_kinematics(wrong)
+
+
+class SecondLengthIgnored(TwoState):
+    def state_rate(self, v, v_plastic, state, w):
+        return (self.approach(v_plastic, state[0], self.D0),) * 2
+
+
+def test_parameters_that_are_not_exchangeable_are_caught():
+    law = EXAMPLES["two-state"].law(TwoState)
+    assert "exchange" in check_law(law)
+    with pytest.raises(identities.BrokenIdentityError, match="D2, B2 is another law"):
+        check_law(EXAMPLES["two-state"].law(SecondLengthIgnored))

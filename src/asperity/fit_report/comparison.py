@@ -68,7 +68,7 @@ def page(found: Comparison, fits: Mapping[str, Fit]) -> str:
     first = next(iter(fits.values()))
     names = " and ".join(term.name for term in first.objective.terms)
     sections = {
-        "Verdict": f"<p>{escape(found.verdict)}</p>" + table(*laws_table(found)),
+        "Verdict": f"<p>{escape(found.verdict)}</p>" + table(*laws_table(found, reasons=True)),
         "Data and laws": _figures(fits),
         "Estimates": _estimates(fits),
         "Data": data_tables(first),

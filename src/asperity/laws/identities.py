@@ -243,12 +243,14 @@ def units(law: Law) -> None:
 
 def exchange(law: Law) -> None:
     """Parameters that are declared exchangeable change nothing, in some order of the states."""
+    # One of them may be positive by its rule, and the other of either sign.
+    values = {f.name: jnp.abs(jnp.asarray(getattr(law, f.name))) for f in dataclasses.fields(law)}
+    law = type(law)(**values)
     v, state, w = sample(law)
     friction, rates = law.friction(v, state, w), law.state_rate(v, 1.5 * v, state, w)
     fields = {n: p.path.rsplit(".", 1)[-1] for n, p in law_parameters(type(law)).items()}
     unknown = {n for names in law.exchangeable for n in names} - set(fields)
     assert not unknown, f"exchangeable names {', '.join(sorted(unknown))}, which are no parameters"
-    values = {f.name: getattr(law, f.name) for f in dataclasses.fields(law)}
     for first, second in itertools.combinations(law.exchangeable, 2):
         pairs = [(fields[a], fields[b]) for a, b in zip(first, second, strict=True)]
         other = type(law)(

@@ -177,10 +177,10 @@ def require_rereadable(path: Path, label: str) -> None:
     Raises
     ------
     InputError
-        If there is something at the path that is no regular file.
+        If there is something else at the path than a regular file or a folder.
     """
     other = not_a_file(path)
-    if other:
+    if other and not path.is_dir():
         raise InputError(
             f"{label} must be a regular file, got '{path}', {other}; write the data to a file"
         )

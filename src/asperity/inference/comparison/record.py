@@ -34,11 +34,13 @@ def comparison_record(found: Comparison) -> dict[str, Any]:
     }
 
 
-def laws_table(found: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+def laws_table(
+    found: Comparison, *, reasons: bool = False
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Laws in the order of the comparison, as texts for people: columns' names and rows.
 
     What decides stands in it: chi-squared where uncertainties are given, the logarithm of the
-    likelihood where the noise is estimated.
+    likelihood where the noise is estimated. With `reasons`, why a law is excluded.
     """
     fits = [j.fit for j in found.laws.values() if j.fit.converged]
     lowest = min((f.aicc for f in fits), default=0.0)
@@ -57,7 +59,7 @@ def laws_table(found: Comparison) -> tuple[tuple[str, ...], list[tuple[str, ...]
         # Of excluded laws among searched orbits it is the normal approximation's.
         if j.evidence and math.isfinite(j.evidence.standard_error):
             evidence += f" +- {j.evidence.standard_error:.2g}"
-        notes = ["excluded"] if j.excluded else []
+        notes = [f"excluded: {j.why}" if reasons else "excluded"] if j.excluded else []
         if f.undetermined:
             notes.append(f"{', '.join(f.undetermined)} not determined")
         rows.append(
