@@ -132,8 +132,8 @@ def require_computable(**channels: Array) -> None:
         largest = float(np.abs(values).max(initial=0.0))
         if largest and not 1 / _LARGEST < largest < _LARGEST:
             raise InputError(
-                f"measure.trace must hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size, got "
-                f"{largest:.4g} as the largest of '{name}'; correct its unit, or cut damaged rows "
+                f"measure.trace must hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size, "
+                f"got {largest:.4g} as the largest of '{name}'; correct its unit, or cut damaged rows "
                 "out with a window"
             )
 
