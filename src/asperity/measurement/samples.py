@@ -133,8 +133,8 @@ def require_computable(**channels: Array) -> None:
         if largest and not 1 / _LARGEST < largest < _LARGEST:
             raise InputError(
                 f"measure.trace must hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size, "
-                f"got {largest:.4g} as the largest of '{name}'; correct its unit, or cut damaged rows "
-                "out with a window"
+                f"got {largest:.4g} as the largest of '{name}'; correct its unit, or cut damaged "
+                "rows out with a window"
             )
 
 
