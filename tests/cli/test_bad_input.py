@@ -1,5 +1,7 @@
 """Bad input to any command: one sentence on stderr, exit code 2, nothing left behind."""
 
+import math
+import random
 from pathlib import Path
 
 import pytest
@@ -216,3 +218,132 @@ def test_questions_to_tables_that_have_no_answer(asperity, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     (tmp_path / "t.csv").write_text(READINGS, encoding="utf-8")
     refused(asperity(*command, "--material", "bureau2000"), *parts)
+
+
+UNITS = {
+    "R": "cm", "h0": "um", "P0": "Pa", "eta": "Pa s", "W0": "N", "M": "kg", "lambda_z": "um",
+}  # fmt: skip
+WORDS = [
+    *("0", "-0", ".", "1e", "+", "nan", "inf", "²", "1²", "٣", "9" * 5000, "1e-400"),
+    *("1e9999999", "1e" + "9" * 30, "1e-" + "9" * 30, "\ud800", "1_0", "0x1"),
+]
+
+
+def any_number(draw: random.Random) -> str:
+    """A number of any size, or a word that is none."""
+    kind = draw.random()
+    if kind < 0.4:
+        return f"{10 ** draw.uniform(-3, 3):.3g}"
+    if kind < 0.8:
+        return f"{draw.choice([1, 1, 1, -1]) * draw.uniform(1, 9):.3g}e{draw.randint(-330, 330)}"
+    return draw.choice(WORDS)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_numbers_of_any_size_get_an_answer_or_a_sentence(asperity, seed: int) -> None:
+    draw = random.Random(seed)
+    answered = 0
+    for _ in range(50):
+        options = ["-f", f"{any_number(draw)} Hz"]
+        for name, unit in UNITS.items():
+            if draw.random() < 0.2:
+                options += ["--set", f"{name}={any_number(draw)} {unit}"]
+        options += ["--vacuum"] * (draw.random() < 0.2)
+        if draw.random() < 0.3:
+            options += ["--inverse", any_number(draw), "--for", draw.choice(["radius", "gap"])]
+        result = asperity("air", "--material", "bureau2000", *options)
+        if result.exit_code == 2:
+            refused(result, "must")
+            continue
+        answered += 1
+        assert "nan" not in result.stdout
+        assert "inf" not in result.stdout
+    assert answered > 5
+
+
+def recording(path: Path, load: list[float], force: list[float]) -> Path:
+    rows = zip(range(len(load)), load, force, strict=True)
+    lines = [f"{k / 1000:.3f},{w!r},{f!r}" for k, w, f in rows]
+    path.write_text("\n".join(["time (s),load (N),force (N)", *lines, ""]), encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("word", ["²", "1²", "٣", "³⁰", "9" * 5000, "-1", "3", "12345678901234567"])
+def test_a_column_of_no_number(asperity, tmp_path: Path, word: str) -> None:
+    file = recording(tmp_path / "a.csv", [7.0] * 100, [3.5] * 100)
+    for option in ("--load", "--force", "--time"):
+        refused(asperity("measure", file, option, word), "must be a column, got")
+
+
+@pytest.mark.parametrize(
+    "size", ["0", "-0", "0e5", "1e9999999", "-1e9999999", "1e-9999999", "1e400", "1e" + "9" * 30]
+)
+def test_a_unit_of_no_size(asperity, tmp_path: Path, size: str) -> None:
+    file = recording(tmp_path / "a.csv", [7.0] * 100, [3.5] * 100)
+    for name, unit in (("load", "N"), ("force", "kN"), ("time", "s")):
+        refused(
+            asperity("measure", file, "--unit", f"{name}={size} {unit}"),
+            "--unit must be a size between",
+        )
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_recordings_of_any_size_are_measured_or_refused(asperity, tmp_path, seed: int) -> None:
+    draw = random.Random(seed)
+    swing = draw.choice([0.0, 0.2])
+    load = [7 * (1 + swing * math.cos(0.12 * k)) for k in range(600)]
+    force = [0.5 * w * (1 + 1e-3 * draw.gauss(0, 1)) for w in load]
+    for channel in draw.sample([load, force], draw.choice([1, 2])):
+        scale = 10.0 ** draw.choice([draw.uniform(-320, -40), draw.uniform(40, 300)])
+        bad = draw.choice([0.0, 0.02, 0.5])
+        word = draw.choice([math.inf, -math.inf, math.nan, 1e308, 5e-324])
+        channel[:] = [word if draw.random() < bad else v * scale for v in channel]
+    file = recording(tmp_path / "a.csv", load, force)
+    for options in ((), ("--no-modulation",)):
+        refused(asperity("measure", file, *options), "must ")
+
+
+@pytest.mark.parametrize("exponent", [-300, -160, -20, 20, 300])
+def test_uncertainties_that_no_reading_has(asperity, tmp_path: Path, exponent: int) -> None:
+    (tmp_path / "t.csv").write_text(READINGS.replace("1e-5", f"1e{exponent}"), encoding="utf-8")
+    call = ("fit", tmp_path / "t.csv", "--law", "rice-ruina", "--free", "A")
+    refused(asperity(*call, "--material", "bureau2000"), "mu1_err must be from 1e-15 to 1e+15")
+
+
+PROTOCOL = """
+law = "rice-ruina"
+material = "bureau2000"
+steps = ["slide for 1 s"]
+"""
+
+
+SENSOR = '[tribometer]\nrate = "1 Hz"\n[tribometer.sensors.F]\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "parts"),
+    [
+        (f'self = 5\n{PROTOCOL}[start]\nvelocity = "1 um/s"', ["self must be a known field"]),
+        (
+            f'{PROTOCOL}[start]\nvelocity = "1 um/s"\n{SENSOR}type = ["x"]',
+            ["tribometer.sensors.F.type must be a sensor, got a list of 1;"],
+        ),
+        (
+            f'{PROTOCOL}[start]\nvelocity = "1 um/s"\nstates = [1e300, -1e300]',
+            ["start.states must be states whose rates are numbers", "begin nearer to steady"],
+        ),
+        (
+            f'{PROTOCOL}[start]\nvelocity = "1 um/s"\nstates = [-1.0, 0.0]',
+            ["start.states must leave an interface force that is not negative"],
+        ),
+    ],
+)
+def test_a_protocol_that_cannot_be_run(asperity, tmp_path: Path, text: str, parts) -> None:
+    file = tmp_path / "a.toml"
+    file.write_text(text, encoding="utf-8")
+    result = asperity("run", file, "--out", tmp_path / "a.nc")
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    for part in parts:
+        assert part in result.stderr.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == [file]

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import types
+import warnings
 
 import pytest
 
@@ -130,3 +131,33 @@ def test_a_message_with_line_breaks_stays_one_line(asperity) -> None:
 def test_the_commands_are_a_group_of_modules() -> None:
     group = Shell(name="x", commands={"air": "asperity.cli.air"})
     assert group.list_commands(None) == ["air"]  # type: ignore[arg-type]
+
+
+def test_a_warning_is_a_line_without_a_path(monkeypatch, capsys) -> None:
+    """Each text once; while tests run, a warning is an error elsewhere."""
+    import click
+
+    @click.command()
+    def noisy() -> None:
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            for _ in range(2):
+                warnings.warn("overflow encountered in square", RuntimeWarning, stacklevel=1)
+                warnings.warn("a library\nhas its say", UserWarning, stacklevel=1)
+        click.echo("answer")
+
+    module = types.ModuleType("noisy_command")
+    module.noisy = noisy  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "noisy_command", module)
+    before = warnings.showwarning
+    with pytest.raises(SystemExit) as left:
+        Shell(name="x", commands={"noisy": "noisy_command"}).main(["noisy"])
+    assert not left.value.code
+    assert warnings.showwarning is before
+    shown = capsys.readouterr()
+    assert shown.out == "answer\n"
+    assert shown.err.splitlines() == [
+        "asperity: warning: a number left the range of doubles on the way "
+        "(overflow encountered in square)",
+        "asperity: warning: a library has its say",
+    ]

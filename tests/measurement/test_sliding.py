@@ -145,3 +145,29 @@ def test_bad_input_is_one_sentence(channels, options, message) -> None:
     made = recorded(time, **dict.fromkeys(channels, friction))
     with pytest.raises(InputError, match=message):
         measure_sliding(made, **options)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_under_an_infinite_load_there_is_no_friction(seed) -> None:
+    """The quotient would be 0."""
+    draw = np.random.default_rng(seed)
+    time = np.arange(2000) / 100
+    load = np.full(time.size, STRESS)
+    shear = 0.6 * load * (1 + 1e-3 * draw.standard_normal(time.size))
+    lost = draw.random(time.size) < draw.uniform(0.05, 0.6)
+    load[lost] = draw.choice([np.inf, -np.inf, np.nan], lost.sum())
+    found = measure_sliding(recorded(time, normal_stress=load, shear_stress=shear))
+    assert found.time.size == time.size - lost.sum()
+    assert found.friction.value == pytest.approx(0.6, abs=5 * 6e-4 / np.sqrt(found.time.size))
+    assert found.load.value == pytest.approx(STRESS)
+    nowhere = recorded(time, normal_stress=np.full(time.size, np.inf), shear_stress=shear)
+    with pytest.raises(InputError, match="usable samples, got 0"):
+        measure_sliding(nowhere)
+
+
+def test_friction_is_measured_where_the_load_is_never_a_number() -> None:
+    time, slip, friction = velocity_step()
+    nothing = np.full(time.size, np.nan)
+    found = measure_sliding(recorded(time, friction=friction, slip=slip, normal_stress=nothing))
+    assert found.load is None
+    check(found)

@@ -56,7 +56,8 @@ def transfer_function(
     Raises
     ------
     InputError
-        When an argument is not a finite positive number or the shapes do not broadcast.
+        When an argument is not a finite positive number, the shapes do not broadcast, or the
+        stiffnesses leave the range of doubles.
     """
     contact = NormalContact(W0=W0, lambda_z=lambda_z)  # type: ignore[arg-type]
     advice = "give the frequency of the modulation in hertz"
@@ -66,10 +67,16 @@ def transfer_function(
     if layer is not None:
         fields = (layer.P0, layer.h0, layer.eta, layer.R, layer.temperature)
     check_shapes("modulation.frequency", f, mass, contact.W0, contact.lambda_z, *fields)
-    omega = 2 * np.pi * f
-    denominator = 1 - mass * omega**2 / contact.stiffness + 0j
-    if layer is not None:
-        denominator = denominator + layer.dynamic_stiffness(omega) / contact.stiffness
+    with np.errstate(all="ignore"):
+        omega = 2 * np.pi * np.asarray(f)
+        denominator = 1 - mass * omega**2 / contact.stiffness + 0j
+        if layer is not None:
+            denominator = denominator + layer.dynamic_stiffness(omega) / contact.stiffness
+    if not np.all(np.isfinite(denominator)):
+        raise InputError(
+            "modulation.frequency must leave stiffnesses that are finite numbers, got "
+            f"{np.max(f):g} Hz; bring it, the slider and the layer nearer to an experiment"
+        )
     return _reciprocal(denominator)
 
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any, NoReturn
 
 import click
 
 from asperity.cli.interrupt import INTERRUPTED, MESSAGE, ending_at_once
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, printable
 
 _BAD_INPUT = 2
 
@@ -57,7 +59,7 @@ class Shell(click.Group):
         Click's own standalone mode is not used: its messages take several lines.
         """
         try:
-            with ending_at_once():
+            with ending_at_once(), _warnings_as_sentences():
                 code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
         except InputError as error:
             code = _print_error(str(error), _BAD_INPUT)
@@ -66,6 +68,26 @@ class Shell(click.Group):
         except click.ClickException as error:
             code = _print_error(error.format_message(), _BAD_INPUT)
         sys.exit(code)
+
+
+@contextmanager
+def _warnings_as_sentences() -> Iterator[None]:
+    """Show a library's warning as one line without the path of its source, once for each text."""
+    earlier, shown = warnings.showwarning, set()
+
+    def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        text = printable(str(message))
+        if issubclass(category, RuntimeWarning) and " encountered in " in text:
+            text = f"a number left the range of doubles on the way ({text})"
+        if text not in shown:
+            shown.add(text)
+            click.echo(f"asperity: warning: {text}", err=True)
+
+    warnings.showwarning = show
+    try:
+        yield
+    finally:
+        warnings.showwarning = earlier
 
 
 def _print_error(message: str, code: int) -> int:

@@ -165,7 +165,7 @@ def multiplier_gap(before: NDArray[np.complex128], now: NDArray[np.complex128]) 
     old, new = from_logs(before), from_logs(now)
     # Beyond doubles the logarithms are compared, the multipliers elsewhere.
     huge = now.real > LARGEST_LOG
-    with np.errstate(invalid="ignore", over="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         several = len(new) > 2
         largest = np.minimum(np.abs(new).max(initial=0.0), np.exp(LARGEST_LOG))
         floor = max(_VANISHING[several], several * _LOST_IN_ROUND_OFF * largest)

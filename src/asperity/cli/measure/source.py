@@ -197,5 +197,5 @@ def expressions_of(texts: tuple[str, ...]) -> dict[str, str]:
 
 
 def _name_or_number(name: str) -> str | int:
-    """Columns of files without headers are chosen by number."""
-    return int(name) if name.isdigit() else name
+    """Columns of files without headers are chosen by number: in the digits 0 to 9."""
+    return int(name) if name.isascii() and name.isdigit() and len(name) < 10 else name

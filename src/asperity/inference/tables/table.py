@@ -40,6 +40,8 @@ _RUN, _KIND, _REASON, _UNIT = ("run", "file"), "kind", "reason", "unit"
 _TEXTS = (*_RUN, _KIND, _REASON, _UNIT)
 #: Smallest eigenvalue of the correlations of a row.
 _SMALLEST_EIGENVALUE = 1e-9
+#: Smallest standard uncertainty of a reading, and one over the largest.
+_SMALLEST_ERROR = 1e-15
 #: Forces over the load beyond this are in per cent or not divided by the load.
 _LARGEST_FRICTION = 10.0
 #: Probability below which mean_friction and delta_mu are too alike to have errors of their own.
@@ -422,6 +424,14 @@ def _observables(
             raise InputError(
                 f"{table}.{name}_err must be a finite positive number, got {error[row]:g} in row "
                 f"{row + 1}; give the standard uncertainty"
+            )
+        # Values are of order 1: below the spacing of doubles there, or as far above, none is known.
+        bad = np.isfinite(column) & ((error < _SMALLEST_ERROR) | (error > 1 / _SMALLEST_ERROR))
+        if bad.any():
+            row = int(np.flatnonzero(bad)[0])
+            raise InputError(
+                f"{table}.{name}_err must be from {_SMALLEST_ERROR:g} to {1 / _SMALLEST_ERROR:g}, "
+                f"got {error[row]:g} in row {row + 1}; give the standard uncertainty"
             )
         errors[name] = error
     for harmonic in (1, 2):

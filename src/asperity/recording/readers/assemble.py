@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.errors import InputError, closest, listed, printable
+from asperity.parameters.arguments import shown
 from asperity.recording.checks import check
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
@@ -159,7 +160,7 @@ def _name_of(wanted: str | int, names: list[str], labels: Mapping[str, str], fie
     if isinstance(wanted, int):
         if not -len(names) <= wanted < len(names):
             raise InputError(
-                f"{field} must be a column, got {wanted}; the file has columns 0 to "
+                f"{field} must be a column, got {shown(wanted)}; the file has columns 0 to "
                 f"{len(names) - 1}"
             )
         return names[wanted]

@@ -9,6 +9,7 @@ from functools import lru_cache
 
 from asperity.errors import InputError
 from asperity.units import KINDS
+from asperity.units.convert import shortened
 from asperity.units.scale import normalised, unit_factor
 
 #: Words for units, lower case, as the unit they stand for.
@@ -50,6 +51,8 @@ _DIRECT = {
     "bar": ("pressure", Decimal(100_000)),
     "%": ("dimensionless", Decimal("0.01")),
 }
+#: Smallest size of one recorded unit (SI), and one over the largest.
+_SMALLEST = Decimal("1e-100")
 _NUMBERED = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s+(\S.*)")
 
 
@@ -142,7 +145,7 @@ def required(text: str, name: str) -> Unit:
     Raises
     ------
     InputError
-        If it is not a unit of `asperity.units`.
+        If it is not a unit of `asperity.units`, or its size is zero or beyond doubles.
     """
     match = _NUMBERED.fullmatch(text)
     unit = understood(match[2] if match else text)
@@ -151,4 +154,15 @@ def required(text: str, name: str) -> Unit:
             f"units['{name}'] must be a unit, got '{text}'; write it like 'N', 'MPa', 'um', '-' "
             "for a pure number, or '12.5 N' for what one recorded unit is"
         )
-    return Unit(unit.kind, unit.factor * Decimal(match[1])) if match else unit
+    if match is None:
+        return unit
+    try:
+        factor = unit.factor * Decimal(match[1])
+    except ArithmeticError:  # decimals have a largest power of ten themselves
+        factor = Decimal(0)
+    if not _SMALLEST < abs(factor) < 1 / _SMALLEST:
+        raise InputError(
+            f"units['{name}'] must be a size between {_SMALLEST:.0e} and {1 / _SMALLEST:.0e} in "
+            f"SI, got '{shortened(text)}'; give what one recorded unit is, like '12.5 N'"
+        )
+    return Unit(unit.kind, factor)

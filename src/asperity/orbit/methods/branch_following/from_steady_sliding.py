@@ -297,7 +297,9 @@ def _extremum(pair: PointPair, step: MovingMeshStep, rows: Indices, chosen: Indi
     t_next = step.next.point.t[chosen]
     slope_next = step.next.point.tangent.t[chosen]
     # The parabola of the slope has its zero at x; the area under the slope to there is the rise.
-    x = slope / (slope - slope_next)
+    # Equal slopes have none, and their result is not used.
+    parted = slope != slope_next
+    x = slope / np.where(parted, slope - slope_next, 1.0)
     rise = 0.5 * x * slope
     whole = 0.5 * (slope + slope_next)
     scale = np.where(np.abs(whole) > 1e-12, (t_next - t) / np.where(whole == 0, 1.0, whole), 0.0)
