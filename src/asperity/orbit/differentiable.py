@@ -1,4 +1,4 @@
-"""The periodic response as a function that JAX programs call, with derivatives of every order.
+"""The periodic response as a function that JAX programs call and differentiate.
 
 A call finds the orbits and then evaluates them. Orbits are found without derivatives: by the fast
 method within the compiled program, and by the search of `asperity.orbit.search` where the fast
