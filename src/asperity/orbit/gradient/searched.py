@@ -16,7 +16,7 @@ from asperity.orbit.gradient.mesh_derivatives import orbit_derivatives
 from asperity.orbit.gradient.multipliers import sorted_logs
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.gradient.program import Parameters, Program, ResponseValues
-from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits, SearchedOrbits
+from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits
 from asperity.orbit.gradient.search.search import search_orbits
 from asperity.orbit.outcome import Outcome
 
@@ -82,22 +82,28 @@ def _count(program: Program) -> int:
     return 1 + 2 * program.harmonics + 2 * program.states * program.multipliers
 
 
-def _called(function: Any, shapes: Any, program: Program, parameters: Any, wanted: Array) -> Any:
-    """A function of NumPy arrays, called in another process if any point is wanted."""
+def _called(
+    program: Program, parameters: Any, wanted: Array, *, derivatives: bool
+) -> tuple[Array, Array, Array]:
+    """`_response` in another process, if any point is wanted."""
+    (points,), names = wanted.shape, program.equations.names
+    count = _count(program)
+    shapes = (
+        jax.ShapeDtypeStruct((points, count), np.dtype(float)),
+        jax.ShapeDtypeStruct((points,), np.dtype(np.int64)),
+        jax.ShapeDtypeStruct((len(names) * derivatives, points, count), np.dtype(float)),
+    )
 
     def call(parameters: Any, wanted: Any) -> Any:
         values = {n: np.asarray(v) for n, v in parameters.items()}
-        return _in_another_process(function, program, values, np.asarray(wanted))
+        return _in_another_process(_response, program, values, np.asarray(wanted), derivatives)
 
     def search(parameters: Any) -> Any:
         return jax.pure_callback(call, shapes, parameters, wanted, vmap_method="sequential")
 
     def nothing(parameters: Any) -> Any:
-        def empty(s: Any) -> Array:
-            none = int(Outcome.NO_ORBIT) if s.dtype == np.int64 else 0.0
-            return jnp.full(s.shape, none, s.dtype)
-
-        return jax.tree.map(empty, shapes)
+        columns, outcome, table = (jnp.zeros(s.shape, s.dtype) for s in shapes)
+        return columns, outcome + int(Outcome.NO_ORBIT), table
 
     return jax.lax.cond(wanted.any(), search, nothing, parameters)
 
@@ -114,62 +120,42 @@ def _in_another_process(function: Any, *arguments: Any) -> Any:
     return executor.submit(function, *arguments).result()
 
 
-def _searched(
-    program: Program, parameters: dict[str, Float], wanted: NDArray[np.bool_]
-) -> SearchedOrbits:
-    return search_orbits(program.equations, program.harmonics, parameters, wanted)
-
-
 def _response(
-    program: Program, parameters: dict[str, Float], wanted: NDArray[np.bool_]
-) -> tuple[Float, NDArray[np.int64]]:
-    orbits = _searched(program, parameters, wanted)
-    columns = np.zeros((len(wanted), _count(program)))
+    program: Program, parameters: dict[str, Float], wanted: NDArray[np.bool_], derivatives: bool
+) -> tuple[Float, NDArray[np.int64], Float]:
+    """Real columns (points, count) of the response, the outcome, and derivatives of the columns.
+
+    The derivatives are of shape (parameters, points, count), without parameters if not asked for.
+    """
+    equations, points, count = program.equations, len(wanted), _count(program)
+    orbits = search_orbits(equations, program.harmonics, parameters, wanted)
+    columns = np.zeros((points, count))
+    table = np.zeros((len(equations.names) * derivatives, points, count))
     for index, part in orbits.parts:
         values = values_of(part, multipliers=program.multipliers)
-        columns[index] = np.hstack(
-            [values.mean_friction[:, None], *_parts(values.harmonics, values.log_multipliers)]
-        )
-    return columns, np.asarray(orbits.outcome)
-
-
-def _parts(*columns: NDArray[np.complex128]) -> list[Float]:
-    return [part for a in columns for part in (a.real, a.imag)]
-
-
-def _table(program: Program, parameters: dict[str, Float], wanted: NDArray[np.bool_]) -> Float:
-    orbits = _searched(program, parameters, wanted)
-    names = program.equations.names
-    table = np.zeros((len(names), len(wanted), _count(program)))
-    for index, part in orbits.parts:
-        own = {n: v[index] for n, v in parameters.items()}
-        table[:, index] = derivatives_of(
-            program.equations, own, part, multipliers=program.multipliers
-        )
-    return table
+        parts = [a for z in values[1:3] for a in (z.real, z.imag)]
+        columns[index] = np.hstack([values.mean_friction[:, None], *parts])
+        if derivatives:
+            here = {n: v[index] for n, v in parameters.items()}
+            table[:, index] = derivatives_of(equations, here, part, multipliers=program.multipliers)
+    return columns, np.asarray(orbits.outcome), table
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def _columns(program: Program, parameters: Parameters, wanted: Array) -> tuple[Array, Array]:
     """Real columns (points, count) of the response, and the outcome."""
-    (points,) = wanted.shape
-    shapes = (
-        jax.ShapeDtypeStruct((points, _count(program)), np.dtype(float)),
-        jax.ShapeDtypeStruct((points,), np.dtype(np.int64)),
-    )
-    return _called(_response, shapes, program, parameters, wanted)
+    return _called(program, parameters, wanted, derivatives=False)[:2]
 
 
 @_columns.defjvp
 def _columns_rule(program: Program, primals: tuple, tangents: tuple) -> tuple[Any, Any]:
     parameters, wanted = primals
-    columns, outcome = _columns(program, parameters, wanted)
-    names = program.equations.names
-    shape = (len(names), *columns.shape)
     fixed = jax.lax.stop_gradient(parameters)
-    shapes = jax.ShapeDtypeStruct(shape, np.dtype(float))
-    table = _called(_table, shapes, program, fixed, wanted)
-    table = _unknown(table, sum(parameters.values()))
+    columns, outcome, table = _called(program, fixed, wanted, derivatives=True)
+    # Of both, derivatives of the next order are not known.
+    point = sum(parameters.values())
+    columns, table = _unknown(columns, point), _unknown(table, point)
+    names = program.equations.names
     change = sum(table[k] * tangents[0][n][:, None] for k, n in enumerate(names))
     return (columns, outcome), (change, np.zeros(outcome.shape, jax.dtypes.float0))
 
