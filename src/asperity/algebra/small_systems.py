@@ -14,6 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
+from numpy.typing import NDArray
 
 #: Entries [row][column] of a small matrix, each an array over the operating points.
 Matrix = list[list[Array]]
@@ -231,14 +232,13 @@ def product(a: Array, b: Array) -> Array:
     return (a[:, :, None] * b[None]).sum(1)
 
 
-def scaled_product(maps: Array) -> tuple[Array, Array]:
+def scaled_product(maps: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Product of the maps of successive intervals, the last one leftmost, kept near unit size.
-
-    Of NumPy or JAX arrays, as `spectral_radius` and `spectral_abscissa`.
 
     Parameters
     ----------
     maps : array, shape (n, n, intervals, points)
+        Of NumPy.
 
     Returns
     -------
@@ -246,42 +246,34 @@ def scaled_product(maps: Array) -> tuple[Array, Array]:
         Divided by the exponential of its scale.
     log_scale : array, shape (points,)
     """
-    xp = maps.__array_namespace__()
     n, _, intervals, points = maps.shape
-    # The root of their number side by side, and then the products of these: few operations to
-    # compile, and an error that grows with the root only.
+    # The root of their number next to each other, and then the products of these: an error that
+    # grows with the root only.
     length = math.isqrt(intervals - 1) + 1
     blocks = -(-intervals // length)
     added = (n, n, blocks * length - intervals, points)
-    padding = xp.broadcast_to(xp.eye(n)[..., None, None], added)
-    maps = xp.concatenate([maps, padding], axis=2).reshape(n, n, blocks, length, points)
-    rows, scales = _scaled_products(xp.moveaxis(maps, 3, 0))
-    whole, scale = _scaled_products(xp.moveaxis(rows, 2, 0))
+    padding = np.broadcast_to(np.eye(n)[..., None, None], added)
+    maps = np.concatenate([maps, padding], axis=2).reshape(n, n, blocks, length, points)
+    rows, scales = _scaled_products(np.moveaxis(maps, 3, 0))
+    whole, scale = _scaled_products(np.moveaxis(rows, 2, 0))
     return whole, scale + scales.sum(0)
 
 
-def _scaled_products(factors: Array) -> tuple[Array, Array]:
+def _scaled_products(
+    factors: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Products over the first axis of (count, n, n, ...), and the logarithms of their scales."""
-    xp = factors.__array_namespace__()
-
-    def step(carry: tuple[Array, Array], factor: Array) -> tuple[tuple[Array, Array], None]:
-        done, log_scale = carry
-        done = product(factor, done)
-        size = abs(done).max((0, 1))
-        size = xp.where(size > 0, size, 1.0)
-        return (done / size, log_scale + xp.log(size)), None
-
-    carry = factors[0], xp.zeros(factors.shape[3:])
-    if xp is jnp:
-        carry, _ = jax.lax.scan(step, carry, factors[1:])
-    else:
-        for factor in factors[1:]:
-            carry, _ = step(carry, factor)
-    return carry
+    done, log_scale = factors[0], np.zeros(factors.shape[3:])
+    for factor in factors[1:]:
+        done = np.einsum("ij...,jk...->ik...", factor, done)
+        size = np.abs(done).max((0, 1))
+        size = np.where(size > 0, size, 1.0)
+        done, log_scale = done / size, log_scale + np.log(size)
+    return done, log_scale
 
 
 def spectral_radius(matrix: Array) -> Array:
-    """Largest modulus of the eigenvalues of (n, n, ...) matrices.
+    """Largest modulus of the eigenvalues of (n, n, ...) matrices, of NumPy or JAX.
 
     Exact up to two states; to a per mille for more, by repeated squaring.
     """
@@ -304,7 +296,9 @@ def spectral_radius(matrix: Array) -> Array:
 
 
 def spectral_abscissa(matrix: Array) -> Array:
-    """Largest real part of the eigenvalues of (n, n, ...) matrices; NaN where not finite.
+    """Largest real part of the eigenvalues of (n, n, ...) matrices, NaN where not finite.
+
+    Of NumPy or JAX arrays.
 
     In closed form up to two states. For more by LAPACK, which balances matrices: those of motion
     with inertia have entries that differ by many orders of magnitude, and entries larger than any

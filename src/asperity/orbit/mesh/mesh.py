@@ -86,9 +86,7 @@ class Orbit(NamedTuple):
 
     def stage_sums(self, slopes: Array) -> Array:
         """a_jk slopes_k: increments of the states at the stages per unit width."""
-        # NumPy or JAX, as the arrays are.
-        xp = slopes.__array_namespace__()
-        return xp.einsum("jk,nkmb->njmb", self.scheme.a, slopes)
+        return np.einsum("jk,nkmb->njmb", self.scheme.a, slopes)
 
     @property
     def stage_deviations(self) -> Array:

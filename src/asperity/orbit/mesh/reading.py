@@ -28,7 +28,7 @@ VANISHING_GROWTH = -200.0
 def orbit_observables(
     values: PointValues, response: Array, orbit: Orbit, harmonics: int
 ) -> Observables:
-    """Observables of a converged orbit, without its growth, for NumPy or JAX arrays.
+    """Observables of a converged orbit, without its growth.
 
     Parameters
     ----------
@@ -39,11 +39,10 @@ def orbit_observables(
     orbit : Orbit
     harmonics : int
     """
-    xp = values.rates.__array_namespace__()
     weights = quadrature(orbit) / (2 * np.pi)
     mean = values.force_mean[0, 0] + (weights * values.force_rest).sum((0, 1))
-    turn = xp.exp(-1j * orbit.stage_phases)
-    turns = xp.cumprod(xp.broadcast_to(turn, (harmonics, *turn.shape)), axis=0)
+    turn = np.exp(-1j * orbit.stage_phases)
+    turns = np.cumprod(np.broadcast_to(turn, (harmonics, *turn.shape)), axis=0)
     phasors = 2 * (turns * (weights * values.force_rest)).sum((1, 2))
     maps = transfer_maps(response, orbit.widths, orbit.scheme.b)
     monodromy, log_scale = scaled_product(maps)
@@ -57,8 +56,8 @@ def orbit_observables(
         monodromy,
         log_scale,
         2 * np.pi * (weights * trace).sum((0, 1)),
-        xp.where(small, mean_jacobian, np.nan),
-        xp.full(mean.shape, np.inf),
+        np.where(small, mean_jacobian, np.nan),
+        np.full(mean.shape, np.inf),
         orbit.start,
     )
 
