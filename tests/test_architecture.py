@@ -33,7 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "loads": _BASE,  # knows no laws
     "air": _BASE,  # knows no friction
     "materials": _BASE | {"laws"},  # knows no solvers
-    "slider": _BASE | {"laws", "loads"},  # knows no solvers
+    "slider": _BASE | {"laws", "loads", "algebra"},  # knows no solvers
     "theory": _EQUATIONS | {"algebra"},
     "transients": _EQUATIONS | {"algebra"},
     "orbit": _EQUATIONS | {"algebra", "theory", "transients"},  # knows no instruments, no files

@@ -93,7 +93,7 @@ def test_files_without_an_end_are_refused(tmp_path: Path, monkeypatch: pytest.Mo
     for reader in (load_plan, load_protocol, load_recipe, read_plan, materials.load):
         with pytest.raises(InputError, match="must be a readable TOML file, got '/dev/zero'"):
             reader(Path("/dev/zero"))
-    with pytest.raises(InputError, match="must be a readable table, got '/dev/zero': it is a dev"):
+    with pytest.raises(InputError, match="must be a regular file, got '/dev/zero', a device"):
         read_table("/dev/zero")
     monkeypatch.setattr(file_content, "LARGEST", 1000)
     (tmp_path / "long.toml").write_text("title = 'x'\n" + "#" * 1000)

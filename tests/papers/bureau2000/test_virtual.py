@@ -79,7 +79,9 @@ def test_bars_hold_the_orbits(experiment, simulated):
         assert hits.sum() >= binom.ppf(1e-3, len(hits), 0.95), name
     for rows in experiment.values():
         strongest = rows.iloc[-1]
-        for name, share in (("mean_friction", 0.01), ("delta_mu", 0.06), ("mu1", 0.02)):
+        # In vacuum the force recovers from the strongest modulation for longer than the pause lasts:
+        # F(0) is that before, and the drift until then counts as uncertainty.
+        for name, share in (("mean_friction", 0.01), ("delta_mu", 0.1), ("mu1", 0.02)):
             assert strongest[f"{name}_uncertainty"] < share * abs(strongest[name]), name
 
 
