@@ -25,6 +25,10 @@ def _count(event, duration_secs, **_):
         _running["programs"] += kind == "compiling"
 
 
+def _room(nodeid):
+    return nodeid.split("::")[0].split("/")[1]
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection(session):
     """Listen once tests are collected: whoever only lists them does not wait for JAX."""
@@ -41,13 +45,13 @@ def pytest_runtest_protocol(item):
     """What a test compiles, its fixtures included, goes to its room."""
     _running.clear()
     result = yield
-    totals[item.nodeid.split("/")[1]].update(_running)
+    totals[_room(item.nodeid)].update(_running)
     return result
 
 
 def pytest_runtest_logreport(report):
     """Time of all parts of a test."""
-    counts = totals[report.nodeid.split("/")[1]]
+    counts = totals[_room(report.nodeid)]
     # Processes of xdist send their reports here, and their programs at the end.
     counts["seconds"] += report.duration
     counts["tests"] += report.when == "call"

@@ -79,7 +79,7 @@ def test_bars_hold_the_orbits(experiment, simulated):
         assert hits.sum() >= binom.ppf(1e-3, len(hits), 0.95), name
     for rows in experiment.values():
         strongest = rows.iloc[-1]
-        # In vacuum the force recovers from the strongest modulation for longer than the pause lasts:
+        # In vacuum the force recovers from the strongest modulation for longer than the pause:
         # F(0) is that before, and the drift until then counts as uncertainty.
         for name, share in (("mean_friction", 0.01), ("delta_mu", 0.1), ("mu1", 0.02)):
             assert strongest[f"{name}_uncertainty"] < share * abs(strongest[name]), name
