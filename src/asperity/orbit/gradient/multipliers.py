@@ -7,32 +7,13 @@ import jax.numpy as jnp
 from jax import Array
 
 
-def log_multipliers(monodromy: Array, log_scale: Array, log_determinant: Array) -> Array:
-    """ln|m| + i arg m, as `asperity.orbit.floquet.log_multipliers` has them.
-
-    Parameters
-    ----------
-    monodromy : array, shape (n, n, points)
-        Divided by exp(log_scale).
-    log_scale : array, shape (points,)
-    log_determinant : array, shape (points,)
-        Of the whole monodromy matrix, by Liouville's formula.
+def log_multipliers_of_exponent(exponent: Array) -> Array:
+    """ln|m| + i arg m from a matrix L, (n, n, points), of which e^L is the monodromy matrix.
 
     Returns
     -------
     complex array, shape (n, points), sorted by falling real part
     """
-    n = monodromy.shape[0]
-    if n == 1:
-        return log_determinant[None] + 0j
-    if n == 2:
-        return _log_pair(monodromy, log_scale, log_determinant)
-    values, _ = eigensystem(jnp.moveaxis(monodromy, -1, 0) + 0j)
-    return sorted_logs(jnp.log(values.T) + log_scale)
-
-
-def log_multipliers_of_exponent(exponent: Array) -> Array:
-    """The same from a matrix L, shape (n, n, points), of which e^L is the monodromy matrix."""
     n = exponent.shape[0]
     if n == 1:
         return exponent[0] + 0j
@@ -55,22 +36,6 @@ def sorted_logs(logs: Array) -> Array:
     margin = 1e-9 * (1 + jnp.abs(logs.real))
     order = jnp.argsort(-logs.real - margin * jnp.sign(logs.imag), axis=0, stable=True)
     return jnp.take_along_axis(logs, order, axis=0)
-
-
-def _log_pair(monodromy: Array, log_scale: Array, log_determinant: Array) -> Array:
-    """The larger of two from the trace, the smaller one from the determinant."""
-    half_trace = 0.5 * (monodromy[0, 0] + monodromy[1, 1])
-    square = half_trace**2 - jnp.exp(log_determinant - 2 * log_scale)
-    negative = half_trace < 0
-    sign = jnp.where(negative, -1.0, 1.0)
-    real = square >= 0
-    root = jnp.sqrt(jnp.where(real, square, 1.0))
-    size = jnp.log(jnp.abs(half_trace + sign * jnp.where(real, root, 0.0))) + log_scale
-    turn = jnp.arctan2(jnp.sqrt(jnp.where(real, 1.0, -square)), half_trace)
-    angle = jnp.where(real, jnp.where(negative, jnp.pi, 0.0), turn)
-    first = jnp.where(real, size, 0.5 * log_determinant)
-    second = jnp.where(real, log_determinant - size, 0.5 * log_determinant)
-    return jnp.stack([first + 1j * angle, second + 1j * jnp.where(real, angle, -angle)])
 
 
 @jax.custom_jvp
