@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from jax.typing import ArrayLike
 
-from asperity.orbit.batches import run_chunks
+from asperity.loads import Harmonic
 from asperity.orbit.periodic import periodic_response
 from asperity.orbit.response import PeriodicResponse
-from asperity.orbit.stiffness import stiffness_of_steady_sliding
+from asperity.orbit.steady_sliding import steady_sliding
 from asperity.parameters import DRIVE
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import Problem, checked_slider, flatten
@@ -51,12 +51,10 @@ def averaged_response(
     """
     checked_slider(slider)
     V = DRIVE["V"].check(velocity)
-    problem, shape = flatten(Problem(QuasiStatic(slider, V, np.asarray(1.0)), np.asarray(0.0)))
-    stiffness = np.zeros(problem.system.V.shape)
-    for part, value in run_chunks(
-        stiffness_of_steady_sliding, (problem,), np.arange(stiffness.size), 4096
-    ):
-        stiffness[part] = value
+    problem, shape = flatten(
+        Problem(QuasiStatic(slider, V, np.asarray(1.0)), Harmonic(np.asarray(0.0)))
+    )
+    stiffness = steady_sliding(problem).rate
     omega = np.maximum(stiffness.reshape(shape), 1e-300) / _STIFFNESS
     return periodic_response(
         slider,

@@ -8,7 +8,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from asperity.algebra import cyclic, small_systems
 from asperity.laws import RiceRuina, get_law
@@ -27,7 +26,6 @@ EXACT = 1e-11
 #: Points and right-hand sides of the small systems.
 POINTS, COLUMNS = 50, 4
 
-expm_points = jax.jit(small_systems.expm_points)
 product = jax.jit(small_systems.product)
 solve_columns = jax.jit(small_systems.solve_columns)
 spectral_abscissa = jax.jit(small_systems.spectral_abscissa)
@@ -92,21 +90,6 @@ def test_a_singular_matrix_is_not_solved_silently():
         repeated([[1.0, 2.0], [2.0, 4.0]]), repeated(np.ones((2, COLUMNS)))
     ):
         assert not np.isfinite(found).any()
-
-
-@pytest.mark.parametrize("size", [1e-6, 1.0, 20.0])
-@pytest.mark.parametrize("n", [1, 2, 3])
-def test_matrix_exponential(n, size):
-    matrix = size * matrices(n)
-    found = each(expm_points(matrix))
-    for one, expected in zip(found, map(expm, each(matrix)), strict=True):
-        np.testing.assert_allclose(one, expected, rtol=0, atol=EXACT * np.abs(expected).max())
-
-
-def test_matrix_exponential_of_a_defective_matrix():
-    expected = np.exp(0.3) * np.array([[1.0, 1.0], [0.0, 1.0]])
-    found = each(expm_points(repeated([[0.3, 1.0], [0.0, 0.3]])))
-    np.testing.assert_allclose(found[0], expected, atol=1e-15)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])

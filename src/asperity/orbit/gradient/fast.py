@@ -24,11 +24,7 @@ from asperity.orbit.methods.fourier.balance import BalanceEquations, balanced_or
 from asperity.orbit.methods.fourier.observables import force_spectrum, orbit_error
 from asperity.orbit.methods.fourier.orbit import fourier_orbit, load_cycle
 from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
-from asperity.orbit.stiffness import (
-    deepest_unloading,
-    sharpness_of_slip,
-    stiffness_of_steady_sliding,
-)
+from asperity.orbit.steady_sliding import steady_sliding_of
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 
@@ -85,14 +81,11 @@ def _balance(program: Program) -> BalanceEquations:
 def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
     """Orbits by Fourier collocation, checked for convergence and resolution."""
     problem = program.equations.problem(parameters)
-    system, load = problem
     valid = program.equations.valid(parameters)
-    sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
-    rate = stiffness_of_steady_sliding(sliding)
+    rate, sharpness, unloading = steady_sliding_of(problem)
     # Points out of range are left to the search, which says so.
     good = valid & (rate >= SMALLEST_RATE) & (rate < _STIFFEST)
-    good &= deepest_unloading(sliding) <= LARGEST_UNLOADING
-    good &= sharpness_of_slip(sliding) <= _SHARPEST
+    good &= (unloading <= LARGEST_UNLOADING) & (sharpness <= _SHARPEST)
     solve = _fourier_orbits if _quasi_static(program) else _balanced_orbits
     return solve(problem, program, valid, good)
 

@@ -13,7 +13,7 @@ from asperity.orbit.methods.fourier.programs import fast_solve
 from asperity.orbit.methods.method import Method
 from asperity.orbit.observables import waveform
 from asperity.orbit.solution import SearchOptions, Solution
-from asperity.orbit.stiffness import STIFFNESS_CHUNK, sharpness_of_slip, stiffness_of_steady_sliding
+from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
 
@@ -25,7 +25,7 @@ _CHUNK = 4 * FAST_BLOCK
 #: Estimated error that is accepted.
 _ERROR = 1e-9
 #: Rate per radian of a disturbance above which the iteration does not contract, from experience.
-LARGEST_STIFFNESS = 1.0
+LARGEST_RATE = 1.0
 
 
 class Fourier(Method):
@@ -43,16 +43,10 @@ class Fourier(Method):
         """As in `Method`; a grid gives its failures to the next, finer one."""
         points = np.arange(problem.system.V.shape[-1])
         solution = Solution.unsolved(problem, len(points), options)
-        stiffness, sharpness = np.empty((2, len(points)))
-        for measure, values in (
-            (stiffness_of_steady_sliding, stiffness),
-            (sharpness_of_slip, sharpness),
-        ):
-            for part, value in run_chunks(measure, (problem,), points, STIFFNESS_CHUNK):
-                values[part] = value
-        left = points[stiffness < LARGEST_STIFFNESS]
+        rate, sharpness, _ = steady_sliding(problem)
+        left = points[rate < LARGEST_RATE]
         # Blocks run until their slowest point is done: points of like difficulty belong together.
-        left = left[np.argsort(stiffness[left], kind="stable")]
+        left = left[np.argsort(rate[left], kind="stable")]
         for sharpest, nodes, grading in _GRIDS:
             solve = partial(
                 fast_solve,

@@ -1,4 +1,4 @@
-"""Observables of a Fourier orbit: mean, harmonics and monodromy matrix.
+"""Observables of a Fourier orbit: mean, harmonics and the logarithm of the monodromy matrix.
 
 The fundamental matrix is Q(tau) exp(L tau) with Q periodic of mean 1, which obeys
 dQ/dtau = J Q - Q L and is found by the iteration that finds the orbit; the multipliers are
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.algebra.small_systems import Matrix, expm_points, inverse_points
+from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.loads import Modulation
 from asperity.orbit.methods.fourier.orbit import (
     FourierOrbit,
@@ -66,7 +66,7 @@ def fourier_observables(
     observables = Observables(
         mean,
         phasors,
-        expm_points(2 * jnp.pi * exponent),
+        jnp.full_like(exponent, jnp.nan),
         zero,
         2 * jnp.pi * trace,
         2 * jnp.pi * exponent,

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
+from asperity._jax import jit_large
 from asperity.loads import Excitation, Harmonic
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
@@ -29,7 +30,7 @@ _NODES, _HARMONICS = 48, 12
 _LEAST = 0.2
 
 
-@jax.jit
+@jit_large
 def averaged_start(problem: Problem) -> tuple[Array, Array]:
     """First states of shooting, (size, points), and the fastest relaxation by slip, per radian."""
     system, load = problem
