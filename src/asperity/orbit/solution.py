@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.orbit.batches import Indices, put, take
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.scheme import GAUSS, scheme_for
+from asperity.orbit.mesh.mesh import GAUSS, Orbit, scheme_for
 from asperity.orbit.observables import Observables
 from asperity.orbit.outcome import Outcome
 from asperity.slider.problem import Problem

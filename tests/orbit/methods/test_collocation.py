@@ -12,11 +12,18 @@ import pytest
 from asperity.algebra import cyclic, small_systems
 from asperity.laws import RiceRuina, get_law
 from asperity.loads import Harmonic
-from asperity.orbit.mesh import condensation
-from asperity.orbit.mesh.mesh import Orbit, equidistributed, evaluate, graded_mesh, split
+from asperity.orbit.mesh import equations
+from asperity.orbit.mesh.mesh import (
+    GAUSS,
+    STAGES,
+    Orbit,
+    equidistributed,
+    evaluate,
+    graded_mesh,
+    split,
+)
 from asperity.orbit.mesh.newton import ACCEPTED, Plane, solve, solve_in_plane
 from asperity.orbit.mesh.reading import read_orbit
-from asperity.orbit.mesh.scheme import GAUSS, STAGES
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import Problem, checked_problem, flatten
 from asperity.theory.adiabatic import adiabatic_growth
@@ -323,9 +330,9 @@ def test_condensation_is_that_of_each_interval(monkeypatch):
     entries = STAGES * n * ((STAGES + 1) * n + sides)
     blocks = {}
     for name, at_a_time in (("whole", intervals), ("blocks", 20)):
-        monkeypatch.setattr(condensation, "_CACHED", at_a_time * entries)
+        monkeypatch.setattr(equations, "_CACHED", at_a_time * entries)
         # A new function each time: the size of the blocks is a constant of the program.
-        condense = jax.jit(lambda *inputs: condensation.condense(*inputs))
+        condense = jax.jit(lambda *inputs: equations.condense(*inputs))
         blocks[name] = jax.tree.map(np.asarray, condense(jacobian, right, widths, GAUSS.a))
     for m in (0, 27, 59):
         J, h = np.moveaxis(jacobian[..., m], 2, 0), widths[m]

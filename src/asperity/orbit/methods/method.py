@@ -17,7 +17,7 @@ class Method(ABC):
 
     A search goes through a list of methods; each is given the points that the ones before it left
     and that it may help. To add one, implement it and put it into
-    `asperity.orbit.methods.registry`.
+    `asperity.orbit.search`.
 
     Class attributes
     ----------------

@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.orbit.batches import Indices, mesh_chunk, put, take
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.scheme import scheme_for
-from asperity.orbit.methods.collocation.refinement import accept
+from asperity.orbit.mesh.mesh import Orbit, scheme_for
+from asperity.orbit.methods.collocation.method import accept
 from asperity.orbit.methods.method import Method
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding

@@ -8,8 +8,10 @@ import numpy as np
 
 from asperity.orbit.batches import mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.remeshing import remeshed
-from asperity.orbit.methods.branch_following.from_steady_sliding import MESHES
-from asperity.orbit.methods.branch_following.method import orbits_along_branches
+from asperity.orbit.methods.branch_following.from_steady_sliding import (
+    MESHES,
+    orbits_along_branches,
+)
 from asperity.orbit.methods.collocation.frequency_path import orbits_from_high_frequency
 from asperity.orbit.methods.collocation.initial_guess import (
     InitialGuess,

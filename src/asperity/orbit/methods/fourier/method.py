@@ -4,18 +4,53 @@ from __future__ import annotations
 
 from functools import partial
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
-from asperity.orbit.batches import FAST_BLOCK, run_chunks, take
-from asperity.orbit.methods.fourier.orbit import FourierOrbit
-from asperity.orbit.methods.fourier.programs import fast_solve
+from asperity._jax import jit_large
+from asperity.orbit.batches import FAST_BLOCK, points_of, run_chunks, take
+from asperity.orbit.methods.fourier.orbit import FourierOrbit, fourier_observables, fourier_orbit
 from asperity.orbit.methods.method import Method
-from asperity.orbit.observables import waveform
+from asperity.orbit.observables import Observables, waveform
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
+
+
+@partial(jit_large, static_argnames=("nodes", "grading", "harmonics"))
+def fast_solve(
+    problem: Problem, *, nodes: int, grading: float, harmonics: int
+) -> tuple[Observables, Array, FourierOrbit]:
+    """Fourier collocation: the observables, their estimated error and the orbits.
+
+    Works on blocks of points that fit into a core's cache, each until its slowest point is done.
+    """
+    points = points_of(problem)
+
+    def solve(block: Problem) -> tuple[Observables, Array, FourierOrbit]:
+        return _fast_block(block, nodes, grading, harmonics)
+
+    blocks = jax.tree.map(lambda a: a.reshape(-1, FAST_BLOCK), problem)
+    results = jax.lax.map(solve, blocks)
+    return jax.tree.map(lambda a: jnp.moveaxis(a, 0, -2).reshape(*a.shape[1:-1], points), results)
+
+
+def _fast_block(
+    problem: Problem, nodes: int, grading: float, harmonics: int
+) -> tuple[Observables, Array, FourierOrbit]:
+    system, load = problem
+    points = points_of(problem)
+    orbit = fourier_orbit(
+        system, load, points, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
+    )
+    observables, error = fourier_observables(system, load, orbit, harmonics=harmonics, max_steps=40)
+    each = {name: jnp.full(points, getattr(orbit, name)) for name in ("steps", "grading")}
+    return observables, error, orbit._replace(**each)
+
 
 #: Grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for: the
 #: nodes that a pulse needs grow with the root of it.
