@@ -17,7 +17,7 @@ from asperity.laws import Law
 from asperity.loads import Modulation
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.methods.branch_following.arclength import ParameterLine, still
-from asperity.orbit.methods.starting_orbits import starting_orbits
+from asperity.orbit.search import find_orbits
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
 from asperity.parameters.arguments import number, pair, shown
 from asperity.slider import Slider
@@ -237,8 +237,15 @@ def one_problem(
 
 def starting_orbit(problem: Problem, intervals: int) -> Orbit | None:
     """An orbit of the one point of `problem` on a mesh of `intervals`; None where there is none."""
-    guess = starting_orbits(jax.tree.map(np.asarray, problem), 1, intervals)
-    return guess.orbit if guess.found[0] else None
+    solution = find_orbits(
+        jax.tree.map(np.asarray, problem),
+        1,
+        harmonics=2,
+        phases=0,
+        progress=lambda _: None,
+        intervals=intervals,
+    )
+    return solution.orbit if solution.converged[0] else None
 
 
 def held_parameters(problem: Problem, *moving: str) -> dict[str, float]:

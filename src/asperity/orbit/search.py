@@ -124,14 +124,14 @@ def find_orbits(
         Called with the number of points finished since the last call.
     methods : tuple of Method
     intervals : int
-        Of the meshes on which orbits found on a mesh are kept; 0 to keep none.
+        Of the meshes on which orbits are kept, by methods on meshes alone; 0 to keep none.
     """
     options = SearchOptions(harmonics, phases, progress, intervals)
     solution = Solution.unsolved(problem, points, options)
     mark_out_of_range(problem, solution)
     outside = solution.outcome == Outcome.OUT_OF_RANGE
     for method in methods:
-        if not method.suits(problem):
+        if not method.suits(problem) or (intervals and not method.on_mesh):
             continue
         left = method.candidates(solution)
         left = left[~outside[left]]

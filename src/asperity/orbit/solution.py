@@ -34,8 +34,8 @@ class Solution(NamedTuple):
     method : str array, shape (points,)
         Name of the method that gave the outcome; "" for none.
     orbit : Orbit
-        Orbits of the points that a method found on a mesh, on `SearchOptions.intervals` intervals,
-        without any where that is 0; the mesh of the others is 0 throughout.
+        Orbits of the converged points on `SearchOptions.intervals` intervals, without any where
+        that is 0; the mesh of the others is 0 throughout.
     """
 
     mean_friction: Float
@@ -123,7 +123,7 @@ class SearchOptions(NamedTuple):
     progress : callable
         Called with the number of points solved since the last call.
     intervals : int
-        Of the meshes on which orbits that were found on a mesh are kept; 0 to keep none.
+        Of the meshes on which orbits are kept; 0 to keep none.
     """
 
     harmonics: int

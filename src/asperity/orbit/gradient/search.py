@@ -31,7 +31,6 @@ from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import ACCEPTED
 from asperity.orbit.mesh.remeshing import refined_orbit
 from asperity.orbit.methods.collocation.initial_guess import orbits_from_averaged_limit
-from asperity.orbit.methods.starting_orbits import starting_orbits
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.search import find_orbits
 from asperity.slider.problem import Problem
@@ -73,13 +72,7 @@ def whole_search(
         intervals=meshes[0],
     )
     orbit = found.orbit
-    solved = np.flatnonzero(found.converged)
-    # Methods without a mesh, fast ones, leave the orbit to be found on one.
-    bare = solved[orbit.mesh[-1, solved] == 0]
-    if len(bare):
-        start = starting_orbits(take(problem, bare), len(bare), meshes[0])
-        put(orbit, bare[start.found], take(start.orbit, np.flatnonzero(start.found)))
-    left = solved[orbit.mesh[-1, solved] > 0]
+    left = np.flatnonzero(found.converged)
     result.outcome[:] = np.where(found.converged, int(Outcome.NOT_RESOLVED), found.outcome)
     for intervals in meshes:
         agreement = _LAST_AGREEMENT if intervals == meshes[-1] else _AGREEMENT

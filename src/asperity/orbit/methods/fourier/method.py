@@ -68,6 +68,7 @@ class Fourier(Method):
 
     name = "fourier"
     choice = "fourier"
+    on_mesh = False
     block = 2**20
 
     def suits(self, problem: Problem) -> bool:

@@ -158,6 +158,7 @@ class Shooting(Method):
 
     name = "shooting"
     choice = "fourier"
+    on_mesh = False
     block = 100 * _CHUNK
 
     def suits(self, problem: Problem) -> bool:
