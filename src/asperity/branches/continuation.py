@@ -57,7 +57,7 @@ class BranchRecorder:
         """Begin at `start`."""
         self.follower, self.moving, self.report, self.periods = follower, moving, report, periods
         self.branch_orbits = [start]
-        self.found: list[tuple[LocatedBifurcation, int]] = []
+        self.located: list[tuple[LocatedBifurcation, int]] = []
 
     def follow_branch(self, most_steps: int) -> str:
         """Walk until the branch leaves the span; returns a key of the results."""
@@ -79,8 +79,8 @@ class BranchRecorder:
             edge = 1.0 if there.t > 1 else 0.0
             there, length = self.follower.reaching(here, length, edge) or (there, length)
         at = len(self.branch_orbits) - 1
-        self.found += [
-            (found, at) for found in bifurcations_between(self.follower, here, length, there)
+        self.located += [
+            (located, at) for located in bifurcations_between(self.follower, here, length, there)
         ]
         self.branch_orbits.append(there)
         self.report(1)
@@ -98,7 +98,7 @@ class BranchRecorder:
             harmonics=np.stack([s.harmonics for s in self.branch_orbits]),
             log_multipliers=np.stack([s.logs for s in self.branch_orbits]),
             periods=self.periods,
-            bifurcations=tuple(self._bifurcation(found, at) for found, at in self.found),
+            bifurcations=tuple(self._bifurcation(located, at) for located, at in self.located),
             result=_RESULTS[why].format(value=values[-1], unit=unit, steps=steps),
             completed=why in ("end", "start"),
             motion=problem.system,
@@ -107,24 +107,24 @@ class BranchRecorder:
             last=self.branch_orbits[-1].point,
         )
 
-    def _bifurcation(self, found: LocatedBifurcation, at: int) -> Bifurcation:
-        intervals = found.branch_orbit.point.orbit.mesh.shape[0] - 1
-        fine = polished(self.follower, found, 3 * intervals)
-        branch_orbit = fine or found.branch_orbit
+    def _bifurcation(self, located: LocatedBifurcation, at: int) -> Bifurcation:
+        intervals = located.branch_orbit.point.orbit.mesh.shape[0] - 1
+        fine = polished(self.follower, located, 3 * intervals)
+        branch_orbit = fine or located.branch_orbit
         value = float(self.moving.value(branch_orbit.t))
-        coarse = float(self.moving.value(found.branch_orbit.t))
+        coarse = float(self.moving.value(located.branch_orbit.t))
         omega = float(np.asarray(self.follower.line.at(np.array([branch_orbit.t])).system.omega)[0])
-        angle = abs(np.angle(np.exp(1j * branch_orbit.logs[found.critical].imag)))
-        fold = found.kind in ("fold", "branch point")
+        angle = abs(np.angle(np.exp(1j * branch_orbit.logs[located.critical].imag)))
+        fold = located.kind in ("fold", "branch point")
         return Bifurcation(
-            kind=found.kind,
+            kind=located.kind,
             value=value,
             error=abs(coarse - value) / abs(value) if fine else np.inf,
             mean_friction=branch_orbit.mean_friction,
             log_multipliers=branch_orbit.logs,
             frequency=0.0 if fold else angle / (2 * np.pi) * omega / (2 * np.pi),
-            unstable_before=found.before,
-            unstable_after=found.after,
+            unstable_before=located.before,
+            unstable_after=located.after,
             index=at,
             critical=branch_orbit,
         )

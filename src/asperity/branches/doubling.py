@@ -91,14 +91,14 @@ def doubled_branch(
     -------
     Branch
         With `periods` 2: its harmonics c_n belong to n f / 2, its multipliers to two periods. It
-        starts beside the period doubling and is followed within the same span. The two halves of a
+        starts next to the period doubling and is followed within the same span. The two halves of a
         doubled branch are one orbit, begun a period later: one of them is followed.
 
     Raises
     ------
     InputError
         If the bifurcation is no period doubling, the branch is itself one of doubled period,
-        or no doubled orbit is found beside it.
+        or there is no doubled orbit next to it.
     """
     branch = instance(branch, Branch, "branch", "follow one with continuation")
     advice = "take one of the branch's bifurcations"
@@ -120,7 +120,7 @@ def doubled_branch(
     start = None if simple is None else _beside(follower, twice, simple)
     if start is None:
         raise InputError(
-            "bifurcation must have a doubled orbit beside it, got none that Newton's method finds; "
+            "bifurcation must have a doubled orbit next to it, got none by Newton's method; "
             "continue in another parameter"
         )
     recorder = BranchRecorder(twice, moving, start, counted(progress, most_steps), periods=2)

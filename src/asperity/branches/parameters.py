@@ -164,14 +164,14 @@ def fixed_as_text(law: type[Law], fixed: Mapping[str, float]) -> str:
 
 def _end(parameter: Parameter, value: Any, field: str) -> float:
     """An end of a span, which the parameter must be able to have."""
-    found = number(value, field, parameter.kind, parameter.rule)
+    checked = number(value, field, parameter.kind, parameter.rule)
     # What can be 0 in a table, for not being there, has to be there to be continued in.
-    if parameter.name in ("M", "eta") and not found > 0:
+    if parameter.name in ("M", "eta") and not checked > 0:
         raise InputError(
-            f"{field} must be positive for {parameter.name}, got {found:g} {parameter.unit}; "
+            f"{field} must be positive for {parameter.name}, got {checked:g} {parameter.unit}; "
             "give a span above zero"
         )
-    return found
+    return checked
 
 
 def start_of(slider: Slider, parameter: str, span: Any, field: str = "span") -> dict[str, Any]:
@@ -218,7 +218,7 @@ def one_problem(
             f"{slider.law.name}; its force is mu W, whatever the parameters"
         )
     amplitude = moving.get("epsilon", epsilon)
-    asked = checked_problem(
+    problem = checked_problem(
         slider,
         **given,
         epsilon=amplitude if modulation is None else epsilon,
@@ -226,7 +226,7 @@ def one_problem(
         inertia=inertia,
         radiation_damping=moving.get("eta", radiation_damping),
     )
-    flat, shape = flatten(asked)
+    flat, shape = flatten(problem)
     if shape not in ((), (1,)):
         raise InputError(
             f"parameters must be numbers for a continuation, got arrays of shape {shape}; "

@@ -3,7 +3,7 @@
 A point of a boundary is the zero of a test function on a line through the plane of the two
 parameters. From a known point the next is sought on the line across the boundary's own direction a
 step ahead, so that boundaries may turn back in either parameter. On that line folds, period
-doublings and Neimark-Sacker points are found like those of any branch.
+doublings and Neimark-Sacker points are located like those of any branch.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ class BoundaryPoint(NamedTuple):
     at : array, shape (2,)
         Coordinates of both parameters.
     branch_orbit : BranchOrbit
-        Critical orbit, with its direction along the line on which it was found.
+        Critical orbit, with its direction along the line on which it was located.
     """
 
     at: Float
@@ -181,10 +181,10 @@ def critical_point(
     start = follower.at(known.point, 0.0) if kind != "fold" else follower.across(known.point, 0.0)
     if start is None:
         return None
-    found = root_near(follower, start, criterion(kind, _critical_index(kind, start)))
-    if found is None:
+    critical = root_near(follower, start, criterion(kind, _critical_index(kind, start)))
+    if critical is None:
         return None
-    return BoundaryPoint(guess + found.t * direction, found)
+    return BoundaryPoint(guess + critical.t * direction, critical)
 
 
 def _critical_index(kind: Kind, branch_orbit: BranchOrbit) -> int:
@@ -438,19 +438,19 @@ def _scan_lines(lines: int) -> list[tuple[Float, Float]]:
 def _crossings(
     plane: ParameterPlane, at: Float, direction: Float
 ) -> list[tuple[Any, BoundaryPoint]]:
-    """Bifurcations on a line; none where no orbit is found at its start."""
+    """Bifurcations on a line; none where there is no orbit at its start."""
     follower = plane.follower(at, direction)
     orbit = starting_orbit(follower.line.at(np.zeros(1)), INTERVALS)
     start = None if orbit is None else follower.begin(orbit, 0.0, INTERVALS)
     if start is None:
         return []
-    found = []
+    points = []
 
     def visit(here: BranchOrbit, length: float, there: BranchOrbit) -> None:
         for bifurcation in bifurcations_between(follower, here, length, there):
             branch_orbit = bifurcation.branch_orbit
             if bifurcation.kind != "branch point" and 0 <= branch_orbit.t <= 1:
-                found.append(
+                points.append(
                     (bifurcation.kind, BoundaryPoint(at + branch_orbit.t * direction, branch_orbit))
                 )
 
@@ -462,7 +462,7 @@ def _crossings(
         ended=lambda branch_orbit: not 0 <= branch_orbit.t <= 1,
         visit=visit,
     )
-    return found
+    return points
 
 
 def _lies_on(curve: TracedBoundary, kind: str, crossing: BoundaryPoint) -> bool:

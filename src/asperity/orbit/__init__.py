@@ -1,4 +1,4 @@
-"""Periodic orbits: found by several methods, with Floquet multipliers and derivatives."""
+"""Periodic orbits: several methods, Floquet multipliers, derivatives."""
 
 from asperity.orbit.differentiable import (
     ResponseFunction,

@@ -100,7 +100,7 @@ class PeriodicResponse(Displayed):
     load : Modulation
         What is modulated.
     slider, velocity, epsilon, frequency
-        What was asked, in SI; epsilon is the amplitude of the load's first harmonic.
+        The operating point, in SI; epsilon is the amplitude of the load's first harmonic.
     """
 
     mean_friction: Float
@@ -252,7 +252,7 @@ class PeriodicResponse(Displayed):
         return 2 * np.pi * np.arange(samples) / max(samples, 1)
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
-        """Law, equation of motion, and what was found."""
+        """Law, equation of motion, and the outcome."""
         law, points = self.slider.law.name, self.mean_friction.size
         title = f"PeriodicResponse, {law}, {self.motion.name}, {count_text(points, 'point')}"
         drive = ((n, getattr(self, DRIVE[n].argument)) for n in ("V", "epsilon", "frequency"))
@@ -325,9 +325,9 @@ class PeriodicResponse(Displayed):
         """Parameters of the equations and of the drive with their values, of any shape."""
         problem = Problem(self.motion, self.load)
         known = equation_parameters(self.motion, self.load)
-        found = {name: (p, value_of(problem, p)) for name, p in known.items()}
+        values = {name: (p, value_of(problem, p)) for name, p in known.items()}
         # Of a load that is not harmonic: the amplitude of its first harmonic.
-        return found | {"epsilon": (DRIVE["epsilon"], self.epsilon)}
+        return values | {"epsilon": (DRIVE["epsilon"], self.epsilon)}
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -193,7 +193,7 @@ def find_orbits_on_cores(
 def _collect(
     solution: Solution, index: np.ndarray, job: Any, progress: Callable[[int], None]
 ) -> None:
-    # Orbits, of which none are asked for, stay behind.
+    # Orbits are not wanted here.
     for target, values in zip(solution[:-1], job.result()[:-1], strict=True):
         target[..., index] = values
     progress(len(index))

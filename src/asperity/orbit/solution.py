@@ -24,7 +24,7 @@ class Solution(NamedTuple):
     Attributes
     ----------
     mean_friction, harmonics, log_multipliers, start, waveform : array
-        As in `Observables`; NaN where no orbit was found.
+        As in `Observables`; NaN where there is no orbit.
     iterations : int array, shape (points,)
         Steps of Fourier collocation, or steps or intervals of the last division of the period.
     outcome : int array, shape (points,)
@@ -51,7 +51,7 @@ class Solution(NamedTuple):
 
     @classmethod
     def unsolved(cls, problem: Problem, points: int, options: SearchOptions) -> Solution:
-        """No orbit of a problem found yet."""
+        """No orbit of a problem yet."""
         return cls.empty(problem.system.size, points, options, scheme_for(problem.system))
 
     @classmethod
@@ -62,7 +62,7 @@ class Solution(NamedTuple):
         options: SearchOptions,
         scheme: CollocationScheme = GAUSS,
     ) -> Solution:
-        """No orbit with `size` states found yet."""
+        """No orbit with `size` states yet."""
         return cls(
             np.full(points, np.nan),
             np.full((options.harmonics, points), np.nan + 0j),
@@ -114,7 +114,7 @@ class Solution(NamedTuple):
 
 
 class SearchOptions(NamedTuple):
-    """Observables that are asked for, and progress.
+    """Which observables are wanted, and progress.
 
     Attributes
     ----------

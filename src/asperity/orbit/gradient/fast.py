@@ -125,11 +125,11 @@ class FastOrbits(NamedTuple):
     unknowns : pytree
         Of the equations of the method.
     floquet : pytree or None
-        Of those of the Floquet factor, where multipliers are asked for.
+        Of those of the Floquet factor, where multipliers are wanted.
     prepared : tuple
         What the linear systems of their derivatives need.
     valid, converged : bool array, shape (points,)
-        Whether the parameters obey their rules, and whether the orbit is found and resolved.
+        Whether the parameters obey their rules, and whether the orbit converged and is resolved.
     """
 
     unknowns: Any

@@ -52,12 +52,12 @@ def converged_orbits(orbit: Orbit, observables: Observables, harmonics: int) -> 
 
 
 class SearchedOrbits(NamedTuple):
-    """What a search has found.
+    """Orbits of a search.
 
     Attributes
     ----------
     outcome : int array, shape (points,)
-        Of all points; those that were not asked for have `Outcome.NO_ORBIT`.
+        Of all points; those that were not wanted have `Outcome.NO_ORBIT`.
     parts : list of (array of int, MeshOrbits)
         Converged points with their orbits, each point once, each part on a mesh of its own.
     """
@@ -67,7 +67,7 @@ class SearchedOrbits(NamedTuple):
 
     @classmethod
     def none(cls, points: int) -> SearchedOrbits:
-        """Nothing found yet."""
+        """No orbit yet."""
         return cls(np.full(points, int(Outcome.NO_ORBIT)), [])
 
     def add(self, index: Indices, orbits: MeshOrbits) -> None:
@@ -155,9 +155,9 @@ def followed_orbits(
     Returns
     -------
     list of (array of int, Orbit, Observables)
-        For each mesh on which any was found: the points, their orbits and observables.
+        For each mesh that serves any point: the points, their orbits and observables.
     """
-    found = []
+    parts = []
     size, points = guess.centre.shape
     before = np.full((1 + harmonics, points), np.nan + 0j)
     for intervals in (COARSER, *meshes):
@@ -177,11 +177,11 @@ def followed_orbits(
                 good.append((part[kept], take(fine, kept), take(reading, kept)))
             left.append(part[solved & ~served])
         if good:
-            found += good
+            parts += good
         index, guess = np.concatenate([np.zeros(0, int), *left]), finer
         if not len(index):
             break
-    return found
+    return parts
 
 
 def largest_change(before: NDArray[np.complex128], reading: Observables) -> Float:

@@ -63,7 +63,7 @@ def whole_search(
     result = SearchedOrbits.none(points)
     if not points:
         return result
-    found = find_orbits(
+    solution = find_orbits(
         problem,
         points,
         harmonics=counted,
@@ -71,9 +71,9 @@ def whole_search(
         progress=lambda _: None,
         intervals=meshes[0],
     )
-    orbit = found.orbit
-    left = np.flatnonzero(found.converged)
-    result.outcome[:] = np.where(found.converged, int(Outcome.NOT_RESOLVED), found.outcome)
+    orbit = solution.orbit
+    left = np.flatnonzero(solution.converged)
+    result.outcome[:] = np.where(solution.converged, int(Outcome.NOT_RESOLVED), solution.outcome)
     for intervals in meshes:
         agreement = _LAST_AGREEMENT if intervals == meshes[-1] else _AGREEMENT
         finer = Orbit.empty(orbit.scheme, size, intervals, points)
@@ -81,14 +81,14 @@ def whole_search(
         chunk = mesh_chunk(size)
         for part, (fine, reading, error) in run_chunks(solve, (problem, orbit), left, chunk):
             put(finer, part, fine)
-            numbers = np.vstack([found.mean_friction[part], found.harmonics[:, part]])
+            numbers = np.vstack([solution.mean_friction[part], solution.harmonics[:, part]])
             served = (error < ACCEPTED) & (largest_change(numbers, reading) < agreement)
             kept = np.flatnonzero(served)
             orbits = MeshOrbits(
                 take(fine, kept),
-                found.mean_friction[part[kept]],
-                found.harmonics[:harmonics, part[kept]],
-                found.log_multipliers[:, part[kept]],
+                solution.mean_friction[part[kept]],
+                solution.harmonics[:harmonics, part[kept]],
+                solution.log_multipliers[:, part[kept]],
             )
             result.add(part[kept], orbits)
         orbit, left = finer, left[result.outcome[left] != Outcome.CONVERGED]
@@ -113,10 +113,10 @@ class DirectSearch:
     harmonics : int
     meshes : tuple of int
         Numbers of intervals of the meshes that orbits may lie on, rising.
-    found : SearchedOrbits
+    result : SearchedOrbits
         To be filled.
     known : KnownOrbits or None
-        Of the first points; it keeps what is found.
+        Of the first points; it keeps the orbits.
     every : bool
         Whether to give up once a point has no orbit.
     """
@@ -126,7 +126,7 @@ class DirectSearch:
     problem: Problem
     harmonics: int
     meshes: tuple[int, ...]
-    found: SearchedOrbits
+    result: SearchedOrbits
     known: KnownOrbits | None
     every: bool
 
@@ -139,7 +139,7 @@ class DirectSearch:
         if len(left):
             self._from_averaged_limit(left)
         left = self._left(wanted)
-        if len(left) and not (self.every and (self.found.outcome == Outcome.OUT_OF_RANGE).any()):
+        if len(left) and not (self.every and (self.result.outcome == Outcome.OUT_OF_RANGE).any()):
             self._from_motions(left)
 
     @property
@@ -149,7 +149,7 @@ class DirectSearch:
 
     def _left(self, wanted: Indices) -> Indices:
         """Points that are neither solved nor out of range."""
-        done = np.isin(self.found.outcome[wanted], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
+        done = np.isin(self.result.outcome[wanted], (Outcome.CONVERGED, Outcome.OUT_OF_RANGE))
         return wanted[~done]
 
     def _follow(self, guess: Orbit, index: Indices) -> None:
@@ -157,7 +157,7 @@ class DirectSearch:
         for part, orbit, observables in followed_orbits(
             self.problem, guess, index, self._counted, self.meshes
         ):
-            self.found.add(part, converged_orbits(orbit, observables, self.harmonics))
+            self.result.add(part, converged_orbits(orbit, observables, self.harmonics))
             if self.known is not None:
                 self.known.keep(self.problem, part, orbit)
 
@@ -171,10 +171,10 @@ class DirectSearch:
             progress=lambda _: None,
             methods=(),
         )
-        self.found.outcome[index] = none.outcome
+        self.result.outcome[index] = none.outcome
         index = self._left(index)
-        guess = orbits_from_averaged_limit(self.problem, len(self.found.outcome), index)
-        self._follow(guess.orbit, index[guess.found[index]])
+        guess = orbits_from_averaged_limit(self.problem, len(self.result.outcome), index)
+        self._follow(guess.orbit, index[guess.solved[index]])
 
     def _from_motions(self, index: Indices) -> None:
         """Until the first motion that does not settle, where every point must have an orbit."""
@@ -217,15 +217,15 @@ def search_orbits(
         Whether a direct search may end at the first point without an orbit.
     """
     problem = jax.tree.map(np.asarray, equations.problem(parameters))
-    found = SearchedOrbits.none(len(wanted))
+    result = SearchedOrbits.none(len(wanted))
     index = np.flatnonzero(wanted)
     if direct:
-        DirectSearch(equations, parameters, problem, harmonics, MESHES, found, known, every).run(
+        DirectSearch(equations, parameters, problem, harmonics, MESHES, result, known, every).run(
             index
         )
-        return found
-    own = whole_search(take(problem, index), len(index), harmonics, MESHES)
-    found.outcome[index] = own.outcome
-    for part, orbits in own.parts:
-        found.add(index[part], orbits)
-    return found
+        return result
+    searched = whole_search(take(problem, index), len(index), harmonics, MESHES)
+    result.outcome[index] = searched.outcome
+    for part, orbits in searched.parts:
+        result.add(index[part], orbits)
+    return result

@@ -69,15 +69,15 @@ def settled_orbits(
     orbit = Orbit.empty(scheme_for(problem.system), size, intervals, points)
     if equations.coefficients is not None:
         return orbit, index[:0]
-    found = []
+    rows = []
     for i in index:
         period = _last_period(equations, {n: float(v[i]) for n, v in parameters.items()})
         if period is not None:
             put(orbit, np.array([i]), _on_mesh(take(problem, np.array([i])), period, intervals))
-            found.append(i)
+            rows.append(i)
         elif every:
             break
-    return orbit, np.array(found, int)
+    return orbit, np.array(rows, int)
 
 
 def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> DenseOutput | None:

@@ -71,7 +71,7 @@ class FourierSeries(Method):
     choice = "series"
 
     def suits(self, problem: Problem) -> bool:
-        """Any equations: points with smooth orbits are found out by the attempt."""
+        """Any equations: an attempt shows which orbits are smooth."""
         return True
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
@@ -87,19 +87,19 @@ class FourierSeries(Method):
         orbit, resolved = series_orbits(part, len(smooth))
         kept = np.flatnonzero(resolved)
         if len(kept):
-            found = Solution.unsolved(problem, len(kept), options)
-            accept(take(part, kept), found, take(orbit, kept), options)
+            attempt = Solution.unsolved(problem, len(kept), options)
+            accept(take(part, kept), attempt, take(orbit, kept), options)
             rows = smooth[kept]
-            exact = slow[rows] | (np.abs(found.harmonics[:2]) > _LEAST_HARMONIC).all(0)
-            options.progress(int(found.converged[exact].sum()))
-            solution.merge(rows[exact], take(found, np.flatnonzero(exact)))
+            exact = slow[rows] | (np.abs(attempt.harmonics[:2]) > _LEAST_HARMONIC).all(0)
+            options.progress(int(attempt.converged[exact].sum()))
+            solution.merge(rows[exact], take(attempt, np.flatnonzero(exact)))
         return solution
 
 
 def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool_]]:
     """Orbits of all points of `problem` (NumPy arrays) on `INTERVALS` even intervals.
 
-    Returned beside them is which of them a series resolves, shape (points,).
+    Returned with them is which of them a series resolves, shape (points,).
     """
     scheme, size = scheme_for(problem.system), problem.system.size
     orbit = Orbit.empty(scheme, size, INTERVALS, points)

@@ -82,7 +82,7 @@ def still(problem: Problem) -> Problem:
 
 
 def amplitude_line(problem: Problem) -> ParameterLine:
-    """From steady sliding at t = 0 to the modulation asked for at t = 1."""
+    """From steady sliding at t = 0 to the requested modulation at t = 1."""
     origin = problem._replace(load=jax.tree.map(np.zeros_like, problem.load))
     added = still(problem)._replace(load=problem.load)
     return ParameterLine(origin, added, still(problem))

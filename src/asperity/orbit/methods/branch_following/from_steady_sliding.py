@@ -1,4 +1,4 @@
-"""From steady sliding to the amplitude asked for, through folds and canards, in batches.
+"""From steady sliding to the requested amplitude, through folds and canards, in batches.
 
 `BranchFollowing` is the method of the search that takes the orbits at the ends of these branches,
 or the reason why a branch ends before.
@@ -56,7 +56,7 @@ MESHES = (BranchMesh(216, 200), BranchMesh(648, 1000))
 #: round-off in the phase limits it.
 RUNAWAY = 13.0
 
-#: Distance from the amplitude asked for below which steps aim at it, and at which it is reached.
+#: Distance from the requested amplitude below which steps aim at it, and at which it is reached.
 _NEAR, _ARRIVED = 1e-2, 1e-6
 #: Rise of the exponent beyond `RUNAWAY` for which a branch is still followed there.
 _AHEAD = 0.5
@@ -98,7 +98,7 @@ class SteadyBranch(NamedTuple):
         do not grow.
     growth : array, shape (points,)
         Exponent by which a disturbance grows while it does, of the last orbit or of steady
-        sliding at the amplitude asked for, whichever is larger; 0 where the outcome is definite.
+        sliding at the requested amplitude, whichever is larger; 0 where the outcome is definite.
     """
 
     orbit: Orbit
@@ -111,7 +111,7 @@ class SteadyBranch(NamedTuple):
 
     @property
     def arrived(self) -> NDArray[np.bool_]:
-        """Whether the amplitude asked for was reached."""
+        """Whether the requested amplitude was reached."""
         return np.abs(self.share - 1) <= _ARRIVED
 
     @property
@@ -123,7 +123,7 @@ class SteadyBranch(NamedTuple):
 
     @property
     def ran_away(self) -> NDArray[np.bool_]:
-        """Whether slip becomes too fast to be followed before the amplitude asked for."""
+        """Whether slip becomes too fast to be followed before the requested amplitude."""
         return ~self.arrived & ~self.folded & (self.end < 1)
 
     @property
@@ -285,7 +285,7 @@ def _follow(
 
 
 def _towards_the_end(pair: PointPair, ratio: Float, failures: NDArray[np.int_]) -> Float:
-    """Steps that are not predicted to pass the amplitude asked for; back where one passed it."""
+    """Steps that are not predicted to pass the requested amplitude; back where one passed it."""
     last, left = pair.point.t - pair.t_before, 1 - pair.point.t
     near = (last != 0) & (np.abs(left) < _NEAR)
     near |= (last > 0) & ((ratio * last > left) | (left < 0))
@@ -363,7 +363,7 @@ def orbits_along_branches(
 ) -> tuple[InitialGuess, NDArray[np.bool_]]:
     """Orbits of all points of `problem` (NumPy arrays) at the end of their branch.
 
-    Where a branch does not reach the amplitude asked for, `outcome` says why. Returned beside the
+    Where a branch does not reach the requested amplitude, `outcome` says why. Returned with the
     guess is whether a finer mesh would give the same, shape (points,).
     """
     branch = follow_from_steady_sliding(problem, np.arange(points), mesh)
@@ -378,5 +378,5 @@ def orbits_along_branches(
         rows = np.flatnonzero(which & (amplitude > 0))
         guess.outcome[rows] = outcome
         guess.detail[rows] = share[rows] * amplitude[rows]
-    guess.found[:] = branch.arrived
+    guess.solved[:] = branch.arrived
     return guess, branch.definite

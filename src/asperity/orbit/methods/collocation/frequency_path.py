@@ -50,7 +50,7 @@ class FrequencyPath(Method):
         return True
 
     def candidates(self, solution: Solution) -> Indices:
-        """Points whose branch from steady sliding has no orbit at the amplitude asked for."""
+        """Points whose branch from steady sliding has no orbit at the requested amplitude."""
         return np.flatnonzero(np.isin(solution.outcome, WITHOUT_ORBIT))
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
@@ -73,7 +73,7 @@ def orbits_from_high_frequency(problem: Problem, points: int) -> InitialGuess:
     omega = np.asarray(problem.system.omega)
     first = omega * np.maximum(rate / _FAST_MODULATION, 1.0)
     guess = orbits_from_averaged_limit(_at_frequency(problem, first), points)
-    _follow(problem, first, guess.orbit, guess.found)
+    _follow(problem, first, guess.orbit, guess.solved)
     return guess
 
 
@@ -81,7 +81,7 @@ def _at_frequency(problem: Problem, omega: Float) -> Problem:
     return problem._replace(system=eqx.tree_at(lambda q: q.omega, problem.system, omega))
 
 
-def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool_]) -> None:
+def _follow(problem: Problem, first: Float, orbit: Orbit, solved: NDArray[np.bool_]) -> None:
     """Follow orbits from omega = `first` to that of the problem, evenly in its logarithm.
 
     Parameters
@@ -92,11 +92,11 @@ def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool
         rad/s.
     orbit : Orbit
         Orbits at `first`; overwritten with those at the end of the path.
-    found : bool array, shape (points,)
+    solved : bool array, shape (points,)
         Which points have an orbit; overwritten with those that reach the end.
     """
-    reached, step = np.zeros(len(found)), np.full(len(found), _FIRST_STEP)
-    active = np.flatnonzero(found)
+    reached, step = np.zeros(len(solved)), np.full(len(solved), _FIRST_STEP)
+    active = np.flatnonzero(solved)
 
     chunk = mesh_chunk(problem.system.size)
     for _ in range(_MOST_STEPS):
@@ -112,7 +112,7 @@ def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool
             reached[part[good]] = trial[part[good]]
             step[part] *= np.where(good, _GROWTH, _SHRINKAGE)
         active = active[(reached[active] < 1) & (step[active] > _SHORTEST_STEP)]
-    found[:] = reached >= 1
+    solved[:] = reached >= 1
 
 
 def _advance(problem: Problem, guess: Orbit) -> tuple[Orbit, Float]:

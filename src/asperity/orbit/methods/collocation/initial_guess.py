@@ -35,7 +35,7 @@ class InitialGuess(NamedTuple):
     Attributes
     ----------
     orbit : Orbit
-    found : bool array, shape (points,)
+    solved : bool array, shape (points,)
         Which points have an orbit.
     outcome : int array, shape (points,)
         `Outcome` of the others.
@@ -44,13 +44,13 @@ class InitialGuess(NamedTuple):
     """
 
     orbit: Orbit
-    found: NDArray[np.bool_]
+    solved: NDArray[np.bool_]
     outcome: NDArray[np.int_]
     detail: Float
 
     @classmethod
     def none(cls, problem: Problem, points: int, intervals: int = FIRST_MESH) -> InitialGuess:
-        """No orbit found yet."""
+        """No orbit yet."""
         system = problem.system
         return cls(
             Orbit.empty(scheme_for(system), system.size, intervals, points),
@@ -79,7 +79,7 @@ def orbits_from_averaged_limit(
     for part, (first, error) in run_chunks(_first_orbit, (problem,), index, chunk):
         good = error < ACCEPTED
         put(guess.orbit, part[good], take(first, np.flatnonzero(good)))
-        guess.found[part] = good
+        guess.solved[part] = good
     return guess
 
 

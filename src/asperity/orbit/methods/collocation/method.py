@@ -235,10 +235,10 @@ def solve_from(
     guess : InitialGuess
     options : SearchOptions
     """
-    informed = guess.found | (guess.detail > 0)
+    informed = guess.solved | (guess.detail > 0)
     solution.outcome[informed] = guess.outcome[informed]
     solution.detail[informed] = guess.detail[informed]
-    index = np.flatnonzero(guess.found)
+    index = np.flatnonzero(guess.solved)
     if len(index):
         coarse = guess.orbit.mesh.shape[0] - 1
         meshes = tuple(intervals for intervals in MESHES if intervals >= coarse)

@@ -214,7 +214,7 @@ class BalanceEquations:
     def solve(
         self, product: Callable[[Any], Any], right: BalanceUnknowns, at: tuple[Prepared, Array]
     ) -> BalanceUnknowns:
-        """By the contraction that found the orbit."""
+        """By the contraction that solves for the orbit."""
 
         def contract(y: BalanceUnknowns) -> BalanceUnknowns:
             return jax.tree.map(jnp.subtract, y, product(y))
