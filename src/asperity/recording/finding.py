@@ -12,7 +12,7 @@ Severity = Literal["note", "warning", "error"]
 
 #: Findings on a file whose columns are not all that was recorded, or not under their names.
 _COLUMNS = frozenset(
-    {"truncated", "damaged", "heading mismatch", "other length", "short column", "text column"}
+    {"truncated", "heading mismatch", "other length", "short column", "text column"}
 )
 
 

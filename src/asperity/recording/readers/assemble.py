@@ -15,9 +15,8 @@ from asperity.parameters.arguments import shown
 from asperity.recording.checks import check
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
-from asperity.recording.readers.labels import split_labels
 from asperity.recording.readers.raw import refuse_truncated
-from asperity.recording.readers.units import Unit, is_empty, required, understood
+from asperity.recording.readers.units import Unit, is_empty, required, split_labels, understood
 from asperity.recording.roles import ROLES, candidates, role_of
 from asperity.recording.trace import Channel, Trace
 
