@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.measurement.channels import compressive, shear_channel
-from asperity.recording.checks import check
+from asperity.recording.checks import check, spikes
 from asperity.recording.rounded_time import even_times
-from asperity.recording.spikes import spikes
 
 if TYPE_CHECKING:
     from asperity.recording.finding import Finding

@@ -136,9 +136,7 @@ def test_hdf5_that_is_cut_is_refused(tmp_path, planted, cut, part):
     path = tmp_path / "a.h5"
     with h5py.File(path, "w") as file:
         h5_datasets(file, planted)
-    with pytest.raises(
-        InputError, match=r"must be a whole file of format 'hdf5', got 'cut_a.h5'.*cut"
-    ):
+    with pytest.raises(InputError, match=r"whole file of format .hdf5., got .cut_a.h5.,.* cut"):
         read(cut(path, part))
 
 

@@ -136,7 +136,7 @@ def test_of_two_orders_of_day_and_month_the_shorter_recording_is_meant(tmp_path)
 @pytest.mark.parametrize("part", [0.01, 0.3, 0.6, 0.95])
 def test_gzip_that_is_cut_is_refused(tmp_path, part):
     packed = gzip.compress(PLAIN.encode())
-    with pytest.raises(InputError, match="must be a whole file of format 'text'.*may be cut"):
+    with pytest.raises(InputError, match=r"must be a whole file of format 'text'.*may be cut"):
         read(written(tmp_path, packed[: max(3, int(part * len(packed)))]))
 
 
@@ -144,7 +144,7 @@ def test_gzip_that_is_cut_is_refused(tmp_path, part):
 def test_gzip_that_is_damaged_is_refused(tmp_path, at):
     packed = bytearray(gzip.compress(PLAIN.encode()))
     packed[at] ^= 1
-    with pytest.raises(InputError, match="must be a whole file of format 'text'.*or damaged"):
+    with pytest.raises(InputError, match=r"must be a whole file of format 'text'.*or damaged"):
         read(written(tmp_path, bytes(packed)))
 
 
