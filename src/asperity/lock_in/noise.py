@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.lock_in.basis import Basis
-from asperity.lock_in.blocks import BlockSums
+from asperity.lock_in.normal_equations import Basis, BlockSums
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

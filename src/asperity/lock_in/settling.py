@@ -21,9 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.lock_in.blocks import BlockSums
 from asperity.lock_in.noise import harmonic_sums, noise_around
-from asperity.lock_in.normal_equations import inverted
+from asperity.lock_in.normal_equations import BlockSums, inverted
 
 Array = NDArray[np.float64]
 

@@ -14,20 +14,19 @@ from asperity.errors import ConstantLoadError, InputError
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
-from asperity.measurement.pauses import under_the_same_load
 from asperity.measurement.samples import Samples, about_window, usable
-from asperity.measurement.series import MeanLevel, Rate, effective_dof, mean_level, rate_between
-from asperity.measurement.sliding.trend import bin_means, columns, fit_trend
-from asperity.measurement.verdicts import (
-    checks,
-    instrument,
-    interference,
-    plausibility,
-    steadiness,
+from asperity.measurement.series import (
+    MeanLevel,
+    Rate,
+    bin_means,
+    columns,
+    effective_dof,
+    fit_trend,
+    mean_level,
+    rate_between,
 )
+from asperity.measurement.verdicts import checks, instrument, steadiness
 from asperity.measurement.verdicts.checks import drift_rate
-from asperity.measurement.verdicts.flat_top import flat_top
-from asperity.measurement.verdicts.shift import shifting_response
 from asperity.measurement.verdicts.verdict import Check, Verdict, worst
 from asperity.measurement.window import (
     LoadInterval,
@@ -35,6 +34,7 @@ from asperity.measurement.window import (
     settled,
     settling_from,
     stretches,
+    under_the_same_load,
     whole_periods,
 )
 from asperity.parameters.display import Displayed, SummaryLine
@@ -336,10 +336,10 @@ def _asked(
         checks.modulation(reading),
         checks.periods(reading),
         checks.signal(reading),
-        plausibility.contact(reading),
-        plausibility.friction(reading),
-        plausibility.response(reading),
-        plausibility.aliasing(reading, rate),
+        checks.contact(reading),
+        checks.friction(reading),
+        checks.response(reading),
+        checks.aliasing(reading, rate),
         steadiness.leakage(reading),
         steadiness.steady_load(reading, time, load),
         steadiness.steady_force(reading, time, force),
@@ -359,11 +359,11 @@ def _about_the_instrument(
         *instrument.made_force(reading, samples, time, load, force),
         instrument.held_samples(reading, load, force),
         instrument.dropouts(load, force),
-        flat_top(reading, time, load, force),
-        interference.mains(reading, samples, parts),
-        *interference.lines_in_the_pauses(reading, samples, parts),
-        interference.hum(reading, time, force),
-        shifting_response(reading, time, force),
+        instrument.flat_top(reading, time, load, force),
+        instrument.mains(reading, samples, parts),
+        *instrument.lines_in_the_pauses(reading, samples, parts),
+        instrument.hum(reading, time, force),
+        steadiness.shifting_response(reading, time, force),
     )
 
 

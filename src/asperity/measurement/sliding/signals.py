@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.measurement.channels import (
+from asperity.measurement.samples import (
     compressive,
     load_channel,
     refuse_contradiction,
+    require_computable,
     shear_channel,
 )
-from asperity.measurement.samples import require_computable
 from asperity.recording.roles import candidates, words
 from asperity.recording.rounded_time import even_times
 

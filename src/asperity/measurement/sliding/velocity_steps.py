@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from asperity.measurement.sliding.trend import TrendFit, bin_means, columns, fit_trend
+from asperity.measurement.series import TrendFit, bin_means, columns, fit_trend
 
 Array = NDArray[np.float64]
 
