@@ -1,4 +1,4 @@
-"""A measurement as plain numbers and texts, for JSON and tables, and the curves that pictures show."""
+"""A measurement as plain numbers and texts for JSON and tables, and as curves for pictures."""
 
 from __future__ import annotations
 

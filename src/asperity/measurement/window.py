@@ -1,4 +1,4 @@
-"""Where a recording is modulated, which part of that is fit to be read, and which pauses give F(0)."""
+"""Where a recording is modulated, which part of it can be read, and which pauses give F(0)."""
 
 from __future__ import annotations
 

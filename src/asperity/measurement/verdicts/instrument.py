@@ -1,11 +1,10 @@
 """Faults of the instrument: held samples, dropouts, a force that was made, mains, flat tops.
 
 A waveform that is clipped before the recorder's noise is added has no two equal samples: only the
-mean cycle shows it. Two descriptions of the mean cycle are compared, a sum of harmonics and a sum of
-harmonics that is cut off above, below or on both sides, by the Bayesian information criterion. Few
-harmonics and a level describe a clipped signal to within its noise, where the corners need many
-harmonics; a smooth signal, be it ever so flat at its top, needs as many harmonics with the level as
-without.
+mean cycle shows it. Two descriptions of the mean cycle are compared by the Bayesian information
+criterion: a sum of harmonics, and one that is cut off above, below or on both sides. Few harmonics
+and a level describe a clipped signal to within its noise, where the corners need many harmonics; a
+smooth signal, be it ever so flat at its top, needs as many harmonics with the level as without.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Is it one state that was recorded?
+"""Whether one steady state was recorded.
 
 Load and force that wander, oscillations that are no harmonics, a response that changes within the
 window.
