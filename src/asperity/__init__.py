@@ -43,7 +43,7 @@ if TYPE_CHECKING:
         response_function,
         sensitivities,
     )
-    from asperity.protocol.from_file import run_experiment as run
+    from asperity.protocol.run import run_experiment as run
     from asperity.recording.readers import read
     from asperity.slider import Slider
     from asperity.sweep.map import response_map as map

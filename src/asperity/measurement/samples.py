@@ -239,8 +239,8 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     F, name = _force(trace, force, W)
     if W.kind != F.kind:
         raise InputError(
-            f"measure.force must have the dimension of the load, got {_told(F)} for '{force}' and "
-            f"{_told(W)} for '{load}'; name the units when reading"
+            f"measure.force must have the dimension of the load, got {_dimension_text(F)} for '{force}' and "
+            f"{_dimension_text(W)} for '{load}'; name the units when reading"
         )
     names = (_name(trace, W), name)
     if names[0] == names[1]:
@@ -363,5 +363,5 @@ def _name(trace: Trace, channel: Channel) -> str:
     return next(name for name, c in trace.channels.items() if c is channel)
 
 
-def _told(channel: Channel) -> str:
+def _dimension_text(channel: Channel) -> str:
     return f"'{channel.unit}'" if channel.kind else "no known unit"

@@ -17,9 +17,9 @@ from typing import Any, TypeVar
 
 from asperity._version import __version__
 from asperity.errors import InputError
-from asperity.outputs.file import to_disk, writable
 from asperity.outputs.json import json_content
 from asperity.outputs.targets import fresh_name, record_name, unfinished_name
+from asperity.outputs.written import to_disk, writable
 
 _Result = TypeVar("_Result")
 

@@ -10,8 +10,7 @@ from asperity.laws import registered
 from asperity.operating_point import known_parameters
 from asperity.parameters.arguments import shown
 from asperity.parameters.toml_file import toml_content
-from asperity.protocol.mistakes import ProtocolError
-from asperity.protocol.protocol import Protocol
+from asperity.protocol.protocol import Protocol, ProtocolError
 from asperity.units import KINDS
 
 #: Kinds of the quantities in the tables of a file, where each carries its unit.

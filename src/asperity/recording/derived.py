@@ -15,7 +15,7 @@ from asperity.recording.finding import Finding
 from asperity.recording.roles import ROLES, role_of
 from asperity.recording.trace import Channel, Trace
 from asperity.units import KINDS
-from asperity.units.dimension import base_units, kind_of_dimension, unit_text
+from asperity.units.scale import base_units, kind_of_dimension, unit_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

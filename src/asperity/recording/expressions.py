@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
-from asperity.units.dimension import Dimension, base_units, dimension_of, unit_text
+from asperity.units.scale import Dimension, base_units, dimension_of, unit_text
 
 Array = NDArray[np.float64]
 

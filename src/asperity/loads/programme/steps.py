@@ -13,9 +13,8 @@ from asperity.errors import InputError
 from asperity.loads.consistency import checked_modulation
 from asperity.loads.modulation import Modulation
 from asperity.loads.programme.harmonic import HarmonicSegment
-from asperity.loads.programme.interpolants import interpolated
 from asperity.loads.programme.periodic import PeriodicSegment
-from asperity.loads.programme.recorded import RecordedSegment
+from asperity.loads.programme.recorded import RecordedSegment, interpolated
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.parameters.arguments import number
 from asperity.units import to_radians, to_si
