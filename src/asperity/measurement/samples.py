@@ -239,8 +239,8 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     F, name = _force(trace, force, W)
     if W.kind != F.kind:
         raise InputError(
-            f"measure.force must have the dimension of the load, got {_dimension_text(F)} for '{force}' and "
-            f"{_dimension_text(W)} for '{load}'; name the units when reading"
+            f"measure.force must have the dimension of the load, got {_dimension_text(F)} for "
+            f"'{force}' and {_dimension_text(W)} for '{load}'; name the units when reading"
         )
     names = (_name(trace, W), name)
     if names[0] == names[1]:
