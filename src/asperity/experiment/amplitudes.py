@@ -127,15 +127,15 @@ _UNITS = {
 
 
 def _row(point: AmplitudePoint) -> dict[str, float]:
-    found = point.measurement
-    reading = found.reading
+    measurement = point.measurement
+    reading = measurement.reading
     row = {
         "measured_epsilon": reading.epsilon,
         "mean_friction": reading.mean_friction,
         "mean_friction_uncertainty": reading.uncertainty("mean_friction"),
-        "static_friction": found.static_friction,
-        "delta_mu": found.delta_mu,
-        "delta_mu_uncertainty": found.delta_mu_uncertainty,
+        "static_friction": measurement.static_friction,
+        "delta_mu": measurement.delta_mu,
+        "delta_mu_uncertainty": measurement.delta_mu_uncertainty,
         "drift": point.drift,
     }
     for n in (1, 2):
@@ -204,8 +204,10 @@ class AmplitudeMotion:
             begin = i * (self.sliding + self.modulated)
             end = begin + 2 * self.sliding + self.modulated
             part = trace.slice(begin, end)
-            found = measure(part, load=LOAD, force=FORCE, frequency=frequency, harmonics=harmonics)
-            points.append(AmplitudePoint(epsilon, begin, end, found))
+            measurement = measure(
+                part, load=LOAD, force=FORCE, frequency=frequency, harmonics=harmonics
+            )
+            points.append(AmplitudePoint(epsilon, begin, end, measurement))
         return AmplitudeSeries(
             trace, tuple(points), self.velocity, frequency, self.exciter.transfer
         )

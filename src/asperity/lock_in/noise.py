@@ -98,8 +98,8 @@ def local_noise(
         Whether a settling of the mean was fitted too.
     """
     orders = range(blocks.basis.harmonics + 1)
-    found = [noise_around(k, blocks, residual[:, k], white, settles=settles) for k in orders]
-    spectra, dof = zip(*found, strict=True)
+    noises = [noise_around(k, blocks, residual[:, k], white, settles=settles) for k in orders]
+    spectra, dof = zip(*noises, strict=True)
     return LocalNoise(np.array(spectra), np.array(dof))
 
 

@@ -204,14 +204,14 @@ def uneven_sums(
     chunk = -(-length // -(-length // _CHUNK))
     worker = _Chunk(basis, time, len(channels), chunk)
     blocks = -(-time.size // length)
-    found = np.zeros((blocks, 2 * basis.harmonics + 1, worker.rows), dtype=complex)
+    totals = np.zeros((blocks, 2 * basis.harmonics + 1, worker.rows), dtype=complex)
     for b in range(blocks):
         end = min((b + 1) * length, time.size)
         for at in range(b * length, end, chunk):
             stop = min(at + chunk, end)
-            found[b] += worker.sums(time[at:stop], [c[at:stop] for c in channels])
-    powers = found[:, :, : worker.powers]
-    return _gram(basis, powers), _moments(basis, found[:, :, worker.powers :], len(channels))
+            totals[b] += worker.sums(time[at:stop], [c[at:stop] for c in channels])
+    powers = totals[:, :, : worker.powers]
+    return _gram(basis, powers), _moments(basis, totals[:, :, worker.powers :], len(channels))
 
 
 class _Chunk:
@@ -317,8 +317,8 @@ def _gram(basis: Basis, powers: Complex) -> Array:
     total, apart = k[:, None] + k, k[:, None] - k
     for a, at in ((0, first), (1, second)):
         cosine, sine = slice(at, at + n), slice(at + n, at + 2 * n)
-        beside = powers[:, 1 : n + 1, a : a + first].transpose(0, 2, 1)
-        gram[:, :first, cosine], gram[:, :first, sine] = beside.real, beside.imag
+        mixed = powers[:, 1 : n + 1, a : a + first].transpose(0, 2, 1)
+        gram[:, :first, cosine], gram[:, :first, sine] = mixed.real, mixed.imag
         for b, to in ((0, first), (1, second)):
             summed = powers[:, total, a + b] / 2
             other = powers[:, np.abs(apart), a + b] / 2

@@ -80,15 +80,15 @@ def strongest_line(
         piece = slice(at, at + _SPECTRUM)
         spectra.append(_spectrum(*_evenly(time[piece], values[piece], _SPECTRUM)))
     lines = [_top(*spectrum, between) for spectrum in spectra]
-    found = [line for line in lines if line is not None]
-    if not found:
+    present = [line for line in lines if line is not None]
+    if not present:
         where = "" if between is None else f" about {sum(between) / 2:.6g} Hz"
         raise InputError(
             f"reference.frequency must lie within what the recording resolves, got {time.size} "
             f"samples in {time[-1] - time[0]:.6g} s{where}; give another frequency or a longer "
             "window"
         )
-    return max(found, key=lambda line: line.amplitude)
+    return max(present, key=lambda line: line.amplitude)
 
 
 def require_modulated(line: SpectralLine, load: Array) -> None:

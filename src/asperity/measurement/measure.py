@@ -201,19 +201,19 @@ def measure_amplitudes(
         As `measure` where the recording as a whole cannot be read.
     """
     recording = _prepared(trace, load, force, frequency, detrend, refine)
-    found: list[Measurement | InputError] = []
+    measurements: list[Measurement | InputError] = []
     for part in recording.parts:
         if not part.modulated:
             continue
         try:
-            found.append(
+            measurements.append(
                 _measured(
                     recording, part, harmonics, None, detrend, only_whole_periods=only_whole_periods
                 )
             )
         except InputError as error:
-            found.append(error)
-    return found
+            measurements.append(error)
+    return measurements
 
 
 @dataclass(frozen=True, eq=False)
@@ -393,8 +393,8 @@ def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadI
     whole = LoadInterval(0, samples.time.size, line.amplitude)
     if line.amplitude < _LINE * line.background:
         return [whole]
-    found = stretches(samples.time, samples.load, frequency)
-    return found if any(part.modulated for part in found) else [whole]
+    parts = stretches(samples.time, samples.load, frequency)
+    return parts if any(part.modulated for part in parts) else [whole]
 
 
 def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int) -> tuple[int, int]:
@@ -422,11 +422,11 @@ def _around(
     at, most = parts.index(chosen), chosen.stop - chosen.first
     sides: list[tuple[MeanLevel, MeanLevel] | None] = []
     for step in (-1, 1):
-        beside = parts[at + step] if 0 <= at + step < len(parts) else None
-        if beside is None or beside.modulated or beside.stop - beside.first < 16:
+        pause = parts[at + step] if 0 <= at + step < len(parts) else None
+        if pause is None or pause.modulated or pause.stop - pause.first < 16:
             sides.append(None)
             continue
-        first, stop = beside.first, beside.stop
+        first, stop = pause.first, pause.stop
         # What is much later, or much earlier, says little.
         if step > 0:
             stop = min(stop, first + 2 * most)
@@ -473,9 +473,9 @@ def _rates(
     samples: Samples, sides: tuple[tuple[MeanLevel, MeanLevel] | None, ...]
 ) -> list[Rate | None]:
     """Rates at which the force changes in the pauses."""
-    found: list[Rate | None] = []
+    rates: list[Rate | None] = []
     for side in sides:
-        found.append(None)
+        rates.append(None)
         if side is None:
             continue
         first, stop = np.searchsorted(samples.time, [side[0].start, side[0].end])
@@ -483,8 +483,8 @@ def _rates(
             at, means = bin_means(samples.time[first:stop], samples.force[first:stop])
             fit = fit_trend(columns(at - at[0], 1), means)
             doubt = float(np.sqrt(fit.variance * fit.inverse[1, 1]))
-            found[-1] = Rate(float(fit.beta[1]), doubt, float(fit.dof))
-    return found
+            rates[-1] = Rate(float(fit.beta[1]), doubt, float(fit.dof))
+    return rates
 
 
 def _static_friction(

@@ -34,19 +34,19 @@ _BINS = 90
 _MOST = 1 << 18
 
 
-def modulated_record(found: Measurement) -> dict[str, Any]:
+def modulated_record(measurement: Measurement) -> dict[str, Any]:
     """Everything that a reading says.
 
     Parameters
     ----------
-    found : Measurement
+    measurement : Measurement
 
     Returns
     -------
     dict
         Of numbers, texts, lists and dicts, in SI.
     """
-    reading = found.reading
+    reading = measurement.reading
     orders = range(1, reading.harmonics.size + 1)
     values = {name: float(getattr(reading, name)) for name in _SCALARS}
     for n in orders:
@@ -54,16 +54,16 @@ def modulated_record(found: Measurement) -> dict[str, Any]:
         values |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
     doubts = {name: reading.uncertainty(name) for name in values}
     intervals = {name: reading.half_width(name) for name in values}
-    joint = observable_covariance(found)
-    if isfinite(found.delta_mu_interval_95):
-        intervals["delta_mu"] = found.delta_mu_interval_95
+    joint = observable_covariance(measurement)
+    if isfinite(measurement.delta_mu_interval_95):
+        intervals["delta_mu"] = measurement.delta_mu_interval_95
     return {
         "mode": "modulated",
-        "verdict": found.verdict,
+        "verdict": measurement.verdict,
         **values,
-        "static_friction": found.static_friction,
-        "delta_mu": found.delta_mu,
-        "uncertainties": {**doubts, "delta_mu": found.delta_mu_uncertainty},
+        "static_friction": measurement.static_friction,
+        "delta_mu": measurement.delta_mu,
+        "uncertainties": {**doubts, "delta_mu": measurement.delta_mu_uncertainty},
         "intervals_95": intervals,
         "harmonics": _pairs(reading.harmonics),
         "load_harmonics": _pairs(reading.load_harmonics),
@@ -82,38 +82,38 @@ def modulated_record(found: Measurement) -> dict[str, Any]:
             for settling in reading.settlings
             if settling.present
         ],
-        "F0_before": _level(found.before),
-        "F0_after": _level(found.after),
+        "F0_before": _level(measurement.before),
+        "F0_after": _level(measurement.after),
         "window": {
             "start": reading.start,
             "end": reading.end,
             "samples": reading.samples,
             "periods": reading.periods,
-            "chosen_by": found.chosen_by,
+            "chosen_by": measurement.chosen_by,
         },
         "stretches": [
             {
-                "start": float(found.samples.time[part.first]),
-                "end": float(found.samples.time[part.stop - 1]),
+                "start": float(measurement.samples.time[part.first]),
+                "end": float(measurement.samples.time[part.stop - 1]),
                 "amplitude": part.amplitude,
             }
-            for part in found.stretches
+            for part in measurement.stretches
         ],
-        "checks": checks_record(found.checks),
-        "findings": [asdict(finding) for finding in found.samples.findings],
-        "channels": {"W": found.samples.names[0], "F": found.samples.names[1]},
-        "unit": found.samples.unit,
-        "dropped_samples": found.samples.dropped,
+        "checks": checks_record(measurement.checks),
+        "findings": [asdict(finding) for finding in measurement.samples.findings],
+        "channels": {"W": measurement.samples.names[0], "F": measurement.samples.names[1]},
+        "unit": measurement.samples.unit,
+        "dropped_samples": measurement.samples.dropped,
         "conventions": CONVENTIONS,
     }
 
 
-def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     """Joint covariance of what fits compare: mean_friction, delta_mu, mu1, phase1, mu2, phase2.
 
     Parameters
     ----------
-    found : Measurement
+    measurement : Measurement
 
     Returns
     -------
@@ -124,10 +124,10 @@ def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[
         phasor, and across it over the amplitude. Its diagonal are the squares of the reported
         uncertainties.
     """
-    reading = found.reading
+    reading = measurement.reading
     at = reading.names.index
     names, rows = ["mean_friction"], [np.eye(len(reading.names))[at("mean_friction")]]
-    if isfinite(found.delta_mu_uncertainty):
+    if isfinite(measurement.delta_mu_uncertainty):
         names.append("delta_mu")
         rows.append(rows[0])
     for n in range(1, min(reading.harmonics.size, 2) + 1):
@@ -144,10 +144,11 @@ def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[
     covariance = J @ reading.covariance @ J.T
     if "delta_mu" in names:
         # The level at constant load has errors of its own, which nothing else shares.
-        covariance[1, 1] = found.delta_mu_uncertainty**2
+        covariance[1, 1] = measurement.delta_mu_uncertainty**2
     # Phases that may be any have a bound on what is reported of them.
     doubts = [
-        found.delta_mu_uncertainty if n == "delta_mu" else reading.uncertainty(n) for n in names
+        measurement.delta_mu_uncertainty if n == "delta_mu" else reading.uncertainty(n)
+        for n in names
     ]
     # A variance of zero may come out a round-off below it.
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -156,12 +157,12 @@ def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[
     return tuple(names), covariance
 
 
-def sliding_record(found: SlidingMeasurement) -> dict[str, Any]:
+def sliding_record(measurement: SlidingMeasurement) -> dict[str, Any]:
     """Everything that a recording without modulation says.
 
     Parameters
     ----------
-    found : SlidingMeasurement
+    measurement : SlidingMeasurement
 
     Returns
     -------
@@ -170,20 +171,20 @@ def sliding_record(found: SlidingMeasurement) -> dict[str, Any]:
     """
     return {
         "mode": "sliding",
-        "verdict": found.verdict,
-        "friction": _level(found.friction),
-        "load": _level(found.load),
-        "unit": found.load_unit,
-        "rates": [{"rate": rate, "share": share} for rate, share in found.rates],
-        "samples": int(found.time.size),
-        "velocity_from": found.velocity_from,
-        "detrend": found.detrend,
-        "chosen_by": found.chosen_by,
-        "segments": [{**asdict(s), "steady": _level(s.steady)} for s in found.segments],
-        "steps": [asdict(step) for step in found.steps],
-        "holds": [asdict(hold) for hold in found.holds],
-        "healing": None if found.healing is None else asdict(found.healing),
-        "checks": checks_record(found.checks),
+        "verdict": measurement.verdict,
+        "friction": _level(measurement.friction),
+        "load": _level(measurement.load),
+        "unit": measurement.load_unit,
+        "rates": [{"rate": rate, "share": share} for rate, share in measurement.rates],
+        "samples": int(measurement.time.size),
+        "velocity_from": measurement.velocity_from,
+        "detrend": measurement.detrend,
+        "chosen_by": measurement.chosen_by,
+        "segments": [{**asdict(s), "steady": _level(s.steady)} for s in measurement.segments],
+        "steps": [asdict(step) for step in measurement.steps],
+        "holds": [asdict(hold) for hold in measurement.holds],
+        "healing": None if measurement.healing is None else asdict(measurement.healing),
+        "checks": checks_record(measurement.checks),
         "conventions": SLIDING_CONVENTIONS,
     }
 
@@ -220,15 +221,15 @@ class MeanCycle(NamedTuple):
     fitted: Array
 
 
-def mean_cycle(found: Measurement) -> MeanCycle:
+def mean_cycle(measurement: Measurement) -> MeanCycle:
     """The mean cycle of the force against the phase of the load.
 
     Parameters
     ----------
-    found : Measurement
+    measurement : Measurement
     """
-    reading, cut = found.reading, slice(*found.window)
-    time, force = found.samples.time[cut], found.samples.force[cut]
+    reading, cut = measurement.reading, slice(*measurement.window)
+    time, force = measurement.samples.time[cut], measurement.samples.force[cut]
     middle, length = (reading.start + reading.end) / 2, reading.end - reading.start
     trend = reading.drift[1, 0] * (time - middle) / length if reading.drift.shape[1] else 0.0
     phase = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
@@ -243,12 +244,12 @@ def mean_cycle(found: Measurement) -> MeanCycle:
     return MeanCycle(middles[filled], (mean - reading.mean_friction)[filled], fine, fitted)
 
 
-def residual_spectrum(found: Measurement) -> tuple[Array, Array]:
+def residual_spectrum(measurement: Measurement) -> tuple[Array, Array]:
     """Amplitudes of F/W0 without the fitted harmonics, up to the order after the last one.
 
     Parameters
     ----------
-    found : Measurement
+    measurement : Measurement
 
     Returns
     -------
@@ -257,8 +258,11 @@ def residual_spectrum(found: Measurement) -> tuple[Array, Array]:
     amplitude : array, shape (n,)
         Under a Hann window.
     """
-    reading, cut = found.reading, slice(*found.window)
-    time, force = found.samples.time[cut][:_MOST], found.samples.force[cut][:_MOST] / reading.W0
+    reading, cut = measurement.reading, slice(*measurement.window)
+    time, force = (
+        measurement.samples.time[cut][:_MOST],
+        measurement.samples.force[cut][:_MOST] / reading.W0,
+    )
     middle = (reading.start + reading.end) / 2
     cycles = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
     order = np.arange(1, reading.harmonics.size + 1)

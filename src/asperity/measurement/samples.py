@@ -162,16 +162,16 @@ def compressive(load: Array, shear: Array) -> tuple[Array, Array, list[Finding]]
     if not _mean(load) < 0:
         return load, shear, []
     if _mean(shear) < 0:
-        said = (
+        sentence = (
             "Load and shear are negative on average, as where compression counts as negative; both "
             "were read with the other sign."
         )
-        return -load, -shear, [Finding("sign", "note", 2.0, "", said)]
-    said = (
+        return -load, -shear, [Finding("sign", "note", 2.0, "", sentence)]
+    sentence = (
         "The load is negative on average and the shear is not; the load was read with the other "
         "sign, as contacts bear compression. If its zero is off, correct that instead."
     )
-    return -load, shear, [Finding("sign", "warning", 1.0, "", said)]
+    return -load, shear, [Finding("sign", "warning", 1.0, "", sentence)]
 
 
 def _mean(values: Array) -> float:
@@ -341,22 +341,22 @@ def _defects(
     names_found: set[str],
     keep: NDArray[np.bool_] | None,
 ) -> NDArray[np.intp]:
-    found = [np.empty(0, dtype=np.intp)]
+    defects = [np.empty(0, dtype=np.intp)]
     if keep is not None:
         rows = np.flatnonzero(keep)
-        found.append(np.flatnonzero(np.diff(rows) > 1) + 1)
+        defects.append(np.flatnonzero(np.diff(rows) > 1) + 1)
     if "gap" in names_found:
         steps = np.diff(time)
-        found.append(np.flatnonzero(steps > _GAP * np.median(steps)) + 1)
+        defects.append(np.flatnonzero(steps > _GAP * np.median(steps)) + 1)
     if "spike" in names_found:
-        found += [spikes(channel) for channel in values]
+        defects += [spikes(channel) for channel in values]
     if "saturation" in names_found:
         for channel in values:
             for extreme in (channel.max(), channel.min()):
                 at = channel == extreme
                 # A single largest value is none: saturation stands still.
-                found.append(np.flatnonzero(at[1:] & at[:-1]) + 1)
-    return np.unique(np.concatenate(found))
+                defects.append(np.flatnonzero(at[1:] & at[:-1]) + 1)
+    return np.unique(np.concatenate(defects))
 
 
 def _name(trace: Trace, channel: Channel) -> str:

@@ -82,7 +82,7 @@ def stretches(time: Array, load: Array, frequency: float) -> list[LoadInterval]:
     )
     cuts = np.flatnonzero((changed & on[1:] & on[:-1]) | (on[1:] != on[:-1])) + 1
     bounds = [0, *cuts.tolist(), amplitude.size]
-    found = []
+    intervals = []
     for a, b in pairwise(bounds):
         first, stop = a + (a > 0), b - (b < amplitude.size)
         if b - a == 1 and not on[a]:
@@ -91,8 +91,8 @@ def stretches(time: Array, load: Array, frequency: float) -> list[LoadInterval]:
         if stop - first < 1:
             continue
         height = float(np.median(amplitude[first:stop])) if on[a] else 0.0
-        found.append(LoadInterval(int(edges[first]), int(edges[stop]), height))
-    return found
+        intervals.append(LoadInterval(int(edges[first]), int(edges[stop]), height))
+    return intervals
 
 
 def envelope(time: Array, load: Array, frequency: float) -> tuple[Array, NDArray[np.intp]]:

@@ -86,16 +86,16 @@ def numbers_of(
     if material:
         file = material.endswith(".toml")
         source = materials.load(folder / material if file else material)
-    found = sourced_numbers(given, source, "protocol", law_name)
+    numbers = sourced_numbers(given, source, "protocol", law_name)
     needed = [n for n in names if known[n].default is None or (n == "M" and inertia)]
-    missing = [n for n in needed if n not in found]
+    missing = [n for n in needed if n not in numbers]
     if missing:
         raise InputError(
             f"parameters must have all numbers of {law_name}, got none for {', '.join(missing)}; "
             f"name a material that has them or give each one, like {missing[0]} = "
             f'"{known[missing[0]].example}"'
         )
-    return {name: found[name] for name in names if name in found}
+    return {name: numbers[name] for name in names if name in numbers}
 
 
 def slider_of(law_name: str, values: Mapping[str, float]) -> Slider:

@@ -350,9 +350,9 @@ def run_experiment(
     InputError
         If the protocol has a mistake, or `out` cannot be written.
     """
-    asked = protocol
-    if not isinstance(asked, Protocol):
-        asked = load_protocol(file_path(asked, "protocol"))
+    chosen = protocol
+    if not isinstance(chosen, Protocol):
+        chosen = load_protocol(file_path(chosen, "protocol"))
     target = file_path(out, "out")
     resume, progress = switch(resume, "resume"), function(progress, "progress")
-    return run_protocol(asked, target, resume=resume, progress=progress)
+    return run_protocol(chosen, target, resume=resume, progress=progress)

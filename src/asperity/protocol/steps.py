@@ -239,7 +239,9 @@ def _meant(line: str, name: str) -> list[StepForm]:
         return [form for form in FORMS if form.verb.split()[0] == words[0]]
     verbs = [*verbs, "repeat"]
     tried = (" ".join(words[:2]), words[0] if words else "")
-    near = [m for said in tried for m in get_close_matches(said, verbs, n=1, cutoff=0.6)]
+    near = [
+        m for words_said in tried for m in get_close_matches(words_said, verbs, n=1, cutoff=0.6)
+    ]
     examples = [form.example for form in FORMS if near and form.verb.startswith(near[0])]
     if near == ["repeat"]:
         examples = [REPEAT_EXAMPLE]
@@ -254,16 +256,16 @@ def _quantities(
     parts: Mapping[str, str], name: str, line: str, example: str
 ) -> dict[str, float | str]:
     """Values in SI; what is no quantity stays a text."""
-    found: dict[str, float | str] = {}
+    quantities: dict[str, float | str] = {}
     for key, text in parts.items():
         if key not in _KINDS:
-            found[key] = text
+            quantities[key] = text
             continue
         try:
-            found[key] = to_si(text, _KINDS[key], f"{name}.{key}", require_unit=True)
+            quantities[key] = to_si(text, _KINDS[key], f"{name}.{key}", require_unit=True)
         except InputError as error:
             raise InputError(f"{error}, as in '{example}' (in '{line}')") from None
-    return found
+    return quantities
 
 
 @dataclass(frozen=True)
@@ -308,14 +310,14 @@ def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iter
 def _planned(
     steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[str]
 ) -> list[PlannedStep]:
-    found: list[PlannedStep] = []
+    planned: list[PlannedStep] = []
     for number, given in enumerate(steps, start=1):
         place = f"{prefix}{number}"
         try:
-            found += _one(given, place, folder, mistakes)
+            planned += _one(given, place, folder, mistakes)
         except InputError as error:
             mistakes.append(str(error))
-    return found
+    return planned
 
 
 def _one(given: Any, place: str, folder: Path, mistakes: list[str]) -> list[PlannedStep]:

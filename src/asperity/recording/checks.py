@@ -80,26 +80,26 @@ def check(trace: Trace) -> tuple[Finding, ...]:
     """
     # Sums and differences of a damaged file may overflow, which is no news here.
     with np.errstate(over="ignore", invalid="ignore"):
-        found = [*_missing(trace.time, trace.time, "time"), *check_sampling(trace.time)]
+        findings = [*_missing(trace.time, trace.time, "time"), *check_sampling(trace.time)]
         for name, channel in trace.channels.items():
-            found += _missing(channel.values, trace.time, name)
-            found += _saturation(channel.values, trace.time, name)
-            found += _spikes(channel.values, trace.time, name)
-    return tuple(found)
+            findings += _missing(channel.values, trace.time, name)
+            findings += _saturation(channel.values, trace.time, name)
+            findings += _spikes(channel.values, trace.time, name)
+    return tuple(findings)
 
 
 def _missing(values: Array, time: Array, name: str) -> list[Finding]:
     # A sum is finite when all terms are, and costs one pass without a copy; when it is not, look.
     if np.isfinite(values.sum()):
         return []
-    found = []
+    findings = []
     for slug, bad in (("nan", np.isnan(values)), ("infinite", np.isinf(values))):
         count = int(bad.sum())
         if not count:
             continue
         first = int(np.argmax(bad))
         what = "not a number" if slug == "nan" else "infinite"
-        found.append(
+        findings.append(
             Finding(
                 slug,
                 "error" if count == values.size or name == "time" else "warning",
@@ -109,7 +109,7 @@ def _missing(values: Array, time: Array, name: str) -> list[Finding]:
                 f"{first}.",
             )
         )
-    return found
+    return findings
 
 
 def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
@@ -131,7 +131,7 @@ def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
                 f"'{name}' has one and the same value in the whole recording.",
             )
         ]
-    found = []
+    findings = []
     for side, extreme in (("largest", high), ("smallest", low)):
         at_extreme = values == extreme
         count = int(np.count_nonzero(at_extreme))
@@ -148,8 +148,8 @@ def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
             "by a command."
         )
         where = f"{name}, row {first}, t = {time[first]:.10g} s"
-        found.append(Finding("saturation", "warning", count / values.size, where, sentence))
-    return found
+        findings.append(Finding("saturation", "warning", count / values.size, where, sentence))
+    return findings
 
 
 def _most_at_a_level(values: Array, extreme: float, side: str) -> int | None:
@@ -189,14 +189,14 @@ def _spikes(values: Array, time: Array, name: str) -> list[Finding]:
 
 def spikes(values: Array) -> NDArray[np.intp]:
     """Samples that are spikes, in rising order."""
-    found = [np.empty(0, dtype=np.intp)]
+    parts = [np.empty(0, dtype=np.intp)]
     most = max(_APART)
     # What overflows or is missing is news of another check.
     with np.errstate(over="ignore", invalid="ignore"):
         for start in range(0, max(values.size - 2 * most, 0), _CHUNK):
             piece = values[start : start + _CHUNK + 2 * most]
-            found += [_standing_out(piece, apart) + start for apart in _APART]
-    return np.unique(np.concatenate(found))
+            parts += [_standing_out(piece, apart) + start for apart in _APART]
+    return np.unique(np.concatenate(parts))
 
 
 def _standing_out(piece: Array, apart: int) -> NDArray[np.intp]:
@@ -221,8 +221,8 @@ def _locally(sizes: Array, at: NDArray[np.intp], apart: int) -> NDArray[np.bool_
         for part in np.array_split(np.arange(at.size), at.size // _CHUNK + 1):
             near = at[part, None] + side
             inside = (near >= 0) & (near < sizes.size)
-            beside = np.where(inside, sizes[np.clip(near, 0, sizes.size - 1)], 0.0)
-            out[part] &= jump[part] > _OUT * np.median(beside, axis=1)
+            near_sizes = np.where(inside, sizes[np.clip(near, 0, sizes.size - 1)], 0.0)
+            out[part] &= jump[part] > _OUT * np.median(near_sizes, axis=1)
     return out
 
 

@@ -61,9 +61,9 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
 
 
-def _with(trace: Trace, target: str, found: Evaluated, field: str, text: str) -> Trace:
+def _with(trace: Trace, target: str, evaluated: Evaluated, field: str, text: str) -> Trace:
     role = role_of(target)
-    quantity = found.quantity
+    quantity = evaluated.quantity
     kind = kind_of_dimension(quantity.dimension)
     _check_kind(role, kind, quantity, field)
     shape = trace.time.shape
@@ -78,13 +78,15 @@ def _with(trace: Trace, target: str, found: Evaluated, field: str, text: str) ->
         channels = {kept if name == target else name: c for name, c in channels.items()}
         findings = tuple(_moved(f, target, kept) for f in findings)
         roles = {r: kept if name == target else name for r, name in roles.items()}
-        found = replace(found, sources=tuple(kept if s == target else s for s in found.sources))
+        evaluated = replace(
+            evaluated, sources=tuple(kept if s == target else s for s in evaluated.sources)
+        )
     channels[target] = channel
     if role is not None:
         roles[role] = target
     alone = check(Trace(trace.time, {target: channel}))
     own = [f for f in alone if f.name not in _OF_TIME and not f.where.startswith("time,")]
-    inherited = _inherited(findings, found.sources, target, {f.name for f in own})
+    inherited = _inherited(findings, evaluated.sources, target, {f.name for f in own})
     return replace(trace, channels=channels, findings=(*findings, *own, *inherited), roles=roles)
 
 
@@ -176,10 +178,10 @@ def _inherited(
             about = f.where == source or f.where.startswith(f"{source}, ")
             if not about or f.name in (*own, "unknown unit", "unit overridden", "constant"):
                 continue
-            said = f"'{target}' is made from '{source}': {f.sentence}"
+            sentence = f"'{target}' is made from '{source}': {f.sentence}"
             where = f"{target}{f.where.removeprefix(source)}"
             name = f.name if f.name.startswith("source ") else f"source {f.name}"
-            made.append(Finding(name, f.severity, f.number, where, said))
+            made.append(Finding(name, f.severity, f.number, where, sentence))
     return made
 
 

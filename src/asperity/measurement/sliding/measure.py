@@ -298,7 +298,7 @@ def _steps(
     degree: int,
 ) -> tuple[list[VelocityStep], list[str]]:
     """Every change between two sliding segments, and sentences on those that cannot be read."""
-    found: list[VelocityStep] = []
+    steps: list[VelocityStep] = []
     unread: list[str] = []
     # The first segment may begin with the loading.
     first = segments[0]
@@ -325,22 +325,22 @@ def _steps(
             unread.append(f"the step at {change.time:.6g} s does not settle in what was recorded")
             settling = np.inf
             continue
-        found.append(step)
+        steps.append(step)
         settling = step.settling_slip
-    return found, unread
+    return steps, unread
 
 
 def _holds(
     signals: SlidingSignals, cut: Partition, bounds: list[int], degree: int
 ) -> list[HoldReading]:
-    found = []
+    holds = []
     for k, hold in enumerate(cut.holds):
         if not hold or k in (0, len(cut.holds) - 1):
             continue
         a, b, c, d = bounds[k - 1 : k + 3]
         if min(b - a, d - c) < _FEWEST or c - b < 2:
             continue
-        found.append(
+        holds.append(
             read_hold(
                 signals.time,
                 signals.friction,
@@ -352,7 +352,7 @@ def _holds(
                 settling=k > 1,
             )
         )
-    return found
+    return holds
 
 
 def _rates(time: Array) -> tuple[tuple[float, float], ...]:

@@ -337,29 +337,32 @@ def _transition(
     """The least of the transitions, the neighbour to join it to, and its share of that."""
     least: tuple[int, int, float] | None = None
     for k in range(len(speeds)):
-        beside = [j for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
+        neighbours = [j for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
         speed = abs(speeds[k])
-        if len(beside) == 2 and speed < 0.2 * min(abs(speeds[j]) for j in beside):
+        if len(neighbours) == 2 and speed < 0.2 * min(abs(speeds[j]) for j in neighbours):
             continue  # a stop is no transition, however short
-        spans, paths = [float(duration[j]) for j in beside], [float(path[j]) for j in beside]
-        same = len(beside) == 2 and _log_ratio(speeds[k - 1], speeds[k + 1]) < np.log(_RATIO)
+        spans, paths = (
+            [float(duration[j]) for j in neighbours],
+            [float(path[j]) for j in neighbours],
+        )
+        same = len(neighbours) == 2 and _log_ratio(speeds[k - 1], speeds[k + 1]) < np.log(_RATIO)
         span, slid = (sum(spans), sum(paths)) if same else (min(spans), min(paths))
         share = max(duration[k] / max(span, 1e-300), path[k] / max(slid, 10 * noise))
-        between = len(beside) == 2 and min(abs(speeds[j]) for j in beside) < speed < max(
-            abs(speeds[j]) for j in beside
+        between = len(neighbours) == 2 and min(abs(speeds[j]) for j in neighbours) < speed < max(
+            abs(speeds[j]) for j in neighbours
         )
         if between:
             share = min(share, _share_of_ramp(k, duration, path, speeds, noise))
         few = between and bounds[k + 1] - bounds[k] <= _FEW_CELLS
-        near = min(beside, key=lambda j: _log_ratio(speeds[k], speeds[j]))
+        near = min(neighbours, key=lambda j: _log_ratio(speeds[k], speeds[j]))
         # Displacement of the contact, not of the machine, overshoots and settles after a step.
         own = max(duration[k] / max(duration[near], 1e-300), path[k] / max(path[near], 10 * noise))
         settles = (
-            len(beside) == 2
+            len(neighbours) == 2
             and own < _SETTLING
             and _log_ratio(speeds[k], speeds[near]) < np.log(_SETTLING_RATIO)
             and _log_ratio(speeds[k], speeds[near])
-            < 0.7 * max(_log_ratio(speeds[k], speeds[j]) for j in beside)
+            < 0.7 * max(_log_ratio(speeds[k], speeds[j]) for j in neighbours)
         )
         limit = _RAMP if between else _DISTURBANCE if same else _TRANSITION
         if share < limit or few:
@@ -485,11 +488,11 @@ def _holds(
 ) -> tuple[list[bool], list[str]]:
     holds, doubts = [], []
     for k, (first, stop) in enumerate(pieces):
-        beside = [abs(speeds[j]) for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
-        if not beside:
+        neighbours = [abs(speeds[j]) for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
+        if not neighbours:
             holds.append(False)
             continue
-        share = abs(speeds[k]) / max(min(beside), 1e-300)
+        share = abs(speeds[k]) / max(min(neighbours), 1e-300)
         moved = abs(float(displacement[stop - 1] - displacement[first]))
         still = share < _HOLD or (share < 0.2 and moved < _CELL_NOISE * noise)
         holds.append(bool(still))

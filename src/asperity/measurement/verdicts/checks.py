@@ -192,14 +192,14 @@ def resolution(reading: LockInReading, load: Array, force: Array) -> Check:
     Noise of half a step smooths them; without it a harmonic below a step is no harmonic.
     """
     heights = (reading.epsilon, reading.phasor(1).amplitude)
-    found = []
+    answers = []
     for c, (name, values) in enumerate((("load", load), ("force", force))):
         steps = np.diff(np.unique(values[: 1 << 14]))
         step = float(steps.min()) if steps.size else 0.0
         noise = float(np.sqrt(reading.noise.spectra[1:, c, c].real.mean()))
         number = step / max(heights[c] * abs(reading.W0), 1e-300)
-        found.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))
-    seen, number, name, noisy = max(found)
+        answers.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))
+    seen, number, name, noisy = max(answers)
     return judged(
         "resolution",
         number,
@@ -210,34 +210,36 @@ def resolution(reading: LockInReading, load: Array, force: Array) -> Check:
     )
 
 
-def findings(found: list[Finding], samples: int, span: float) -> list[Check]:
+def findings(noticed: list[Finding], samples: int, span: float) -> list[Check]:
     """What the reader and the checks of the recording say about the window.
 
     Parameters
     ----------
-    found : list of Finding
+    noticed : list of Finding
     samples : int
         In the window.
     span : float
         Its length (s).
     """
-    return [_finding(finding, samples, span) for finding in found]
+    return [_finding(finding, samples, span) for finding in noticed]
 
 
-def _finding(found: Finding, samples: int, span: float) -> Check:
-    sentence = found.sentence.rstrip(".") + (f" ({found.where})" if found.where else "")
+def _finding(finding: Finding, samples: int, span: float) -> Check:
+    sentence = finding.sentence.rstrip(".") + (f" ({finding.where})" if finding.where else "")
     # Shares of the window, where the number of the finding can be made one.
     shares = {
         "saturation": 1.0,
         **dict.fromkeys(("spike", "repeated time", "nan", "infinite"), 1 / samples),
         "gap": 1 / span,
     }
-    if found.name in shares:
-        return judged(found.name, found.number * shares[found.name], LIMITS[found.name], sentence)
-    if found.name in LIMITS:
-        return judged(found.name, found.number, LIMITS[found.name], sentence)
-    grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[found.severity]
-    return judged(found.name, 1.0, grave, sentence)
+    if finding.name in shares:
+        return judged(
+            finding.name, finding.number * shares[finding.name], LIMITS[finding.name], sentence
+        )
+    if finding.name in LIMITS:
+        return judged(finding.name, finding.number, LIMITS[finding.name], sentence)
+    grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[finding.severity]
+    return judged(finding.name, 1.0, grave, sentence)
 
 
 def _nonzero(value: float) -> float:

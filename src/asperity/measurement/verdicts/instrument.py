@@ -206,7 +206,7 @@ def lines_in_the_pauses(
     parts : list of LoadInterval
         Modulated and unmodulated parts of the recording.
     """
-    found: tuple[float, str, bool] | None = None
+    largest: tuple[float, str, bool] | None = None
     for part in parts:
         if part.modulated:
             continue
@@ -226,15 +226,15 @@ def lines_in_the_pauses(
             number = line / height
             # What is smaller than the uncertainty of the harmonic changes nothing that is reported.
             seen = line > _SEEN * doubt and line > own.amplitude_uncertainty * abs(reading.W0)
-            if found is None or (seen, number) > (found[2], found[0]):
+            if largest is None or (seen, number) > (largest[2], largest[0]):
                 sentence = (
                     f"without modulation the force has a line of {number:.2g} mu{n} W0 at {f:.6g} "
                     "Hz: mains, cross-talk or the drive, which is part of what is read"
                 )
-                found = number, sentence, seen
-    if found is None:
+                largest = number, sentence, seen
+    if largest is None:
         return ()
-    number, sentence, seen = found
+    number, sentence, seen = largest
     if not seen:
         sentence = "without modulation the force has no line at f and 2f that stands out"
     limits = LIMITS["lines in the pauses"]
@@ -392,9 +392,9 @@ def _compared(cycle: _Cycle) -> tuple[float, _Level]:
     for harmonics in range(1, min(_CUT, most // 2) + 1):
         for side in ("at its top", "at its bottom", "at its top and bottom"):
             for share in _STARTS:
-                found = _cut_off(cycle, columns[:, : 2 * harmonics + 1], side, share)
-                if found.criterion < best.criterion:
-                    best = found
+                level = _cut_off(cycle, columns[:, : 2 * harmonics + 1], side, share)
+                if level.criterion < best.criterion:
+                    best = level
     return least - best.criterion, best
 
 

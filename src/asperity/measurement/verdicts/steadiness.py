@@ -57,16 +57,16 @@ def slow_line(reading: LockInReading, time: Array, force: Array) -> SpectralLine
     # Means over a third of a period keep what is slower.
     span = float(time[piece][-1] - time[piece][0])
     blocks = int(min(left.size, max(64, 3.3 * highest * span)))
-    found = [_below(block_means(time[piece], blocks), block_means(left, blocks), highest)]
+    candidates = [_below(block_means(time[piece], blocks), block_means(left, blocks), highest)]
     if time.size > _PIECE:
         count = reading.blocks.count
         slow = reading.residual[:-1, 0, 1].real / count[:-1]
-        found.append(_below(reading.blocks.middle[:-1], slow, 0.9 * f))
+        candidates.append(_below(reading.blocks.middle[:-1], slow, 0.9 * f))
     # Above the modulation, harmonics beyond those that are fitted are no oscillations of their own.
     width = 2 / span
     lines = [
         line
-        for line in found
+        for line in candidates
         if line is not None
         and (
             line.frequency < 0.9 * f
@@ -223,7 +223,7 @@ def shifting_response(reading: LockInReading, time: Array, force: Array) -> Chec
     omega = 2 * np.pi * reading.frequency
     orders = range(1, reading.harmonics.size + 1)
     middle = (reading.start + reading.end) / 2
-    found = []
+    responses = []
     for piece in np.array_split(np.arange(time.size), pieces):
         t = time[piece]
         u = (t - t[0]) / (t[-1] - t[0]) - 0.5
@@ -232,8 +232,8 @@ def shifting_response(reading: LockInReading, time: Array, force: Array) -> Chec
             angle = n * omega * (t - middle)
             columns += [np.cos(angle), np.sin(angle)]
         beta = np.linalg.lstsq(np.stack(columns, axis=1), force[piece])[0]
-        found.append(complex(beta[2], -beta[3]))
-    phasors = np.array(found)
+        responses.append(complex(beta[2], -beta[3]))
+    phasors = np.array(responses)
     mean = phasors.mean()
     # Of noise alone: the uncertainty of a harmonic that settles is that of what it settles to.
     # Amplitude over a piece has half the variance of a complex phasor: two components a piece.

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.errors import InputError, listed
 from asperity.recording.finding import Finding
+from asperity.recording.readers.units import Unit, in_si
 from asperity.recording.roles import candidates, words
 from asperity.units import to_si
 
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from asperity.recording.readers.raw import RawRecording
-    from asperity.recording.readers.units import Unit
 
 #: Orders of day and month, each with both clocks.
 _DATES = ("%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%m-%Y", "%d.%m.%y", "%m/%d/%y", "%d/%m/%y")
@@ -77,14 +76,14 @@ def settle_time(
         return _from_column(roles["time"], values, units)
     kinds = {name: units[name].kind if name in units else None for name in values}
     exact = [n for n in candidates("time", kinds) if "".join(words(n)) in ("time", "t")]
-    found = exact if len(exact) == 1 else candidates("time", kinds)
-    if len(found) > 1:
+    fitting = exact if len(exact) == 1 else candidates("time", kinds)
+    if len(fitting) > 1:
         raise InputError(
-            f"columns['time'] must be chosen, got {' and '.join(map(repr, found))}, which both "
-            f"can be it; choose one, like columns={{'time': '{found[0]}'}}"
+            f"columns['time'] must be chosen, got {' and '.join(map(repr, fitting))}, which both "
+            f"can be it; choose one, like columns={{'time': '{fitting[0]}'}}"
         )
-    if found:
-        return _from_column(found[0], values, units)
+    if fitting:
+        return _from_column(fitting[0], values, units)
     if recorded.step is not None:
         time = np.asarray(recorded.start + np.arange(rows) * recorded.step)
         return Clock(time, f"interval of {recorded.step:.10g} s in the file")
@@ -106,7 +105,7 @@ def _from_first_column(
             f"'{first}'}}, or give the sampling rate, like rate='10 kHz'"
         )
     clock = _from_column(first, values, units)
-    said = Finding(
+    assumed = Finding(
         "no header",
         "warning",
         len(values),
@@ -114,7 +113,7 @@ def _from_first_column(
         "The file names no columns; the first, which only rises, was taken for time; say "
         "columns={'time': 0} to confirm, and name the units.",
     )
-    return Clock(clock.time, clock.source, first, [said, *clock.findings])
+    return Clock(clock.time, clock.source, first, [assumed, *clock.findings])
 
 
 def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[str, Unit]) -> Clock:
@@ -123,7 +122,7 @@ def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[s
         return _from_dates(name, raw)
     unit = units.get(name)
     if unit is None:
-        said = Finding(
+        assumed = Finding(
             "unknown unit",
             "warning",
             1.0,
@@ -131,13 +130,8 @@ def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[s
             f"The file states no unit of '{name}' that is known; seconds were assumed, until "
             f"units={{'{name}': ...}} says otherwise.",
         )
-        return Clock(np.asarray(raw, dtype=np.float64), f"column '{name}'", name, [said])
-    seconds = np.asarray(raw, dtype=np.float64)
-    if unit.factor < 1:
-        seconds = seconds / float(Decimal(1) / unit.factor)
-    elif unit.factor > 1:
-        seconds = seconds * float(unit.factor)
-    return Clock(seconds, f"column '{name}'", name)
+        return Clock(np.asarray(raw, dtype=np.float64), f"column '{name}'", name, [assumed])
+    return Clock(in_si(raw, unit), f"column '{name}'", name)
 
 
 def _from_dates(name: str, raw: NDArray[Any]) -> Clock:

@@ -198,26 +198,26 @@ def _columns(
     """Channels one behind the other; of a file that is cut, those that can be used."""
     ends = np.cumsum([c.elements for c in header.channels])
     lost = max(0, int(ends[-1]) - data.size)
-    found = []
+    arrays = []
     for channel, end in zip(header.channels, ends.tolist(), strict=True):
-        found.append(data[end - channel.elements : end])
-    whole = [v.size == c.elements for c, v in zip(header.channels, found, strict=True)]
-    columns = list(zip(header.channels, found, strict=True))
+        arrays.append(data[end - channel.elements : end])
+    whole = [v.size == c.elements for c, v in zip(header.channels, arrays, strict=True)]
+    columns = list(zip(header.channels, arrays, strict=True))
     findings: list[Finding] = []
-    if lost and all(whole[:-1]) and found[-1].size:
+    if lost and all(whole[:-1]) and arrays[-1].size:
         # The cut is in the last column: the rows before it are whole.
-        kept = found[-1].size
+        kept = arrays[-1].size
         where = f"row {kept}"
-        said = f"{lost} rows lack their last column, and were left out."
+        loss = f"{lost} rows lack their last column, and were left out."
         columns = [(c, v[:kept]) for c, v in columns]
     elif lost:
         where = ", ".join(
             f"'{c.name}'" for c, ok in zip(header.channels, whole, strict=True) if not ok
         )
-        said = f"{where} could not be read, being stored behind the cut."
+        loss = f"{where} could not be read, being stored behind the cut."
         columns = [pair for pair, ok in zip(columns, whole, strict=True) if ok]
     if lost:
-        findings.append(truncated(path, lost, where, f"{lost} numbers are missing; {said}"))
+        findings.append(truncated(path, lost, where, f"{lost} numbers are missing; {loss}"))
     if not columns:
         raise refuse_truncated(path, "which ends within its first column")
     rows = max(values.size for _, values in columns)

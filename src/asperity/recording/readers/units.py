@@ -11,6 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.recording.roles import ROLES, candidates
@@ -176,6 +180,19 @@ def required(text: str, name: str) -> Unit:
             f"SI, got '{shortened(text)}'; give what one recorded unit is, like '12.5 N'"
         )
     return Unit(unit.kind, factor)
+
+
+def in_si(values: NDArray[Any], unit: Unit | None) -> NDArray[np.float64]:
+    """Values times the factor of the unit, rounded once."""
+    values = np.asarray(values, dtype=np.float64)
+    if unit is None or unit.factor == 1:
+        return values
+    # What overflows in a damaged file becomes infinite, which the checks report.
+    with np.errstate(over="ignore"):
+        # 10^-n is inexact in binary, 10^n is not.
+        if abs(unit.factor) < 1:
+            return values / float(Decimal(1) / unit.factor)
+        return values * float(unit.factor)
 
 
 def split_labels(labels: Sequence[str]) -> list[tuple[str, str]]:
