@@ -64,7 +64,7 @@ _HOMES = {
     "perturbation_response": ("theory", "perturbation_response"),
     "read": ("recording.readers", "read"),
     "response_function": ("orbit", "response_function"),
-    "run": ("protocol.from_file", "run_experiment"),
+    "run": ("protocol.run", "run_experiment"),
     "sensitivities": ("orbit", "sensitivities"),
     "stability_boundary": ("branches", "stability_boundary"),
     "transient": ("transients", "transient"),

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, printable
-from asperity.loads.excitation import Excitation
-from asperity.loads.harmonic import Harmonic
-from asperity.loads.modulation import Modulation
+from asperity.loads.modulation import Excitation, Harmonic, Modulation
 from asperity.loads.periodic import Periodic
 from asperity.parameters.arguments import instance, shown
 

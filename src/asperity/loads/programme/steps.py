@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 from asperity.errors import InputError
 from asperity.loads.consistency import checked_modulation
 from asperity.loads.modulation import Modulation
-from asperity.loads.programme.harmonic import HarmonicSegment
-from asperity.loads.programme.periodic import PeriodicSegment
+from asperity.loads.programme.formulas import HarmonicSegment, PeriodicSegment
 from asperity.loads.programme.recorded import RecordedSegment, interpolated
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.parameters.arguments import number
