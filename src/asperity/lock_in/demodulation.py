@@ -133,11 +133,11 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     gram, moments = blocks.totals()
     inner = inverted(gram[:linear, :linear])
     beta = inner @ moments[:linear]
-    own = _own_columns(basis, beta[:, 0], refine)
-    outer = inverted(own.T @ gram @ own)
+    selected = _own_columns(basis, beta[:, 0], refine)
+    outer = inverted(selected.T @ gram @ selected)
     slope, change = np.zeros(linear), 0.0
     if refine:
-        solution = outer @ (own.T @ moments[:, 0])
+        solution = outer @ (selected.T @ moments[:, 0])
         change = float(solution[linear])
         slope = -inner @ (gram @ frequency_direction(basis, beta[:, 1]))[:linear]
         beta = np.stack([solution[:linear], beta[:, 1] + slope * change], axis=1)
@@ -146,16 +146,16 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     if settles:
         white = float(_white(blocks, residual_sums(blocks, full))[1, 1])
         settlings = find_settlings(blocks, 1, full[:, 1], inner, white)
-        settled = without(blocks, 1, settlings)
-        beta[:, 1] -= inner @ (moments - settled.totals()[1])[:linear, 1]
-        blocks, full = settled, _on_basis(basis, beta, change)
+        without_settling = without(blocks, 1, settlings)
+        beta[:, 1] -= inner @ (moments - without_settling.totals()[1])[:linear, 1]
+        blocks, full = without_settling, _on_basis(basis, beta, change)
     residual = residual_sums(blocks, full)
     mean_settles = any(s.present and not s.order for s in settlings)
     noise = local_noise(blocks, residual, _white(blocks, residual), mean_settles)
     plain = np.eye(basis.size)[:, :linear]
-    disturbed = sum_covariance(basis, gram, noise, (own, plain))
+    disturbed = sum_covariance(basis, gram, noise, (selected, plain))
     # Errors of (beta of the load, omega, beta of the force) are linear in the sums of the noise.
-    size = own.shape[1]
+    size = selected.shape[1]
     errors = np.zeros((size + linear, size + linear))
     errors[:size, :size], errors[size:, size:] = outer, inner
     if refine:
@@ -172,10 +172,10 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
 
 def _own_columns(basis: Basis, load: Array, refine: bool) -> Array:
     """Columns of the fit of the load, the frequency last; (size, linear + refine)."""
-    own = np.eye(basis.size)[:, : basis.linear + refine]
+    selected = np.eye(basis.size)[:, : basis.linear + refine]
     if refine:
-        own[:, basis.linear] = frequency_direction(basis, load)
-    return own
+        selected[:, basis.linear] = frequency_direction(basis, load)
+    return selected
 
 
 def _on_basis(basis: Basis, beta: Array, change: float) -> Array:

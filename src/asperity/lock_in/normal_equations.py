@@ -437,9 +437,9 @@ def _even(basis: Basis, time: Array, channels: list[Array], length: int, step: f
     table = basis.columns(basis.centre + step * np.arange(float(length)))
     whole = time.size // length
     parts = [_turned(basis, time[0], channels, table, step, 0, whole)]
-    if rest := time.size - whole * length:
+    if left := time.size - whole * length:
         tail = [channel[whole * length :] for channel in channels]
-        parts.append(_turned(basis, time[0], tail, table[:, :rest].copy(), step, whole * length, 1))
+        parts.append(_turned(basis, time[0], tail, table[:, :left].copy(), step, whole * length, 1))
     return join(parts)
 
 

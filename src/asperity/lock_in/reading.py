@@ -333,10 +333,10 @@ def _jacobian(
     level[:first] = average / mean_load
     mean[linear + fitted :][:first] = average
     # Relative change of the load's fundamental: real part amplitude, imaginary part phase.
-    own = load[0] / phasors[0, 0]
+    fundamental = load[0] / phasors[0, 0]
     order = np.arange(1, n + 1)[:, None]
     turn = np.exp(-1j * np.angle(phasors[0, 0] / mean_load) * order) / mean_load
-    lost = 1j * order * own.imag + level
+    lost = 1j * order * fundamental.imag + level
     force_rows = turn * force - relative[:, 1:] * lost
     load_rows = turn * load - relative[:, :1] * lost
     frequency = np.zeros(size)
@@ -346,7 +346,7 @@ def _jacobian(
     return np.vstack(
         [
             level * mean_load,
-            abs(relative[0, 0]) * (own.real - level),
+            abs(relative[0, 0]) * (fundamental.real - level),
             frequency,
             mean,
             mean / mean_load - friction * level,

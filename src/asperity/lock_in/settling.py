@@ -105,7 +105,7 @@ class Settling:
         return self.odds > 1
 
     @property
-    def told(self) -> bool:
+    def determined(self) -> bool:
         """Whether its end lies in the window."""
         return self.unfinished < 0.05
 

@@ -461,7 +461,7 @@ def _settled_level(time: Array, force: Array) -> MeanLevel | None:
     if settling.present:
         force = force - settling.at(time - time[0])
     level = mean_level(time, force)
-    if settling.present and not settling.told:
+    if settling.present and not settling.determined:
         limit = checks.LIMITS["transient"][0]
         if abs(settling.amplitude) > limit * abs(level.value):
             return None

@@ -77,7 +77,7 @@ def modulated_record(measurement: Measurement) -> dict[str, Any]:
                 "order": settling.order,
                 "decay": settling.decay,
                 "amplitude": abs(settling.amplitude),
-                "ends_in_window": settling.told,
+                "ends_in_window": settling.determined,
             }
             for settling in reading.settlings
             if settling.present

@@ -117,12 +117,12 @@ def steady_from(values: Array, degree: int) -> int:
         return 0
     errors = []
     for cut in range(n // 2 + 1):
-        rest = values[cut:]
-        u = np.linspace(-1, 1, rest.size)
+        late = values[cut:]
+        u = np.linspace(-1, 1, late.size)
         columns = np.polynomial.legendre.legvander(u, degree)
-        beta = np.linalg.lstsq(columns, rest)[0]
-        spread = np.sum((rest - columns @ beta) ** 2) / (rest.size - degree - 1)
-        errors.append(spread / rest.size)
+        beta = np.linalg.lstsq(columns, late)[0]
+        spread = np.sum((late - columns @ beta) ** 2) / (late.size - degree - 1)
+        errors.append(spread / late.size)
     error = np.array(errors)
     return int(np.argmax(error <= error.min() * (1 + 3 * np.sqrt(2 / n)) + 1e-300))
 

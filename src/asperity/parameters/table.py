@@ -254,9 +254,11 @@ def law_parameters(law: Any) -> Mapping[str, Parameter]:
                 f"law.{name} must have a name that is free, got '{name}', which is the "
                 f"{EXPERIMENT[name].meaning}; rename the field of {law.__name__}"
             )
-        own = declared.metadata.get("parameter")
+        parameter = declared.metadata.get("parameter")
         # A field without declaration is a pure number.
-        parameters[name] = own or Parameter(name, "dimensionless", "finite", label=f"law.{name}")
+        parameters[name] = parameter or Parameter(
+            name, "dimensionless", "finite", label=f"law.{name}"
+        )
         path = f"system.slider.law.{declared.name}"
         parameters[name] = dataclasses.replace(parameters[name], name=name, path=path)
     return MappingProxyType(parameters)

@@ -48,7 +48,7 @@ _STRICT = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
 def numbers_of(
     law_name: str,
-    given: Mapping[str, float | str],
+    stated: Mapping[str, float | str],
     material: str,
     folder: Path,
     inertia: bool,
@@ -58,7 +58,7 @@ def numbers_of(
     Parameters
     ----------
     law_name : str
-    given : mapping of str to float or str
+    stated : mapping of str to float or str
     material : str
         Name, or file relative to `folder`; empty for none.
     folder : Path
@@ -74,7 +74,7 @@ def numbers_of(
     law = get_law(law_name)
     known = {**law_parameters(law), **MACHINE}
     names = tuple(known)
-    for name in given:
+    for name in stated:
         if canonical_name(name, known) is None:
             owners = [n for n, other in registered().items() if name in law_parameters(other)]
             raise InputError(
@@ -86,7 +86,7 @@ def numbers_of(
     if material:
         file = material.endswith(".toml")
         source = materials.load(folder / material if file else material)
-    numbers = sourced_numbers(given, source, "protocol", law_name)
+    numbers = sourced_numbers(stated, source, "protocol", law_name)
     needed = [n for n in names if known[n].default is None or (n == "M" and inertia)]
     missing = [n for n in needed if n not in numbers]
     if missing:

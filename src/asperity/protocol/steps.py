@@ -311,25 +311,25 @@ def _planned(
     steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[str]
 ) -> list[PlannedStep]:
     planned: list[PlannedStep] = []
-    for number, given in enumerate(steps, start=1):
+    for number, step in enumerate(steps, start=1):
         place = f"{prefix}{number}"
         try:
-            planned += _one(given, place, folder, mistakes)
+            planned += _one(step, place, folder, mistakes)
         except InputError as error:
             mistakes.append(str(error))
     return planned
 
 
-def _one(given: Any, place: str, folder: Path, mistakes: list[str]) -> list[PlannedStep]:
-    if isinstance(given, ProgrammeStep):
-        return [PlannedStep(place, repr(given), given)]
-    if isinstance(given, str):
-        line = " ".join(given.split())
+def _one(step: Any, place: str, folder: Path, mistakes: list[str]) -> list[PlannedStep]:
+    if isinstance(step, ProgrammeStep):
+        return [PlannedStep(place, repr(step), step)]
+    if isinstance(step, str):
+        line = " ".join(step.split())
         if line.lower().split(" ")[0] != "repeat":
             return [PlannedStep(place, line, parse_step(line, place, folder))]
         times, inner = _repetition(line, place)
     else:
-        times, inner = given.repeat, given.steps
+        times, inner = step.repeat, step.steps
     block = _planned(inner, f"{place}.", folder, mistakes)
     if times * len(block) > MOST:
         raise InputError(

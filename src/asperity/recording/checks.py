@@ -154,14 +154,14 @@ def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
 
 def _most_at_a_level(values: Array, extreme: float, side: str) -> int | None:
     """Samples at the fullest of the values next to the extreme; None if there are too few."""
-    rest, most = values, 0
+    left, most = values, 0
     level = extreme
     for _ in range(_LEVELS):
-        rest = rest[rest < level] if side == "largest" else rest[rest > level]
-        if not rest.size:
+        left = left[left < level] if side == "largest" else left[left > level]
+        if not left.size:
             return None
-        level = rest.max() if side == "largest" else rest.min()
-        most = max(most, int(np.count_nonzero(rest == level)))
+        level = left.max() if side == "largest" else left.min()
+        most = max(most, int(np.count_nonzero(left == level)))
     return most
 
 

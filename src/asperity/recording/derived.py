@@ -85,9 +85,9 @@ def _with(trace: Trace, target: str, evaluated: Evaluated, field: str, text: str
     if role is not None:
         roles[role] = target
     alone = check(Trace(trace.time, {target: channel}))
-    own = [f for f in alone if f.name not in _OF_TIME and not f.where.startswith("time,")]
-    inherited = _inherited(findings, evaluated.sources, target, {f.name for f in own})
-    return replace(trace, channels=channels, findings=(*findings, *own, *inherited), roles=roles)
+    direct = [f for f in alone if f.name not in _OF_TIME and not f.where.startswith("time,")]
+    inherited = _inherited(findings, evaluated.sources, target, {f.name for f in direct})
+    return replace(trace, channels=channels, findings=(*findings, *direct, *inherited), roles=roles)
 
 
 def _with_time(trace: Trace, time: NDArray[np.float64], field: str, text: str) -> Trace:
@@ -169,14 +169,14 @@ def _quantity(channel: Channel, key: str, field: str) -> Quantity:
 
 
 def _inherited(
-    findings: tuple[Finding, ...], sources: tuple[str, ...], target: str, own: set[str]
+    findings: tuple[Finding, ...], sources: tuple[str, ...], target: str, known: set[str]
 ) -> list[Finding]:
     """What is known of the sources that a check of the new channel may not see."""
     made = []
     for source in sources:
         for f in findings:
             about = f.where == source or f.where.startswith(f"{source}, ")
-            if not about or f.name in (*own, "unknown unit", "unit overridden", "constant"):
+            if not about or f.name in (*known, "unknown unit", "unit overridden", "constant"):
                 continue
             sentence = f"'{target}' is made from '{source}': {f.sentence}"
             where = f"{target}{f.where.removeprefix(source)}"

@@ -58,10 +58,10 @@ class Recorder:
 
     def __post_init__(self) -> None:
         for name, kind in (("rate", "frequency"), ("cut_off", "frequency"), ("jitter", "time")):
-            given = getattr(self, name)
-            if given is None:
+            stated = getattr(self, name)
+            if stated is None:
                 continue
-            value = to_si(given, kind, f"Recorder.{name}")
+            value = to_si(stated, kind, f"Recorder.{name}")
             if value < 0 or (value == 0 and name != "jitter"):
                 raise InputError(
                     f"Recorder.{name} must be positive, got {value:g} {KINDS[kind].si}; "

@@ -201,9 +201,9 @@ def _transient(
     def free(values: Array) -> Array:
         return np.asarray(values - base @ (base.T @ values))
 
-    rest = free(friction)
-    own = np.stack([free(stepped - wave) for wave in waves])
-    gram, moment = own @ own.T, own @ rest
+    free_friction = free(friction)
+    free_waves = np.stack([free(stepped - wave) for wave in waves])
+    gram, moment = free_waves @ free_waves.T, free_waves @ free_friction
     gain, chosen, amplitudes = -1.0, (0, 1), np.zeros(2)
     for slow in range(1, decays.size):
         for fast in range(slow):

@@ -89,18 +89,19 @@ def load_harmonics(reading: LockInReading) -> Check:
     """How much of mu2 can come from a second harmonic of the load."""
     if reading.harmonics.size < 2:
         return judged("load harmonics", 0.0, LIMITS["load harmonics"], "mu2 was not asked for")
-    second, own = reading.load_phasor(2), reading.phasor(2)
+    second, response = reading.load_phasor(2), reading.phasor(2)
     share = second.amplitude
     effect = reading.phasor(1).amplitude / abs(reading.epsilon) * share
-    number = effect / max(own.amplitude, 1e-300)
+    number = effect / max(response.amplitude, 1e-300)
     return judged(
         "load harmonics",
         number,
         LIMITS["load harmonics"],
         f"the load's second harmonic is {share:.3g} W0; answered as the first is, it makes "
-        f"{effect:.2g} of mu2 = {own.amplitude:.3g}, and at most "
+        f"{effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
         f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once",
-        significant=share > 4 * second.amplitude_uncertainty and effect > own.amplitude_uncertainty,
+        significant=share > 4 * second.amplitude_uncertainty
+        and effect > response.amplitude_uncertainty,
     )
 
 
@@ -147,10 +148,10 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
             f"{lasts:.2g} of its time constants; "
         ) + (
             "what it settles to is read"
-            if settling.told
+            if settling.determined
             else "what it settles to cannot be told, record a longer stretch"
         )
-        seen = chosen_by == "user" or not settling.told
+        seen = chosen_by == "user" or not settling.determined
         return judged("transient", number, LIMITS["transient"], sentence, significant=seen)
     away = [drift_rate(reading).beyond(pause) for pause in pauses if reading.drift.shape[1]]
     # A pause that recovers from a modulation may drift too: none of them may explain the window.

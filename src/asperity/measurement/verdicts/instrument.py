@@ -147,9 +147,9 @@ def made_force(
     friction = force / np.where(load == 0, np.nan, load)
     good = np.isfinite(friction)
     friction, turn = friction[good] - np.mean(friction[good]), turn[good]
-    own = 2 * abs(np.mean(friction * (turn - np.mean(turn))))
+    modulated = 2 * abs(np.mean(friction * (turn - np.mean(turn))))
     whole = abs(reading.epsilon * reading.mean_friction)
-    number = float(own / whole) if whole else np.inf
+    number = float(modulated / whole) if whole else np.inf
     sentence = (
         f"the force was made from friction x load ('{name}'); the recorded coefficient is "
         f"modulated by {number:.2g} of epsilon times its mean"
@@ -221,11 +221,11 @@ def lines_in_the_pauses(
             line, doubt = _line(time, force, f)
             if not doubt < np.inf:
                 continue
-            own = reading.phasor(n)
-            height = max(own.amplitude, own.amplitude_uncertainty) * abs(reading.W0)
+            harmonic = reading.phasor(n)
+            height = max(harmonic.amplitude, harmonic.amplitude_uncertainty) * abs(reading.W0)
             number = line / height
             # What is smaller than the uncertainty of the harmonic changes nothing that is reported.
-            seen = line > _SEEN * doubt and line > own.amplitude_uncertainty * abs(reading.W0)
+            seen = line > _SEEN * doubt and line > harmonic.amplitude_uncertainty * abs(reading.W0)
             if largest is None or (seen, number) > (largest[2], largest[0]):
                 sentence = (
                     f"without modulation the force has a line of {number:.2g} mu{n} W0 at {f:.6g} "
@@ -283,8 +283,8 @@ def _line(time: Array, values: Array, frequency: float) -> tuple[float, float]:
         t, x = time[piece], values[piece]
         u = 2 * np.pi * np.arange(t.size) / t.size
         weight = (1 - np.cos(u)) / t.size
-        rest = x - np.polynomial.Polynomial.fit(t, x, 1)(t)
-        phasors.append(2 * np.sum(weight * rest * np.exp(-2j * np.pi * frequency * t)))
+        detrended = x - np.polynomial.Polynomial.fit(t, x, 1)(t)
+        phasors.append(2 * np.sum(weight * detrended * np.exp(-2j * np.pi * frequency * t)))
     mean = np.mean(phasors)
     # A network wanders: the pieces need not agree in phase as the mean does.
     scatter = np.sqrt(np.mean(np.abs(phasors - mean) ** 2) / (_LINE_PIECES - 1))

@@ -94,14 +94,14 @@ def _below(time: Array, values: Array, highest: float) -> SpectralLine | None:
 
 def _residual(basis: Basis, time: Array, force: Array) -> Array:
     """What a fit of its own leaves of a piece."""
-    own = Basis(
+    piece = Basis(
         basis.omega,
         basis.harmonics,
         basis.degree,
         float(time[0] + time[-1]) / 2,
         float(time[-1] - time[0]) / 2,
     )
-    columns = own.columns(time)[: own.linear]
+    columns = piece.columns(time)[: piece.linear]
     beta = solved(columns @ columns.T, columns @ force)
     return force - beta @ columns
 

@@ -51,10 +51,10 @@ def assemble(
     labels = {c.label: name for c, name in zip(recorded.columns, names, strict=True)}
     try:
         roles = _chosen_roles(columns or {}, names, labels)
-        given = _by_name(units or {}, names, labels, roles)
+        stated = _by_name(units or {}, names, labels, roles)
     except InputError as error:
         raise with_cause(error, findings) from None
-    known = _known_units(texts, given, findings)
+    known = _known_units(texts, stated, findings)
     _check_kinds(roles, known)
     values = {name: c.values for name, c in zip(names, recorded.columns, strict=True)}
     numbers = {name: v for name, v in values.items() if v.dtype.kind in "iufb"}
@@ -185,14 +185,14 @@ def _by_name(
 
 
 def _known_units(
-    texts: dict[str, str], given: Mapping[str, str], findings: list[Finding]
+    texts: dict[str, str], stated: Mapping[str, str], findings: list[Finding]
 ) -> dict[str, Unit]:
     """Units that are understood; what the user gives goes before what the file says."""
     known = {}
     for name, text in texts.items():
         unit = understood(text)
-        if name in given:
-            wanted = required(given[name], name)
+        if name in stated:
+            wanted = required(stated[name], name)
             if unit is not None and unit != wanted:
                 findings.append(
                     Finding(
@@ -200,7 +200,7 @@ def _known_units(
                         "note",
                         float(wanted.factor),
                         name,
-                        f"The file gives '{name}' in '{text}'; it was read in '{given[name]}', as "
+                        f"The file gives '{name}' in '{text}'; it was read in '{stated[name]}', as "
                         "asked.",
                     )
                 )
