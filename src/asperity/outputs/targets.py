@@ -149,7 +149,8 @@ def require_short(target: Path, files: Iterable[Path], name: str = "out") -> Non
     if length > _LONGEST:
         raise InputError(
             f"{name} must have a name of at most {_LONGEST - length + name_length} bytes, got "
-            f"{name_length}, which leaves no room for the names of files beside it; choose a shorter one"
+            f"{name_length}, which leaves no room for the names of files beside it; choose a "
+            "shorter one"
         )
 
 
