@@ -86,7 +86,8 @@ class AmplitudeSeries:
         -------
         xarray.Dataset
             ``measured_epsilon, mean_friction, static_friction, delta_mu, mu1, mu2, phase1,
-            phase2`` with ``..._uncertainty`` where there is one, ``drift`` and ``verdict``.
+            phase2`` with ``..._uncertainty`` where there is one, ``drift`` and ``verdict``; of
+            the harmonics, those that were read.
         """
         import xarray
 
@@ -94,6 +95,7 @@ class AmplitudeSeries:
         data = {
             name: ("epsilon", np.array([row[name] for row in rows]), {"units": unit})
             for name, unit in _UNITS.items()
+            if all(name in row for row in rows)
         }
         data["verdict"] = ("epsilon", np.array([p.measurement.verdict for p in self.points]), {})
         about = {"units": "1", "long_name": "commanded relative amplitude of the load"}
@@ -129,24 +131,15 @@ _UNITS = {
 def _row(point: AmplitudePoint) -> dict[str, float]:
     measurement = point.measurement
     reading = measurement.reading
-    row = {
+    row = reading.observables()
+    row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in row}
+    return row | {
         "measured_epsilon": reading.epsilon,
-        "mean_friction": reading.mean_friction,
-        "mean_friction_uncertainty": reading.uncertainty("mean_friction"),
         "static_friction": measurement.static_friction,
         "delta_mu": measurement.delta_mu,
         "delta_mu_uncertainty": measurement.delta_mu_uncertainty,
         "drift": point.drift,
     }
-    for n in (1, 2):
-        phasor = reading.phasor(n)
-        row |= {
-            f"mu{n}": phasor.amplitude,
-            f"mu{n}_uncertainty": phasor.amplitude_uncertainty,
-            f"phase{n}": phasor.phase,
-            f"phase{n}_uncertainty": phasor.phase_uncertainty,
-        }
-    return row
 
 
 @dataclass(frozen=True, eq=False)

@@ -163,6 +163,14 @@ class LockInReading:
         """Number of modulation periods in the window."""
         return (self.end - self.start) * self.frequency
 
+    def observables(self) -> dict[str, float]:
+        """W0, epsilon, frequency, mean_force, mean_friction, then mu1, phase1, ... by name."""
+        numbers = {name: float(getattr(self, name)) for name in _SCALARS}
+        for n in range(1, self.harmonics.size + 1):
+            phasor = self.phasor(n)
+            numbers |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
+        return numbers
+
     def uncertainty(self, name: str) -> float:
         """Standard uncertainty of a number; one of `names`, mu1, phase1, mu2, ...
 

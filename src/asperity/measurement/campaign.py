@@ -206,13 +206,9 @@ def modulated_rows(path: Path, measurements: Iterable[Measurement | InputError])
             "verdict": measurement.verdict,
             "reason": "",
         }
-        names = ["W0", "epsilon", "frequency", "mean_force", "mean_friction"]
-        row |= {name: float(getattr(reading, name)) for name in names}
-        for n in range(1, reading.harmonics.size + 1):
-            phasor = reading.phasor(n)
-            row |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
-            names += [f"mu{n}", f"phase{n}"]
-        row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in names}
+        observables = reading.observables()
+        row |= observables
+        row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in observables}
         row |= {
             "static_friction": measurement.static_friction,
             "delta_mu": measurement.delta_mu,

@@ -25,7 +25,6 @@ SLIDING_CONVENTIONS = (
     "change = level after less level before, both extrapolated to the step; "
     "healing = peak after a hold less level before it; uncertainties are standard uncertainties"
 )
-_SCALARS = ("W0", "epsilon", "frequency", "mean_force", "mean_friction")
 
 Array = NDArray[np.float64]
 
@@ -47,11 +46,7 @@ def modulated_record(measurement: Measurement) -> dict[str, Any]:
         Of numbers, texts, lists and dicts, in SI.
     """
     reading = measurement.reading
-    orders = range(1, reading.harmonics.size + 1)
-    values = {name: float(getattr(reading, name)) for name in _SCALARS}
-    for n in orders:
-        phasor = reading.phasor(n)
-        values |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
+    values = reading.observables()
     doubts = {name: reading.uncertainty(name) for name in values}
     intervals = {name: reading.half_width(name) for name in values}
     joint = observable_covariance(measurement)
