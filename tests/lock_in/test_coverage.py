@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from asperity.lock_in.demodulation import lock_in
-from asperity.lock_in.phasor import Phasor
+from asperity.lock_in.reading import Phasor
 
 SEEDS = 200
 NAMES = ("W0", "epsilon", "frequency", "mean_friction", "mu1", "phase1", "mu2", "phase2")

@@ -1,4 +1,9 @@
-"""The LOOK binary of xlook: columns behind a header of fixed size.
+"""The LOOK binary of xlook, the data program of the Penn State rock mechanics laboratory.
+
+The header is big-endian: title (20 bytes), number of records (int32), number of channels (int32),
+sweep (int32), ``dtime`` (float32); then 16 (older) or 32 headers of 84 bytes, one a channel: name
+(13 bytes), units (13), gain (float32), comment (50), number of elements (int32). Channels that are
+not used are called ``no_val``. Columns follow, one behind the other.
 
 Older files hold big-endian float32, as the header is; newer ones float64 in the byte order of the
 machine that wrote them, mostly little-endian. The header says nothing of it, so the size of the
@@ -7,16 +12,30 @@ file decides between 4 and 8 bytes, and the numbers themselves the byte order.
 
 from __future__ import annotations
 
+import string
+import struct
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
 from asperity.recording.finding import Finding
-from asperity.recording.readers.look.header import LookHeader, headers
-from asperity.recording.readers.raw import RawColumn, RawRecording, refuse_truncated, truncated
+from asperity.recording.readers.raw import (
+    RawColumn,
+    RawRecording,
+    beginning,
+    refuse_truncated,
+    truncated,
+)
 from asperity.recording.roles import candidates
+
+_START = struct.Struct(">20siiif")
+_CHANNEL = struct.Struct(">13s13sf50si")
+#: Headers that a file may have room for, the newer first.
+_SLOTS = (32, 16)
+_PRINTABLE = frozenset(string.printable.encode()) - frozenset(b"\t\n\r\x0b\x0c")
+_UNUSED = "no_val"
 
 #: Number formats, the likelier first.
 _TYPES = (">f4", "<f8", ">f8", "<f4")
@@ -27,12 +46,36 @@ _FITS = 0.4
 _SMALLEST, _LARGEST = 1e-12, 1e12
 
 
-def load(path: Path, group: str | None = None) -> RawRecording:
-    """Columns of a LOOK file; a `group` makes no sense in it and is refused."""
-    if group is not None:
-        raise InputError("read.group must be left out for LOOK files, got one; they have no groups")
+@dataclass(frozen=True)
+class _Channel:
+    """A channel that is in use."""
+
+    name: str
+    units: str
+    comment: str
+    elements: int
+
+
+@dataclass(frozen=True)
+class _Header:
+    """Header of a file, read with one number of slots."""
+
+    title: str
+    records: int
+    dtime: float
+    channels: tuple[_Channel, ...]
+    size: int
+
+
+def is_format(path: Path) -> bool:
+    """Whether the beginning of a file makes sense as a header."""
+    return bool(_headers(beginning(path)))
+
+
+def read(path: Path) -> RawRecording:
+    """Columns of a LOOK file; it has no groups."""
     raw = np.fromfile(path, dtype=np.uint8)
-    readings = headers(raw[: 1 << 12].tobytes())
+    readings = _headers(raw[: 1 << 12].tobytes())
     if not readings:
         raise refuse_truncated(path, "whose LOOK header is not whole or not one")
     header, dtype, sure = _layout(raw, readings)
@@ -63,13 +106,54 @@ def load(path: Path, group: str | None = None) -> RawRecording:
     return RawRecording(columns, findings, provenance)
 
 
+def _header_size(slots: int) -> int:
+    """Bytes before the data."""
+    return _START.size + slots * _CHANNEL.size
+
+
+def _headers(head: bytes) -> list[_Header]:
+    """Every reading of `head` that makes sense, with 32 slots and with 16."""
+    read = (_header(head, slots) for slots in _SLOTS if len(head) >= _header_size(slots))
+    return [header for header in read if header is not None]
+
+
+def _header(head: bytes, slots: int) -> _Header | None:
+    title, records, channels, _, dtime = _START.unpack_from(head)
+    if records < 1 or not 1 <= channels <= slots or _text(title) is None:
+        return None
+    behind = head[_header_size(slots) :][: len(_UNUSED)]
+    if behind and _UNUSED.encode().startswith(behind):
+        # The header goes on: a file of 32 slots that is cut within them.
+        return None
+    used = []
+    for i in range(slots):
+        fields = _CHANNEL.unpack_from(head, _START.size + i * _CHANNEL.size)
+        name, units, comment = (_text(fields[k]) for k in (0, 1, 3))
+        elements = fields[4]
+        if name is None or units is None or not 0 <= elements <= records:
+            return None
+        # An empty slot of a program that does not write `no_val` holds nothing.
+        if name and not name.startswith(_UNUSED):
+            # xlook itself takes a channel without a count for a full one.
+            used.append(_Channel(name, units, comment or "", elements or records))
+    if not used:
+        return None
+    return _Header(_text(title) or "", records, dtime, tuple(used), _header_size(slots))
+
+
+def _text(raw: bytes) -> str | None:
+    """Text up to its NUL; None if it holds what no text does."""
+    text = raw.partition(b"\0")[0]
+    return text.decode("ascii").strip() if _PRINTABLE.issuperset(text) else None
+
+
 def _as_doubles(data: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
     # NaN of a damaged file may be of the signalling sort.
     with np.errstate(all="ignore"):
         return data.astype(np.float64)
 
 
-def _layout(raw: np.ndarray[Any, Any], readings: list[LookHeader]) -> tuple[LookHeader, str, bool]:
+def _layout(raw: np.ndarray[Any, Any], readings: list[_Header]) -> tuple[_Header, str, bool]:
     """Header and number format that fit, and whether nothing else fits as well."""
     pairs = [(h, t) for h in readings for t in _TYPES]
     whole = [p for p in pairs if _needed(*p) == raw.size]
@@ -81,12 +165,12 @@ def _layout(raw: np.ndarray[Any, Any], readings: list[LookHeader]) -> tuple[Look
     return *fitting[best], all(scores[best] - s > 0.05 for s in others)
 
 
-def _needed(header: LookHeader, dtype: str) -> int:
+def _needed(header: _Header, dtype: str) -> int:
     elements = sum(c.elements for c in header.channels)
     return header.size + elements * np.dtype(dtype).itemsize
 
 
-def _sense(raw: np.ndarray[Any, Any], header: LookHeader, dtype: str) -> float:
+def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
     """Share of numbers of a size that occurs, less the roughness of the first columns.
 
     Half of a float64 is no sensible float32 and makes a rough column; two float32 in one float64
@@ -109,31 +193,31 @@ def _sense(raw: np.ndarray[Any, Any], header: LookHeader, dtype: str) -> float:
 
 
 def _columns(
-    path: Path, header: LookHeader, data: np.ndarray[Any, Any]
+    path: Path, header: _Header, data: np.ndarray[Any, Any]
 ) -> tuple[list[RawColumn], list[Finding]]:
     """Channels one behind the other; of a file that is cut, those that can be used."""
     ends = np.cumsum([c.elements for c in header.channels])
     lost = max(0, int(ends[-1]) - data.size)
-    found = []
+    arrays = []
     for channel, end in zip(header.channels, ends.tolist(), strict=True):
-        found.append(data[end - channel.elements : end])
-    whole = [v.size == c.elements for c, v in zip(header.channels, found, strict=True)]
-    columns = list(zip(header.channels, found, strict=True))
+        arrays.append(data[end - channel.elements : end])
+    whole = [v.size == c.elements for c, v in zip(header.channels, arrays, strict=True)]
+    columns = list(zip(header.channels, arrays, strict=True))
     findings: list[Finding] = []
-    if lost and all(whole[:-1]) and found[-1].size:
+    if lost and all(whole[:-1]) and arrays[-1].size:
         # The cut is in the last column: the rows before it are whole.
-        kept = found[-1].size
+        kept = arrays[-1].size
         where = f"row {kept}"
-        said = f"{lost} rows lack their last column, and were left out."
+        loss = f"{lost} rows lack their last column, and were left out."
         columns = [(c, v[:kept]) for c, v in columns]
     elif lost:
         where = ", ".join(
             f"'{c.name}'" for c, ok in zip(header.channels, whole, strict=True) if not ok
         )
-        said = f"{where} could not be read, being stored behind the cut."
+        loss = f"{where} could not be read, being stored behind the cut."
         columns = [pair for pair, ok in zip(columns, whole, strict=True) if ok]
     if lost:
-        findings.append(truncated(path, lost, where, f"{lost} numbers are missing; {said}"))
+        findings.append(truncated(path, lost, where, f"{lost} numbers are missing; {loss}"))
     if not columns:
         raise refuse_truncated(path, "which ends within its first column")
     rows = max(values.size for _, values in columns)
