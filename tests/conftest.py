@@ -2,6 +2,7 @@
 
 import gc
 import os
+from itertools import groupby
 
 import pytest
 
@@ -47,7 +48,13 @@ def scope(nodeid):
     return nodeid.split("::")[0] if room(nodeid) == LONGEST[0] else room(nodeid)
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` selects
 def pytest_collection_modifyitems(items):
+    """Rooms in order, and the first short test of each file marked for `make quick`."""
+    for _, file in groupby(items, key=lambda item: item.path):
+        first = next((item for item in file if not item.get_closest_marker("long")), None)
+        if first is not None:
+            first.add_marker("quick")
     order = {name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: order.get(room(item.nodeid), len(order)))
 

@@ -242,7 +242,7 @@ def test_inertia_depends_on_lambda(varied):
     assert (low, high) == (pytest.approx(-0.11, abs=0.01), pytest.approx(0.17, abs=0.01))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("uncertainty", PAPER.contents.uncertainty, ids=lambda u: u.quantity)
 def test_every_number_that_rests_on_an_uncertain_quantity_says_so(claims, uncertainty):
     """Differences of formulas from an integration and identities rest on it in name only."""
