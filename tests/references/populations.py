@@ -1,4 +1,4 @@
-"""Many draws of one kind: the first in every run of the suite, the others in `make test-long`."""
+"""Many draws of one kind: few in every run of the suite, the others in `make test-long`."""
 
 import pytest
 
@@ -15,3 +15,8 @@ def population(draws, *, short=1):
     """
     values = list(range(draws) if isinstance(draws, int) else draws)
     return [*values[:short], *(pytest.param(v, marks=pytest.mark.long) for v in values[short:])]
+
+
+def draws(few, many):
+    """How many draws a statistic is taken over: few in `make test`, many in `make test-long`."""
+    return pytest.mark.parametrize("draws", [few, pytest.param(many, marks=pytest.mark.long)])
