@@ -27,7 +27,9 @@ def run_fit(*arguments):
 
 
 def test_a_recording_is_fitted(recording):
-    found = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", "--json")
+    # At the rate of the other fits of this file, for one program.
+    options = ["--free", "A,B,D0,K", "--fit-rate", "5 Hz", "--json"]
+    found = run_fit(recording, "--law", "rice-ruina", *options)
     assert found.exit_code == 0, found.output
     record = json.loads(found.output)
     K = record["parameters"]["K"]
@@ -35,7 +37,7 @@ def test_a_recording_is_fitted(recording):
     # The stiffness over the load that the recording was computed with.
     assert abs(K["value"] - 4e3) < 4 * K["se"]
     assert record["noise"]["model"].startswith("AR(")
-    assert record["noise"]["effective_samples"] < 1400
+    assert record["noise"]["effective_samples"] < 700
 
 
 def test_priors_of_a_material_want_the_free_parameters(recording):
