@@ -34,6 +34,7 @@ LONGEST = (
 BRIEF = (
     *("orbit", "docs", "theory", "transients", "laws", "app"),
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
+    *(f"cli/test_{name}.py" for name in ("design", "map", "other_commands", "response", "run")),
 )
 _SWITCH = "jax_disable_most_optimizations"
 
