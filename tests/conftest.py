@@ -53,7 +53,8 @@ def scope(nodeid):
 def pytest_collection_modifyitems(items):
     """Rooms in order, and the first short test of each file marked for `make quick`."""
     for _, file in groupby(items, key=lambda item: item.path):
-        first = next((item for item in file if not item.get_closest_marker("long")), None)
+        long = ("long", "slow")
+        first = next((i for i in file if not any(map(i.get_closest_marker, long))), None)
         if first is not None:
             first.add_marker("quick")
     order = {name: place for place, name in enumerate(LONGEST)}

@@ -27,6 +27,8 @@ from asperity.papers.ledger.headline import headlines
 from asperity.papers.ledger.ledger import altered, judge_claims
 from asperity.papers.paper import Paper
 
+pytestmark = pytest.mark.slow
+
 #: What is not reproduced. A verdict that turns has to be looked at, and its `why` rewritten.
 MISPRINTS = {
     "steady-position",
