@@ -47,6 +47,15 @@ def test_the_readings_are_the_response_to_what_the_contacts_bear(series) -> None
         assert np.all(found[f"{name}_uncertainty"] < 0.02 * np.abs(getattr(truth, name)))
 
 
+def test_another_transfer_is_seen(series) -> None:
+    found = series.to_dataset()
+    other = asp.periodic_response(
+        SLIDER, velocity=V, epsilon=1.05 * abs(TRANSFER) * np.array(EPSILONS), frequency=F
+    )
+    error = np.abs(found.mu1.values - other.mu1)
+    assert np.all(error > 5 * found.mu1_uncertainty.values + 1e-4 * other.mu1)
+
+
 def test_phases_are_against_the_applied_load(series) -> None:
     found = series.to_dataset()
     truth = asp.periodic_response(
