@@ -10,9 +10,6 @@ from asperity.theory import closed_forms as cf
 if TYPE_CHECKING:
     from asperity.protocol.protocol import Protocol
 
-#: Laws whose steady sliding loses stability at a stiffness known in closed form.
-_RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip")
-_ELASTIC = {"elasto-plastic": "slider", "elasto-plastic-age": "plastic"}
 #: Growth per slipped metre (1/m) that counts as zero: far below that of any interface.
 _ROUND_OFF = 1e-3
 
@@ -37,16 +34,12 @@ def stability_statement(protocol: Protocol) -> str:
     if protocol.start.states is not None or not level.velocity > 0:
         return ""
     lambda_ = numbers.get("lambda", 0.0)
-    rigid = protocol.law in _RIGID or (protocol.law in _ELASTIC and lambda_ == 0)
-    if numbers.get("eta", 0.0) > 0 or (not rigid and (heavy or protocol.law not in _ELASTIC)):
+    kc = cf.critical_stiffness_form(protocol.law, elastic=lambda_ != 0, inertia=heavy)
+    if kc is None or numbers.get("eta", 0.0) > 0:
         return _linearised(protocol, numbers)
     fields: dict[str, Any] = {name: numbers[name] for name in ("A", "B", "D0", "K")}
     fields |= {"mu": numbers["mu0"], "W0": level.load, "V": level.velocity, "omega": 1.0}
-    point = cf.SmallModulation(**fields, M=numbers.get("M", 0.0), lambda_=lambda_)
-    if not rigid:
-        critical = cf.critical_stiffness_elastic(point, _ELASTIC[protocol.law])
-    else:
-        critical = cf.critical_stiffness_inertial(point) if heavy else cf.critical_stiffness(point)
+    critical = kc(cf.SmallModulation(**fields, M=numbers.get("M", 0.0), lambda_=lambda_))
     ratio = float(numbers["K"] / critical)
     if not 0 < ratio < 1:
         return ""

@@ -13,6 +13,7 @@ Linker-Dieterich ageing and elastic asperities as well, are in `asperity.theory.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Literal, TypeAlias
 
@@ -26,6 +27,11 @@ from asperity.errors import InputError
 from asperity.laws.parameter import checked
 
 Form: TypeAlias = Literal["derived", "as_printed"]
+
+#: Laws whose steady sliding loses stability at a stiffness known in closed form: of rigid
+#: asperities, and of elastic ones with the velocity of their age law.
+_RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip")
+_ELASTIC = {"elasto-plastic": "slider", "elasto-plastic-age": "plastic"}
 
 
 def _quantity(name: str, kind: str, rule: str = "positive", **options: Any) -> Any:
@@ -241,6 +247,27 @@ def critical_stiffness_elastic(p: SmallModulation, age_velocity: str = "slider")
             f"got '{age_velocity}'; choose one of the two"
         )
     return (p.B - p.A) * p.W0 / lengths[age_velocity]
+
+
+def critical_stiffness_form(
+    law: str, *, elastic: bool, inertia: bool
+) -> Callable[[SmallModulation], Array] | None:
+    """The closed form of Kc that holds for a law; None where there is none.
+
+    Parameters
+    ----------
+    law : str
+        Name of a registered law.
+    elastic : bool
+        Whether its asperities have a shear elastic length above zero.
+    inertia : bool
+        Whether the mass of the slider counts.
+    """
+    if law in _RIGID or (law in _ELASTIC and not elastic):
+        return critical_stiffness_inertial if inertia else critical_stiffness
+    if law in _ELASTIC and not inertia:
+        return partial(critical_stiffness_elastic, age_velocity=_ELASTIC[law])
+    return None
 
 
 def _check_form(form: str) -> None:

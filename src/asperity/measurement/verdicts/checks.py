@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.series import MeanLevel, Rate
 from asperity.measurement.verdicts.steadiness import slow_line
-from asperity.measurement.verdicts.verdict import Check, judged
+from asperity.measurement.verdicts.verdict import Check, judged, percent
 from asperity.recording.finding import Finding
 
 Array = NDArray[np.float64]
@@ -111,13 +111,13 @@ def drift(reading: LockInReading, before: MeanLevel | None, after: MeanLevel | N
         change = after.value - before.value
         doubt = float(np.hypot(before.uncertainty, after.uncertainty))
         share = change / _nonzero(before.value)
-        sentence = f"F(0) after the modulation differs by {_percent(share)} from F(0) before it"
+        sentence = f"F(0) after the modulation differs by {percent(share)} from F(0) before it"
         significant = abs(change) > 3 * doubt
     else:
         change = float(reading.drift[1].sum())
         share = change / _nonzero(reading.mean_force)
         sentence = (
-            f"the force drifts by {_percent(share)} over the window; F(0) before and after is not "
+            f"the force drifts by {percent(share)} over the window; F(0) before and after is not "
             "in the recording"
         )
         significant = abs(change) > 10 * reading.uncertainty("mean_force")
@@ -144,7 +144,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
     if settling is not None:
         number, lasts = abs(settling.amplitude) / mean, length / settling.decay
         sentence = (
-            f"the force settles by {_percent(number)} of its mean, and the window holds "
+            f"the force settles by {percent(number)} of its mean, and the window holds "
             f"{lasts:.2g} of its time constants; "
         ) + (
             "what it settles to is read"
@@ -157,7 +157,7 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
     # A pause that recovers from a modulation may drift too: none of them may explain the window.
     number = min(away, default=0.0) * length / mean
     sentence = (
-        f"over the window the force moves by {_percent(number)} of its mean more than without "
+        f"over the window the force moves by {percent(number)} of its mean more than without "
         "modulation: it still settles, to what cannot be told"
         if number
         else "no settling of the force stands out"
@@ -182,7 +182,7 @@ def stick_slip(reading: LockInReading, time: Array, force: Array) -> Check:
         if seen:
             sentence = (
                 f"the force oscillates at {line.frequency:.4g} Hz, no harmonic, by "
-                f"{_percent(number)} of its mean"
+                f"{percent(number)} of its mean"
             )
     return judged("stick-slip", number, LIMITS["stick-slip"], sentence, significant=seen)
 
@@ -245,10 +245,6 @@ def _finding(finding: Finding, samples: int, span: float) -> Check:
 
 def _nonzero(value: float) -> float:
     return value or 1e-300
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
 
 
 def _times(number: float) -> str:

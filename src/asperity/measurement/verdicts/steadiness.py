@@ -13,7 +13,7 @@ from asperity.lock_in.normal_equations import Basis, solved
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, strongest_line
 from asperity.measurement.series import block_means
-from asperity.measurement.verdicts.verdict import Check, judged
+from asperity.measurement.verdicts.verdict import Check, judged, percent
 
 Array = NDArray[np.float64]
 
@@ -114,7 +114,7 @@ def leakage(reading: LockInReading) -> Check:
         "leakage",
         number,
         LIMITS["leakage"],
-        f"sidebands of the load hold {_percent(number)} of its amplitude; if much, it is no "
+        f"sidebands of the load hold {percent(number)} of its amplitude; if much, it is no "
         "steady line of one frequency: choose a window in which it is",
         significant=beyond > 3.0,
     )
@@ -128,7 +128,7 @@ def steady_response(reading: LockInReading) -> Check:
         "steady response",
         number,
         LIMITS["steady response"],
-        f"sidebands of the force hold {_percent(number)} of its first harmonic; mu1 changes within "
+        f"sidebands of the force hold {percent(number)} of its first harmonic; mu1 changes within "
         "the window, or another line is next to it, if that is much",
         significant=3.0 < beyond < np.inf,
     )
@@ -145,7 +145,7 @@ def steady_load(reading: LockInReading, time: Array, load: Array) -> Check:
         "steady load",
         number,
         LIMITS["steady load"],
-        f"the mean load {motion} by {_percent(number)} in the window, apart from its modulation",
+        f"the mean load {motion} by {percent(number)} in the window, apart from its modulation",
         significant=significant,
     )
 
@@ -158,7 +158,7 @@ def steady_force(reading: LockInReading, time: Array, force: Array) -> Check:
         "steady force",
         number,
         LIMITS["steady force"],
-        f"slower than the modulation, the force wanders by {_percent(number)} of its mean about "
+        f"slower than the modulation, the force wanders by {percent(number)} of its mean about "
         "the fitted drift",
         significant=seen,
     )
@@ -201,10 +201,6 @@ def _wander(reading: LockInReading, time: Array, values: Array, channel: int) ->
         if power > _EXCESS * noise and power - noise > worst**2 / 2:
             worst, seen = float(np.sqrt(2 * (power - noise))), True
     return worst, seen
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"
 
 
 def shifting_response(reading: LockInReading, time: Array, force: Array) -> Check:

@@ -74,3 +74,8 @@ def judged(
 def worst(checks: Iterable[Check]) -> Verdict:
     """The gravest verdict; ``"ok"`` if there is none."""
     return max((check.verdict for check in checks), key=_ORDER.index, default="ok")
+
+
+def percent(share: float) -> str:
+    """A share in two digits, for a sentence."""
+    return f"{100 * share:.2g} %"
