@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import binom
 
 from asperity.lock_in.demodulation import lock_in
-from asperity.lock_in.phasor import Phasor
+from asperity.lock_in.reading import Phasor
 from references.populations import draws, population
 
 SEEDS = 200

@@ -38,7 +38,7 @@ def test_without_noise_the_truth_is_fitted(truth, detrend, even, draws) -> None:
         assert found.mean_friction == pytest.approx(level, abs=0.03 * error)
         for n, c in enumerate(truth.harmonics, 1):
             assert abs(found.harmonics[n - 1] - c) < 1e-3 * error
-        assert found.settling.told
+        assert found.settling.determined
 
 
 @draws(6, 30)
