@@ -8,6 +8,8 @@ import pytest
 import asperity as asp
 from asperity.errors import InputError
 
+pytestmark = pytest.mark.slow
+
 #: Accuracy of a boundary, relative: what is promised.
 BOUNDARY = 1e-6
 

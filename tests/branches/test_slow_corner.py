@@ -14,64 +14,63 @@ from asperity.orbit.methods.branch_following.from_steady_sliding import (
 )
 from asperity.slider import equation_of_motion
 from asperity.slider.problem import Problem, flatten
+from references.populations import population
+
+pytestmark = pytest.mark.slow
+
+#: V/(2 pi f D0), K/Kc, epsilon, and what becomes of them.
+CORNER = {
+    "an orbit at the end of a canard": (4.45, 0.43, 0.23, Outcome.CONVERGED),
+    "a runaway": (17.0, 0.28, 0.42, Outcome.RUNAWAY),
+    "a fold": (4.62, 0.88, 0.30, Outcome.FOLDED),
+    "an orbit too unstable to be held": (69.0, 0.72, 0.64, Outcome.SENSITIVE),
+}
 
 
-@pytest.fixture(scope="module")
-def corner(shooting):
-    """Points of the slow corner, by V/(2 pi f D0), K/Kc and epsilon."""
-    base = shooting(K=1.0)
-    rows = np.array(
-        [
-            # q, K/Kc, epsilon
-            [4.45, 0.43, 0.23],
-            [17.0, 0.28, 0.42],
-            [4.62, 0.88, 0.30],
-            [69.0, 0.72, 0.64],
-        ]
-    )
-    q, stiffness, epsilon = rows.T
-    numbers = {"V": 1e-4, "K": stiffness * base.Kc, "f": 1e-4 / (2 * np.pi * q * base.D0)}
-    slider = asp.Slider(base.slider.law, spring=numbers["K"], load=base.W0)
-    response = asp.periodic_response(
-        slider,
-        velocity=numbers["V"],
-        epsilon=epsilon,
-        frequency=numbers["f"],
-        waveform=4096,
-        methods=("collocation",),
-    )
-    return base, numbers, epsilon, response
+@pytest.fixture
+def solve(shooting):
+    """The base slider, K, frequency and response of a point of the slow corner."""
+
+    def solve(name):
+        base, V = shooting(K=1.0), 1e-4
+        q, stiffness, epsilon, _ = CORNER[name]
+        K, frequency = stiffness * base.Kc, V / (2 * np.pi * q * base.D0)
+        response = asp.periodic_response(
+            asp.Slider(base.slider.law, spring=[K], load=base.W0),
+            velocity=V,
+            epsilon=epsilon,
+            frequency=frequency,
+            waveform=4096,
+            methods=("collocation",),
+        )
+        return K, frequency, epsilon, response
+
+    return solve
 
 
-def test_an_orbit_at_the_end_of_a_canard_is_found(corner):
-    *_, response = corner
+def test_an_orbit_at_the_end_of_a_canard_obeys_the_equations(solve, reference):
+    K, frequency, epsilon, response = solve("an orbit at the end of a canard")
     assert response.converged[0]
     # Jumps of the slip rate by many orders of magnitude.
     assert np.ptp(response.waveform[1, 0]) > 10
-
-
-def test_found_orbits_obey_the_equations(corner, reference):
-    _, numbers, epsilon, response = corner
-    rows = np.flatnonzero(response.converged)
     shot = reference.multiple_shooting(
-        reference.Printed(
-            K=numbers["K"][rows, None], V=numbers["V"], frequency=numbers["f"][rows, None]
-        ),
-        epsilon[rows, None],
-        *response.waveform[:, rows, ::8],
+        reference.Printed(K=K, V=1e-4, frequency=frequency),
+        np.array([[epsilon]]),
+        *response.waveform[..., ::8],
     )
-    np.testing.assert_allclose(response.mean_friction[rows], shot.mean, rtol=1e-7)
-    error = np.abs(response.harmonics[rows, :2] - shot.harmonics)
+    np.testing.assert_allclose(response.mean_friction, shot.mean, rtol=1e-7)
+    error = np.abs(response.harmonics[:, :2] - shot.harmonics)
     assert (error <= 1e-6 * np.abs(shot.harmonics)).all()
 
 
-def test_what_does_not_arrive_says_why(corner):
-    *_, epsilon, response = corner
-    assert list(response.outcome[1:]) == [Outcome.RUNAWAY, Outcome.FOLDED, Outcome.SENSITIVE]
-    for row in (1, 2, 3):
-        assert np.isnan(response.mean_friction[row])
-        assert 0 < response.detail[row] < epsilon[row]
-        assert f"{response.detail[row]:.3g}" in response.result[row]
+# The last one takes a minute; `orbit/test_search.py` has what it is called.
+@pytest.mark.parametrize("name", population(list(CORNER)[1:], short=2))
+def test_what_does_not_arrive_says_why(solve, name):
+    _, _, epsilon, response = solve(name)
+    assert response.outcome[0] == CORNER[name][-1]
+    assert np.isnan(response.mean_friction[0])
+    assert 0 < response.detail[0] < epsilon
+    assert f"{response.detail[0]:.3g}" in response.result[0]
 
 
 def test_folds_of_the_amplitude_are_those_of_the_continuation(shooting):

@@ -9,6 +9,8 @@ from asperity import Slider, periodic_response, perturbation_response, sensitivi
 from asperity.errors import InputError
 from asperity.laws import ElastoPlastic, law_parameters
 
+pytestmark = pytest.mark.slow
+
 #: Of a derivative, relative to its largest term. Differences over 0.4 % and 0.2 %, extrapolated,
 #: leave the fifth order, about (0.004 mu/A)^4; responses good to 1e-12 leave 1e-12/0.004.
 DIFFERENCES = 2e-6

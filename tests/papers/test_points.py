@@ -20,6 +20,8 @@ from asperity.papers.measured_points import (
     with_curves,
 )
 
+pytestmark = pytest.mark.slow
+
 ARTIFICIAL = Path(__file__).parents[2] / "examples" / "artificial_points.csv"
 ROW = {
     "figure": "figure-02",

@@ -28,6 +28,8 @@ from asperity.papers.paper import Paper, find_paper
 from asperity.papers.report import reproduce
 from asperity.papers.report.markup import rich
 
+pytestmark = pytest.mark.slow
+
 FIGURES = [f"figure-{n:02}" for n in range(1, 16)]
 DRAWN = [name for name in FIGURES if name not in ("figure-01", "figure-10")]
 VIRTUAL = [f"virtual-{n:02}" for n in (2, 3, 4, 5)]

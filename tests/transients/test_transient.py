@@ -21,6 +21,7 @@ from asperity.loads import (
     StepLoad,
 )
 from asperity.transients import Trajectory, transient
+from references.populations import population
 
 START = {"load": "7 N", "velocity": "1 um/s"}
 LAMBDA = 6.2e-7
@@ -165,13 +166,19 @@ EXTRA = {
 COMMON = {"mu0": 0.5, "A": 0.013, "B": 0.026, "D0": 4e-7, "V0": 1e-6}
 
 
+RATE_DEPENDENT = sorted(
+    name
+    for name, law in registered().items()
+    if law.__module__.startswith("asperity.") and law.rate_dependent
+)
+#: In every run: laws whose programs other tests have compiled.
+SUITE = ("rice-ruina", "linker-dieterich", "elasto-plastic", "two-state", "regularised")
+
+
 @pytest.mark.parametrize(
     "name",
-    sorted(
-        n for n, law in registered().items()
-        if law.__module__.startswith("asperity.") and law.rate_dependent
-    ),
-)  # fmt: skip
+    population([*SUITE, *(n for n in RATE_DEPENDENT if n not in SUITE)], short=len(SUITE)),
+)
 def test_every_law_relaxes_to_steady_sliding_under_another_load(name) -> None:
     cls = registered()[name]
     values = COMMON | EXTRA

@@ -12,6 +12,8 @@ from asperity.laws import RiceRuina
 from asperity.parameters import law_parameters
 from asperity.recording import Channel, Trace
 
+pytestmark = pytest.mark.slow
+
 FREE = ["A", "B", "D0"]
 #: The whole of it, and without parts of the first and the last segment.
 WINDOWS = [(0.0, 140.0), (13.0, 140.0), (0.0, 120.0)]
