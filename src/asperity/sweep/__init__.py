@@ -8,27 +8,27 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from asperity.sweep.estimate import dry_run
     from asperity.sweep.export import export_store
     from asperity.sweep.load import load_plan
-    from asperity.sweep.plan.model import SweepPlan
-    from asperity.sweep.read import open_store, reasons
-    from asperity.sweep.run.dry_run import dry_run
-    from asperity.sweep.run.run import SweepSummary, run_sweep
-    from asperity.sweep.status import SweepStatus, store_status, summary_statistics
+    from asperity.sweep.outcome import reasons
+    from asperity.sweep.plan import SweepPlan
+    from asperity.sweep.results import SweepStatus, open_store, store_status, summary_statistics
+    from asperity.sweep.run import SweepSummary, run_sweep
 
 #: Public names and their modules.
 _HOMES = {
-    "SweepPlan": "plan.model",
-    "SweepStatus": "status",
-    "SweepSummary": "run.run",
-    "dry_run": "run.dry_run",
+    "SweepPlan": "plan",
+    "SweepStatus": "results",
+    "SweepSummary": "run",
+    "dry_run": "estimate",
     "export_store": "export",
     "load_plan": "load",
-    "open_store": "read",
-    "reasons": "read",
-    "run_sweep": "run.run",
-    "store_status": "status",
-    "summary_statistics": "status",
+    "open_store": "results",
+    "reasons": "outcome",
+    "run_sweep": "run",
+    "store_status": "results",
+    "summary_statistics": "results",
 }
 
 __all__ = [

@@ -12,7 +12,7 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.outputs import output_file, require_disk, written_file
 from asperity.parameters.arguments import file_path
-from asperity.sweep.solve.outcome import words
+from asperity.sweep.outcome import words
 from asperity.sweep.store.store import SweepStore
 
 _FORMATS = (".nc", ".csv", ".parquet")

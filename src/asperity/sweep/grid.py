@@ -15,11 +15,9 @@ from numpy.typing import NDArray
 from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters
 from asperity.parameters.arguments import shown
-from asperity.sweep.plan.axis import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
-from asperity.sweep.plan.mistakes import PlanError
-from asperity.sweep.plan.model import SweepPlan
-from asperity.sweep.plan.points import Points
-from asperity.sweep.plan.ratios import RATIOS
+from asperity.sweep.axes import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
+from asperity.sweep.plan import PlanError, SweepPlan
+from asperity.sweep.points import RATIOS, Points
 from asperity.sweep.record import plan_record
 from asperity.sweep.solve import SOLVES
 
@@ -84,6 +82,11 @@ class SweepGrid:
         return math.prod(self.shape)
 
     @property
+    def bytes(self) -> float:
+        """Of all answers in a store, uncompressed."""
+        return self.points * (8.0 * (len(self.record["outputs"]) + 1) + 2)
+
+    @property
     def chunk_shape(self) -> tuple[int, ...]:
         """Number of chunks along each axis."""
         return tuple(-(-n // c) for n, c in zip(self.shape, self.chunks, strict=True))
@@ -129,29 +132,16 @@ class SweepGrid:
         rows = [axis.rows(s.start, s.stop) for axis, s in zip(self.axes, slices, strict=True)]
         return self._points(rows, tuple(s.stop - s.start for s in slices))
 
-    def numbered(self, numbers: NDArray[np.int64]) -> Points:
-        """Points by their numbers in C order, anywhere on the grid."""
-        places = np.unravel_index(numbers, self.shape)
-        rows = []
-        for axis, index in zip(self.axes, places, strict=True):
-            picked = [axis.rows(int(i), int(i) + 1) for i in index]
-            rows.append({n: np.concatenate([p[n] for p in picked]) for n in axis.names})
-        return self._points(rows, None, len(numbers))
-
-    def _points(
-        self, rows: list[dict[str, Column]], shape: tuple[int, ...] | None, count: int = 0
-    ) -> Points:
-        """Points from the columns of each axis: their product, or row by row without a shape."""
-        count = math.prod(shape) if shape is not None else count
+    def _points(self, rows: list[dict[str, Column]], shape: tuple[int, ...]) -> Points:
+        """The product of the columns of all axes."""
+        count = math.prod(shape)
         values = {n: np.full(count, float(v)) for n, v in self.record["numbers"].items()}
-        first = self.record["laws"][0]
-        laws = np.full(count, first, dtype=object)
+        laws = np.full(count, self.record["laws"][0], dtype=object)
         data = None
         for i, columns in enumerate(rows):
             for name, column in columns.items():
-                if shape is not None:
-                    along = column.reshape([-1 if k == i else 1 for k in range(len(shape))])
-                    column = np.broadcast_to(along, shape).ravel()
+                along = column.reshape([-1 if k == i else 1 for k in range(len(shape))])
+                column = np.broadcast_to(along, shape).ravel()
                 if name == "law":
                     laws = np.where(column == "", laws, column)
                 elif name == "data":

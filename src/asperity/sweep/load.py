@@ -5,8 +5,7 @@ from __future__ import annotations
 import os
 
 from asperity.parameters.toml_file import toml_content
-from asperity.sweep.plan.mistakes import PlanError
-from asperity.sweep.plan.model import SweepPlan
+from asperity.sweep.plan import PlanError, SweepPlan
 from asperity.sweep.record import without_unit
 
 

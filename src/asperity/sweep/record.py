@@ -22,10 +22,9 @@ from asperity.laws import get_law, known_law
 from asperity.operating_point import known_parameters, sourced_numbers
 from asperity.parameters import Parameter, canonical_name, point_parameters, suggestion
 from asperity.parameters.arguments import shown
-from asperity.sweep.plan.axis import SOBOL_BITS, TEXTS, columns_of
-from asperity.sweep.plan.mistakes import PlanError
-from asperity.sweep.plan.model import AxisTable, SweepPlan
-from asperity.sweep.plan.ratios import RATIOS
+from asperity.sweep.axes import SOBOL_BITS, TEXTS, columns_of
+from asperity.sweep.plan import AxisTable, PlanError, SweepPlan
+from asperity.sweep.points import RATIOS
 from asperity.sweep.solve import SOLVES
 from asperity.units import KINDS
 
@@ -472,6 +471,28 @@ def _twice(axes: Mapping[str, Any]) -> Iterator[str]:
                     f"axes.{owners[column]} has too; leave one out"
                 )
             owners[column] = name
+
+
+def is_extension(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Whether `new` has all points of `old`, and others only behind them along axes."""
+    rest = [key for key in {*old, *new} if key not in ("axes", "laws")]
+    if any(old.get(key) != new.get(key) for key in rest):
+        return False
+    if list(old["axes"]) != list(new["axes"]) or new["laws"][: len(old["laws"])] != old["laws"]:
+        return False
+    return all(_longer(old["axes"][name], new["axes"][name]) for name in old["axes"])
+
+
+def _longer(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    if "columns" in old and "columns" in new:
+        before, after = old["columns"], new["columns"]
+        return list(before) == list(after) and all(
+            after[name][: len(before[name])] == before[name] for name in before
+        )
+    if "over" in old and "over" in new:
+        same = all(old[key] == new[key] for key in ("draw", "seed", "over"))
+        return same and new["count"] >= old["count"]
+    return False
 
 
 def without_unit(plan: SweepPlan) -> list[str]:

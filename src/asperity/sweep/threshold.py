@@ -17,12 +17,11 @@ from asperity.parameters.arguments import number, pair, switch, whole_number
 from asperity.slider import Slider
 from asperity.slider.named import slider_values
 from asperity.slider.problem import checked_slider
-from asperity.sweep.map.crossing import find_crossings
-from asperity.sweep.map.plane import PointResponses, solve_points
-from asperity.sweep.plan.points import POINT_BYTES
+from asperity.sweep.crossing import STABILITY, find_crossings
+from asperity.sweep.outcome import Answers
+from asperity.sweep.points import POINT_BYTES, Float
+from asperity.sweep.responses import answers_of_law, bifurcation_kinds
 from asperity.units import format_si
-
-Float = NDArray[np.float64]
 
 #: Limits of the search, over K_c.
 _BETWEEN = (0.3, 4.0)
@@ -230,7 +229,7 @@ def search_thresholds(
     usable = crossed.any(axis=1) & stiffer
     line = np.flatnonzero(usable)
     k = last[line]
-    found = find_crossings(
+    crossings = find_crossings(
         lines,
         np.stack([steps[k], line], axis=-1),
         np.stack([steps[k + 1], line], axis=-1),
@@ -239,11 +238,11 @@ def search_thresholds(
     )
     stiffness, turn, where = np.full((3, count), np.nan)
     kind, result, what = (np.full(count, "", dtype=object) for _ in range(3))
-    at = lines.stiffness(found.where)
-    stiffness[line] = np.where(found.found, at, np.nan)
-    where[line], what[line] = at, np.where(found.found, "found", "no crossing")
-    turn[line] = np.abs(found.points["multiplier_argument"]) / (2 * np.pi)
-    kind[line], result[line] = found.points.mode, found.reason
+    at = lines.stiffness(crossings.where)
+    stiffness[line] = np.where(crossings.located, at, np.nan)
+    where[line], what[line] = at, np.where(crossings.located, "found", "no crossing")
+    turn[line] = np.abs(crossings.points["multiplier_argument"]) / (2 * np.pi)
+    kind[line], result[line] = bifurcation_kinds(crossings.points), crossings.reason
     for i in np.flatnonzero(~usable):
         failed = [j for j, text in enumerate(reasons[i]) if text]
         unstable = g[i, -1] > 0
@@ -303,6 +302,8 @@ def _ends(slider: Slider, velocity: Any, between: tuple[Any, Any] | None) -> tup
 class _StiffnessLines:
     """Lines of increasing stiffness, each with the other numbers of its operating point."""
 
+    outputs = STABILITY
+
     def __init__(
         self, law: type[Law], values: Mapping[str, Float], low: Float, high: Float
     ) -> None:
@@ -314,9 +315,9 @@ class _StiffnessLines:
         line = np.round(where[:, 1]).astype(int)
         return np.asarray(self.low[line] * (self.high[line] / self.low[line]) ** where[:, 0])
 
-    def solve(self, where: Float) -> PointResponses:
+    def solve(self, where: Float) -> Answers:
         """Responses at (fraction, number of the line)."""
         line = np.round(where[:, 1]).astype(int)
         values = {name: numbers[line] for name, numbers in self.values.items()}
         values["K"] = self.stiffness(where)
-        return solve_points(self.law, values)
+        return answers_of_law(self.law, values, STABILITY)

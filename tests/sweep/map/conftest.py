@@ -7,7 +7,8 @@ import pytest
 
 from asperity import materials
 from asperity.sweep.map import Axis
-from asperity.sweep.map.plane import NUMBERS, PointResponses
+from asperity.sweep.map.plane import OUTPUTS
+from asperity.sweep.outcome import Answers, SweepOutcome
 
 
 @pytest.fixture(scope="session")
@@ -26,6 +27,8 @@ def numbers(pmma):
 class KnownPlane:
     """Stands for a `MapPlane` whose ln|m| is a formula of the positions."""
 
+    outputs = OUTPUTS
+
     def __init__(self, g: Callable, count: int, failed: Callable | None = None) -> None:
         self.g, self.failed = g, failed or (lambda x, y: np.zeros(x.shape, bool))
         self.x = self.y = Axis("epsilon", 0.0, 0.5, count)
@@ -36,14 +39,13 @@ class KnownPlane:
         return np.stack([a.ravel() for a in np.meshgrid(u, u)], axis=-1)
 
     def solve(self, where):
-        points = PointResponses.empty(len(where))
         x, y = where.T
-        lost = self.failed(x, y)
-        points.numbers[:] = np.where(lost, np.nan, 0.0)
-        points.numbers[NUMBERS.index("log_multiplier")] = np.where(lost, np.nan, self.g(x, y))
-        points.converged[:] = ~lost
-        points.result[:] = np.where(lost, "planted failure", "converged")
-        return points
+        numbers = {name: np.zeros(len(where)) for name in OUTPUTS} | {
+            "log_multiplier": self.g(x, y)
+        }
+        answers = Answers(numbers, np.zeros(len(where), np.int16), np.zeros(len(where)))
+        answers.fail(self.failed(x, y), SweepOutcome.REFUSED)
+        return answers
 
 
 @pytest.fixture

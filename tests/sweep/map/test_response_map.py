@@ -12,7 +12,8 @@ from asperity.errors import InputError
 from asperity.operating_point import SourcedNumber, respond
 from asperity.orbit import Outcome
 from asperity.outputs import Interrupted, capacity
-from asperity.sweep.map import SHOWN, Axis, crossing, plane, response_map, write_map
+from asperity.sweep import crossing, responses
+from asperity.sweep.map import SHOWN, Axis, response_map, write_map
 
 EPS = Axis("epsilon", 0.0, 0.4, 7)
 K = Axis("K", "0.1 N/um", "0.3 N/um", 8)
@@ -103,8 +104,8 @@ def test_rows_are_y_also_where_the_axes_are_exchanged(rigid, numbers) -> None:
 
 
 def test_a_point_that_fails_says_why_and_costs_no_other(numbers, monkeypatch) -> None:
-    def failing(law, values, progress=None):
-        response = respond(law, values, progress)
+    def failing(law, values, progress=None, **options):
+        response = respond(law, values, progress, **options)
         lost = np.asarray(values["epsilon"]) > 0.3
         logs = np.where(lost[:, None], np.nan + 0j, response.log_multipliers)
         outcome = np.where(lost, Outcome.NO_ORBIT, response.outcome)
@@ -112,7 +113,7 @@ def test_a_point_that_fails_says_why_and_costs_no_other(numbers, monkeypatch) ->
         planted = {"log_multipliers": logs, "outcome": outcome, "mean_friction": mean}
         return dataclasses.replace(response, **planted)
 
-    monkeypatch.setattr(plane, "respond", failing)
+    monkeypatch.setattr(responses, "respond", failing)
     found = response_map("rice-ruina", numbers, x=EPS, y=K)
     failed = ~found["converged"].values
     assert (failed == (found["epsilon"].values > 0.3)).all()
@@ -137,11 +138,11 @@ def test_a_law_without_dynamics_has_no_boundary(numbers) -> None:
 def test_inertia_and_damping_are_passed_on(numbers, monkeypatch) -> None:
     asked = []
 
-    def note(law, values, progress=None):
+    def note(law, values, progress=None, **options):
         asked.append(values)
         return respond(law, {**values, "inertia": 0.0, "eta": 0.0}, progress)
 
-    monkeypatch.setattr(plane, "respond", note)
+    monkeypatch.setattr(responses, "respond", note)
     x, y = Axis("M", "1 kg", "2 kg", 2), Axis("eta", 0.0, 500.0, 2)
     point = {"K": 2.2e5, "epsilon": 0.2, "inertia": 1}
     found = response_map("elasto-plastic", numbers | point, x=x, y=y)

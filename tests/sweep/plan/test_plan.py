@@ -45,7 +45,7 @@ def test_the_grid_is_the_product_in_c_order(tmp_path: Path) -> None:
     axes = {"K": {"values": (1e5, 2e5)}, "epsilon": {"from": 0.1, "to": 0.3, "count": 3}}
     grid = SweepGrid.of(SweepPlan(**FIXED, axes=axes))
     assert grid.shape == (2, 3)
-    points = grid.numbered(np.arange(6))
+    points = grid.between((slice(0, 2), slice(0, 3)))
     assert points.values["K"].tolist() == [1e5] * 3 + [2e5] * 3
     assert points.values["epsilon"].tolist() == [0.1, 0.2, 0.3] * 2
     every = np.concatenate([grid.at(c).values["epsilon"] for c in range(grid.chunk_count)])

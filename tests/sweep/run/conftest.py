@@ -8,10 +8,10 @@ from references.closed_form_sweep import ClosedForm
 
 @pytest.fixture
 def closed_form(monkeypatch: pytest.MonkeyPatch) -> ClosedForm:
-    from asperity.sweep.run import tasks
+    from asperity.sweep import worker
 
     found = ClosedForm()
     monkeypatch.setitem(SOLVES, "periodic", found)
     monkeypatch.setenv("NPROC", "1")
-    tasks._worker.cache_clear()
+    worker._opened.cache_clear()
     return found

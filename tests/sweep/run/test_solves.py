@@ -10,7 +10,7 @@ import asperity as asp
 from asperity import materials
 from asperity.errors import InputError
 from asperity.sweep import SweepPlan, open_store, run_sweep, store_status
-from asperity.sweep.run import tasks
+from asperity.sweep import worker
 from references.closed_form_sweep import ThisProcess
 
 PMMA = materials.load("bureau2000")
@@ -20,7 +20,7 @@ KC = (PMMA.B - PMMA.A) * PMMA.W0 / PMMA.D0
 @pytest.fixture(autouse=True)
 def _one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NPROC", "1")
-    tasks._worker.cache_clear()
+    worker._opened.cache_clear()
 
 
 def sweep(out: Path, **fields: Any) -> Any:

@@ -9,9 +9,9 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.laws import registry
-from asperity.sweep import open_store, run_sweep
-from asperity.sweep.run import run, tasks
-from asperity.sweep.run.executors import local_cluster
+import asperity.sweep.run as run_module
+from asperity.sweep import open_store, run_sweep, worker
+from asperity.sweep.workers import local_cluster
 from references.closed_form_sweep import ClosedForm, InClosedForm, ThisProcess, plan_of
 
 LAW = """
@@ -96,12 +96,12 @@ def test_a_store_is_continued_by_what_began_it(
 ) -> None:
     out = tmp_path / "s.zarr"
     run_sweep(plan_of(), out, workers=ThisProcess())
-    other = {**run.numerics(), "jaxlib": "0.0.1"}
-    monkeypatch.setattr(run, "numerics", lambda: other)
+    other = {**run_module.numerics(), "jaxlib": "0.0.1"}
+    monkeypatch.setattr(run_module, "numerics", lambda: other)
     with pytest.raises(InputError, match=r'got \'s\.zarr\' with jaxlib = .* there and "0\.0\.1"'):
         run_sweep(plan_of(), out, workers=ThisProcess())
     # Asked to, the new version solves failed points; its workers must have it as well.
     with pytest.raises(InputError, match=r"workers must have the versions of the driver.*jaxlib"):
         run_sweep(plan_of(), out, workers=ThisProcess(), retry_failed=True)
-    monkeypatch.setattr(tasks, "numerics", lambda: other)
+    monkeypatch.setattr(worker, "numerics", lambda: other)
     assert run_sweep(plan_of(), out, workers=ThisProcess(), retry_failed=True).solved > 0

@@ -15,7 +15,7 @@ Examples:
   asperity sweep plan.toml --dry-run
   asperity sweep plan.toml --out results.zarr
   asperity sweep plan.toml --out results.zarr --cluster 4
-  asperity sweep status results.zarr
+  asperity.sweep.results results.zarr
   asperity sweep summary results.zarr
   asperity sweep export results.zarr results.nc
   asperity sweep plot results.zarr --show delta_mu --x epsilon --y stiffness_ratio --out drop.png
@@ -113,7 +113,7 @@ def run(
     if found.failed:
         click.echo(
             f"asperity: {found.failed:,} of {found.points:,} points have no answer; the variable "
-            "'outcome' says why, and asperity sweep status counts the reasons",
+            "'outcome' says why, and asperity.sweep.results counts the reasons",
             err=True,
         )
     return 1 if found.failed else 0
@@ -134,7 +134,6 @@ def _estimate(plan: Path, as_json: bool) -> int:
         ("chunks", f"{found.chunks:,} of {' x '.join(map(str, found.chunk_shape))} points"),
         ("disk", f"{size_text(found.bytes)} at most"),
         ("sample", f"{found.sample:,} points"),
-        ("second stage", f"{found.second_stage:.2%} of the points"),
         ("failed", f"{found.failed:.2%} of the sample"),
         ("time", f"{alone} of one core, about; {together} on {cores}"),
     ]
@@ -150,7 +149,7 @@ def status(store: Path, as_json: bool) -> int:
     from asperity.cli.report import aligned, to_json
     from asperity.outputs import size_text
     from asperity.sweep import store_status
-    from asperity.sweep.status import status_record
+    from asperity.sweep.results import status_record
 
     found = store_status(store)
     if as_json:

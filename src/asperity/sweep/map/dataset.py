@@ -11,8 +11,10 @@ import xarray
 from asperity._version import __version__
 from asperity.parameters import OUTPUTS, point_parameters
 from asperity.sweep.map.boundary import MapBoundary
-from asperity.sweep.map.critical import critical_stiffness_along
-from asperity.sweep.map.plane import MapPlane, PointResponses
+from asperity.sweep.map.plane import MapPlane
+from asperity.sweep.outcome import Answers
+from asperity.sweep.responses import bifurcation_kinds, is_stable
+from asperity.theory import closed_forms as cf
 
 #: Names of the numbers on the grid, which a picture can show.
 SHOWN = (
@@ -28,19 +30,23 @@ SHOWN = (
     "growth_rate",
 )
 
+#: Laws whose steady sliding loses stability at a stiffness known in closed form.
+_RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip")
+_ELASTIC = {"elasto-plastic": "slider", "elasto-plastic-age": "plastic"}
+
 _POINT = "boundary_point"
 _CONVENTION = "F/W0 = mean + sum mu_n cos(n w t + phase_n), w(t) = 1 + eps cos(w t)"
 
 
 def as_dataset(
-    plane: MapPlane, grid: PointResponses, boundary: MapBoundary, origins: Mapping[str, str]
+    plane: MapPlane, grid: Answers, boundary: MapBoundary, origins: Mapping[str, str]
 ) -> xarray.Dataset:
     """The dataset of a map: grid, boundary, fixed numbers.
 
     Parameters
     ----------
     plane : MapPlane
-    grid : PointResponses
+    grid : Answers
     boundary : MapBoundary
     origins : mapping of str to str
         Source of each fixed number, where known.
@@ -54,14 +60,14 @@ def as_dataset(
     }
     for name, values in (
         # Strings of fixed width: NetCDF has no Python objects.
-        ("mode", grid.mode.astype(str)),
-        ("stable", grid.stable),
+        ("mode", bifurcation_kinds(grid).astype(str)),
+        ("stable", is_stable(grid)),
         ("converged", grid.converged),
         ("result", grid.result.astype(str)),
     ):
         data[name] = (dims, values.reshape(plane.shape), OUTPUTS[name].attributes)
     data |= _boundary(plane, boundary)
-    for side, values in critical_stiffness_along(plane).items():
+    for side, values in _critical_stiffness_along(plane).items():
         data["critical_stiffness"] = (
             side,
             values,
@@ -76,8 +82,7 @@ def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
     where, points = boundary.where, boundary.points
     values = plane.values(where)
     derived = _derived(points, values["frequency"])
-    found = boundary.line >= 0
-    kinds = np.where(found, points.mode, "")
+    kinds = np.where(boundary.line >= 0, bifurcation_kinds(points), "")
     named: dict[str, Any] = {
         "boundary_line": (
             _POINT,
@@ -96,22 +101,53 @@ def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
     return named
 
 
-def _derived(points: PointResponses, frequency: np.ndarray) -> dict[str, np.ndarray]:
+def _derived(points: Answers, frequency: np.ndarray) -> dict[str, np.ndarray]:
+    """All that `SHOWN` names, from what is kept of the points."""
     log = points["log_multiplier"]
-    found = {name: points[name] for name in SHOWN if name not in _DERIVED}
     with np.errstate(over="ignore"):
-        found["floquet_max"] = np.exp(log)
-    found["mode_frequency"] = np.abs(points["multiplier_argument"]) / (2 * np.pi) * frequency
-    found["growth_rate"] = log * frequency
-    return found
+        largest = np.exp(log)
+    turn = np.abs(points["multiplier_argument"]) / (2 * np.pi)
+    rest = {"floquet_max": largest, "mode_frequency": turn * frequency,
+            "growth_rate": log * frequency}  # fmt: skip
+    return {name: rest[name] if name in rest else points[name] for name in SHOWN}
 
 
-_DERIVED = ("floquet_max", "mode_frequency", "growth_rate")
+def _critical_stiffness_along(plane: MapPlane) -> dict[str, np.ndarray]:
+    """K_c (N/m) of unmodulated sliding along the other axis, where K is on one of the two.
+
+    Returns
+    -------
+    dict of str to array
+        By the name of the other axis; empty if K is on neither, or there is no closed form for
+        the law with this inertia and damping.
+    """
+    axes = {plane.x.name: plane.x, plane.y.name: plane.y}
+    if "K" not in axes:
+        return {}
+    (other,) = (axis for name, axis in axes.items() if name != "K")
+    u = np.linspace(0.0, 1.0, other.count)
+    where = np.stack([u, 0 * u] if other is plane.x else [0 * u, u], axis=-1)
+    values = plane.values(where)
+    if np.any(values["eta"] > 0):
+        return {}
+    heavy, name = bool(np.any(values["inertia"])), plane.law.name
+    rigid = name in _RIGID or (name in _ELASTIC and not np.any(values["lambda"]))
+    if not rigid and (heavy or name not in _ELASTIC):
+        return {}
+    numbers: dict[str, Any] = {n: values[n] for n in ("A", "B", "D0", "K", "W0", "V", "M")}
+    elastic: Any = values.get("lambda", np.zeros(1))
+    numbers |= {"mu": values["mu0"], "omega": 2 * np.pi * values["frequency"]}
+    p = cf.SmallModulation(**numbers, lambda_=elastic)
+    if not rigid:
+        critical = cf.critical_stiffness_elastic(p, _ELASTIC[name])
+    else:
+        critical = cf.critical_stiffness_inertial(p) if heavy else cf.critical_stiffness(p)
+    return {other.name: np.asarray(critical)}
 
 
 def _coordinates(plane: MapPlane, origins: Mapping[str, str]) -> dict[str, Any]:
     known = point_parameters(plane.law)
-    found: dict[str, Any] = {
+    coordinates: dict[str, Any] = {
         axis.name: (axis.name, axis.values, known[axis.name].attributes)
         for axis in (plane.x, plane.y)
     }
@@ -119,8 +155,8 @@ def _coordinates(plane: MapPlane, origins: Mapping[str, str]) -> dict[str, Any]:
         attributes = dict(known[name].attributes)
         if name in origins:
             attributes["origin"] = origins[name]
-        found[name] = ((), value, attributes)
-    return found
+        coordinates[name] = ((), value, attributes)
+    return coordinates
 
 
 def _global_attributes(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:

@@ -4,82 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.laws import Law
-from asperity.operating_point import motions, respond, without_contact, without_mass
-from asperity.orbit.floquet import kind_of_crossing
-from asperity.parameters.arguments import increments
+from asperity.operating_point import without_mass
+from asperity.sweep.crossing import STABILITY
 from asperity.sweep.map.axis import Axis
+from asperity.sweep.outcome import Answers
+from asperity.sweep.points import Float
+from asperity.sweep.responses import answers_of_law
 
-Float = NDArray[np.float64]
-
-#: Numbers kept of the response at a point, besides `converged` and `result`.
-NUMBERS = (
-    "mean_friction",
-    "delta_mu",
-    "mu1",
-    "mu2",
-    "phase1",
-    "phase2",
-    "log_multiplier",
-    "multiplier_argument",
-)
-
-
-@dataclass
-class PointResponses:
-    """Responses at some positions.
-
-    Attributes
-    ----------
-    numbers : array, shape (len(NUMBERS), points)
-        NaN where not converged. ``log_multiplier`` is ln|m| of the leading multiplier, -inf
-        for a law without dynamics, and ``multiplier_argument`` its arg m (rad).
-    converged : bool array, shape (points,)
-    result : object array, shape (points,)
-        "converged", or why not.
-    """
-
-    numbers: Float
-    converged: NDArray[np.bool_]
-    result: NDArray[np.object_]
-
-    @classmethod
-    def empty(cls, count: int) -> PointResponses:
-        """Arrays for `count` points, none of them solved."""
-        return cls(
-            np.full((len(NUMBERS), count), np.nan),
-            np.zeros(count, dtype=bool),
-            np.full(count, "", dtype=object),
-        )
-
-    def __getitem__(self, name: str) -> Float:
-        return self.numbers[NUMBERS.index(name)]
-
-    @property
-    def stable(self) -> NDArray[np.bool_]:
-        """All multipliers inside the unit circle; False where not converged."""
-        return self.converged & (self["log_multiplier"] < 0)
-
-    @property
-    def mode(self) -> NDArray[np.object_]:
-        """Bifurcation of the leading multiplier at the unit circle; "" where not known."""
-        return kind_of_crossing(self["log_multiplier"] + 1j * self["multiplier_argument"])
-
-    def take(self, index: NDArray[Any]) -> PointResponses:
-        """The points `index`, by number or by a mask."""
-        return PointResponses(self.numbers[:, index], self.converged[index], self.result[index])
-
-    def put(self, index: NDArray[np.intp], others: PointResponses) -> None:
-        """Replace the points `index` by `others`."""
-        self.numbers[:, index] = others.numbers
-        self.converged[index] = others.converged
-        self.result[index] = others.result
+#: Outputs that are kept of each point.
+OUTPUTS = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", *STABILITY)
 
 
 @dataclass(frozen=True)
@@ -99,6 +37,8 @@ class MapPlane:
     x: Axis
     y: Axis
 
+    outputs = OUTPUTS
+
     @property
     def shape(self) -> tuple[int, int]:
         """Rows and columns of the grid."""
@@ -111,7 +51,7 @@ class MapPlane:
         return np.stack([a.ravel() for a in np.meshgrid(u, v)], axis=-1)
 
     def values(self, where: Float) -> dict[str, Float]:
-        """Every number of the operating points at some positions, in SI.
+        """Numbers of the operating points at some positions, in SI.
 
         Parameters
         ----------
@@ -119,17 +59,17 @@ class MapPlane:
             Fractions of the x and of the y axis.
         """
         points = len(where)
-        found = {name: np.full(points, float(value)) for name, value in self.fixed.items()}
-        found[self.x.name] = self.x.at(where[:, 0])
-        found[self.y.name] = self.y.at(where[:, 1])
-        if without_mass(found).any():
+        values = {name: np.full(points, float(value)) for name, value in self.fixed.items()}
+        values[self.x.name] = self.x.at(where[:, 0])
+        values[self.y.name] = self.y.at(where[:, 1])
+        if without_mass(values).any():
             raise InputError(
                 "M must be positive where inertia is asked for, got 0 kg; give the mass, as "
                 "M='1.6 kg'"
             )
-        return found
+        return values
 
-    def solve(self, where: Float, progress: Callable[[int], None] | None = None) -> PointResponses:
+    def solve(self, where: Float, progress: Callable[[int], None] | None = None) -> Answers:
         """Responses at some positions.
 
         Parameters
@@ -139,49 +79,4 @@ class MapPlane:
         progress : callable, optional
             Called with the number of points finished since the last call.
         """
-        return (
-            solve_points(self.law, self.values(where), progress)
-            if len(where)
-            else PointResponses.empty(0)
-        )
-
-
-def solve_points(
-    law: type[Law], values: dict[str, Float], progress: Callable[[int], None] | None = None
-) -> PointResponses:
-    """Responses at operating points, each group with one equation of motion on its own.
-
-    A point at which the contact is lost within the period has no response; `result` says why.
-
-    Parameters
-    ----------
-    law : type of Law
-    values : dict of str to array, shape (points,)
-        All numbers in SI.
-    progress : callable, optional
-        Called with the number of points finished since the last call.
-    """
-    points = PointResponses.empty(len(values["V"]))
-    reasons = np.array(without_contact(values), dtype=object)
-    points.result[:] = reasons
-    kept = np.flatnonzero(reasons == "")
-    if progress is not None and len(kept) < len(reasons):
-        progress(len(reasons) - len(kept))
-    for group in motions({name: value[kept] for name, value in values.items()}):
-        index = kept[group]
-        some = {name: value[index] for name, value in values.items()}
-        points.put(index, _solve(law, some, progress))
-    return points
-
-
-def _solve(
-    law: type[Law], values: dict[str, Float], progress: Callable[[int], None] | None
-) -> PointResponses:
-    response = respond(law, values, increments(progress))
-    logs = response.log_multipliers
-    leading = logs[..., 0] if logs.shape[-1] else np.full(len(logs), -np.inf + 0j)
-    own = {"log_multiplier": leading.real, "multiplier_argument": leading.imag}
-    numbers = [own[n] if n in own else getattr(response, n) for n in NUMBERS]
-    # A phase of a point that failed may be 0 where its modulus is NaN.
-    kept = np.where(response.converged, np.stack(numbers), np.nan)
-    return PointResponses(kept, response.converged, response.result)
+        return answers_of_law(self.law, self.values(where), OUTPUTS, progress)

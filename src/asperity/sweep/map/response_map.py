@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import csv
+import dataclasses
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,19 +16,22 @@ from asperity.operating_point import (
     refuse_foreign,
     sourced_numbers,
 )
-from asperity.outputs import output_file, require_memory, written_file
+from asperity.outputs import UnfinishedText, output_file, require_memory, written_file
 from asperity.parameters import MODULATION, point_parameters
 from asperity.parameters.arguments import function, instance, switch
+from asperity.sweep.engine import solve_here
 from asperity.sweep.map.axis import Axis
 from asperity.sweep.map.boundary import MapBoundary, trace_boundary
 from asperity.sweep.map.dataset import as_dataset
-from asperity.sweep.map.grid import BLOCK, interrupted, kept_beside, solve_grid, solve_grid_kept
-from asperity.sweep.map.plane import MapPlane
+from asperity.sweep.map.plane import OUTPUTS, MapPlane
+from asperity.sweep.outcome import Answers
 from asperity.units import KINDS
 
 if TYPE_CHECKING:
     import xarray
 
+#: Points of a chunk.
+_CHUNK = 4800
 #: Bytes that a point of a map takes, with its boundary and its file: 250 to 300 without these, from
 #: the largest resident memory at 250,000 to 2,250,000 points.
 _POINT_BYTES = 500.0
@@ -84,7 +89,7 @@ def response_map(
     grid. A feature within one cell that changes no stability at its corners is not detected.
     """
     plane, origins = _plane(law, numbers, x, y)
-    grid = solve_grid(plane, function(progress, "progress") or _silent)
+    grid = _solved(plane, None, function(progress, "progress") or _silent, _CHUNK)
     traced = trace_boundary(plane, grid) if switch(boundary, "boundary") else MapBoundary.empty()
     return as_dataset(plane, grid, traced, origins)
 
@@ -98,20 +103,20 @@ def write_map(
     y: Axis,
     resume: bool = False,
     progress: Callable[[int, int], None] | None = None,
-    block: int = BLOCK,
+    block: int = _CHUNK,
 ) -> xarray.Dataset:
-    """`response_map` to a NetCDF file; an interruption keeps the finished blocks.
+    """`response_map` to a NetCDF file; an interruption keeps the finished chunks.
 
     Parameters
     ----------
     out : Path
-        Written when everything is done; until then finished blocks are in ``OUT.partial``.
+        Written when everything is done; until then finished chunks are in ``OUT.partial``.
     law, numbers, x, y, progress
         As for `response_map`.
     resume : bool
         Continue an interrupted map; without one, start from the first point.
     block : int
-        Points solved and kept at a time.
+        Points of a chunk: solved and kept at a time.
 
     Raises
     ------
@@ -122,16 +127,43 @@ def write_map(
     """
     plane, origins = _plane(law, numbers, x, y)
     target = output_file(out, example="map.nc")
-    kept = kept_beside(target, plane)
-    grid = solve_grid_kept(plane, kept, resume, progress or _silent, block)
-    try:
-        found = as_dataset(plane, grid, trace_boundary(plane, grid), origins)
+    axes = {name: dataclasses.asdict(getattr(plane, name)) for name in ("x", "y")}
+    kept = UnfinishedText(target, {"law": plane.law.name, "numbers": dict(plane.fixed), **axes})
+    kept.start(resume)
+    with kept.interruptible("points", x.count * y.count):
+        grid = _solved(plane, kept, progress or _silent, block)
+        dataset = as_dataset(plane, grid, trace_boundary(plane, grid), origins)
         with written_file(target) as file:
-            found.to_netcdf(file, engine="h5netcdf")
-    except KeyboardInterrupt:
-        raise interrupted(kept, len(grid.converged)) from None
+            dataset.to_netcdf(file, engine="h5netcdf")
     kept.discard()
-    return found
+    return dataset
+
+
+def _solved(
+    plane: MapPlane,
+    kept: UnfinishedText | None,
+    progress: Callable[[int, int], None],
+    chunk: int,
+) -> Answers:
+    """Responses at the points of the grid; those of finished chunks are lines of `kept`."""
+    nodes = plane.nodes()
+    grid = Answers.empty(OUTPUTS, len(nodes))
+    if kept is not None:
+        for i, row in enumerate(csv.reader(kept.text().splitlines())):
+            *numbers, outcome, detail = row
+            for name, cell in zip(OUTPUTS, numbers, strict=True):
+                grid.numbers[name][i] = float(cell)
+            grid.outcome[i], grid.detail[i] = int(outcome), float(detail)
+
+    def solve(start: int, stop: int, advance: Callable[[int], None]) -> None:
+        part = plane.solve(nodes[start:stop], advance)
+        grid.put(slice(start, stop), part)
+        if kept is not None:
+            columns: list[Any] = [*part.numbers.values(), part.outcome, part.detail]
+            kept.append_rows(list(zip(*(c.tolist() for c in columns), strict=True)))
+
+    solve_here(len(nodes), chunk, solve, progress, 0 if kept is None else kept.rows)
+    return grid
 
 
 def _plane(

@@ -25,10 +25,10 @@ from asperity.parameters import (
 )
 from asperity.parameters.arguments import some_of
 from asperity.parameters.file_content import file_content
-from asperity.sweep.plan.model import FitTable, SweepPlan
-from asperity.sweep.plan.points import Points
-from asperity.sweep.solve.kind import Findings, SolveKind, laws_of
-from asperity.sweep.solve.outcome import SweepOutcome
+from asperity.sweep.outcome import Answers, SweepOutcome
+from asperity.sweep.plan import FitTable, SweepPlan
+from asperity.sweep.points import Points
+from asperity.sweep.solve.kind import SolveKind
 
 if TYPE_CHECKING:
     from asperity.inference import Fit, LockInTable
@@ -76,7 +76,6 @@ class FitSolve(SolveKind):
     name = "fit"
     outputs = ()
     defaults = ()
-    batch = 4
 
     def parameters(self) -> dict[str, Parameter]:
         """As in `SolveKind`."""
@@ -129,19 +128,15 @@ class FitSolve(SolveKind):
         """As in `SolveKind`."""
         return max(1, min(64, points // 8))
 
-    def first(self, points: Points, record: Mapping[str, Any]) -> Findings:
-        """Nothing: every fit takes its time."""
-        return Findings.empty(record["outputs"], len(points))
-
-    def second(self, points: Points, record: Mapping[str, Any]) -> Findings:
+    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
-        found = Findings.empty(record["outputs"], len(points))
-        for law, rows in laws_of(points):
+        answers = Answers.empty(record["outputs"], len(points))
+        for law, rows in points.by_law():
             for row in rows:
                 one = {n: float(v[row]) for n, v in points.values.items() if np.isfinite(v[row])}
-                own = [] if points.data is None else [str(points.data[row])]
-                _fit_point(law, one, own, int(row), record, found)
-        return found
+                files = [] if points.data is None else [str(points.data[row])]
+                _fit_point(law, one, files, int(row), record, answers)
+        return answers
 
 
 def data_files(plan: SweepPlan) -> list[str]:
@@ -257,10 +252,10 @@ def _read(path: str, digest: str, given: tuple[tuple[str, float], ...]) -> LockI
 def _fit_point(
     law: str,
     values: dict[str, float],
-    own: Sequence[str],
+    files: Sequence[str],
     row: int,
     record: Mapping[str, Any],
-    found: Findings,
+    answers: Answers,
 ) -> None:
     from asperity.inference import Prior, fit
 
@@ -272,7 +267,7 @@ def _fit_point(
     given = tuple((n, values[n]) for n in _OPERATING if n in values)
     tables = [
         _read(str(Path(record["folder"], name)), settings["files"][name], given)
-        for name in own or settings["data"]
+        for name in files or settings["data"]
     ]
     fixed = _fixed(values, [n for n in known if n not in free], record["origins"], tables)
     truth = {name: values[name] for name in free if name in values}
@@ -282,7 +277,7 @@ def _fit_point(
         drawn = [_drawn(t, law, {**fixed, **truth}, inertia, noise) for t in tables]
         tables = [table for table in drawn if table is not None]
         if len(tables) < len(drawn):
-            found.fail(np.array([row]), SweepOutcome.NO_READINGS)
+            answers.fail(np.array([row]), SweepOutcome.NO_READINGS)
             return
     priors = {n: Prior(*p) for n, p in settings["prior"].items() if n in free}
     fitted = fit(
@@ -293,12 +288,12 @@ def _fit_point(
         check_stiffness=False,
     )  # fmt: skip
     if not fitted.converged:
-        found.fail(np.array([row]), SweepOutcome.FIT_FAILED)
+        answers.fail(np.array([row]), SweepOutcome.FIT_FAILED)
         return
     numbers = _numbers(fitted)
-    for name in found.numbers:
-        found.numbers[name][row] = numbers.get(name, np.nan)
-    found.outcome[row] = SweepOutcome.CONVERGED
+    for name in answers.numbers:
+        answers.numbers[name][row] = numbers.get(name, np.nan)
+    answers.outcome[row] = SweepOutcome.CONVERGED
 
 
 def _fixed(

@@ -9,15 +9,16 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.laws import get_law
-from asperity.operating_point import motions
 from asperity.parameters import Output
-from asperity.sweep.plan.model import SweepPlan
-from asperity.sweep.plan.points import Points
-from asperity.sweep.solve.kind import Findings, SolveKind, laws_of
-from asperity.sweep.solve.outcome import SweepOutcome
-from asperity.sweep.solve.periodic import solvable
+from asperity.sweep.outcome import Answers, SweepOutcome
+from asperity.sweep.plan import SweepPlan
+from asperity.sweep.points import Points
+from asperity.sweep.responses import solvable
+from asperity.sweep.solve.kind import SolveKind
 from asperity.sweep.threshold import require_scan, search_thresholds
 
+#: Points of a chunk: enough to share the fixed costs of a search, and some seconds of work.
+_FEWEST, _MOST = 24, 480
 #: Codes of the bifurcations, in the order of `flag_meanings`.
 KINDS = ("fold", "period doubling", "Neimark-Sacker")
 _OUTCOMES = {
@@ -44,7 +45,6 @@ class ThresholdSolve(SolveKind):
     )
     defaults = tuple(output.name for output in outputs)
     supplies = ("K",)
-    batch = 24
 
     def settings(self, plan: SweepPlan) -> dict[str, Any]:
         """As in `SolveKind`."""
@@ -58,48 +58,35 @@ class ThresholdSolve(SolveKind):
         return {"between": [low, high], "scan": plan.threshold.scan}
 
     def require_memory(self, points: int, record: Mapping[str, Any]) -> None:
-        """As in `SolveKind`, and for the stiffnesses of a batch."""
+        """As in `SolveKind`, and for the stiffnesses of a chunk."""
         super().require_memory(points, record)
-        require_scan(min(points, self.batch), record["settings"]["scan"], "threshold.scan")
+        require_scan(points, record["settings"]["scan"], "threshold.scan")
 
     def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
         """As in `SolveKind`."""
-        return max(self.batch, min(20 * self.batch, points // 8))
+        return max(_FEWEST, min(_MOST, points // 8))
 
-    def first(self, points: Points, record: Mapping[str, Any]) -> Findings:
-        """Only what cannot be solved is found out: every threshold takes a search."""
-        found = Findings.empty(record["outputs"], len(points))
-        for law, rows in laws_of(points):
-            solvable(law, _with_stiffness(points, rows, law, record)[0], rows, found)
-        return found
-
-    def second(self, points: Points, record: Mapping[str, Any]) -> Findings:
+    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
-        found = Findings.empty(record["outputs"], len(points))
-        for law, rows in laws_of(points):
-            values, critical = _with_stiffness(points, rows, law, record)
-            for group in motions(values):
-                some = {n: v[group] for n, v in values.items()}
-                found.put(rows[group], _search(law, some, critical[group], record))
-        return found
-
-
-def _with_stiffness(
-    points: Points, rows: Any, law: str, record: Mapping[str, Any]
-) -> tuple[dict[str, np.ndarray], np.ndarray]:
-    """Values of the points, with the softest spring in place of none, and K_c."""
-    values = points.take(rows).of_law(law)
-    if not {"A", "B", "D0"} <= set(values):
-        critical = np.full(len(rows), np.nan)
-    else:
-        critical = (values["B"] - values["A"]) * values["W0"] / values["D0"]
-    values["K"] = record["settings"]["between"][0] * critical
-    return values, critical
+        answers = Answers.empty(record["outputs"], len(points))
+        between = record["settings"]["between"]
+        for law, rows in points.by_law():
+            values = points.take(rows).of_law(law)
+            critical = np.full(len(rows), np.nan)
+            if {"A", "B", "D0"} <= set(values):
+                critical = (values["B"] - values["A"]) * values["W0"] / values["D0"]
+            # The softest spring stands for the stiffness, which a point has none of.
+            values["K"] = between[0] * critical
+            sound = solvable(get_law(law), values, rows, answers)
+            if len(sound):
+                values = {n: v[sound] for n, v in values.items()}
+                answers.put(rows[sound], _search(law, values, critical[sound], record))
+        return answers
 
 
 def _search(
     law: str, values: dict[str, np.ndarray], critical: np.ndarray, record: Mapping[str, Any]
-) -> Findings:
+) -> Answers:
     settings = record["settings"]
     low, high = settings["between"]
     searched = search_thresholds(
@@ -115,7 +102,7 @@ def _search(
     }
     outcome = np.array([int(_OUTCOMES[what]) for what in searched.what], dtype=np.int16)
     good = outcome == SweepOutcome.CONVERGED
-    return Findings(
+    return Answers(
         {name: np.where(good, numbers[name], np.nan) for name in record["outputs"]},
         outcome,
         np.where(good, 0.0, searched.where / critical),

@@ -16,11 +16,11 @@ from asperity.parameters import EXPERIMENT, Output, all_parameters
 from asperity.parameters.arguments import number
 from asperity.protocol.plan import plan as planned_steps
 from asperity.slider.named import slider_from
-from asperity.sweep.plan.model import SweepPlan, TransientTable
-from asperity.sweep.plan.points import Points
-from asperity.sweep.solve.kind import Findings, SolveKind, laws_of
-from asperity.sweep.solve.outcome import SweepOutcome
-from asperity.sweep.solve.periodic import solvable
+from asperity.sweep.outcome import Answers, SweepOutcome
+from asperity.sweep.plan import SweepPlan, TransientTable
+from asperity.sweep.points import Points
+from asperity.sweep.responses import solvable
+from asperity.sweep.solve.kind import SolveKind
 from asperity.transients import Trajectory, transient
 
 #: Channels of a trajectory and their units.
@@ -52,7 +52,6 @@ class TransientSolve(SolveKind):
     defaults = ()
     # A programme need not have a modulation.
     supplies = ("epsilon", "frequency")
-    batch = 2
 
     def settings(self, plan: SweepPlan) -> dict[str, Any]:
         """As in `SolveKind`."""
@@ -98,24 +97,17 @@ class TransientSolve(SolveKind):
         """As in `SolveKind`."""
         return max(1, min(64, points // 8))
 
-    def first(self, points: Points, record: Mapping[str, Any]) -> Findings:
-        """Only what cannot be integrated is found out: every transient takes its time."""
-        found = Findings.empty(record["outputs"], len(points))
-        for law, rows in laws_of(points):
-            solvable(law, _values(points.take(rows), law), rows, found)
-        return found
-
-    def second(self, points: Points, record: Mapping[str, Any]) -> Findings:
+    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
-        found = Findings.empty(record["outputs"], len(points))
-        for law, rows in laws_of(points):
-            values = _values(points.take(rows), law)
-            every = points.take(rows).values
-            for k, row in enumerate(rows):
+        answers = Answers.empty(record["outputs"], len(points))
+        for law, rows in points.by_law():
+            some = points.take(rows)
+            values = _values(some, law)
+            for k in solvable(get_law(law), values, rows, answers):
                 one = {n: float(v[k]) for n, v in values.items()}
-                named = {n: float(v[k]) for n, v in every.items()} | one
-                _integrate(law, one, named, int(row), record["settings"], found)
-        return found
+                named = {n: float(v[k]) for n, v in some.values.items()} | one
+                _integrate(law, one, named, int(rows[k]), record["settings"], answers)
+        return answers
 
 
 def _values(points: Points, law: str) -> dict[str, np.ndarray]:
@@ -132,7 +124,7 @@ def _integrate(
     named: Mapping[str, float],
     row: int,
     settings: Mapping[str, Any],
-    found: Findings,
+    answers: Answers,
 ) -> None:
     lines = [line.format_map(_WithUnits(named)) for line in settings["steps"]]
     steps, mistakes = planned_steps(lines, Path())
@@ -149,11 +141,11 @@ def _integrate(
         most_steps=settings["most_steps"],
     )
     if trajectory.termination is not None:
-        found.fail(np.array([row]), SweepOutcome.STOPPED, trajectory.termination.time)
+        answers.fail(np.array([row]), SweepOutcome.STOPPED, trajectory.termination.time)
         return
     for name, one in settings["numbers"].items():
-        found.numbers[name][row] = _reduced(trajectory, one)
-    found.outcome[row] = SweepOutcome.CONVERGED
+        answers.numbers[name][row] = _reduced(trajectory, one)
+    answers.outcome[row] = SweepOutcome.CONVERGED
 
 
 def _reduced(trajectory: Trajectory, one: Mapping[str, Any]) -> float:

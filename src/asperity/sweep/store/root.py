@@ -18,7 +18,7 @@ from asperity.errors import InputError
 from asperity.outputs.json import json_content
 from asperity.sweep.grid import SweepGrid
 from asperity.sweep.record import ATTRIBUTES
-from asperity.sweep.store.durable import put, sync_file, sync_folder
+from asperity.sweep.store import durable
 
 #: Attribute that says what kind of group this is, and the format.
 KIND = "asperity_sweep"
@@ -90,10 +90,10 @@ def _group(attributes: Any, arrays: Any = None) -> dict[str, Any]:
 
 def _write(folder: Path, content: Mapping[str, Any]) -> None:
     file = folder / "zarr.json"
-    put(file, json.dumps(content, indent=2).encode())
-    sync_file(file)
-    sync_folder(folder)
-    sync_folder(folder.parent)
+    durable.put(file, json.dumps(content, indent=2).encode())
+    durable.sync_file(file)
+    durable.sync_folder(folder)
+    durable.sync_folder(folder.parent)
 
 
 def _seal(attributes: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str, Any]:

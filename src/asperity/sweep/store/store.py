@@ -7,11 +7,8 @@ reached the disk.
 
 from __future__ import annotations
 
-import hashlib
-import json
 import os
-import shutil
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,12 +17,11 @@ import zarr
 
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
-from asperity.sweep.grid import SweepGrid
+from asperity.sweep.outcome import Answers
 from asperity.sweep.record import OF_CHUNKS, OF_POINTS
-from asperity.sweep.solve import Findings
-from asperity.sweep.store.durable import make_way, put, sync_file, sync_folder
-from asperity.sweep.store.root import FORMAT, KIND, Root, read_root, write_root
-from asperity.sweep.store.skeleton import ALL_CHUNKS, NOT_DONE, coordinates, skeleton
+from asperity.sweep.store import durable
+from asperity.sweep.store.layout import ALL_CHUNKS, NOT_DONE, checksum, chunk_file, reset
+from asperity.sweep.store.root import Root, read_root, write_root
 
 #: Reading a damaged chunk raises one of these, by the codec that finds out.
 _DAMAGED = (ValueError, RuntimeError, OSError, KeyError, TypeError)
@@ -82,7 +78,7 @@ class SweepStore:
     def _require_labels(self) -> None:
         """Refuse to read a store whose coordinates are not those that were written."""
         for name, array in self.labels.items():
-            found = _checksum()
+            found = checksum()
             try:
                 for place in np.ndindex(*array.cdata_shape):
                     found.update(chunk_file(self.path, name, place).read_bytes())
@@ -96,6 +92,11 @@ class SweepStore:
     def failed_in(self, chunk: int) -> int:
         """Failed points of a chunk, -1 where it is not done or its status is damaged."""
         return self._of(self.status, chunk, NOT_DONE)
+
+    def share_done(self) -> float:
+        """Share of the chunks that are done, from the number of files."""
+        files = sum(len(names) for _, _, names in os.walk(self.path / "status" / "c"))
+        return min(1.0, files / self.grid.chunk_count)
 
     def is_done(self, chunk: int) -> bool:
         """Whether the status of a chunk says that it is done."""
@@ -138,13 +139,13 @@ class SweepStore:
 
     def _digest(self, chunk: int, failed: int) -> int:
         """Of the part of the grid, the failed points and the files of a chunk."""
-        found = _checksum(repr((self.grid.slices(chunk), failed)).encode())
+        found = checksum(repr((self.grid.slices(chunk), failed)).encode())
         for name in self.arrays:
             content = self._file(name, chunk).read_bytes()
             found.update(f"{name} {len(content)} ".encode() + content)
         return int.from_bytes(found.digest(), "little", signed=True)
 
-    def write(self, chunk: int, findings: Findings) -> None:
+    def write(self, chunk: int, answers: Answers) -> None:
         """Write a chunk; when this returns it is on the disk and done.
 
         Raises
@@ -156,17 +157,17 @@ class SweepStore:
         slices = self.grid.slices(chunk)
         shape = tuple(s.stop - s.start for s in slices)
         values: dict[str, Any] = {
-            **findings.numbers,
-            "outcome": findings.outcome,
-            "detail": findings.detail,
+            **answers.numbers,
+            "outcome": answers.outcome,
+            "detail": answers.detail,
         }
         for name in self._of_chunks:
-            make_way(self._file(name, chunk))
+            durable.make_way(self._file(name, chunk))
         for name, array in self.arrays.items():
             array[slices] = values[name].reshape(shape)
-        self.checksum[self.grid.place(chunk)] = self._digest(chunk, findings.failed)
+        self.checksum[self.grid.place(chunk)] = self._digest(chunk, answers.failed)
         self._sync([self._file(name, chunk) for name in (*self.arrays, "checksum")])
-        self.status[self.grid.place(chunk)] = findings.failed
+        self.status[self.grid.place(chunk)] = answers.failed
         self._sync([self._file("status", chunk)])
 
     def reset(self, chunk: int) -> None:
@@ -183,9 +184,9 @@ class SweepStore:
 
     def _sync(self, files: list[Path]) -> None:
         for file in files:
-            sync_file(file)
+            durable.sync_file(file)
         for folder in self._folders(files):
-            sync_folder(folder)
+            durable.sync_folder(folder)
 
     def _folders(self, files: list[Path]) -> Iterator[Path]:
         """Folders of the files, up to their arrays, each once and inner ones first."""
@@ -236,108 +237,6 @@ def _damaged(path: Path, what: str) -> InputError:
     )
 
 
-def _checksum(content: bytes = b"") -> Any:
-    return hashlib.blake2b(content, digest_size=8)
-
-
 def _array(group: Any, name: str) -> Any:
     """An array that writes every chunk, which is no part of its file."""
     return group[name].with_config(ALL_CHUNKS)
-
-
-def chunk_file(path: Path, name: str, place: tuple[int, ...]) -> Path:
-    """File of a chunk of an array, by its position among the chunks."""
-    return path.joinpath(name, "c", *map(str, place))
-
-
-def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
-    """Make a chunk of a store not done."""
-    file = chunk_file(path, "status", grid.place(chunk))
-    if file.is_file():
-        file.unlink()
-        sync_folder(file.parent)
-
-
-def fresh_folder(store: Path) -> Path:
-    """Where a store is made, until it is complete."""
-    return store.with_name(store.name + ".new")
-
-
-def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> SweepStore:
-    """Make an empty store; it has its name when it is complete.
-
-    Raises
-    ------
-    InputError
-        If the folder cannot be written.
-    """
-    fresh = fresh_folder(path)
-    shutil.rmtree(fresh, ignore_errors=True)
-    try:
-        fresh.mkdir()
-        lay_out(fresh, grid, attributes)
-        fresh.rename(path)
-        sync_folder(path.parent)
-    except OSError as error:
-        shutil.rmtree(fresh, ignore_errors=True)
-        raise InputError(
-            f"out must be a folder that can be written, got '{path}' "
-            f"({(error.strerror or str(error)).lower()}); choose another place with room"
-        ) from None
-    return SweepStore(path)
-
-
-def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
-    """Give a store the arrays, coordinates and attributes of a plan; answers in it stay.
-
-    Parameters
-    ----------
-    path : Path
-        A folder, which may hold all of it already.
-    grid : SweepGrid
-    attributes : mapping
-        Those that do not follow from the grid.
-
-    Returns
-    -------
-    list of str
-        Files that were missing or differed, and were written.
-    """
-    written: list[str] = []
-    arrays: dict[str, Any] = {}
-    checksums: dict[str, Any] = {}
-    for name, content in skeleton(grid):
-        file, array = path / name, name.split("/")[0]
-        if file.name == "zarr.json":
-            arrays[array] = json.loads(content)
-        else:
-            checksums.setdefault(array, _checksum()).update(content)
-        if not _holds(file, content):
-            put(file, content)
-            sync_file(file)
-            sync_folder(file.parent)
-            written.append(name)
-    for folder in {(path / name).parents[1] for name in written}:
-        sync_folder(folder)
-    write_root(
-        path,
-        {
-            **attributes,
-            KIND: FORMAT,
-            "Conventions": "CF-1.11",
-            "plan": json.dumps(grid.record),
-            "plan_sha256": grid.digest,
-            "chunk_shape": list(grid.chunks),
-            "coordinates": " ".join(coordinates(arrays, grid)),
-            "coordinate_checksums": {name: c.hexdigest() for name, c in checksums.items()},
-        },
-        arrays,
-    )
-    return written
-
-
-def _holds(file: Path, content: bytes) -> bool:
-    try:
-        return file.read_bytes() == content
-    except OSError:
-        return False

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.laws import Law
-from asperity.operating_point import without_contact, without_mass
+from asperity.operating_point import without_mass
 from asperity.parameters import Parameter, point_parameters, required
 
 Row = list[str]
@@ -74,10 +74,6 @@ def read_numbers(
         reasons[i] = reasons[i] or (
             "M must be positive where inertia is 1, got 0; fill it in or name a material with it"
         )
-    sound = np.flatnonzero([not reason for reason in reasons])
-    lost = without_contact({n: v[sound] for n, v in values.items()})
-    for i, reason in zip(sound, lost, strict=True):
-        reasons[i] = reason
     if not law.rate_dependent:
         for i in np.flatnonzero((values["inertia"] > 0) | (values["eta"] > 0)):
             reasons[i] = reasons[i] or (

@@ -1,20 +1,27 @@
-"""Periodic responses of a table, in blocks."""
+"""Periodic responses of a table, in chunks of rows."""
 
 from __future__ import annotations
 
-import csv
-import io
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from asperity.outputs import Interrupted, UnfinishedText, output_file
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.laws import get_law
+from asperity.outputs import UnfinishedText, output_file
 from asperity.parameters import RESULT_COLUMNS
-from asperity.sweep.table.rows import solve_block
+from asperity.sweep.engine import solve_here
+from asperity.sweep.outcome import Answers
+from asperity.sweep.responses import answers_of_law
+from asperity.sweep.table.cells import Row, fit_width, read_numbers
 from asperity.sweep.table.source import TableSource, open_table
 
-#: Rows solved and written at a time: at most so many are lost by an interruption.
-_BLOCK = 20_000
+#: Rows of a chunk: at most so many are lost by an interruption.
+_CHUNK = 20_000
+#: The result columns that hold numbers, and ``stable``.
+_OUTPUTS = RESULT_COLUMNS[: RESULT_COLUMNS.index("converged")]
 
 
 @dataclass(frozen=True)
@@ -41,14 +48,14 @@ def run_table(
     filled: Mapping[str, float] | None = None,
     resume: bool = False,
     progress: Callable[[int, int], None] | None = None,
-    block: int = _BLOCK,
+    block: int = _CHUNK,
 ) -> TableSummary:
     """Periodic response for every row of a CSV table.
 
     Parameters
     ----------
     source, out : Path
-        `out` is written when all rows are done; until then finished blocks are in ``OUT.partial``.
+        `out` is written when all rows are done; until then finished chunks are in ``OUT.partial``.
     law : str, optional
         Law of the rows that name none.
     filled : mapping of str to float, optional
@@ -58,7 +65,7 @@ def run_table(
     progress : callable, optional
         Called with the number of rows done so far and of all rows.
     block : int
-        Rows solved and written at a time.
+        Rows of a chunk: solved and written at a time.
 
     Raises
     ------
@@ -73,44 +80,68 @@ def run_table(
     table = open_table(source, law, filled)
     output = UnfinishedText(out, {"table": table.digest, "law": law, "filled": filled})
     output.start(resume)
-    try:
-        _fill_output(table, output, law, filled, progress or (lambda done, total: None), block)
+    chunks = table.blocks(block, skip=output.rows)
+
+    def solve(start: int, stop: int, advance: Callable[[int], None]) -> None:
+        rows, reasons = zip(
+            *(fit_width(row, len(table.header)) for row in next(chunks)), strict=True
+        )
+        answers, results = _solved(table, rows, list(reasons), law, filled, advance)
+        header = None if start else [*table.header, *RESULT_COLUMNS]
+        lines = [(*row, *cells) for row, cells in zip(rows, _cells(answers, results), strict=True)]
+        output.append_rows(lines, table.delimiter, header, failed=answers.failed)
+
+    with output.interruptible("rows", table.rows):
+        solve_here(table.rows, block, solve, progress or (lambda done, total: None), output.rows)
         output.finish()
-    except KeyboardInterrupt:
-        done = output.rows
-        raise Interrupted(f"{done} of {table.rows} rows" if done else "") from None
-    finally:
-        output.discard_if_empty()
     return TableSummary(table.rows, int(output.progress["failed"]), out)
 
 
-def _fill_output(
+def _solved(
     table: TableSource,
-    output: UnfinishedText,
+    rows: Sequence[Row],
+    reasons: list[str],
     law: str | None,
     filled: Mapping[str, float],
-    progress: Callable[[int, int], None],
-    block: int,
-) -> None:
-    width = len(table.header)
-    header = [] if output.rows else [[*table.header, *RESULT_COLUMNS]]
-    solved = output.rows
-    progress(solved, table.rows)
+    advance: Callable[[int], None],
+) -> tuple[Answers, list[str]]:
+    """Answers of some rows, and the column ``result``; rows with a reason are not solved."""
+    answers = Answers.empty(_OUTPUTS, len(rows))
+    advance(sum(bool(reason) for reason in reasons))
+    for name, members in _by_law(rows, table.columns.get("law"), law, reasons).items():
+        try:
+            kind = get_law(name)
+            values, refused = read_numbers([rows[i] for i in members], kind, table.columns, filled)
+        except InputError as error:
+            refused = [str(error)] * len(members)
+        for i, reason in zip(members, refused, strict=True):
+            reasons[i] = reason
+        advance(sum(bool(reason) for reason in refused))
+        sound = np.array([k for k, reason in enumerate(refused) if not reason], dtype=np.intp)
+        if len(sound):
+            some = {n: v[sound] for n, v in values.items()}
+            answers.put(members[sound], answers_of_law(kind, some, _OUTPUTS, advance))
+    results = [reason or str(text) for reason, text in zip(reasons, answers.result, strict=True)]
+    return answers, results
 
-    def advance(count: int) -> None:
-        nonlocal solved
-        solved += count
-        progress(solved, table.rows)
 
-    for part in table.blocks(block, skip=output.rows):
-        rows, results = solve_block(part, table.columns, width, law, filled, advance)
-        lines = ([*row, *cells] for row, cells in zip(rows, results.cells(), strict=True))
-        text = _text([*header, *lines], table.delimiter)
-        output.append(text, len(rows), failed=results.failed)
-        header = []
+def _by_law(
+    rows: Sequence[Row], place: int | None, law: str | None, reasons: Sequence[str]
+) -> dict[str, np.ndarray]:
+    """Rows without a reason yet, by their law."""
+    members: dict[str, list[int]] = {}
+    for i, row in enumerate(rows):
+        if not reasons[i]:
+            written = "" if place is None else row[place].strip()
+            members.setdefault(written or law or "", []).append(i)
+    return {name: np.array(index, dtype=np.intp) for name, index in members.items()}
 
 
-def _text(rows: Iterable[Sequence[object]], delimiter: str) -> str:
-    text = io.StringIO(newline="")
-    csv.writer(text, delimiter=delimiter, lineterminator="\n").writerows(rows)
-    return text.getvalue()
+def _cells(answers: Answers, results: Sequence[str]) -> Iterator[tuple[object, ...]]:
+    """Result cells of each row; the numbers of a failed row are empty."""
+    converged = answers.converged
+    *columns, stable = (answers[name] for name in _OUTPUTS)
+    numbers = np.array(columns).astype(object)
+    numbers[:, ~converged] = ""
+    flags = ((converged & (stable > 0)).tolist(), converged.tolist())
+    return zip(*numbers.tolist(), *flags, results, strict=True)

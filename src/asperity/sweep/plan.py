@@ -16,13 +16,19 @@ from pydantic import (
     model_validator,
 )
 
-from asperity.errors import InputError
-from asperity.sweep.plan.mistakes import PlanError, sentences
+from asperity.errors import InputError, MistakesError, closest
+from asperity.parameters.arguments import shown
 
 #: A number in SI, a text with its unit, or a switch.
 Given = bool | float | str
 
 _STRICT = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+
+class PlanError(MistakesError):
+    """A plan that cannot be run."""
+
+    subject = "plan"
 
 
 class AxisTable(BaseModel):
@@ -250,7 +256,7 @@ class SweepPlan(BaseModel):
         try:
             super().__init__(**fields)
         except ValidationError as error:
-            raise PlanError(sentences(error, models)) from None
+            raise PlanError(_sentences(error, models)) from None
 
     @property
     def columns(self) -> dict[str, tuple[Any, ...]]:
@@ -273,3 +279,32 @@ class SweepPlan(BaseModel):
         """A plan with some fields replaced, checked as any other."""
         fields = {name: getattr(self, name) for name in type(self).model_fields}
         return type(self)(**{**fields, **(update or {})})
+
+
+def _sentences(error: ValidationError, models: Mapping[str, type[BaseModel]]) -> list[str]:
+    """The mistakes that pydantic found, as ``<field> must <rule>, got <value>; <what to do>``.
+
+    Parameters
+    ----------
+    error : ValidationError
+    models : mapping of str to type of BaseModel
+        Model of each table by its name, the plan's own under ``""``.
+    """
+    return [_sentence(mistake, models) for mistake in error.errors(include_url=False)]
+
+
+def _sentence(mistake: Any, models: Mapping[str, type[BaseModel]]) -> str:
+    raised = mistake.get("ctx", {}).get("error")
+    if isinstance(raised, InputError):
+        return str(raised)
+    place = mistake["loc"]
+    field = ".".join(map(str, place)) or "plan"
+    if mistake["type"] == "extra_forbidden":
+        model = models[str(place[0]) if len(place) > 1 else ""]
+        known = [f.alias or name for name, f in model.model_fields.items()]
+        advice = closest(str(place[-1]), known)
+        return f"{field} must be a known field, got {shown(mistake['input'])}; {advice}"
+    if mistake["type"] == "missing":
+        return f"{field} must be given, got nothing; add it"
+    rule = " ".join(mistake["msg"].split()).removeprefix("Input should be ")
+    return f"{field} must be {rule}, got {shown(mistake['input'])}; correct the value"

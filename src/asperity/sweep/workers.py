@@ -14,7 +14,13 @@ from contextlib import ExitStack, contextmanager
 from typing import Any
 
 from asperity.errors import InputError, printable
-from asperity.sweep.run.tasks import ENVIRONMENT
+
+#: Environment of a worker: one thread of XLA and of the linear algebra of NumPy, as Dask has it.
+#: Sums over several threads differ in their last bits from sums in one.
+ENVIRONMENT = {
+    "NPROC": "1",
+    **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
+}
 
 #: Seconds after which the workers of a scheduler are counted again.
 _RECOUNT = 5.0
@@ -51,6 +57,25 @@ class Workers(ABC):
     @abstractmethod
     def close(self, *, kill: bool) -> None:
         """Let the processes go; with `kill`, whatever they are doing."""
+
+
+class ThisProcess(Workers):
+    """The process of the driver: a task is done when it is handed out."""
+
+    count = 1
+    about = "this process"
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        """As in `Workers`; an interruption is raised at once."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(task(*args))
+        except Exception as error:  # as an executor does
+            future.set_exception(error)
+        return future
+
+    def close(self, *, kill: bool) -> None:
+        """As in `Workers`."""
 
 
 class LocalProcesses(Workers):

@@ -1,4 +1,4 @@
-"""What a store holds besides answers: its arrays and its coordinates, which follow from the plan.
+"""A store without its answers: arrays, coordinates and attributes, which follow from the plan.
 
 The same plan gives the same files to the last bit. A store is made by writing them all, made longer
 by writing those of the longer plan, and repaired by writing those that differ.
@@ -6,7 +6,12 @@ by writing those of the longer plan, and repaired by writing those that differ.
 
 from __future__ import annotations
 
+import hashlib
+import json
+import math
+import shutil
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,12 +19,15 @@ import zarr
 from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.storage import MemoryStore
 
+from asperity.errors import InputError
+from asperity.sweep.axes import TEXTS
 from asperity.sweep.grid import SweepGrid
-from asperity.sweep.plan.axis import TEXTS
-from asperity.sweep.plan.ratios import RATIOS
+from asperity.sweep.outcome import SweepOutcome, flag_attributes
+from asperity.sweep.points import RATIOS
 from asperity.sweep.record import OF_CHUNKS, OF_POINTS
 from asperity.sweep.solve import SOLVES
-from asperity.sweep.solve.outcome import SweepOutcome, flag_attributes
+from asperity.sweep.store import durable
+from asperity.sweep.store.root import FORMAT, KIND, Root, write_root
 
 #: What `status` holds for a chunk that is not done; otherwise its failed points.
 NOT_DONE = -1
@@ -34,7 +42,150 @@ _MOST_DERIVED = 1_000_000
 ALL_CHUNKS: Any = {"write_empty_chunks": True}
 
 
-def skeleton(grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
+def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
+    """Make an empty store; it has its name when it is complete.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    fresh = fresh_folder(path)
+    shutil.rmtree(fresh, ignore_errors=True)
+    try:
+        fresh.mkdir()
+        lay_out(fresh, grid, attributes)
+        fresh.rename(path)
+        durable.sync_folder(path.parent)
+    except OSError as error:
+        shutil.rmtree(fresh, ignore_errors=True)
+        raise InputError(
+            f"out must be a folder that can be written, got '{path}' "
+            f"({(error.strerror or str(error)).lower()}); choose another place with room"
+        ) from None
+
+
+def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
+    """Give a store the arrays, coordinates and attributes of a plan; answers in it stay.
+
+    Parameters
+    ----------
+    path : Path
+        A folder, which may hold all of it already.
+    grid : SweepGrid
+    attributes : mapping
+        Those that do not follow from the grid.
+
+    Returns
+    -------
+    list of str
+        Files that were missing or differed, and were written.
+    """
+    written: list[str] = []
+    arrays: dict[str, Any] = {}
+    checksums: dict[str, Any] = {}
+    for name, content in _skeleton(grid):
+        file, array = path / name, name.split("/")[0]
+        if file.name == "zarr.json":
+            arrays[array] = json.loads(content)
+        else:
+            checksums.setdefault(array, checksum()).update(content)
+        if not _holds(file, content):
+            durable.put(file, content)
+            durable.sync_file(file)
+            durable.sync_folder(file.parent)
+            written.append(name)
+    for folder in {(path / name).parents[1] for name in written}:
+        durable.sync_folder(folder)
+    write_root(
+        path,
+        {
+            **attributes,
+            KIND: FORMAT,
+            "Conventions": "CF-1.11",
+            "plan": json.dumps(grid.record),
+            "plan_sha256": grid.digest,
+            "chunk_shape": list(grid.chunks),
+            "coordinates": " ".join(_coordinates(arrays, grid)),
+            "coordinate_checksums": {name: c.hexdigest() for name, c in checksums.items()},
+        },
+        arrays,
+    )
+    return written
+
+
+def _holds(file: Path, content: bytes) -> bool:
+    try:
+        return file.read_bytes() == content
+    except OSError:
+        return False
+
+
+def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
+    """Give a store more points; can be repeated after an interruption at any moment.
+
+    Chunks that get new points are no longer done; all others keep theirs.
+
+    Parameters
+    ----------
+    path : Path
+    root : Root
+        Of the store as it is.
+    grid : SweepGrid
+        Of a plan for which `is_extension` holds.
+    attributes : mapping
+        Of the longer store, besides those that follow from its grid.
+
+    Returns
+    -------
+    list of str
+        As of `lay_out`.
+    """
+    pending = {"record": grid.record, "attributes": dict(attributes)}
+    write_root(path, {**root.attributes, "extending": pending}, root.arrays)
+    for chunk in _touched(root.grid, grid):
+        reset(path, root.grid, chunk)
+    return lay_out(path, grid, {"runs": root.runs, **attributes})
+
+
+def _touched(old: SweepGrid, new: SweepGrid) -> list[int]:
+    """Chunks at the end of an axis that were not full and get new points."""
+    shape = old.chunk_shape
+    touched = np.zeros(shape, dtype=bool) if math.prod(shape) else np.zeros(0, dtype=bool)
+    for axis, (before, after, length) in enumerate(
+        zip(old.shape, new.shape, old.chunks, strict=True)
+    ):
+        if after > before and before % length:
+            index: list[Any] = [slice(None)] * len(shape)
+            index[axis] = -1
+            touched[tuple(index)] = True
+    return [int(i) for i in np.flatnonzero(touched)]
+
+
+def fresh_folder(store: Path) -> Path:
+    """Where a store is made, until it is complete."""
+    return store.with_name(store.name + ".new")
+
+
+def chunk_file(path: Path, name: str, place: tuple[int, ...]) -> Path:
+    """File of a chunk of an array, by its position among the chunks."""
+    return path.joinpath(name, "c", *map(str, place))
+
+
+def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
+    """Make a chunk of a store not done."""
+    file = chunk_file(path, "status", grid.place(chunk))
+    if file.is_file():
+        file.unlink()
+        durable.sync_folder(file.parent)
+
+
+def checksum(content: bytes = b"") -> Any:
+    """Of some bytes, and of those it is updated with."""
+    return hashlib.blake2b(content, digest_size=8)
+
+
+def _skeleton(grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
     """Files by their path in the store: the description of each array, then its values if any.
 
     One block of a coordinate is in memory at a time.
@@ -155,7 +306,7 @@ def _derived(arrays: _Arrays, grid: SweepGrid) -> None:
         array[...] = values
 
 
-def coordinates(metadata: Mapping[str, Any], grid: SweepGrid) -> list[str]:
+def _coordinates(metadata: Mapping[str, Any], grid: SweepGrid) -> list[str]:
     """Arrays that are neither answers nor labels of a dimension."""
     others = {*grid.record["outputs"], *OF_POINTS, *OF_CHUNKS, *(axis.name for axis in grid.axes)}
     return [name for name in metadata if name not in others]

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import elementwise
 
-from asperity.sweep.map.plane import PointResponses
-
-Float = NDArray[np.float64]
+from asperity.sweep.outcome import Answers
+from asperity.sweep.points import Float
 
 #: Accuracy of the position of a crossing, in fractions of an axis.
 TOLERANCE = 1e-6
@@ -21,10 +20,19 @@ _MOST_STEPS = 60
 _JUMP = 1e-2
 
 
+#: Outputs that a search for crossings needs.
+STABILITY = ("log_multiplier", "multiplier_argument")
+
+
 class ResponseSource(Protocol):
     """Anything that solves responses at positions, shape (points, 2), such as a `MapPlane`."""
 
-    def solve(self, where: Float) -> PointResponses:
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """What each answer holds, `STABILITY` among it."""
+        ...
+
+    def solve(self, where: Float) -> Answers:
         """The responses."""
         ...
 
@@ -36,17 +44,17 @@ class Crossings:
     Attributes
     ----------
     where : array, shape (points, 2)
-        Fractions of the axes; of a crossing that was not found, where the search ended.
-    points : PointResponses
+        Fractions of the axes; of a crossing that was not located, where the search ended.
+    points : Answers
         The responses there.
-    found : bool array, shape (points,)
+    located : bool array, shape (points,)
     reason : object array, shape (points,)
         "converged", or why there is no crossing.
     """
 
     where: Float
-    points: PointResponses
-    found: NDArray[np.bool_]
+    points: Answers
+    located: NDArray[np.bool_]
     reason: NDArray[np.object_]
 
 
@@ -81,7 +89,7 @@ def find_crossings(
     with np.errstate(invalid="ignore"):
         jumps = points.converged & (np.abs(points["log_multiplier"]) > _JUMP * np.abs(g1 - g0))
     lost = np.flatnonzero(~root.success)
-    reason = points.result.copy()
+    reason = points.result
     reason[jumps] = "the response jumps here: its branch folds away, or two branches meet"
     reason[lost] = [f"the search for the crossing met a point without response: {lines.failure[i]}"
                     for i in lost]  # fmt: skip
@@ -97,7 +105,7 @@ class _SearchLines:
         self.plane, self.start, self.way = plane, start, end - start
         self.length = np.hypot(self.way[:, 0], self.way[:, 1])
         self.g0, self.g1 = g0, g1
-        self.points = PointResponses.empty(len(start))
+        self.points = Answers.empty(plane.outputs, len(start))
         self.nearest = np.where(np.abs(g0) < np.abs(g1), 0.0, self.length)
         self.failure = np.full(len(start), "no change of sign", dtype=object)
 
@@ -112,13 +120,13 @@ class _SearchLines:
         g = np.where(s == 0, self.g0[i], self.g1[i])
         inside = (s != 0) & (s != self.length[i])
         i, s = i[inside], s[inside]
-        found = self.plane.solve(self.start[i] + (s / self.length[i])[:, None] * self.way[i])
-        g[inside] = found["log_multiplier"]
-        failed = ~found.converged
-        self.failure[i[failed]] = found.result[failed]
+        answers = self.plane.solve(self.start[i] + (s / self.length[i])[:, None] * self.way[i])
+        g[inside] = answers["log_multiplier"]
+        failed = ~answers.converged
+        self.failure[i[failed]] = answers.take(failed).result
         known = np.where(self.points.converged[i], np.abs(self.points["log_multiplier"][i]), np.inf)
-        nearer = np.flatnonzero(found.converged & (np.abs(found["log_multiplier"]) < known))
-        self.points.put(i[nearer], found.take(nearer))
+        nearer = np.flatnonzero(answers.converged & (np.abs(answers["log_multiplier"]) < known))
+        self.points.put(i[nearer], answers.take(nearer))
         self.nearest[i[nearer]] = s[nearer]
         return g
 

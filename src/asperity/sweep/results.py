@@ -1,4 +1,4 @@
-"""How far a store is, and statistics over all of its points, chunk by chunk."""
+"""What a store holds: how far it is, the dataset, and statistics of its points, chunk by chunk."""
 
 from __future__ import annotations
 
@@ -9,15 +9,18 @@ import os
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.parameters.arguments import file_path
-from asperity.sweep.solve.outcome import SweepOutcome, words
+from asperity.sweep.outcome import SweepOutcome, words
+from asperity.sweep.store.layout import NOT_DONE
 from asperity.sweep.store.lock import holder_of, is_held, lock_file
-from asperity.sweep.store.skeleton import NOT_DONE
 from asperity.sweep.store.store import SweepStore
+
+if TYPE_CHECKING:
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -55,6 +58,26 @@ class SweepStatus:
     running: str
     runs: list[dict[str, Any]]
     bytes: int
+
+
+def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
+    """The dataset of a sweep, finished or not: labelled, with units, and lazy.
+
+    `xarray.open_zarr` opens the same.
+
+    Parameters
+    ----------
+    store : path
+
+    Raises
+    ------
+    InputError
+        If there is no store of a sweep, or it is damaged.
+    """
+    import xarray
+
+    whole = SweepStore(file_path(store, "store"), mode="r")
+    return xarray.open_zarr(whole.path, consolidated=False, chunks=None)
 
 
 def store_status(store: str | os.PathLike[str]) -> SweepStatus:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import platform
 import shutil
@@ -22,19 +23,17 @@ from asperity.orbit.processes import available_cores
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
 from asperity.parameters.arguments import file_path, whole_number
 from asperity.parameters.file_content import file_content
+from asperity.sweep.engine import SweepProgress, WorkersGoneError, solve_chunks
 from asperity.sweep.grid import SweepGrid
 from asperity.sweep.load import load_plan
-from asperity.sweep.plan.model import SweepPlan
-from asperity.sweep.record import law_places
-from asperity.sweep.run.driver import Driver, SweepProgress, WorkersGoneError, is_full, units_of
-from asperity.sweep.run.executors import Workers, local_cluster, local_processes, scheduler
-from asperity.sweep.run.numerics import numerics, package_version
-from asperity.sweep.run.tasks import Job
-from asperity.sweep.store.extend import extend, is_extension
+from asperity.sweep.plan import SweepPlan
+from asperity.sweep.record import is_extension, law_places
+from asperity.sweep.store.layout import create, extend, fresh_folder, lay_out
 from asperity.sweep.store.lock import StoreLock, lock_file
-from asperity.sweep.store.pieces import pieces_folder, remove_pieces
 from asperity.sweep.store.root import read_root
-from asperity.sweep.store.store import SweepStore, create, fresh_folder, lay_out
+from asperity.sweep.store.store import SweepStore
+from asperity.sweep.worker import Job, numerics, package_version
+from asperity.sweep.workers import Workers, local_cluster, local_processes, scheduler
 
 #: Seconds between signs of life in the lock file.
 _REFRESH = 5.0
@@ -93,7 +92,7 @@ def run_sweep(
         Folder of the store.
     workers : int or Workers, optional
         Processes of this machine; one for each core by default. Or any other
-        `asperity.sweep.run.executors.Workers`.
+        `asperity.sweep.workers.Workers`.
     cluster : int, optional
         Workers of a Dask cluster on this machine, instead.
     address : str, optional
@@ -113,7 +112,7 @@ def run_sweep(
         If the plan has mistakes, the store has another plan or is in use, or the disk is full.
     """
     path = file_path(out, "out").resolve()
-    require_short(path, (fresh_folder(path), pieces_folder(path), lock_file(path)))
+    require_short(path, (fresh_folder(path), lock_file(path)))
     log = log or _silent
     text = ""
     if not isinstance(plan, SweepPlan):
@@ -188,8 +187,8 @@ def _opened(
                 f"out must lie in a folder that exists, got '{path}'; make the folder or choose "
                 "another"
             )
-        remove_pieces(path)
-        return create(path, grid, _attributes(plan, text, grid))
+        create(path, grid, _attributes(plan, text, grid))
+        return SweepStore(path)
     root = read_root(path)
     made = root.attributes["numerics"]
     if made != numerics() and not retry:
@@ -203,22 +202,21 @@ def _opened(
         longer = SweepGrid(pending["record"], root.grid.chunks)
         extend(path, root, longer, pending["attributes"])
         root = read_root(path)
-    held = root.grid
-    if held.record == grid.record:
+    old = root.grid.record
+    if old == grid.record:
         written = [root.damage] if root.damage else []
-        written += lay_out(path, held, {**root.attributes, "runs": root.runs})
+        written += lay_out(path, root.grid, {**root.attributes, "runs": root.runs})
         if written:
             log(
                 "missing or damaged files of the store were written again: "
                 + listed(written, most=5)
             )
         return SweepStore(path)
-    if extending and is_extension(held.record, grid.record):
-        remove_pieces(path)
-        grid = SweepGrid(grid.record, held.chunks)
+    if extending and is_extension(old, grid.record):
+        grid = SweepGrid(grid.record, root.grid.chunks)
         extend(path, root, grid, _attributes(plan, text, grid))
         return SweepStore(path)
-    changed = differences(held.record, grid.record)
+    changed = differences(old, grid.record)
     way = "its axes may only become longer" if extending else (
         "change the plan back, choose another store, or add points to the end of axes with --extend"
     )  # fmt: skip
@@ -251,15 +249,7 @@ def _require_coordinates(grid: SweepGrid, folder: Path) -> None:
 
 def _bytes_left(store: SweepStore) -> float:
     """Bytes that the chunks which are not done will take, uncompressed, at most."""
-    done = sum(1 for _ in _status_files(store))
-    left = max(0, store.grid.chunk_count - done) / store.grid.chunk_count
-    return left * store.grid.points * (8 * (len(store.record["outputs"]) + 1) + 2)
-
-
-def _status_files(store: SweepStore) -> Any:
-    folder = store.path / "status" / "c"
-    for _, _, names in os.walk(folder):
-        yield from names
+    return (1 - store.share_done()) * store.grid.bytes
 
 
 def _run(
@@ -273,9 +263,7 @@ def _run(
     grid = store.grid
     counts = SweepProgress(total=grid.points, chunk_total=grid.chunk_count)
     if not job.retry:
-        # Chunks of one size: counting files does not read them.
-        share = sum(1 for _ in _status_files(store)) / grid.chunk_count
-        counts.stored = round(share * grid.points)
+        counts.stored = round(store.share_done() * grid.points)
     runs = [*store.root.runs, _started(workers)]
     # With --retry-failed these may be others than before; the runs have them all.
     store.update_attributes(runs=runs, numerics=numerics())
@@ -289,11 +277,9 @@ def _run(
         if progress is not None:
             progress(now)
 
-    chunks = units_of(grid.chunk_count, grid.size)
-    driver = Driver(job, chunks, workers, counts, tick, log)
     try:
         with _writing(store.path, counts):
-            driver.run()
+            solve_chunks(job, range(grid.chunk_count), workers, counts, tick, log)
     except WorkersGoneError:
         raise InputError(
             f"workers must run until the sweep ends, got no answer any more ({workers.about}) "
@@ -304,7 +290,6 @@ def _run(
         with contextlib.suppress(OSError):
             runs[-1] |= _ended(counts)
             store.update_attributes(runs=runs)
-    remove_pieces(store.path)
     return SweepSummary(
         out=store.path,
         points=counts.points,
@@ -323,7 +308,8 @@ def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
         yield
     except OSError as error:
         room = size_text(free_disk(path))
-        why = "the disk is full" if is_full(error) else (error.strerror or str(error)).lower()
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        why = "the disk is full" if full else (error.strerror or str(error)).lower()
         done = f" after {counts.points:,} of {counts.total:,} points" if counts else ""
         raise InputError(
             f"out must be a folder that can be written, got '{path.name}' ({why}, {room} free)"
@@ -351,10 +337,7 @@ def _ended(counts: SweepProgress) -> Mapping[str, Any]:
         "points_solved": counts.points - counts.kept,
         "points_kept": counts.kept,
         "failed": counts.failed,
-        "stages": {
-            name: {"points": counts.solved[name], "seconds": round(counts.spent[name], 3)}
-            for name in counts.spent
-        },
+        "worker_seconds": round(counts.spent, 3),
         "worker_memory": round(counts.memory),
         "workers_lost": counts.lost,
     }
