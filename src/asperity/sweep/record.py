@@ -26,7 +26,6 @@ from asperity.sweep.axes import SOBOL_BITS, TEXTS, columns_of
 from asperity.sweep.plan import AxisTable, PlanError, SweepPlan
 from asperity.sweep.points import RATIOS
 from asperity.sweep.solve import SOLVES
-from asperity.units import KINDS
 
 #: Variables of every store with a number for each point, and with one for each chunk.
 OF_POINTS, OF_CHUNKS = ("outcome", "detail"), ("checksum", "status")
@@ -49,9 +48,9 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     """
     mistakes: list[str] = []
     axes: dict[str, Any] = {}
-    plan = _with_places(plan)
-    laws = _laws_named(plan, mistakes)
-    known = _known(laws, plan.solve)
+    plan = with_places(plan)
+    laws = laws_named(plan, mistakes)
+    known = known_names(laws, plan.solve)
     for name, table in plan.axes.items():
         try:
             written, axis = _axis(name, table, known, plan.seed)
@@ -100,7 +99,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     }
 
 
-def _known(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
+def known_names(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
     """Every name that an axis or a fixed number may have."""
     parameters = {**known_parameters(laws[0] if laws else None), **SOLVES[solve].parameters()}
     return {**parameters, **{name: ratio.parameter for name, ratio in RATIOS.items()}}
@@ -108,7 +107,7 @@ def _known(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
 
 def law_places(plan: SweepPlan) -> tuple[str, ...]:
     """Places of the laws that the plan names by one; files by their whole path."""
-    named = dict.fromkeys(map(str, _named(_with_places(plan))))
+    named = dict.fromkeys(map(str, _named(with_places(plan))))
     return tuple(text for text in named if ":" in text)
 
 
@@ -122,7 +121,7 @@ def _law_files(plan: SweepPlan) -> dict[str, str]:
     return found
 
 
-def _with_places(plan: SweepPlan) -> SweepPlan:
+def with_places(plan: SweepPlan) -> SweepPlan:
     """The plan with whole paths: files of laws lie beside it, or where their path says."""
 
     def place(law: Any) -> Any:
@@ -161,7 +160,7 @@ def _named(plan: SweepPlan) -> list[Any]:
     return named
 
 
-def _laws_named(plan: SweepPlan, mistakes: list[str]) -> list[str]:
+def laws_named(plan: SweepPlan, mistakes: list[str]) -> list[str]:
     """Laws of the plan, without repetition, in their order."""
     named = _named(plan)
     found = []
@@ -493,39 +492,3 @@ def _longer(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
         same = all(old[key] == new[key] for key in ("draw", "seed", "over"))
         return same and new["count"] >= old["count"]
     return False
-
-
-def without_unit(plan: SweepPlan) -> list[str]:
-    """Bare numbers where a unit is needed: a file says what it means."""
-    # What is wrong with the laws is said with all else that the plan means.
-    known = _known(_laws_named(_with_places(plan), []), plan.solve)
-    places: list[tuple[str, str, Any]] = [
-        (f"parameters.{name}", name, value) for name, value in plan.parameters.items()
-    ]
-    for axis, table in plan.axes.items():
-        where = f"axes.{axis}"
-        places += [(where, axis, value) for value in (table.from_, table.to)]
-        places += [(where, axis, value) for value in (table.values or ())]
-        for name, values in (table.zip or {}).items():
-            places += [(f"{where}.zip.{name}", name, value) for value in values]
-        for case in table.cases or ():
-            for name, value in case.items():
-                inner = value.values() if isinstance(value, Mapping) else [value]
-                flat = [v for item in inner for v in (item if isinstance(item, list) else [item])]
-                counted = isinstance(value, Mapping)
-                places += [
-                    (f"{where}.cases.{name}", name, v)
-                    for v in flat
-                    if not (counted and v == value.get("count"))
-                ]
-        for name, spread in (table.over or {}).items():
-            places += [(f"{where}.over.{name}", name, v) for v in spread.values()]
-    found = []
-    for place, name, value in places:
-        own = canonical_name(name, known)
-        unit = known[own].unit if own in known else ""
-        bare = isinstance(value, int | float) and not isinstance(value, bool)
-        if unit and bare and math.isfinite(value):
-            example = KINDS[known[str(own)].kind].example
-            found.append(f"{place} must carry a unit, got {value!r}; write it like '{example}'")
-    return list(dict.fromkeys(found))

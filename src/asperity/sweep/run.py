@@ -25,6 +25,7 @@ from asperity.parameters.arguments import file_path, whole_number
 from asperity.parameters.file_content import file_content
 from asperity.sweep.engine import SweepProgress, WorkersGoneError, solve_chunks
 from asperity.sweep.grid import SweepGrid
+from asperity.sweep.job import Job, numerics, package_version
 from asperity.sweep.load import load_plan
 from asperity.sweep.plan import SweepPlan
 from asperity.sweep.record import is_extension, law_places
@@ -32,7 +33,6 @@ from asperity.sweep.store.layout import create, extend, fresh_folder, lay_out
 from asperity.sweep.store.lock import StoreLock, lock_file
 from asperity.sweep.store.root import read_root
 from asperity.sweep.store.store import SweepStore
-from asperity.sweep.worker import Job, numerics, package_version
 from asperity.sweep.workers import Workers, local_cluster, local_processes, scheduler
 
 #: Seconds between signs of life in the lock file.

@@ -18,7 +18,7 @@ from asperity.slider import Slider
 from asperity.slider.named import slider_values
 from asperity.slider.problem import checked_slider
 from asperity.sweep.crossing import STABILITY, find_crossings
-from asperity.sweep.outcome import Answers
+from asperity.sweep.outcome import Answers, SweepOutcome
 from asperity.sweep.points import POINT_BYTES, Float
 from asperity.sweep.responses import answers_of_law, bifurcation_kinds
 from asperity.units import format_si
@@ -184,10 +184,10 @@ class SearchedThresholds(NamedTuple):
         Bifurcation; "" where none was found.
     result : object array, shape (points,)
         "converged", or why there is no threshold.
-    what : object array, shape (points,)
-        "found", "stable" or "unstable" at every stiffness, "no crossing", or "no response" at some.
+    outcome : int16 array, shape (points,)
+        A `SweepOutcome`.
     where : array, shape (points,)
-        Stiffness (N/m) of the threshold, of what stands in its way, or the end that `what` is
+        Stiffness (N/m) of the threshold, of what stands in its way, or the end that `outcome` is
         about.
     """
 
@@ -195,7 +195,7 @@ class SearchedThresholds(NamedTuple):
     turn: Float
     kind: NDArray[np.object_]
     result: NDArray[np.object_]
-    what: NDArray[np.object_]
+    outcome: NDArray[np.int16]
     where: Float
 
 
@@ -237,25 +237,26 @@ def search_thresholds(
         g[line, k + 1],
     )
     stiffness, turn, where = np.full((3, count), np.nan)
-    kind, result, what = (np.full(count, "", dtype=object) for _ in range(3))
+    kind, result = (np.full(count, "", dtype=object) for _ in range(2))
+    outcome = np.zeros(count, dtype=np.int16)
     at = lines.stiffness(crossings.where)
     stiffness[line] = np.where(crossings.located, at, np.nan)
-    where[line], what[line] = at, np.where(crossings.located, "found", "no crossing")
+    where[line] = at
+    outcome[line] = np.where(crossings.located, SweepOutcome.CONVERGED, SweepOutcome.NO_CROSSING)
     turn[line] = np.abs(crossings.points["multiplier_argument"]) / (2 * np.pi)
     kind[line], result[line] = bifurcation_kinds(crossings.points), crossings.reason
     for i in np.flatnonzero(~usable):
-        failed = [j for j, text in enumerate(reasons[i]) if text]
-        unstable = g[i, -1] > 0
-        end = high[i] if unstable else low[i]
-        side = "unstable up to" if unstable else "stable from"
-        what[i] = "no response" if failed else side.split()[0]
-        where[i] = float(low[i] * (high[i] / low[i]) ** steps[failed[0]]) if failed else end
-        result[i] = (
-            reasons[i][failed[-1]]
-            if failed
-            else f"no threshold: {side} {format_si(float(end), 'stiffness')}"
-        )
-    return SearchedThresholds(stiffness, turn, kind, result, what, where)
+        failed = np.flatnonzero(reasons[i] != "")
+        if len(failed):
+            outcome[i], result[i] = SweepOutcome.NO_RESPONSE, reasons[i][failed[-1]]
+            where[i] = low[i] * (high[i] / low[i]) ** steps[failed[0]]
+        elif g[i, -1] > 0:
+            outcome[i], where[i] = SweepOutcome.UNSTABLE_THROUGHOUT, high[i]
+            result[i] = f"no threshold: unstable up to {format_si(float(high[i]), 'stiffness')}"
+        else:
+            outcome[i], where[i] = SweepOutcome.STABLE_THROUGHOUT, low[i]
+            result[i] = f"no threshold: stable from {format_si(float(low[i]), 'stiffness')}"
+    return SearchedThresholds(stiffness, turn, kind, result, outcome, where)
 
 
 def _numbers(slider: Slider) -> dict[str, float]:

@@ -8,10 +8,10 @@ from references.closed_form_sweep import ClosedForm
 
 @pytest.fixture
 def closed_form(monkeypatch: pytest.MonkeyPatch) -> ClosedForm:
-    from asperity.sweep import worker
+    from asperity.sweep import job
 
     found = ClosedForm()
     monkeypatch.setitem(SOLVES, "periodic", found)
     monkeypatch.setenv("NPROC", "1")
-    worker._opened.cache_clear()
+    job._opened.cache_clear()
     return found

@@ -13,7 +13,7 @@ import pytest
 from asperity.errors import InputError
 from asperity.sweep import run_sweep, store_status
 from asperity.sweep.engine import DoneChunk, Report, SweepProgress, solve_chunks
-from asperity.sweep.worker import Job
+from asperity.sweep.job import Job
 from asperity.sweep.workers import Workers
 from references.closed_form_sweep import ClosedForm, plan_of
 

@@ -11,8 +11,7 @@ from scipy.stats import chi2
 from asperity import materials
 from asperity.errors import InputError
 from asperity.inference import table_of
-from asperity.sweep import SweepPlan, load_plan, open_store, run_sweep, store_status
-from asperity.sweep import worker
+from asperity.sweep import SweepPlan, job, load_plan, open_store, run_sweep, store_status
 from asperity.sweep.solve.fit import _disturbed, _fixed
 from references.closed_form_sweep import ThisProcess
 
@@ -24,7 +23,7 @@ ERROR = 1e-3
 @pytest.fixture(autouse=True)
 def _one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NPROC", "1")
-    worker._opened.cache_clear()
+    job._opened.cache_clear()
 
 
 def write(path: Path, seed: int, rows: int = 7) -> np.ndarray:

@@ -12,8 +12,8 @@ import pytest
 import xarray
 from click.testing import CliRunner, Result
 
-from asperity.cli.main import main
 import asperity.sweep.run as run_module
+from asperity.cli.main import main
 from references.closed_form_sweep import ClosedForm, ThisProcess
 
 PLAN = """
@@ -80,14 +80,14 @@ class Whole:
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Whole]:
     """Made once; the closed form and this process stand for the solver and its workers."""
-    from asperity.sweep import worker
+    from asperity.sweep import job
     from asperity.sweep.solve import SOLVES
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(SOLVES, "periodic", ClosedForm())
         patch.setenv("NPROC", "1")
         patch.setattr(run_module, "local_processes", lambda count: nullcontext(ThisProcess()))
-        worker._opened.cache_clear()
+        job._opened.cache_clear()
         yield Whole(tmp_path_factory.mktemp("planted"))
 
 

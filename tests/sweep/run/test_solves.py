@@ -9,8 +9,7 @@ import pytest
 import asperity as asp
 from asperity import materials
 from asperity.errors import InputError
-from asperity.sweep import SweepPlan, open_store, run_sweep, store_status
-from asperity.sweep import worker
+from asperity.sweep import SweepPlan, job, open_store, run_sweep, store_status
 from references.closed_form_sweep import ThisProcess
 
 PMMA = materials.load("bureau2000")
@@ -20,7 +19,7 @@ KC = (PMMA.B - PMMA.A) * PMMA.W0 / PMMA.D0
 @pytest.fixture(autouse=True)
 def _one_thread(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NPROC", "1")
-    worker._opened.cache_clear()
+    job._opened.cache_clear()
 
 
 def sweep(out: Path, **fields: Any) -> Any:

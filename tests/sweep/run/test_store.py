@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 import xarray
 
+import asperity.sweep.run as run_module
 from asperity.errors import InputError
 from asperity.sweep import (
     export_store,
@@ -22,7 +23,6 @@ from asperity.sweep import (
     store_status,
     summary_statistics,
 )
-import asperity.sweep.run as run_module
 from asperity.sweep.store import durable
 from asperity.sweep.store.lock import StoreLock
 from asperity.sweep.store.store import SweepStore
@@ -280,7 +280,7 @@ def test_a_lock_file_of_another_form_holds_nothing(
 def test_a_worker_of_an_older_driver_writes_nothing(
     tmp_path: Path, closed_form: ClosedForm
 ) -> None:
-    from asperity.sweep.worker import Job, SupersededError
+    from asperity.sweep.job import Job, SupersededError
 
     out = tmp_path / "s.zarr"
     run(out)

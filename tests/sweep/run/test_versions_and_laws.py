@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
+import asperity.sweep.run as run_module
 from asperity.errors import InputError
 from asperity.laws import registry
-import asperity.sweep.run as run_module
-from asperity.sweep import open_store, run_sweep, worker
+from asperity.sweep import job, open_store, run_sweep
 from asperity.sweep.workers import local_cluster
 from references.closed_form_sweep import ClosedForm, InClosedForm, ThisProcess, plan_of
 
@@ -103,5 +103,5 @@ def test_a_store_is_continued_by_what_began_it(
     # Asked to, the new version solves failed points; its workers must have it as well.
     with pytest.raises(InputError, match=r"workers must have the versions of the driver.*jaxlib"):
         run_sweep(plan_of(), out, workers=ThisProcess(), retry_failed=True)
-    monkeypatch.setattr(worker, "numerics", lambda: other)
+    monkeypatch.setattr(job, "numerics", lambda: other)
     assert run_sweep(plan_of(), out, workers=ThisProcess(), retry_failed=True).solved > 0

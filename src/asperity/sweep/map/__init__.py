@@ -4,8 +4,8 @@ The grid is solved in blocks, every edge of it whose ends differ in stability is
 crossing, and the crossings are joined to lines, with the kind of bifurcation at each point.
 """
 
-from asperity.sweep.map.axis import Axis
 from asperity.sweep.map.dataset import SHOWN
+from asperity.sweep.map.plane import Axis
 from asperity.sweep.map.response_map import response_map, write_map
 
 __all__ = ["SHOWN", "Axis", "response_map", "write_map"]

@@ -1,8 +1,11 @@
 """The stability boundary on a grid: every edge that it crosses, and lines through the crossings.
 
-The grid finds every piece of the boundary that changes the stability of one of its points, closed
-ones too, and all crossings are searched at once; continuation (`asperity.branches`) follows one
-orbit from one start, in steps that wait for each other, and needs a start on each piece.
+All crossings are searched at once, and the grid finds every piece of the boundary that changes the
+stability of one of its points, closed ones too. Continuation (`asperity.branches`) gives what no
+grid shows, the curves that bound no stability; it follows one orbit in steps that wait for each
+other, needs a start on each piece and ends where the bifurcation becomes one of another kind. For
+rice-ruina over 0.5 to 100 Hz and K it took 154 s for three curves, the crossings of a grid of
+40 x 40 points 43 s for the one line that the map has.
 """
 
 from __future__ import annotations

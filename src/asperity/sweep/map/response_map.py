@@ -20,10 +20,9 @@ from asperity.outputs import UnfinishedText, output_file, require_memory, writte
 from asperity.parameters import MODULATION, point_parameters
 from asperity.parameters.arguments import function, instance, switch
 from asperity.sweep.engine import solve_here
-from asperity.sweep.map.axis import Axis
 from asperity.sweep.map.boundary import MapBoundary, trace_boundary
 from asperity.sweep.map.dataset import as_dataset
-from asperity.sweep.map.plane import OUTPUTS, MapPlane
+from asperity.sweep.map.plane import OUTPUTS, Axis, MapPlane
 from asperity.sweep.outcome import Answers
 from asperity.units import KINDS
 

@@ -21,13 +21,6 @@ from asperity.sweep.threshold import require_scan, search_thresholds
 _FEWEST, _MOST = 24, 480
 #: Codes of the bifurcations, in the order of `flag_meanings`.
 KINDS = ("fold", "period doubling", "Neimark-Sacker")
-_OUTCOMES = {
-    "found": SweepOutcome.CONVERGED,
-    "stable": SweepOutcome.STABLE_THROUGHOUT,
-    "unstable": SweepOutcome.UNSTABLE_THROUGHOUT,
-    "no crossing": SweepOutcome.NO_CROSSING,
-    "no response": SweepOutcome.NO_RESPONSE,
-}
 
 
 class ThresholdSolve(SolveKind):
@@ -100,10 +93,9 @@ def _search(
             [KINDS.index(k) if k in KINDS else np.nan for k in searched.kind], dtype=float
         ),
     }
-    outcome = np.array([int(_OUTCOMES[what]) for what in searched.what], dtype=np.int16)
-    good = outcome == SweepOutcome.CONVERGED
+    good = searched.outcome == SweepOutcome.CONVERGED
     return Answers(
         {name: np.where(good, numbers[name], np.nan) for name in record["outputs"]},
-        outcome,
+        searched.outcome,
         np.where(good, 0.0, searched.where / critical),
     )
