@@ -24,7 +24,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Rooms that take longest from an empty compilation cache; they come first.
 LONGEST = (
-    *("orbit", "app", "benchmarks", "inference", "papers", "branches", "docs", "cli", "sweep"),
+    *("orbit", "app", "benchmarks", "inference", "papers", "branches", "docs", "cli", "study"),
     "transients",
 )
 

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from asperity.parameters import OUTPUTS
-from asperity.sweep import SweepPlan, run_sweep
-from asperity.sweep.outcome import Answers, SweepOutcome
-from asperity.sweep.solve import SOLVES, SolveKind
-from asperity.sweep.workers import ThisProcess, Workers
+from asperity.study import SweepPlan, run_sweep
+from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.solve import SOLVES, SolveKind
+from asperity.study.workers import ThisProcess, Workers
 
 
 class ClosedForm(SolveKind):
