@@ -42,7 +42,7 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
         If there is no store, it is damaged, `out` cannot be written, or pyarrow is missing for
         Parquet.
     """
-    found = SweepStore(file_path(store, "store").resolve(), mode="r")
+    opened = SweepStore(file_path(store, "store").resolve(), mode="r")
     target = output_file(out, example="results.nc")
     write = {".nc": _netcdf, ".csv": _csv, ".parquet": _parquet}.get(target.suffix.lower())
     if write is None:
@@ -50,11 +50,11 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
             f"out must end in {', '.join(_FORMATS)}, got '{target.name}'; write it like results.nc"
         )
     require_disk(
-        found.grid.points * 8.0 * (len(found.record["outputs"]) + 2),
-        target.parent, "out", f"{found.grid.points:,} points", "choose another disk",
+        opened.grid.points * 8.0 * (len(opened.record["outputs"]) + 2),
+        target.parent, "out", f"{opened.grid.points:,} points", "choose another disk",
     )  # fmt: skip
     with written_file(target) as file:
-        return write(found, file)
+        return write(opened, file)
 
 
 def _netcdf(store: SweepStore, file: Path) -> int:

@@ -105,8 +105,8 @@ class SweepGrid:
     def known(self) -> dict[str, Parameter]:
         """Parameters of all laws of the sweep, and ratios."""
         laws = [get_law(name) for name in self.record["laws"]]
-        own = SOLVES[self.record["solve"]].parameters()
-        return {**all_parameters(laws), **own, **{n: r.parameter for n, r in RATIOS.items()}}
+        of_solve = SOLVES[self.record["solve"]].parameters()
+        return {**all_parameters(laws), **of_solve, **{n: r.parameter for n, r in RATIOS.items()}}
 
     def place(self, chunk: int) -> tuple[int, ...]:
         """Position of a chunk among the chunks, by its number in C order."""

@@ -10,7 +10,7 @@ from typing import Any
 from asperity.parameters import canonical_name
 from asperity.parameters.toml_file import toml_content
 from asperity.study.plan import PlanError, SweepPlan
-from asperity.study.record import known_names, laws_named, with_places
+from asperity.study.record import known_names, laws_named
 from asperity.units import KINDS
 
 
@@ -42,7 +42,7 @@ def load_plan(path: str | os.PathLike[str]) -> SweepPlan:
 def _without_unit(plan: SweepPlan) -> list[str]:
     """Sentences about bare numbers where a unit is needed: a file says what it means."""
     # Mistakes in the laws are reported with all others of the plan.
-    known = known_names(laws_named(with_places(plan), []), plan.solve)
+    known = known_names(laws_named(plan, []), plan.solve)
     mistakes = []
     for place, written, value in _numbers(plan):
         name = canonical_name(written, known)

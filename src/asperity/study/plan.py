@@ -71,10 +71,10 @@ class AxisTable(BaseModel):
             "cases": {"cases"},
             "draw": {"draw", "over", "count"},
         }
-        given = {name for name in type(self).model_fields if getattr(self, name) is not None}
-        forms = [form for form in allowed if form.replace("from", "from_") in given]
-        if len(forms) != 1 or given - allowed[forms[0]]:
-            shown = ", ".join(sorted(name.rstrip("_") for name in given)) or "nothing"
+        fields = {name for name in type(self).model_fields if getattr(self, name) is not None}
+        forms = [form for form in allowed if form.replace("from", "from_") in fields]
+        if len(forms) != 1 or fields - allowed[forms[0]]:
+            shown = ", ".join(sorted(name.rstrip("_") for name in fields)) or "nothing"
             raise InputError(
                 f"axis must have one of from-to-count, values, zip, cases or draw, got {shown}; "
                 "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }"
@@ -179,7 +179,7 @@ class FitTable(BaseModel):
     profile : bool
         Intervals by profile likelihood.
     starts, seed : int
-        Starts that are drawn besides the given one, and their seed.
+        Starts that are drawn besides the first one, and their seed.
     """
 
     model_config = _STRICT
@@ -261,19 +261,24 @@ class SweepPlan(BaseModel):
     @property
     def columns(self) -> dict[str, tuple[Any, ...]]:
         """What the axes vary, as the plan writes it: listed values by name, none of draws."""
-        found: dict[str, tuple[Any, ...]] = {}
+        columns: dict[str, tuple[Any, ...]] = {}
         for name, table in self.axes.items():
             if table.values is not None or table.from_ is not None:
-                found[name] = (*found.get(name, ()), *(table.values or ()))
+                columns[name] = (*columns.get(name, ()), *(table.values or ()))
             for column, values in (table.zip or {}).items():
-                found[column] = (*found.get(column, ()), *values)
+                columns[column] = (*columns.get(column, ()), *values)
             for case in table.cases or ():
                 for column, value in case.items():
                     values = tuple(value) if isinstance(value, list | tuple) else (value,)
-                    found[column] = (*found.get(column, ()), *values)
+                    columns[column] = (*columns.get(column, ()), *values)
             for column in table.over or {}:
-                found.setdefault(column, ())
-        return found
+                columns.setdefault(column, ())
+        return columns
+
+    @property
+    def laws(self) -> list[str]:
+        """Laws as the plan writes them, in their order."""
+        return [str(law) for law in (self.law, *self.columns.get("law", ())) if law]
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A plan with some fields replaced, checked as any other."""
@@ -282,13 +287,13 @@ class SweepPlan(BaseModel):
 
 
 def _sentences(error: ValidationError, models: Mapping[str, type[BaseModel]]) -> list[str]:
-    """The mistakes that pydantic found, as ``<field> must <rule>, got <value>; <what to do>``.
+    """The mistakes that pydantic reports, as ``<field> must <rule>, got <value>; <what to do>``.
 
     Parameters
     ----------
     error : ValidationError
     models : mapping of str to type of BaseModel
-        Model of each table by its name, the plan's own under ``""``.
+        Model of each table by its name, that of the plan under ``""``.
     """
     return [_sentence(mistake, models) for mistake in error.errors(include_url=False)]
 

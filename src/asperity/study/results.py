@@ -88,38 +88,38 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
     InputError
         If there is no store of a sweep, or it is damaged.
     """
-    found = SweepStore(file_path(store, "store").resolve(), mode="r")
+    opened = SweepStore(file_path(store, "store").resolve(), mode="r")
     outcomes: Counter[int] = Counter()
     chunks = done = failed = damaged = 0
-    for chunk in range(found.grid.chunk_count):
-        count = found.failed_in(chunk)
+    for chunk in range(opened.grid.chunk_count):
+        count = opened.failed_in(chunk)
         if count == NOT_DONE:
             continue
-        if found.is_damaged(chunk):
+        if opened.is_damaged(chunk):
             damaged += 1
             continue
-        chunks, done, failed = chunks + 1, done + found.grid.size(chunk), failed + count
-        codes, counts = np.unique(found.read(chunk, ("outcome",))["outcome"], return_counts=True)
+        chunks, done, failed = chunks + 1, done + opened.grid.size(chunk), failed + count
+        codes, counts = np.unique(opened.read(chunk, ("outcome",))["outcome"], return_counts=True)
         outcomes.update(dict(zip(codes.tolist(), counts.tolist(), strict=True)))
     names = words()
-    lock = lock_file(found.path)
+    lock = lock_file(opened.path)
     holder = holder_of(lock)
     running = ""
     if holder and is_held(lock):
         running = f"process {holder['process']} on {holder['host']} since {holder['since']}"
     return SweepStatus(
-        store=found.path,
-        title=str(found.attributes.get("title", "")),
-        points=found.grid.points,
+        store=opened.path,
+        title=str(opened.attributes.get("title", "")),
+        points=opened.grid.points,
         done=done,
         failed=failed,
-        chunks=found.grid.chunk_count,
+        chunks=opened.grid.chunk_count,
         chunks_done=chunks,
         chunks_damaged=damaged,
         outcomes={names.get(code, str(code)): n for code, n in sorted(outcomes.items())},
         running=running,
-        runs=found.root.runs,
-        bytes=_bytes_in(found.path),
+        runs=opened.root.runs,
+        bytes=_bytes_in(opened.path),
     )
 
 
@@ -179,11 +179,11 @@ def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, flo
     InputError
         If there is no store of a sweep, or it is damaged.
     """
-    found = SweepStore(file_path(store, "store").resolve(), mode="r")
-    names = tuple(found.record["outputs"])
+    opened = SweepStore(file_path(store, "store").resolve(), mode="r")
+    names = tuple(opened.record["outputs"])
     moments = {name: _Moments() for name in names}
-    for chunk, _ in found.done():
-        values = found.read(chunk, (*names, "outcome"))
+    for chunk, _ in opened.done():
+        values = opened.read(chunk, (*names, "outcome"))
         solved = values["outcome"] == SweepOutcome.CONVERGED
         for name in names:
             moments[name].add(values[name][solved])

@@ -132,7 +132,7 @@ def run_sweep(
         try:
             require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
                          "choose another disk or fewer outputs")  # fmt: skip
-            found = stack.enter_context(pool)
+            pool_workers = stack.enter_context(pool)
         except InputError:
             # A refused start leaves nothing behind.
             if fresh:
@@ -142,17 +142,17 @@ def run_sweep(
             str(store.path), store.grid.digest, lock.token, retry_failed, law_places(plan),
             str(plan.folder.resolve()), numerics(),
         )  # fmt: skip
-        return _run(store, lock, found, job, progress, log)
+        return _run(store, lock, pool_workers, job, progress, log)
 
 
 def _workers(
     workers: int | Workers | None, cluster: int | None, address: str | None
 ) -> AbstractContextManager[Workers]:
-    given = [n for n, v in (("workers", workers), ("cluster", cluster), ("scheduler", address))
+    choices = [n for n, v in (("workers", workers), ("cluster", cluster), ("scheduler", address))
              if v is not None]  # fmt: skip
-    if len(given) > 1:
+    if len(choices) > 1:
         raise InputError(
-            f"{given[0]} must be the only choice of where to run, got {' and '.join(given)}; "
+            f"{choices[0]} must be the only choice of where to run, got {' and '.join(choices)}; "
             "leave all but one out"
         )
     if cluster is not None:
@@ -326,7 +326,7 @@ def _started(workers: Workers) -> dict[str, Any]:
         "workers": workers.about,
         "asperity": __version__,
         "python": platform.python_version(),
-        **{name: found for name in _PACKAGES if (found := package_version(name))},
+        **{name: number for name in _PACKAGES if (number := package_version(name))},
     }
 
 

@@ -107,8 +107,8 @@ def _links(plane: MapPlane, grid: Answers, ends: Index, located: NDArray[np.bool
     cells: dict[tuple[int, int], list[int]] = {}
     for (a, b), k in number.items():
         row, column = divmod(a, columns)
-        beside = (row - 1, column) if b == a + 1 else (row, column - 1)
-        for cell in ((row, column), beside):
+        neighbour = (row - 1, column) if b == a + 1 else (row, column - 1)
+        for cell in ((row, column), neighbour):
             if 0 <= cell[0] < rows - 1 and 0 <= cell[1] < columns - 1:
                 cells.setdefault(cell, []).append(k)
     links = [np.array(k) for k in cells.values() if len(k) == 2]
@@ -180,22 +180,22 @@ def join(links: Index) -> list[Index]:
     links : int array, shape (pairs, 2)
         No index occurs more than twice.
     """
-    beside: dict[int, list[int]] = {}
+    neighbours: dict[int, list[int]] = {}
     for a, b in links.tolist():
-        beside.setdefault(a, []).append(b)
-        beside.setdefault(b, []).append(a)
-    left = dict.fromkeys(sorted(beside))
-    ends = [k for k in left if len(beside[k]) == 1]
+        neighbours.setdefault(a, []).append(b)
+        neighbours.setdefault(b, []).append(a)
+    left = dict.fromkeys(sorted(neighbours))
+    ends = [k for k in left if len(neighbours[k]) == 1]
     lines = []
     for begin in [*ends, *left]:
         if begin not in left:
             continue
         line = [begin]
         del left[begin]
-        while following := [k for k in beside[line[-1]] if k in left]:
+        while following := [k for k in neighbours[line[-1]] if k in left]:
             line.append(following[0])
             del left[following[0]]
-        if len(line) > 2 and begin in beside[line[-1]] and len(beside[begin]) == 2:
+        if len(line) > 2 and begin in neighbours[line[-1]] and len(neighbours[begin]) == 2:
             line.append(begin)
         lines.append(np.array(line))
     return lines

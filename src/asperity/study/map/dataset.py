@@ -107,9 +107,9 @@ def _derived(points: Answers, frequency: np.ndarray) -> dict[str, np.ndarray]:
     with np.errstate(over="ignore"):
         largest = np.exp(log)
     turn = np.abs(points["multiplier_argument"]) / (2 * np.pi)
-    rest = {"floquet_max": largest, "mode_frequency": turn * frequency,
+    derived = {"floquet_max": largest, "mode_frequency": turn * frequency,
             "growth_rate": log * frequency}  # fmt: skip
-    return {name: rest[name] if name in rest else points[name] for name in SHOWN}
+    return {name: derived[name] if name in derived else points[name] for name in SHOWN}
 
 
 def _critical_stiffness_along(plane: MapPlane) -> dict[str, np.ndarray]:

@@ -58,8 +58,8 @@ class Axis:
         object.__setattr__(self, "name", parameter.name)
         for end in ("low", "high"):
             value = getattr(self, end)
-            found = number(value, parameter.label, parameter.kind, parameter.rule)
-            object.__setattr__(self, end, found)
+            si = number(value, parameter.label, parameter.kind, parameter.rule)
+            object.__setattr__(self, end, si)
         object.__setattr__(self, "count", whole_number(self.count, f"axis of {self.name}", 0))
         object.__setattr__(self, "log", switch(self.log, "axis.log"))
         if not self._ends[0] < self._ends[1]:
@@ -133,13 +133,13 @@ class Axis:
 def _parameter(name: str) -> Parameter:
     # A map cannot pass through a switch.
     known = {n: p for n, p in known_parameters().items() if p.rule != "switch"}
-    found = canonical_name(str(name), known)
-    if found is None:
+    name_in_table = canonical_name(str(name), known)
+    if name_in_table is None:
         raise InputError(
             f"axis must be a number of an operating point, got {shown(name)}; "
             + suggestion(str(name), known)
         )
-    return known[found]
+    return known[name_in_table]
 
 
 def _unit(parameter: Parameter) -> str:

@@ -179,19 +179,19 @@ def _plane(
         )
     refuse_foreign(law, {x.name: "", y.name: ""})
     known = point_parameters(get_law(law))
-    given = sourced_numbers(numbers, None, law=law)
+    known_numbers = sourced_numbers(numbers, None, law=law)
     for axis in (x, y):
         if axis.kind != known[axis.name].kind:
             raise InputError(
                 f"axis of {axis.name} must be {KINDS[known[axis.name].kind].noun} for {law}, got "
                 f"{KINDS[axis.kind].noun}; another registered law has a parameter of that name"
             )
-        if axis.name in given:
+        if axis.name in known_numbers:
             raise InputError(
                 f"{axis.name} must be given once, got an axis and a fixed value; leave one out"
             )
-    given |= {axis.name: SourcedNumber(float(axis.low), "axis") for axis in (x, y)}
-    own = numbers_for(law, given)
+    known_numbers |= {axis.name: SourcedNumber(float(axis.low), "axis") for axis in (x, y)}
+    of_law = numbers_for(law, known_numbers)
     defaults = {
         name: SourcedNumber(parameter.default, "default")
         for name, parameter in known.items()
@@ -202,7 +202,7 @@ def _plane(
         x.count * y.count * _POINT_BYTES, "axes", f"{x.count:,} x {y.count:,} points",
         "take fewer, or asperity sweep, which keeps none in memory",
     )  # fmt: skip
-    fixed = {n: s for n, s in (defaults | own).items() if n not in (x.name, y.name)}
+    fixed = {n: s for n, s in (defaults | of_law).items() if n not in (x.name, y.name)}
     plane = MapPlane(get_law(law), {n: s.value for n, s in fixed.items()}, x, y)
     plane.values(plane.nodes()[:1])
     return plane, {n: s.origin for n, s in fixed.items()}

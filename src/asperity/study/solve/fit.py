@@ -145,7 +145,7 @@ def data_files(plan: SweepPlan) -> list[str]:
     Raises
     ------
     InputError
-        If there is none, or an axis names some beside those of the table ``fit``.
+        If there is none, or an axis names some besides those of the table ``fit``.
     """
     axis = [str(name) for name in plan.columns.get("data", ())]
     table = _table(plan)
@@ -153,13 +153,13 @@ def data_files(plan: SweepPlan) -> list[str]:
         raise InputError(
             "fit.data must be left out where an axis has data, got both; leave one of them out"
         )
-    found = list(dict.fromkeys([*(table.data or ()), *axis]))
-    if not found:
+    files = list(dict.fromkeys([*(table.data or ()), *axis]))
+    if not files:
         raise InputError(
             "fit.data must name a table of readings, got nothing; write it like "
             "data = ['readings.csv'], or add an axis of files: [axes.data] values = [...]"
         )
-    return found
+    return files
 
 
 def _table(plan: SweepPlan) -> FitTable:
@@ -182,15 +182,15 @@ def _free(table: FitTable) -> list[str]:
     from asperity.inference.unknowns import EPS_RATIO
 
     known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
-    found = []
+    names = []
     for name in table.free:
-        own = canonical_name(name, known)
-        if own is None:
+        canonical = canonical_name(name, known)
+        if canonical is None:
             raise InputError(f"fit.free must name parameters, got '{name}'; {closest(name, known)}")
-        found.append(own)
-    if not found:
+        names.append(canonical)
+    if not names:
         raise InputError("fit.free must name parameters, got none; write it like ['A', 'B']")
-    return list(dict.fromkeys(found))
+    return list(dict.fromkeys(names))
 
 
 def _priors(plan: SweepPlan, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
@@ -203,17 +203,17 @@ def _priors(plan: SweepPlan, table: FitTable, free: Sequence[str]) -> dict[str, 
         material = materials.load(plan.folder / table.prior if file else table.prior)
         return {n: [p.mean, p.sd, p.source] for n, p in material_priors(material, free).items()}
     known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
-    found: dict[str, list[Any]] = {}
+    priors: dict[str, list[Any]] = {}
     for name, prior in (table.prior or {}).items():
-        own = canonical_name(name, known)
-        if own is None or own not in free:
+        canonical = canonical_name(name, known)
+        if canonical is None or canonical not in free:
             raise InputError(
                 f"fit.prior must be of free parameters, got '{name}'; free it or leave it out"
             )
-        mean = float(known[own].check(prior.mean, f"fit.prior.{name}.mean"))
-        std = float(obeying(prior.std, f"fit.prior.{name}.std", known[own].kind, "positive"))
-        found[own] = [mean, std, "plan"]
-    return found
+        mean = float(known[canonical].check(prior.mean, f"fit.prior.{name}.mean"))
+        std = float(obeying(prior.std, f"fit.prior.{name}.std", known[canonical].kind, "positive"))
+        priors[canonical] = [mean, std, "plan"]
+    return priors
 
 
 def _outputs(free: Sequence[str], known: Mapping[str, Parameter]) -> dict[str, Output]:
@@ -236,7 +236,7 @@ def _digest(path: Path) -> str:
 
 
 @lru_cache(maxsize=256)
-def _read(path: str, digest: str, given: tuple[tuple[str, float], ...]) -> LockInTable:
+def _read(path: str, digest: str, for_all: tuple[tuple[str, float], ...]) -> LockInTable:
     """A table, whose file must be the one that the plan was checked with."""
     from asperity.inference import read_table
 
@@ -245,8 +245,8 @@ def _read(path: str, digest: str, given: tuple[tuple[str, float], ...]) -> LockI
             f"data must not change while a sweep runs, got another '{path}' than at its begin; "
             "restore the file, or choose another store"
         )
-    # Without a digest the columns are asked for, whatever the plan gives for all rows.
-    return read_table(path, dict(given) if digest else _OPERATING)
+    # Without a digest the columns are of interest, whatever the plan has for all rows.
+    return read_table(path, dict(for_all) if digest else _OPERATING)
 
 
 def _fit_point(
@@ -264,9 +264,9 @@ def _fit_point(
     # Of several laws each has its own of the free parameters.
     elsewhere = set(all_parameters(map(get_law, record["laws"])))
     free = [n for n in settings["free"] if n in known or n not in elsewhere]
-    given = tuple((n, values[n]) for n in _OPERATING if n in values)
+    for_all = tuple((n, values[n]) for n in _OPERATING if n in values)
     tables = [
-        _read(str(Path(record["folder"], name)), settings["files"][name], given)
+        _read(str(Path(record["folder"], name)), settings["files"][name], for_all)
         for name in files or settings["data"]
     ]
     fixed = _fixed(values, [n for n in known if n not in free], record["origins"], tables)

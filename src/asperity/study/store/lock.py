@@ -26,7 +26,7 @@ _HOLDER = {"token": str, "host": str, "process": int, "since": str}
 
 
 class StoreLock:
-    """The lock file beside a store, ``STORE.lock``.
+    """The lock file next to a store, ``STORE.lock``.
 
     The operating system drops the lock when the process ends, however it ends. Some shared file
     systems keep locks to one machine: there the driver's refreshing of the file tells others that
@@ -165,11 +165,11 @@ def is_held(path: Path) -> bool:
 
 def holder_of(path: Path) -> dict[str, Any]:
     """What the lock file says of its holder; empty where it says nothing."""
-    found = json_content(path)
-    if not isinstance(found, dict):
+    holder = json_content(path)
+    if not isinstance(holder, dict):
         return {}
-    whole = all(isinstance(found.get(name), kind) for name, kind in _HOLDER.items())
-    return found if whole else {}
+    whole = all(isinstance(holder.get(name), kind) for name, kind in _HOLDER.items())
+    return holder if whole else {}
 
 
 def current_token(store: Path) -> str:

@@ -78,13 +78,16 @@ class SweepStore:
     def _require_labels(self) -> None:
         """Refuse to read a store whose coordinates are not those that were written."""
         for name, array in self.labels.items():
-            found = checksum()
+            digest = checksum()
             try:
                 for place in np.ndindex(*array.cdata_shape):
-                    found.update(chunk_file(self.path, name, place).read_bytes())
+                    digest.update(chunk_file(self.path, name, place).read_bytes())
             except OSError:
-                found = None
-            if found is None or found.hexdigest() != self.attributes["coordinate_checksums"][name]:
+                digest = None
+            if (
+                digest is None
+                or digest.hexdigest() != self.attributes["coordinate_checksums"][name]
+            ):
                 raise _damaged(self.path, f"coordinate '{name}'")
 
     # Chunks
@@ -125,7 +128,7 @@ class SweepStore:
                 yield chunk, failed
 
     def is_damaged(self, chunk: int) -> bool:
-        """Whether a chunk is said to be done and is not sound.
+        """Whether a chunk has the status of one that is done and is not sound.
 
         One that a driver writes just now may look so; looked at again it does not.
         """
@@ -139,11 +142,11 @@ class SweepStore:
 
     def _digest(self, chunk: int, failed: int) -> int:
         """Of the part of the grid, the failed points and the files of a chunk."""
-        found = checksum(repr((self.grid.slices(chunk), failed)).encode())
+        digest = checksum(repr((self.grid.slices(chunk), failed)).encode())
         for name in self.arrays:
             content = self._file(name, chunk).read_bytes()
-            found.update(f"{name} {len(content)} ".encode() + content)
-        return int.from_bytes(found.digest(), "little", signed=True)
+            digest.update(f"{name} {len(content)} ".encode() + content)
+        return int.from_bytes(digest.digest(), "little", signed=True)
 
     def write(self, chunk: int, answers: Answers) -> None:
         """Write a chunk; when this returns it is on the disk and done.

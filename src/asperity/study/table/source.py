@@ -214,8 +214,8 @@ def _column_contents(
     law_place = columns.get("law", -1)
     for row in rows:
         contents.rows += 1
-        own = row[law_place].strip() if 0 <= law_place < len(row) else ""
-        contents.laws.add(own or law or "")
+        written = row[law_place].strip() if 0 <= law_place < len(row) else ""
+        contents.laws.add(written or law or "")
         # Only columns without a number so far are examined: a long table is read at full speed.
         for name in [n for n, place in without_number.items() if place < len(row)]:
             text = row[without_number[name]].strip()
