@@ -12,8 +12,8 @@ from asperity.errors import InputError
 from asperity.laws import ElastoPlastic, RiceRuina, get_law, law_parameters, registered
 from asperity.loads import modulated
 from asperity.orbit import Outcome, differentiable
-from asperity.orbit.gradient.search import search as search_module
-from asperity.orbit.gradient.search.search import search_orbits
+from asperity.orbit.gradient import search as search_module
+from asperity.orbit.gradient.search import search_orbits
 
 #: Richardson's extrapolation of central differences over 0.2 % and 0.1 %, relative to the
 #: largest derivative by the logarithm of a parameter: what it leaves is of the fourth order.

@@ -10,7 +10,7 @@ from asperity.loads import Hold, Modulate, Programme, Slide
 from asperity.operating_point import numbers_for, sourced_numbers
 from asperity.slider.named import slider_from
 from asperity.transients import steps
-from asperity.transients.termination import _SENTENCES
+from asperity.transients.events import _SENTENCES
 
 #: Numbers of laws that the material does not have.
 OTHERS = {

@@ -18,20 +18,19 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity.branches.branch import Bifurcation, Branch
-from asperity.branches.recorder import INTERVALS, BranchRecorder
+from asperity.branches.continuation import INTERVALS, BranchRecorder
 from asperity.branches.steps import BranchFollower, BranchOrbit
 from asperity.errors import InputError
 from asperity.loads import Excitation, Modulation
-from asperity.orbit.mesh.condensation import transfer_maps
-from asperity.orbit.mesh.equations import condensed
+from asperity.orbit.mesh.equations import condensed, transfer_maps
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import Change
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
+    ParameterLine,
     slip_units,
     weighted_row,
 )
-from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
 from asperity.parameters.arguments import counted, function, instance, whole_number
 from asperity.slider.problem import Problem
 

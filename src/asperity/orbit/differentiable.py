@@ -25,21 +25,18 @@ from asperity.laws import Law, get_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
+from asperity.orbit.gradient.known import KnownOrbits, SearchedOrbits
 from asperity.orbit.gradient.parametrised import (
-    ParametrisedProblem,
-    coefficients_of,
-    load_values,
-)
-from asperity.orbit.gradient.program import (
     Parameters,
+    ParametrisedProblem,
     Program,
     ResponseValues,
     by_point,
     chosen,
+    coefficients_of,
+    load_values,
 )
-from asperity.orbit.gradient.search.known import KnownOrbits
-from asperity.orbit.gradient.search.mesh_orbits import SearchedOrbits
-from asperity.orbit.gradient.search.search import search_orbits
+from asperity.orbit.gradient.search import search_orbits
 from asperity.orbit.gradient.searched import derivatives_of, searched_values, values_of
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying

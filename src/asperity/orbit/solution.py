@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.orbit.batches import Indices, put, take
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.scheme import GAUSS, scheme_for
+from asperity.orbit.mesh.mesh import GAUSS, Orbit, scheme_for
 from asperity.orbit.observables import Observables
 from asperity.orbit.outcome import Outcome
 from asperity.slider.problem import Problem
@@ -35,8 +34,8 @@ class Solution(NamedTuple):
     method : str array, shape (points,)
         Name of the method that gave the outcome; "" for none.
     orbit : Orbit
-        Orbits of the points that a method found on a mesh, on `SearchOptions.intervals` intervals,
-        without any where that is 0; the mesh of the others is 0 throughout.
+        Orbits of the converged points on `SearchOptions.intervals` intervals, without any where
+        that is 0; the mesh of the others is 0 throughout.
     """
 
     mean_friction: Float
@@ -124,7 +123,7 @@ class SearchOptions(NamedTuple):
     progress : callable
         Called with the number of points solved since the last call.
     intervals : int
-        Of the meshes on which orbits that were found on a mesh are kept; 0 to keep none.
+        Of the meshes on which orbits are kept; 0 to keep none.
     """
 
     harmonics: int

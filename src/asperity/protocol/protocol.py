@@ -28,10 +28,8 @@ from asperity.protocol.plan import PlannedStep, check_levels, plan
 from asperity.protocol.recording import RecordingSetup, setup_of
 from asperity.slider import Slider
 from asperity.transients import Trajectory, transient
-from asperity.transients.initial_state import require_contact
-from asperity.transients.inputs import MOST_STEPS
-from asperity.transients.sampling import planned_rows
-from asperity.transients.trajectory import row_bytes
+from asperity.transients.inputs import MOST_STEPS, require_contact
+from asperity.transients.trajectory import planned_rows, row_bytes
 from asperity.units import to_si
 
 #: A number in SI, or a text with its unit.

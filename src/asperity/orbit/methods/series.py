@@ -22,14 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.scheme import scheme_for
-from asperity.orbit.methods.collocation.refinement import accept
+from asperity.orbit.batches import Indices, mesh_chunk, put, take
+from asperity.orbit.mesh.mesh import Orbit, scheme_for
+from asperity.orbit.methods.collocation.method import accept
 from asperity.orbit.methods.method import Method
 from asperity.orbit.solution import SearchOptions, Solution
-from asperity.orbit.stiffness import STIFFNESS_CHUNK, sharpness_of_slip, stiffness_of_steady_sliding
-from asperity.slider import QuasiStatic
+from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import adiabatic_states, even_phases
@@ -80,12 +78,8 @@ class FourierSeries(Method):
         """As in `Method`; only points under slow or weak modulation are tried."""
         points = np.arange(problem.system.V.shape[-1])
         solution = Solution.unsolved(problem, len(points), options)
-        system, load = problem
-        # Mass and damping make the equations stiff too, but not their orbits smooth.
-        sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
-        slow, weak = np.zeros((2, len(points)), dtype=bool)
-        for part, smoothness in run_chunks(_smoothness, (sliding,), points, STIFFNESS_CHUNK):
-            slow[part], weak[part] = smoothness
+        rate, sharpness, _ = steady_sliding(problem)
+        slow, weak = rate >= _SLOW, (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
         smooth = np.flatnonzero(slow | weak)
         if not len(smooth):
             return solution
@@ -100,13 +94,6 @@ class FourierSeries(Method):
             options.progress(int(found.converged[exact].sum()))
             solution.merge(rows[exact], take(found, np.flatnonzero(exact)))
         return solution
-
-
-def _smoothness(sliding: Problem) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which points are modulated slowly, and which weakly."""
-    sharpness = np.asarray(sharpness_of_slip(sliding))
-    weak = (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
-    return np.asarray(stiffness_of_steady_sliding(sliding)) >= _SLOW, weak
 
 
 def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool_]]:

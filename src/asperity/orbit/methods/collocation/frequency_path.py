@@ -9,6 +9,7 @@ import equinox as eqx
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity._jax import jit_large
 from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import solve
@@ -21,12 +22,12 @@ from asperity.orbit.methods.collocation.method import solve_from
 from asperity.orbit.methods.method import Method
 from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
 from asperity.orbit.solution import SearchOptions, Solution
-from asperity.orbit.stiffness import STIFFNESS_CHUNK, stiffness_of_steady_sliding
+from asperity.orbit.steady_sliding import perturbation_rate
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
 
-#: Stiffness of steady sliding at which the averaged limit is close enough to start from.
+#: Rate per radian of a perturbation at which the averaged limit is close enough to start from.
 _FAST_MODULATION = 0.02
 #: Steps, in parts of the path: the first, the shortest, and how many there may be.
 _FIRST_STEP, _SHORTEST_STEP, _MOST_STEPS = 0.02, 1e-4, 250
@@ -34,6 +35,8 @@ _FIRST_STEP, _SHORTEST_STEP, _MOST_STEPS = 0.02, 1e-4, 250
 _GROWTH, _SHRINKAGE = 1.6, 0.35
 #: A step is accepted when Newton's method has converged to this; the end point is solved again.
 _ACCEPTED, _NEWTON_STEPS = 1e-5, 10
+
+_rate = jit_large(perturbation_rate)
 
 
 class FrequencyPath(Method):
@@ -63,13 +66,12 @@ class FrequencyPath(Method):
 
 def orbits_from_high_frequency(problem: Problem, points: int) -> InitialGuess:
     """Orbits of all points of `problem` (NumPy arrays) at the end of their path in frequency."""
-    stiffness = np.zeros(points)
-    for part, value in run_chunks(
-        stiffness_of_steady_sliding, (problem,), np.arange(points), STIFFNESS_CHUNK
-    ):
-        stiffness[part] = value
+    rate = np.zeros(points)
+    chunk = mesh_chunk(problem.system.size)
+    for part, value in run_chunks(_rate, (problem,), np.arange(points), chunk):
+        rate[part] = value
     omega = np.asarray(problem.system.omega)
-    first = omega * np.maximum(stiffness / _FAST_MODULATION, 1.0)
+    first = omega * np.maximum(rate / _FAST_MODULATION, 1.0)
     guess = orbits_from_averaged_limit(_at_frequency(problem, first), points)
     _follow(problem, first, guess.orbit, guess.found)
     return guess

@@ -17,13 +17,11 @@ from numpy.typing import NDArray
 from asperity.loads import Modulate, Programme
 from asperity.orbit.batches import Indices, put, take
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.scheme import scheme_for
+from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.transients.dense_output import DenseOutput
-from asperity.transients.initial_state import first_checkpoint
-from asperity.transients.inputs import checked_integration
+from asperity.transients.inputs import checked_integration, first_checkpoint
 
 Float = NDArray[np.float64]
 
