@@ -64,6 +64,8 @@ class ThisProcess(Workers):
 
     count = 1
     about = "this process"
+    lost = ()
+    gone = ()
 
     def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
         """As in `Workers`; an interruption is raised at once."""
