@@ -107,7 +107,7 @@ def main(kills: int, seed: int, law: str = "rice-ruina", frequency: str = "120 H
             sys.stdout.flush()
         code = started(plan, broken, 2).wait()
         same = files_of(whole) == files_of(broken)
-        left = [p.name for p in Path(folder).iterdir() if p.name.endswith((".lock", ".pieces"))]
+        left = [p.name for p in Path(folder).iterdir() if p.name.endswith((".lock",))]
         sys.stdout.write(f"killed {counts}, exit {code}, same bits: {same}, left: {left}\n")
         return same
 

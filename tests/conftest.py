@@ -25,7 +25,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Rooms that take longest from an empty compilation cache; they come first.
 LONGEST = (
-    *("orbit", "inference", "papers", "branches", "docs", "transients", "sweep", "app"),
+    *("orbit", "inference", "papers", "branches", "docs", "transients", "study", "app"),
     *("measurement", "cli", "laws", "theory", "lock_in"),
 )
 

@@ -18,7 +18,7 @@ _EQUATIONS = _BASE | {"laws", "loads", "slider"}
 _SOLVERS = {"algebra", "theory", "orbit", "branches", "transients"}
 _SIGNALS = {"recording", "lock_in", "measurement", "tribometer"}
 _RESULTS = _EQUATIONS | _SOLVERS | _SIGNALS | {"air", "materials"}
-_STUDIES = {"experiment", "protocol", "sweep"}
+_STUDIES = {"experiment", "protocol", "study"}
 
 #: The rooms, and what each may import besides itself: the one place where the order is written.
 MAY_IMPORT: dict[str, set[str]] = {
@@ -46,7 +46,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "experiment": _RESULTS,
     "operating_point": _EQUATIONS | {"algebra", "materials", "orbit"},  # numbers by name
     "protocol": _RESULTS | {"experiment", "operating_point"},
-    "sweep": _RESULTS | {"operating_point", "protocol", "inference"},  # sweeps all of these
+    "study": _RESULTS | {"operating_point", "protocol", "inference"},  # varies all of these
     "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material
     "papers": _RESULTS | _STUDIES | {"figures", "inference"},
@@ -234,7 +234,7 @@ def test_right_imports_pass(tmp_path: Path) -> None:
     (tmp_path / "orbit" / "right.py").write_text(
         "from typing import TYPE_CHECKING\nimport numpy\nfrom asperity.slider import Slider\n"
         "from asperity.orbit.other import y\n"
-        "if TYPE_CHECKING:\n    from asperity.sweep import z\n",
+        "if TYPE_CHECKING:\n    from asperity.study import z\n",
         encoding="utf-8",
     )
     assert wrong_imports(tmp_path) == []

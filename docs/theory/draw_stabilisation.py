@@ -8,8 +8,8 @@ from asperity.figures.style import style
 from asperity.papers.bureau2000.figures.stabilisation import draw_stabilisation
 from asperity.papers.bureau2000.numbers.machine import slider
 from asperity.papers.bureau2000.stabilisation import resonance_map, stabilisation_diagram
-from asperity.sweep.map import Axis
-from asperity.sweep.threshold import natural_scales
+from asperity.study.map import Axis
+from asperity.study.threshold import natural_scales
 
 _, f_c = natural_scales(slider("elasto-plastic"), 1e-6)
 frequencies = f_c * np.concatenate([np.geomspace(1.0, 4.2, 22), np.geomspace(5.0, 300.0, 9)])

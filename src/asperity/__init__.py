@@ -27,7 +27,7 @@ if TYPE_CHECKING:
         protocol,
         recording,
         slider,
-        sweep,
+        study,
         theory,
         transients,
         tribometer,
@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from asperity.protocol.run import run_experiment as run
     from asperity.recording.readers import read
     from asperity.slider import Slider
-    from asperity.sweep.map import response_map as map
+    from asperity.study.map import response_map as map
     from asperity.theory import perturbation_response
     from asperity.transients import transient
 
@@ -57,7 +57,7 @@ _HOMES = {
     "averaged_response": ("orbit", "averaged_response"),
     "continuation": ("branches", "continuation"),
     "doubled_branch": ("branches", "doubled_branch"),
-    "map": ("sweep.map", "response_map"),
+    "map": ("study.map", "response_map"),
     "explore": ("app.notebook", "explore"),
     "measure": ("measurement.from_file", "measure_recording"),
     "periodic_response": ("orbit", "periodic_response"),
@@ -103,7 +103,7 @@ __all__ = [
     "sensitivities",
     "slider",
     "stability_boundary",
-    "sweep",
+    "study",
     "theory",
     "transient",
     "transients",
@@ -118,6 +118,8 @@ def __getattr__(name: str) -> object:
     if name in _HOMES:
         room, there = _HOMES[name]
         value = getattr(import_module(f"asperity.{room}"), there)
+    elif name == "sweep":  # the earlier name of the room
+        value = import_module("asperity.study")
     elif name in __all__:
         value = import_module(f"asperity.{name}")
     else:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.laws import Law, get_law, registered
-from asperity.loads.modulated import contact_lost, modulated
+from asperity.loads.modulated import lowest_load, modulated
 from asperity.orbit import PeriodicResponse, periodic_response
 from asperity.parameters import (
     MODULATION,
@@ -163,7 +163,7 @@ def respond(
     Raises
     ------
     InputError
-        If the load of a point does not stay positive: see `without_contact`.
+        If the load of a point does not stay positive: see `lowest_loads`.
     """
     harmonic = not _more_modulated(values).any()
     damped = np.any(np.asarray(values.get("eta", 0.0)) > 0)
@@ -210,11 +210,11 @@ def without_mass(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.bool_]
     return (np.asarray(values["inertia"]) > 0) & ~(np.asarray(values["M"]) > 0)
 
 
-def without_contact(values: Mapping[str, NDArray[np.float64]]) -> list[str]:
-    """Why the contact is lost within the period at each point; empty where it is not."""
+def lowest_loads(values: Mapping[str, NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Lowest W/W0 over the period at each point; the contact is lost where it is not positive."""
     harmonics = _further_harmonics(values)
     # A harmonic load stays positive by the rule of epsilon.
-    return contact_lost(values["epsilon"], harmonics) if harmonics else [""] * len(values["V"])
+    return lowest_load(values["epsilon"], harmonics) if harmonics else np.ones(len(values["V"]))
 
 
 def _more_modulated(values: Mapping[str, Any]) -> NDArray[np.bool_]:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from asperity.app.api import map as map_tab
-from asperity.sweep import map as maps
-from asperity.sweep.map import Axis
+from asperity.study import map as maps
+from asperity.study.map import Axis
 
 ASKED = {
     "law": "rice-ruina",

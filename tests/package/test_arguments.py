@@ -24,8 +24,8 @@ from asperity.loads import (
     StepLoad,
     modulated,
 )
-from asperity.sweep.map import Axis, write_map
-from asperity.sweep.threshold import stiffness_threshold
+from asperity.study.map import Axis, write_map
+from asperity.study.threshold import stiffness_threshold
 
 PMMA = asp.materials.load("bureau2000")
 LAW = PMMA.law("rice-ruina")

@@ -19,7 +19,7 @@ from asperity.parameters import file_content
 from asperity.parameters.toml_file import parsed_toml
 from asperity.protocol import load_protocol
 from asperity.recording.recipe import load_recipe
-from asperity.sweep import load_plan
+from asperity.study import load_plan
 
 READERS: tuple[Callable[[Path], Any], ...] = (
     *(load_plan, load_protocol, load_recipe, read_plan, materials.load, read_contents),

@@ -11,19 +11,18 @@ from typing import Any
 import numpy as np
 
 from asperity.parameters import OUTPUTS
-from asperity.sweep import SweepPlan, run_sweep
-from asperity.sweep.run.executors import Workers
-from asperity.sweep.solve import SOLVES, Findings, SolveKind
-from asperity.sweep.solve.outcome import SweepOutcome
+from asperity.study import SweepPlan, run_sweep
+from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.solve import SOLVES, SolveKind
+from asperity.study.workers import ThisProcess, Workers
 
 
 class ClosedForm(SolveKind):
-    """mu1 = epsilon K, mu2 = epsilon^2 K; the second stage gets the points with epsilon > 0.6."""
+    """mu1 = epsilon K, mu2 = epsilon^2 K."""
 
     name = "periodic"
     outputs = (OUTPUTS["mu1"], OUTPUTS["mu2"])
     defaults = ("mu1", "mu2")
-    batch = 3
 
     def __init__(self) -> None:
         self.solved: set[tuple[float, float]] = set()
@@ -31,42 +30,16 @@ class ClosedForm(SolveKind):
     def chunk_points(self, points: int, record: Any) -> int:
         return 10
 
-    def first(self, points: Any, record: Any) -> Findings:
-        found = self._solve(points)
-        found.fail(np.flatnonzero(points.values["epsilon"] > 0.6), SweepOutcome.NOT_COMPUTED)
-        return found
-
-    def second(self, points: Any, record: Any) -> Findings:
-        return self._solve(points)
-
-    def _solve(self, points: Any) -> Findings:
+    def solve(self, points: Any, record: Any) -> Answers:
         epsilon, K = points.values["epsilon"], points.values["K"]
         self.solved |= set(zip(K.tolist(), epsilon.tolist(), strict=True))
-        found = Findings.empty(("mu1", "mu2"), len(points))
-        found.numbers["mu1"][:], found.numbers["mu2"][:] = epsilon * K, epsilon**2 * K
-        found.outcome[:] = SweepOutcome.CONVERGED
+        answers = Answers.empty(("mu1", "mu2"), len(points))
+        answers.numbers["mu1"][:], answers.numbers["mu2"][:] = epsilon * K, epsilon**2 * K
+        answers.outcome[:] = SweepOutcome.CONVERGED
         # A whole chunk without one answer, and a few single ones.
-        found.fail(np.flatnonzero(K == 3.0), 4, 0.25)
-        found.fail(np.flatnonzero(epsilon > 0.9), SweepOutcome.STOPPED, 2.5)
-        return found
-
-
-class ThisProcess(Workers):
-    """Tasks are done when they are handed out."""
-
-    count = 2
-    about = "this process"
-
-    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
-        future: Future[Any] = Future()
-        try:
-            future.set_result(task(*args))
-        except Exception as error:  # as an executor does
-            future.set_exception(error)
-        return future
-
-    def close(self, *, kill: bool) -> None:
-        pass
+        answers.fail(np.flatnonzero(K == 3.0), 4, 0.25)
+        answers.fail(np.flatnonzero(epsilon > 0.9), SweepOutcome.STOPPED, 2.5)
+        return answers
 
 
 class InClosedForm(Workers):
@@ -89,22 +62,22 @@ class InClosedForm(Workers):
         self.workers.close(kill=kill)
 
 
-def _in_closed_form(mark: str, task: Callable[..., Any], job: Any, units: Any, *args: Any) -> Any:
+def _in_closed_form(mark: str, task: Callable[..., Any], chunks: Any, *args: Any) -> Any:
     SOLVES["periodic"] = ClosedForm()
-    if any(unit.chunk == 2 for unit in units):
+    if 2 in chunks:
         try:
             os.close(os.open(mark, os.O_CREAT | os.O_EXCL))
         except FileExistsError:
             pass
         else:
             os.kill(os.getpid(), signal.SIGKILL)
-    return task(job, units, *args)
+    return task(chunks, *args)
 
 
 class _Slow(ClosedForm):
-    def first(self, points: Any, record: Any) -> Findings:
+    def solve(self, points: Any, record: Any) -> Answers:
         time.sleep(0.2)
-        return super().first(points, record)
+        return super().solve(points, record)
 
 
 def slow_driver(out: str) -> None:

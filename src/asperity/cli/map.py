@@ -98,7 +98,7 @@ def _solve(
 ) -> xarray.Dataset:
     from asperity.cli.progress import bar
     from asperity.operating_point import refuse_foreign, sourced_numbers
-    from asperity.sweep.map import Axis, write_map
+    from asperity.study.map import Axis, write_map
 
     law = law_named(law)
     axes = []
@@ -129,7 +129,7 @@ def _solve(
 def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
     """Check files and quantity before anything is solved."""
     from asperity.outputs import output_files
-    from asperity.sweep.map import SHOWN
+    from asperity.study.map import SHOWN
 
     if show not in SHOWN:
         raise InputError(

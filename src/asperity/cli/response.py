@@ -136,7 +136,7 @@ def _table(
     from asperity.cli.report import to_json
     from asperity.laws import get_law
     from asperity.operating_point import sourced_numbers
-    from asperity.sweep.table import run_table
+    from asperity.study.table import run_table
 
     if law is not None:
         get_law(law)

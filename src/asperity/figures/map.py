@@ -88,9 +88,9 @@ def draw_map(found: xarray.Dataset, show: str = "growth_rate") -> Figure:
     Parameters
     ----------
     found : Dataset
-        From `asperity.sweep.map.response_map`.
+        From `asperity.study.map.response_map`.
     show : str
-        A key of `asperity.sweep.map.SHOWN`.
+        A key of `asperity.study.map.SHOWN`.
     """
     figure = new_figure(5.0, 4.1)
     axis = figure.subplots()

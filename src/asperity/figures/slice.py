@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from asperity.errors import InputError, closest
 from asperity.figures.style import new_figure
-from asperity.sweep import open_store
+from asperity.study import open_store
 
 
 def plot_slice(

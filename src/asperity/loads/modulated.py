@@ -68,18 +68,25 @@ def modulated(
     return Periodic(series, shear, swing)
 
 
-def contact_lost(
+def lowest_load(
     epsilon: ArrayLike | str = 0.0, load: Mapping[int, tuple[Any, Any]] | None = None
-) -> list[str]:
-    """Why the load of each point is none of a contact; empty where the load stays positive.
+) -> NDArray[np.float64]:
+    """Lowest W/W0 over the period at each point; a lower bound of it where that is positive.
 
     Parameters
     ----------
     epsilon, load
         As for `modulated`, of shape (points,).
     """
-    lowest = np.ravel(_lowest_load(_load_series(epsilon, load)))
-    return ["" if low > 0 else _no_contact(low) for low in lowest]
+    return np.ravel(_lowest_load(_load_series(epsilon, load)))
+
+
+def no_contact(lowest: float) -> str:
+    """The sentence for a load whose lowest W/W0 is not positive."""
+    return (
+        f"load must stay positive over the period, so that contact is never lost, got a "
+        f"lowest W/W0 of {lowest:.4g}; lower the amplitudes"
+    )
 
 
 def sampled(
@@ -185,14 +192,7 @@ def _require_contact(series: Series) -> None:
     """Raise `InputError` where the load does not stay positive over the period."""
     lowest = float(np.min(_lowest_load(series), initial=np.inf))
     if not lowest > 0:
-        raise InputError(_no_contact(lowest))
-
-
-def _no_contact(lowest: float) -> str:
-    return (
-        f"load must stay positive over the period, so that contact is never lost, got a "
-        f"lowest W/W0 of {lowest:.4g}; lower the amplitudes"
-    )
+        raise InputError(no_contact(lowest))
 
 
 def _lowest_load(series: Series) -> NDArray[np.float64]:

@@ -7,11 +7,14 @@ reached the disk: what lies behind the recorded end is a block that was never fi
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import os
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -210,6 +213,32 @@ class UnfinishedText(UnfinishedOutput):
         added = {"rows": rows, **counts}
         summed = {name: self.progress.get(name, 0) + count for name, count in added.items()}
         self.save({**self.progress, **summed, "length": length, "crc32": crc32})
+
+    def append_rows(
+        self,
+        rows: Sequence[Sequence[object]],
+        delimiter: str = ",",
+        header: Sequence[object] | None = None,
+        **counts: int,
+    ) -> None:
+        """`append` rows of cells as CSV, behind a line of column names where there is a header."""
+        text = io.StringIO(newline="")
+        writer = csv.writer(text, delimiter=delimiter, lineterminator="\n")
+        writer.writerows([*([header] if header is not None else []), *rows])
+        self.append(text.getvalue(), len(rows), **counts)
+
+    @contextmanager
+    def interruptible(self, what: str, total: int) -> Iterator[None]:
+        """Turn Ctrl-C into `Interrupted`, with the finished rows of `total`, called `what`.
+
+        Nothing is left behind where not one block was finished.
+        """
+        try:
+            yield
+        except KeyboardInterrupt:
+            raise Interrupted(f"{self.rows} of {total} {what}" if self.rows else "") from None
+        finally:
+            self.discard_if_empty()
 
     def text(self) -> str:
         """Return the finished blocks."""

@@ -14,7 +14,7 @@ from asperity.app.endpoints import Answer, Job, Question
 from asperity.errors import InputError
 from asperity.operating_point import SourcedNumber, refuse_foreign
 from asperity.parameters.arguments import one_of
-from asperity.sweep.map import SHOWN, Axis, response_map
+from asperity.study.map import SHOWN, Axis, response_map
 
 #: Points along each axis: at once and without a boundary, then finer while one looks, up to what is
 #: asked.
@@ -39,7 +39,7 @@ class MapAsked(OperatingPoint):
     ----------
     x, y : AxisAsked
     show : str
-        One of `asperity.sweep.map.SHOWN`.
+        One of `asperity.study.map.SHOWN`.
     count : int
         Points along each axis of the finest grid.
     """

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from asperity.app.api.operating_point import OperatingPoint, law_class
 from asperity.parameters import law_parameters, point_parameters
-from asperity.sweep.map import Axis
+from asperity.study.map import Axis
 from asperity.units import format_si, to_si
 
 
@@ -56,7 +56,7 @@ def plane(
     ]  # fmt: skip
     python = [
         "import asperity as asp",
-        "from asperity.sweep.map import Axis",
+        "from asperity.study.map import Axis",
         "",
         f"numbers = {{{numbers}}}",
         "found = asp.map(",

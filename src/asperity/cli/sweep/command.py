@@ -15,7 +15,7 @@ Examples:
   asperity sweep plan.toml --dry-run
   asperity sweep plan.toml --out results.zarr
   asperity sweep plan.toml --out results.zarr --cluster 4
-  asperity sweep status results.zarr
+  asperity.study.results results.zarr
   asperity sweep summary results.zarr
   asperity sweep export results.zarr results.nc
   asperity sweep plot results.zarr --show delta_mu --x epsilon --y stiffness_ratio --out drop.png
@@ -87,7 +87,7 @@ def run(
     from asperity.cli.report import aligned, to_json
     from asperity.cli.sweep.progress import shown
     from asperity.outputs import size_text
-    from asperity.sweep import run_sweep
+    from asperity.study import run_sweep
 
     with shown() as (progress, log):
         found = run_sweep(
@@ -113,7 +113,7 @@ def run(
     if found.failed:
         click.echo(
             f"asperity: {found.failed:,} of {found.points:,} points have no answer; the variable "
-            "'outcome' says why, and asperity sweep status counts the reasons",
+            "'outcome' says why, and asperity.study.results counts the reasons",
             err=True,
         )
     return 1 if found.failed else 0
@@ -124,7 +124,7 @@ def _estimate(plan: Path, as_json: bool) -> int:
     from asperity.cli.sweep.progress import time_text
     from asperity.orbit.search import available_cores
     from asperity.outputs import size_text
-    from asperity.sweep import dry_run
+    from asperity.study import dry_run
 
     found = dry_run(plan)
     cores = available_cores()
@@ -134,7 +134,6 @@ def _estimate(plan: Path, as_json: bool) -> int:
         ("chunks", f"{found.chunks:,} of {' x '.join(map(str, found.chunk_shape))} points"),
         ("disk", f"{size_text(found.bytes)} at most"),
         ("sample", f"{found.sample:,} points"),
-        ("second stage", f"{found.second_stage:.2%} of the points"),
         ("failed", f"{found.failed:.2%} of the sample"),
         ("time", f"{alone} of one core, about; {together} on {cores}"),
     ]
@@ -149,8 +148,8 @@ def status(store: Path, as_json: bool) -> int:
     """How far a store is, what failed and why, and who has run it."""
     from asperity.cli.report import aligned, to_json
     from asperity.outputs import size_text
-    from asperity.sweep import store_status
-    from asperity.sweep.status import status_record
+    from asperity.study import store_status
+    from asperity.study.results import status_record
 
     found = store_status(store)
     if as_json:
@@ -190,7 +189,7 @@ def _run_text(run: dict[str, Any]) -> str:
 def summary(store: Path, as_json: bool) -> int:
     """Count, mean, deviation, smallest and largest value of every output."""
     from asperity.cli.report import aligned, to_json
-    from asperity.sweep import summary_statistics
+    from asperity.study import summary_statistics
 
     found = summary_statistics(store)
     if as_json:
@@ -210,7 +209,7 @@ def summary(store: Path, as_json: bool) -> int:
 @click.argument("out", type=Path)
 def export(store: Path, out: Path) -> int:
     """Write a store to one file: .nc, .csv or .parquet."""
-    from asperity.sweep import export_store
+    from asperity.study import export_store
 
     count = export_store(store, out)
     click.echo(f"{count:,} points in {out}")

@@ -14,7 +14,7 @@ import click
 from asperity.cli.interrupt import interruptible
 
 if TYPE_CHECKING:
-    from asperity.sweep.run.driver import SweepProgress
+    from asperity.study.engine import SweepProgress
 
 #: Seconds between lines of a log.
 _LINES = 10.0

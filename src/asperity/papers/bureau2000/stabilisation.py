@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from asperity.papers.bureau2000.numbers import paper
 from asperity.papers.bureau2000.numbers.machine import slider
-from asperity.sweep.map import Axis, response_map
-from asperity.sweep.threshold import natural_scales, stiffness_threshold
+from asperity.study.map import Axis, response_map
+from asperity.study.threshold import natural_scales, stiffness_threshold
 
 if TYPE_CHECKING:
     import xarray

@@ -1,0 +1,58 @@
+"""Many operating points: tables, maps, thresholds, and sweeps of any size.
+
+Names are imported when first used: workers of a sweep set the number of threads before JAX loads.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from asperity.study.estimate import dry_run
+    from asperity.study.export import export_store
+    from asperity.study.load import load_plan
+    from asperity.study.outcome import reasons
+    from asperity.study.plan import SweepPlan
+    from asperity.study.results import SweepStatus, open_store, store_status, summary_statistics
+    from asperity.study.run import SweepSummary, run_sweep
+
+#: Public names and their modules.
+_HOMES = {
+    "SweepPlan": "plan",
+    "SweepStatus": "results",
+    "SweepSummary": "run",
+    "dry_run": "estimate",
+    "export_store": "export",
+    "load_plan": "load",
+    "open_store": "results",
+    "reasons": "outcome",
+    "run_sweep": "run",
+    "store_status": "results",
+    "summary_statistics": "results",
+}
+
+__all__ = [
+    "SweepPlan",
+    "SweepStatus",
+    "SweepSummary",
+    "dry_run",
+    "export_store",
+    "load_plan",
+    "open_store",
+    "reasons",
+    "run_sweep",
+    "store_status",
+    "summary_statistics",
+]
+
+
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
+    if name not in _HOMES:
+        raise AttributeError(f"module 'asperity.study' has no attribute '{name}'")
+    return getattr(import_module(f"asperity.study.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

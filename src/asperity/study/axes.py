@@ -1,0 +1,398 @@
+"""The axes of a sweep: rows of numbers that belong together, listed or drawn.
+
+`axis_record` reads an axis as a plan writes it; a `SweepAxis` gives its rows.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+import warnings
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.laws import get_law, known_law
+from asperity.parameters import Parameter, canonical_name, obeying, suggestion
+from asperity.parameters.arguments import shown
+from asperity.study.plan import AxisTable, SweepPlan
+
+Column = NDArray[Any]
+
+#: Columns of texts.
+TEXTS = ("law", "data")
+
+#: Rows that are drawn at a time with a seed of their own: any of them can be drawn without those
+#: before.
+_DRAWN_TOGETHER = 4096
+
+#: Bits of a Sobol sequence, which has as many points; SciPy cannot skip points of longer ones.
+SOBOL_BITS = 30
+
+
+#: Rows that an axis may list: they are kept in memory and in the record.
+MOST_LISTED = 1_000_000
+
+
+class SweepAxis(ABC):
+    """One axis: a name, a length, and the columns that vary along it.
+
+    Attributes
+    ----------
+    name : str
+    length : int
+    names : tuple of str
+        Of the columns: parameters, ratios, or ``law``.
+    """
+
+    name: str
+
+    @property
+    @abstractmethod
+    def length(self) -> int:
+        """Number of rows."""
+
+    @property
+    @abstractmethod
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+
+    @abstractmethod
+    def rows(self, start: int, stop: int) -> dict[str, Column]:
+        """The columns from row `start` to before `stop`: SI, NaN where a row has no value.
+
+        Columns of texts hold names, "" where a row has none.
+        """
+
+    @property
+    def labelled(self) -> bool:
+        """Whether the axis is named after its only column, which then labels the dimension."""
+        return self.names == (self.name,)
+
+
+@dataclass(frozen=True)
+class ListedAxis(SweepAxis):
+    """An axis whose rows are all known.
+
+    Attributes
+    ----------
+    name : str
+    columns : mapping of str to array, shape (length,)
+    """
+
+    name: str
+    columns: Mapping[str, Column]
+
+    @property
+    def length(self) -> int:
+        """Number of rows."""
+        return len(next(iter(self.columns.values())))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.columns)
+
+    def rows(self, start: int, stop: int) -> dict[str, Column]:
+        """As in `SweepAxis`."""
+        return {name: values[start:stop] for name, values in self.columns.items()}
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How a drawn number is spread.
+
+    Attributes
+    ----------
+    low, high : float
+        Ends of a uniform distribution; mean and standard deviation of a normal one.
+    kind : {"linear", "log", "normal"}
+        Uniform in the number, uniform in its logarithm, or normal.
+    """
+
+    low: float
+    high: float
+    kind: str
+
+    def at(self, u: Column) -> Column:
+        """The quantile `u`, 0 < u < 1."""
+        from scipy.special import ndtri
+
+        if self.kind == "normal":
+            return np.asarray(self.low + self.high * ndtri(u))
+        if self.kind == "log":
+            return np.asarray(np.exp(np.log(self.low) + u * np.log(self.high / self.low)))
+        return np.asarray(self.low + u * (self.high - self.low))
+
+
+@dataclass(frozen=True)
+class DrawnAxis(SweepAxis):
+    """An axis of random or quasi-random draws; any row can be had without those before it.
+
+    Attributes
+    ----------
+    name : str
+    method : {"random", "sobol", "halton"}
+        Sobol and Halton sequences are scrambled by the seed.
+    seed, count : int
+    spreads : mapping of str to Spread
+        One dimension of the draws each, in this order.
+    """
+
+    name: str
+    method: str
+    seed: int
+    count: int
+    spreads: Mapping[str, Spread]
+
+    @property
+    def length(self) -> int:
+        """Number of rows."""
+        return self.count
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(self.spreads)
+
+    def rows(self, start: int, stop: int) -> dict[str, Column]:
+        """As in `SweepAxis`."""
+        u = self._uniform(start, stop)
+        # Both ends are left out: the normal distribution has no quantile there.
+        u = np.clip(u, 2.0**-53, 1 - 2.0**-53)
+        return {n: s.at(u[:, i]) for i, (n, s) in enumerate(self.spreads.items())}
+
+    def _uniform(self, start: int, stop: int) -> Column:
+        """Draws in the unit cube, shape (rows, columns)."""
+        from scipy.stats import qmc
+
+        dimensions = len(self.spreads)
+        if self.method == "random":
+            first = start // _DRAWN_TOGETHER
+            blocks = [
+                np.random.default_rng([self.seed, block]).random((_DRAWN_TOGETHER, dimensions))
+                for block in range(first, -(-stop // _DRAWN_TOGETHER))
+            ]
+            skip = start - first * _DRAWN_TOGETHER
+            return np.concatenate(blocks)[skip : skip + stop - start]
+        scramble = np.random.default_rng(self.seed)
+        if self.method == "halton":
+            sequence: Any = qmc.Halton(dimensions, rng=scramble)
+            # Its points follow from their numbers; SciPy's fast_forward makes all those before.
+            sequence.num_generated = start
+        else:
+            sequence = qmc.Sobol(dimensions, bits=SOBOL_BITS, rng=scramble)
+            if start:
+                sequence.fast_forward(start)
+        with warnings.catch_warnings():
+            # Any part of a Sobol sequence is taken, its balanced powers of two or not.
+            warnings.simplefilter("ignore", UserWarning)
+            return np.asarray(sequence.random(stop - start))
+
+
+def columns_of(axis: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the columns of an axis's record."""
+    return tuple(axis["columns"] if "columns" in axis else axis["over"])
+
+
+def axis_record(
+    name: str, table: AxisTable, known: Mapping[str, Parameter], plan: SweepPlan
+) -> tuple[str, dict[str, Any]]:
+    """Name of an axis, and the axis as JSON values in SI.
+
+    Raises
+    ------
+    InputError
+        If a name or a value of it is none.
+    """
+    if table.draw is not None:
+        spreads = {
+            _name(column, known): _spread(column, spread, known)
+            for column, spread in (table.over or {}).items()
+        }
+        if not spreads:
+            raise InputError("over must name what is drawn, got nothing; add over.K = { ... }")
+        if table.draw == "sobol" and (table.count or 0) > 2**SOBOL_BITS:
+            raise InputError(
+                f"count must be at most 2^{SOBOL_BITS} of a Sobol sequence, got {table.count:,}; "
+                "draw 'halton' or 'random'"
+            )
+        return name, {
+            "draw": table.draw,
+            "seed": plan.seed,
+            "count": table.count,
+            "over": spreads,
+        }
+    if table.zip is not None:
+        columns = {_name(n, known): _column(n, v, known, plan.folder) for n, v in table.zip.items()}
+        lengths = {n: len(v) for n, v in columns.items()}
+        if len(set(lengths.values())) != 1:
+            raise InputError(
+                "zip must have lists of one length, got "
+                + (", ".join(f"{k} of {v}" for k, v in lengths.items()) or "nothing")
+                + "; make them equal"
+            )
+        return name, _listed(columns)
+    if table.cases is not None:
+        return name, _listed(_cases(table.cases, known, plan.folder))
+    column = _name(name, known)
+    if table.values is not None:
+        return column, _listed({column: _column(name, table.values, known, plan.folder)})
+    grid = {"from": table.from_, "to": table.to, "count": table.count, "spacing": table.spacing}
+    return column, _listed({column: _grid(name, grid, known)})
+
+
+def _listed(columns: Mapping[str, list[Any]]) -> dict[str, Any]:
+    _check_length(len(next(iter(columns.values()))))
+    return {"columns": dict(columns)}
+
+
+def _check_length(length: int) -> None:
+    """Refuse an axis without rows, or of more than are kept in memory."""
+    if not 1 <= length <= MOST_LISTED:
+        raise InputError(
+            f"axis must have from 1 to {MOST_LISTED:,} rows, got {length:,}; draw them, or split "
+            "the axis"
+        )
+
+
+def _name(name: str, known: Mapping[str, Parameter]) -> str:
+    """The one name of a column."""
+    if name in TEXTS:
+        return name
+    column = canonical_name(name, known)
+    if column is None:
+        raise InputError(
+            f"axis must be a parameter, a ratio or 'law', got {shown(name)}; "
+            + suggestion(name, {**known, "law": Parameter("law", "dimensionless", "finite")})
+        )
+    return column
+
+
+def _column(
+    name: str, values: Sequence[Any], known: Mapping[str, Parameter], folder: Path
+) -> list[Any]:
+    """Values in SI; None where a row has none."""
+    column = _name(name, known)
+    if column == "law":
+        return [law_name(value, folder) for value in values]
+    if column in TEXTS:
+        return [str(value) for value in values]
+    return [None if value == "" else checked_value(known[column], value) for value in values]
+
+
+def law_place(law: Any, folder: Path) -> str:
+    """A law as a plan names it, by its whole path where it lies in a file beside the plan."""
+    file, _, name = str(law).rpartition(":")
+    return f"{(folder / file).resolve()}:{name}" if file.endswith(".py") else str(law)
+
+
+def law_name(law: Any, folder: Path) -> str:
+    """The registered name of a law that a plan names."""
+    place = law_place(law, folder)
+    return known_law(place) if ":" in place else get_law(place).name
+
+
+def checked_value(parameter: Parameter, value: Any) -> float:
+    """One number of a plan in SI."""
+    number = parameter.check(value)
+    if np.ndim(number):
+        raise InputError(f"{parameter.name} must be one number, got {shown(value)}")
+    return float(number)
+
+
+def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> list[float]:
+    """Values at equal distances or ratios, both ends among them."""
+    column = _name(name, known)
+    extra = set(table) - {"from", "to", "count", "spacing"}
+    if column in TEXTS or extra or not {"from", "to", "count"} <= set(table):
+        raise InputError(
+            f"{name} must have from, to and count, got {', '.join(sorted(table))}; write it like "
+            "{ from = 0.01, to = 0.5, count = 20 }"
+        )
+    low, high = (
+        checked_value(known[column], table["from"]),
+        checked_value(known[column], table["to"]),
+    )
+    count, spacing = table["count"], table.get("spacing") or "linear"
+    if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST_LISTED:
+        raise InputError(f"count must be from 1 to {MOST_LISTED:,}, got {shown(count)}")
+    _check_spacing(name, spacing, low, high, ("linear", "log"))
+    u = np.linspace(0.0, 1.0, count)
+    values = low * (high / low) ** u if spacing == "log" else low + (high - low) * u
+    # Fifteen digits: what a longer grid of the same step has in common with this one is then
+    # the same to the last bit, and decimal steps are the numbers that one would write.
+    return [float(f"{value:.15g}") for value in values]
+
+
+def _check_spacing(
+    name: str, spacing: Any, low: float, high: float, kinds: tuple[str, ...]
+) -> None:
+    if spacing not in kinds:
+        raise InputError(
+            f"{name}.spacing must be {' or '.join(kinds)}, got {shown(spacing)}; choose one"
+        )
+    if spacing == "log" and not low * high > 0:
+        raise InputError(
+            f"{name} must have ends above zero to be logarithmic, got {low:g} and {high:g}; "
+            "change them or the spacing"
+        )
+
+
+def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
+    """How a number is drawn: ends or mean and standard deviation in SI, and the kind."""
+    column = _name(name, known)
+    if column in TEXTS:
+        raise InputError(f"over must name numbers, got '{column}'; add an axis of its values")
+    if set(table) == {"mean", "std"}:
+        mean, std = checked_value(known[column], table["mean"]), _width(known[column], table["std"])
+        return {"low": mean, "high": std, "kind": "normal"}
+    if not {"from", "to"} <= set(table) <= {"from", "to", "spacing"}:
+        raise InputError(
+            f"over.{name} must have from and to, or mean and std, got "
+            f"{', '.join(sorted(table)) or 'nothing'}; write it like {{ from = 0.01, to = 0.5 }}"
+        )
+    low, high = (
+        checked_value(known[column], table["from"]),
+        checked_value(known[column], table["to"]),
+    )
+    spacing = table.get("spacing", "linear")
+    _check_spacing(f"over.{name}", spacing, low, high, ("linear", "log"))
+    return {"low": low, "high": high, "kind": spacing}
+
+
+def _width(parameter: Parameter, value: Any) -> float:
+    """A standard deviation, in the unit of its number."""
+    return float(obeying(value, f"{parameter.name}.std", parameter.kind, "positive"))
+
+
+def _cases(
+    cases: Sequence[Mapping[str, Any]], known: Mapping[str, Parameter], folder: Path
+) -> dict[str, Any]:
+    """Rows of all cases, each with every combination of its lists."""
+    names = dict.fromkeys(_name(name, known) for case in cases for name in case)
+    columns: dict[str, list[Any]] = {name: [] for name in names}
+    length = 0
+    for case in cases:
+        lists = {}
+        for name, value in case.items():
+            if isinstance(value, Mapping):
+                lists[_name(name, known)] = _grid(name, value, known)
+            else:
+                values = value if isinstance(value, list | tuple) else [value]
+                lists[_name(name, known)] = _column(name, values, known, folder)
+        length += math.prod(map(len, lists.values()))
+        _check_length(length)
+        for row in itertools.product(*lists.values()):
+            point = dict(zip(lists, row, strict=True))
+            for name in names:
+                columns[name].append(point.get(name, "" if name in TEXTS else None))
+    if not columns:
+        raise InputError("cases must have at least one case, got none; write [{ law = '...' }]")
+    return columns

@@ -1,0 +1,91 @@
+"""What a sweep would take, from its plan and some of its chunks."""
+
+from __future__ import annotations
+
+import os
+import time
+from dataclasses import dataclass
+
+import numpy as np
+
+from asperity.study.grid import SweepGrid
+from asperity.study.load import load_plan
+from asperity.study.plan import SweepPlan
+from asperity.study.solve import SOLVES
+
+#: Chunks that are looked at, and seconds for all of them, about.
+_CHUNKS, _SECONDS = 8, 20.0
+#: Points of a chunk that are solved first: a whole chunk of hard points would take minutes.
+_FEW = 32
+
+
+@dataclass(frozen=True)
+class SweepEstimate:
+    """What a sweep would take.
+
+    Attributes
+    ----------
+    shape, chunk_shape : tuple of int
+        Rows of each axis, and of a chunk.
+    points, chunks : int
+    bytes : float
+        In the store, uncompressed.
+    sample : int
+        Points that were solved for the estimate.
+    failed : float
+        Share of the points of the sample without an answer.
+    seconds : float
+        Processor time for all points; to be divided by the workers.
+    """
+
+    shape: tuple[int, ...]
+    chunk_shape: tuple[int, ...]
+    points: int
+    chunks: int
+    bytes: float
+    sample: int
+    failed: float
+    seconds: float
+
+
+def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
+    """Count the points of a plan, and solve some of them for an estimate of the time.
+
+    Raises
+    ------
+    InputError
+        If the plan has mistakes.
+    """
+    if not isinstance(plan, SweepPlan):
+        plan = load_plan(plan)
+    grid = SweepGrid.of(plan)
+    record = {**grid.record, "folder": str(plan.folder.resolve())}
+    draw = np.random.default_rng(0)
+    count = min(_CHUNKS, grid.chunk_count)
+    sample, failed, seconds = 0, 0, 0.0
+    begin = time.perf_counter()
+    # Evenly over the plan, whose outer axes have the laws.
+    for k in range(count):
+        chunk = grid.at((2 * k + 1) * grid.chunk_count // (2 * count))
+        some = np.sort(draw.permutation(len(chunk))[:_FEW])
+        for points in (chunk.take(some), chunk):
+            SOLVES[plan.solve].solve(points, record)  # for the compiler
+            start = time.process_time()
+            answers = SOLVES[plan.solve].solve(points, record)
+            spent = time.process_time() - start
+            if 2 * spent * len(chunk) / len(points) > _SECONDS / count:
+                break
+        sample, failed = sample + len(points), failed + answers.failed
+        seconds += spent * len(chunk) / len(points)
+        if time.perf_counter() - begin > _SECONDS:
+            break
+    return SweepEstimate(
+        shape=grid.shape,
+        chunk_shape=grid.chunks,
+        points=grid.points,
+        chunks=grid.chunk_count,
+        bytes=grid.bytes,
+        sample=sample,
+        failed=failed / sample,
+        seconds=seconds / (k + 1) * grid.chunk_count,
+    )

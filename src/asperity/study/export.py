@@ -1,0 +1,170 @@
+"""A store as one file: NetCDF, CSV or Parquet, written chunk by chunk."""
+
+from __future__ import annotations
+
+import csv
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.outputs import output_file, require_disk, written_file
+from asperity.parameters.arguments import file_path
+from asperity.study.outcome import words
+from asperity.study.store.store import SweepStore
+
+_FORMATS = (".nc", ".csv", ".parquet")
+
+
+def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> int:
+    """Write a store to one file, whose format its suffix says.
+
+    NetCDF keeps the grid, and points that are not computed are missing there. Tables have a row
+    for each point of the chunks that are done: the columns of the axes, the outputs, ``outcome``
+    as a word, and ``detail``.
+
+    Parameters
+    ----------
+    store : path
+    out : path
+        ``.nc``, ``.csv`` or ``.parquet``.
+
+    Returns
+    -------
+    int
+        Points that were written.
+
+    Raises
+    ------
+    InputError
+        If there is no store, it is damaged, `out` cannot be written, or pyarrow is missing for
+        Parquet.
+    """
+    opened = SweepStore(file_path(store, "store").resolve(), mode="r")
+    target = output_file(out, example="results.nc")
+    write = {".nc": _netcdf, ".csv": _csv, ".parquet": _parquet}.get(target.suffix.lower())
+    if write is None:
+        raise InputError(
+            f"out must end in {', '.join(_FORMATS)}, got '{target.name}'; write it like results.nc"
+        )
+    require_disk(
+        opened.grid.points * 8.0 * (len(opened.record["outputs"]) + 2),
+        target.parent, "out", f"{opened.grid.points:,} points", "choose another disk",
+    )  # fmt: skip
+    with written_file(target) as file:
+        return write(opened, file)
+
+
+def _netcdf(store: SweepStore, file: Path) -> int:
+    import h5netcdf
+
+    written = 0
+    with h5netcdf.File(file, "w") as out:
+        for axis in store.grid.axes:
+            out.dimensions[axis.name] = axis.length
+        for name, array in store.labels.items():
+            dims = tuple(array.metadata.dimension_names or ())
+            if name == "law":
+                texts = np.asarray(array[...], dtype=object)
+                variable = out.create_variable(name, dims, dtype=_text_type())
+                variable[...] = texts
+            else:
+                variable = out.create_variable(name, dims, data=np.asarray(array[...]))
+            _attributes(variable, dict(array.attrs))
+        dims = tuple(axis.name for axis in store.grid.axes)
+        variables = {}
+        for name, array in store.arrays.items():
+            fill: Any = np.nan if array.dtype.kind == "f" else array.fill_value
+            variables[name] = out.create_variable(
+                name, dims, dtype=array.dtype, fillvalue=fill, chunks=store.grid.chunks
+            )
+            _attributes(variables[name], dict(array.attrs))
+            # Where the others are is said for each variable: CF has no place for it in the file.
+            variables[name].attrs["coordinates"] = store.attributes.get("coordinates", "")
+        for chunk, _ in store.done():
+            slices = store.grid.slices(chunk)
+            for name, values in store.read(chunk).items():
+                variables[name][slices] = values
+            written += store.grid.size(chunk)
+        for name in ("title", "source", "convention", "plan", "plan_text"):
+            out.attrs[name] = str(store.attributes.get(name, ""))
+    return written
+
+
+def _text_type() -> Any:
+    import h5py
+
+    return h5py.string_dtype()
+
+
+def _attributes(variable: Any, attributes: dict[str, Any]) -> None:
+    for name, value in attributes.items():
+        if isinstance(value, list):
+            value = np.array(value, dtype=variable.dtype if variable.dtype.kind in "if" else None)
+        variable.attrs[name] = value
+
+
+def _rows(store: SweepStore, chunk: int) -> dict[str, np.ndarray]:
+    """Columns of a table: axes, outputs, outcome and detail."""
+    points = store.grid.at(chunk)
+    columns: dict[str, np.ndarray] = {}
+    for axis in store.grid.axes:
+        for name in axis.names:
+            columns[name] = points.laws if name == "law" else points.values[name]
+    for name, values in store.read(chunk).items():
+        columns[name] = values.ravel()
+    names = words()
+    columns["outcome"] = np.array([names[int(c)] for c in columns["outcome"]], dtype=object)
+    return columns
+
+
+def _csv(store: SweepStore, file: Path) -> int:
+    written = 0
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        for chunk, _ in store.done():
+            columns = _rows(store, chunk)
+            if not written:
+                writer.writerow(columns)
+            writer.writerows(zip(*(_cells(v) for v in columns.values()), strict=True))
+            written += store.grid.size(chunk)
+        if not written:
+            names = [n for axis in store.grid.axes for n in axis.names]
+            writer.writerow([*names, *store.arrays])
+    return written
+
+
+def _cells(values: np.ndarray) -> list[Any]:
+    """Cells of a column; empty where there is no number."""
+    if values.dtype.kind != "f":
+        return list(values.tolist())
+    return ["" if np.isnan(v) else v for v in values.tolist()]
+
+
+def _parquet(store: SweepStore, file: Path) -> int:
+    try:
+        import pyarrow  # type: ignore[import-untyped]
+        from pyarrow import parquet
+    except ImportError:
+        raise InputError(
+            "out must be a format that is installed, got Parquet without pyarrow; install it with "
+            "pip install 'asperity[parquet]', or export to .csv or .nc"
+        ) from None
+    names = [n for axis in store.grid.axes for n in axis.names]
+    texts = {"law", "outcome"}
+    schema = pyarrow.schema(
+        [
+            (n, pyarrow.string() if n in texts else pyarrow.float64())
+            for n in (*names, *store.arrays)
+        ]
+    )
+    written = 0
+    with parquet.ParquetWriter(file, schema) as writer:
+        for chunk, _ in store.done():
+            columns = _rows(store, chunk)
+            arrays = [pyarrow.array(columns[n], type=schema.field(n).type) for n in schema.names]
+            writer.write_table(pyarrow.Table.from_arrays(arrays, schema=schema))
+            written += store.grid.size(chunk)
+    return written

@@ -1,0 +1,183 @@
+"""A map as a labelled dataset: responses on the grid, the boundary, sources of the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray
+
+from asperity._version import __version__
+from asperity.parameters import OUTPUTS, point_parameters
+from asperity.study.map.boundary import MapBoundary
+from asperity.study.map.plane import MapPlane
+from asperity.study.outcome import Answers
+from asperity.study.responses import bifurcation_kinds, is_stable
+from asperity.theory import closed_forms as cf
+
+#: Names of the numbers on the grid, which a picture can show.
+SHOWN = (
+    "mean_friction",
+    "delta_mu",
+    "mu1",
+    "mu2",
+    "phase1",
+    "phase2",
+    "floquet_max",
+    "log_multiplier",
+    "mode_frequency",
+    "growth_rate",
+)
+
+#: Laws whose steady sliding loses stability at a stiffness known in closed form.
+_RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip")
+_ELASTIC = {"elasto-plastic": "slider", "elasto-plastic-age": "plastic"}
+
+_POINT = "boundary_point"
+_CONVENTION = "F/W0 = mean + sum mu_n cos(n w t + phase_n), w(t) = 1 + eps cos(w t)"
+
+
+def as_dataset(
+    plane: MapPlane, grid: Answers, boundary: MapBoundary, origins: Mapping[str, str]
+) -> xarray.Dataset:
+    """The dataset of a map: grid, boundary, fixed numbers.
+
+    Parameters
+    ----------
+    plane : MapPlane
+    grid : Answers
+    boundary : MapBoundary
+    origins : mapping of str to str
+        Source of each fixed number, where known.
+    """
+    dims = (plane.y.name, plane.x.name)
+    nodes = plane.nodes()
+    frequency = plane.values(nodes)["frequency"]
+    derived = _derived(grid, frequency)
+    data: dict[str, Any] = {
+        name: (dims, derived[name].reshape(plane.shape), OUTPUTS[name].attributes) for name in SHOWN
+    }
+    for name, values in (
+        # Strings of fixed width: NetCDF has no Python objects.
+        ("mode", bifurcation_kinds(grid).astype(str)),
+        ("stable", is_stable(grid)),
+        ("converged", grid.converged),
+        ("result", grid.result.astype(str)),
+    ):
+        data[name] = (dims, values.reshape(plane.shape), OUTPUTS[name].attributes)
+    data |= _boundary(plane, boundary)
+    for side, values in _critical_stiffness_along(plane).items():
+        data["critical_stiffness"] = (
+            side,
+            values,
+            _described("N/m", "K_c of unmodulated sliding"),
+        )
+    return xarray.Dataset(
+        data, coords=_coordinates(plane, origins), attrs=_global_attributes(plane, boundary)
+    )
+
+
+def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
+    where, points = boundary.where, boundary.points
+    values = plane.values(where)
+    derived = _derived(points, values["frequency"])
+    kinds = np.where(boundary.line >= 0, bifurcation_kinds(points), "")
+    named: dict[str, Any] = {
+        "boundary_line": (
+            _POINT,
+            boundary.line,
+            _described("1", "line of the point; -1: not found"),
+        ),
+        "boundary_kind": _texts((_POINT,), kinds, "bifurcation on the stability boundary"),
+        "boundary_result": _texts((_POINT,), boundary.reason, "converged, or why not found"),
+    }
+    for axis in (plane.x, plane.y):
+        attributes = _described(axis.unit or "1", f"{axis.name} on the stability boundary")
+        named[f"boundary_{axis.name}"] = (_POINT, values[axis.name], attributes)
+    for name in ("mode_frequency", "log_multiplier"):
+        attributes = _described(OUTPUTS[name].unit, f"{OUTPUTS[name].meaning}, on the boundary")
+        named[f"boundary_{name}"] = (_POINT, derived[name], attributes)
+    return named
+
+
+def _derived(points: Answers, frequency: np.ndarray) -> dict[str, np.ndarray]:
+    """All that `SHOWN` names, from what is kept of the points."""
+    log = points["log_multiplier"]
+    with np.errstate(over="ignore"):
+        largest = np.exp(log)
+    turn = np.abs(points["multiplier_argument"]) / (2 * np.pi)
+    derived = {"floquet_max": largest, "mode_frequency": turn * frequency,
+            "growth_rate": log * frequency}  # fmt: skip
+    return {name: derived[name] if name in derived else points[name] for name in SHOWN}
+
+
+def _critical_stiffness_along(plane: MapPlane) -> dict[str, np.ndarray]:
+    """K_c (N/m) of unmodulated sliding along the other axis, where K is on one of the two.
+
+    Returns
+    -------
+    dict of str to array
+        By the name of the other axis; empty if K is on neither, or there is no closed form for
+        the law with this inertia and damping.
+    """
+    axes = {plane.x.name: plane.x, plane.y.name: plane.y}
+    if "K" not in axes:
+        return {}
+    (other,) = (axis for name, axis in axes.items() if name != "K")
+    u = np.linspace(0.0, 1.0, other.count)
+    where = np.stack([u, 0 * u] if other is plane.x else [0 * u, u], axis=-1)
+    values = plane.values(where)
+    if np.any(values["eta"] > 0):
+        return {}
+    heavy, name = bool(np.any(values["inertia"])), plane.law.name
+    rigid = name in _RIGID or (name in _ELASTIC and not np.any(values["lambda"]))
+    if not rigid and (heavy or name not in _ELASTIC):
+        return {}
+    numbers: dict[str, Any] = {n: values[n] for n in ("A", "B", "D0", "K", "W0", "V", "M")}
+    elastic: Any = values.get("lambda", np.zeros(1))
+    numbers |= {"mu": values["mu0"], "omega": 2 * np.pi * values["frequency"]}
+    p = cf.SmallModulation(**numbers, lambda_=elastic)
+    if not rigid:
+        critical = cf.critical_stiffness_elastic(p, _ELASTIC[name])
+    else:
+        critical = cf.critical_stiffness_inertial(p) if heavy else cf.critical_stiffness(p)
+    return {other.name: np.asarray(critical)}
+
+
+def _coordinates(plane: MapPlane, origins: Mapping[str, str]) -> dict[str, Any]:
+    known = point_parameters(plane.law)
+    coordinates: dict[str, Any] = {
+        axis.name: (axis.name, axis.values, known[axis.name].attributes)
+        for axis in (plane.x, plane.y)
+    }
+    for name, value in plane.fixed.items():
+        attributes = dict(known[name].attributes)
+        if name in origins:
+            attributes["origin"] = origins[name]
+        coordinates[name] = ((), value, attributes)
+    return coordinates
+
+
+def _global_attributes(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
+    return {
+        "asperity_version": __version__,
+        "law": plane.law.name,
+        "source": plane.law.source,
+        "x": plane.x.name,
+        "y": plane.y.name,
+        "x_scale": "log" if plane.x.log else "linear",
+        "y_scale": "log" if plane.y.log else "linear",
+        "relative_tolerance": 1e-8,
+        "convention": _CONVENTION,
+        # Chords of the boundary that may deviate from it by more than 1e-4 of the axes.
+        "boundary_unresolved_chords": boundary.unresolved,
+    }
+
+
+def _described(unit: str, name: str) -> dict[str, str]:
+    return {"units": unit, "long_name": name}
+
+
+def _texts(dims: tuple[str, ...], values: np.ndarray, name: str) -> tuple:
+    return dims, values.astype(str), _described("1", name)

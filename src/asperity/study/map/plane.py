@@ -1,0 +1,208 @@
+"""The plane of a map: two axes, the fixed numbers, and the responses at positions on it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.laws import Law
+from asperity.operating_point import known_parameters, without_mass
+from asperity.parameters import Parameter, canonical_name, suggestion
+from asperity.parameters.arguments import number, shown, switch, whole_number
+from asperity.study.crossing import STABILITY
+from asperity.study.outcome import Answers
+from asperity.study.points import Float
+from asperity.study.responses import answers_of_law
+
+#: Outputs that are kept of each point.
+OUTPUTS = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", *STABILITY)
+
+_AXIS = re.compile(r"\s*([\w]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)(?:\s+|(?=%))(.*)")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A number that varies along a side of a map.
+
+    Attributes
+    ----------
+    name : str
+        As in `asperity.parameters`: ``epsilon``, ``K``, ``V``, ``lambda``...
+    low, high : float
+        Ends in SI; texts with units are converted. ``low < high``.
+    count : int
+        Points of the grid, at least 2, both ends among them.
+    log : bool
+        Whether they lie at equal ratios instead of equal distances.
+
+    Raises
+    ------
+    InputError
+        If the name is unknown, an end breaks the rule of its parameter, or the ends and the count
+        make no grid.
+    """
+
+    name: str
+    low: float | str
+    high: float | str
+    count: int
+    log: bool = False
+
+    def __post_init__(self) -> None:
+        parameter = _parameter(self.name)
+        object.__setattr__(self, "name", parameter.name)
+        for end in ("low", "high"):
+            value = getattr(self, end)
+            si = number(value, parameter.label, parameter.kind, parameter.rule)
+            object.__setattr__(self, end, si)
+        object.__setattr__(self, "count", whole_number(self.count, f"axis of {self.name}", 0))
+        object.__setattr__(self, "log", switch(self.log, "axis.log"))
+        if not self._ends[0] < self._ends[1]:
+            raise InputError(
+                f"axis of {self.name} must go from a smaller to a larger value, got "
+                f"{self.low:g} to {self.high:g}{_unit(parameter)}; write the smaller end first"
+            )
+        if self.count < 2:
+            raise InputError(
+                f"axis of {self.name} must have at least 2 points, got {self.count}; "
+                "ask for 2 or more"
+            )
+        if self.log and not self._ends[0] > 0:
+            raise InputError(
+                f"axis of {self.name} must start above zero to be logarithmic, got "
+                f"{self.low:g}{_unit(parameter)}; raise its lower end or make it linear"
+            )
+
+    @classmethod
+    def parse(cls, text: str, log: bool = False) -> Axis:
+        """Read ``NAME=LOW:HIGH:COUNT UNIT``, as ``K=0.05:0.5:200 N/um``.
+
+        Raises
+        ------
+        InputError
+            If the text has another form, or as `Axis`.
+        """
+        match = _AXIS.fullmatch(text + " ")
+        if match is None:
+            raise InputError(
+                f"axis must be NAME=LOW:HIGH:COUNT UNIT, got '{text}'; "
+                "write it like 'K=0.05:0.5:200 N/um' or 'epsilon=0.01:0.5:200'"
+            )
+        name, low, high, count, unit = (part.strip() for part in match.groups())
+        parameter = _parameter(name)
+        if parameter.unit and not unit:
+            raise InputError(
+                f"axis of {name} must carry a unit, got '{text}'; write it like "
+                f"'{name}={low}:{high}:{count} {parameter.unit}'"
+            )
+        return cls(name, f"{low} {unit}".strip(), f"{high} {unit}".strip(), int(count), log)
+
+    @property
+    def unit(self) -> str:
+        """SI unit; empty for a pure number."""
+        return _parameter(self.name).unit
+
+    @property
+    def kind(self) -> str:
+        """Kind of parameter, a key of `asperity.units.KINDS`."""
+        return _parameter(self.name).kind
+
+    @property
+    def values(self) -> Float:
+        """The grid in SI, shape (count,)."""
+        return self.at(np.linspace(0.0, 1.0, self.count))
+
+    def at(self, u: Any) -> Float:
+        """SI values at the fractions `u` of the axis, 0 at its lower and 1 at its upper end."""
+        low, high = self._ends
+        u = np.asarray(u, dtype=float)
+        inner = low * (high / low) ** u if self.log else low + (high - low) * u
+        # Rounding may leave the interval by a unit in the last place.
+        return np.clip(inner, low, high)
+
+    @property
+    def _ends(self) -> tuple[float, float]:
+        return float(self.low), float(self.high)
+
+
+def _parameter(name: str) -> Parameter:
+    # A map cannot pass through a switch.
+    known = {n: p for n, p in known_parameters().items() if p.rule != "switch"}
+    name_in_table = canonical_name(str(name), known)
+    if name_in_table is None:
+        raise InputError(
+            f"axis must be a number of an operating point, got {shown(name)}; "
+            + suggestion(str(name), known)
+        )
+    return known[name_in_table]
+
+
+def _unit(parameter: Parameter) -> str:
+    return f" {parameter.unit}" if parameter.unit else ""
+
+
+@dataclass(frozen=True)
+class MapPlane:
+    """Two axes, and the fixed numbers.
+
+    Attributes
+    ----------
+    law : type of Law
+    fixed : mapping of str to float
+        SI numbers by name: all parameters of the operating point that are not on an axis.
+    x, y : Axis
+    """
+
+    law: type[Law]
+    fixed: Mapping[str, float]
+    x: Axis
+    y: Axis
+
+    outputs = OUTPUTS
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the grid."""
+        return self.y.count, self.x.count
+
+    def nodes(self) -> Float:
+        """Positions of the grid's points, shape (rows x columns, 2), row by row."""
+        u = np.linspace(0.0, 1.0, self.x.count)
+        v = np.linspace(0.0, 1.0, self.y.count)
+        return np.stack([a.ravel() for a in np.meshgrid(u, v)], axis=-1)
+
+    def values(self, where: Float) -> dict[str, Float]:
+        """Numbers of the operating points at some positions, in SI.
+
+        Parameters
+        ----------
+        where : array, shape (points, 2)
+            Fractions of the x and of the y axis.
+        """
+        points = len(where)
+        values = {name: np.full(points, float(value)) for name, value in self.fixed.items()}
+        values[self.x.name] = self.x.at(where[:, 0])
+        values[self.y.name] = self.y.at(where[:, 1])
+        if without_mass(values).any():
+            raise InputError(
+                "M must be positive where inertia is asked for, got 0 kg; give the mass, as "
+                "M='1.6 kg'"
+            )
+        return values
+
+    def solve(self, where: Float, progress: Callable[[int], None] | None = None) -> Answers:
+        """Responses at some positions.
+
+        Parameters
+        ----------
+        where : array, shape (points, 2)
+            As for `values`.
+        progress : callable, optional
+            Called with the number of points finished since the last call.
+        """
+        return answers_of_law(self.law, self.values(where), OUTPUTS, progress)

@@ -1,0 +1,212 @@
+"""A map of the response and its stability over two numbers of the operating point."""
+
+from __future__ import annotations
+
+import csv
+import dataclasses
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from asperity.errors import InputError
+from asperity.laws import get_law
+from asperity.operating_point import (
+    SourcedNumber,
+    numbers_for,
+    refuse_foreign,
+    sourced_numbers,
+)
+from asperity.outputs import UnfinishedText, output_file, require_memory, written_file
+from asperity.parameters import MODULATION, point_parameters
+from asperity.parameters.arguments import function, instance, switch
+from asperity.study.engine import solve_here
+from asperity.study.map.boundary import MapBoundary, trace_boundary
+from asperity.study.map.dataset import as_dataset
+from asperity.study.map.plane import OUTPUTS, Axis, MapPlane
+from asperity.study.outcome import Answers
+from asperity.units import KINDS
+
+if TYPE_CHECKING:
+    import xarray
+
+#: Points of a chunk.
+_CHUNK = 4800
+#: Bytes that a point of a map takes, with its boundary and its file: 250 to 300 without these, from
+#: the largest resident memory at 250,000 to 2,250,000 points.
+_POINT_BYTES = 500.0
+
+
+def response_map(
+    law: str,
+    numbers: Mapping[str, Any],
+    *,
+    x: Axis,
+    y: Axis,
+    boundary: bool = True,
+    progress: Callable[[int, int], None] | None = None,
+) -> xarray.Dataset:
+    """Response and stability on a grid over two numbers, and the stability boundary between.
+
+    Parameters
+    ----------
+    law : str
+        Name of a registered law.
+    numbers : mapping of str to float, str or SourcedNumber
+        The other numbers of the operating point by name (`asperity.parameters`), SI or
+        texts with units: parameters of the law, ``K, W0, M, eta, V, epsilon, frequency``,
+        ``inertia=1`` to include the mass, and `asperity.parameters.MODULATION`. Parameters that
+        belong to other laws only are left out.
+    x, y : Axis
+        The numbers that vary; any two.
+    boundary : bool
+        Whether to search for the stability boundary, which takes longer than a coarse grid itself.
+        Without it there are no points on ``boundary_point``.
+    progress : callable, optional
+        Called with the number of points done so far and of all points.
+
+    Returns
+    -------
+    xarray.Dataset
+        On the dimensions (y, x): `asperity.study.map.SHOWN`, ``mode``, ``stable``, ``converged``
+        and ``result``; a point that failed has NaN and its reason in ``result``. On
+        ``boundary_point``: position (``boundary_`` and the axis' name), ``boundary_line``,
+        ``boundary_kind``, ``boundary_mode_frequency`` and ``boundary_result``; line -1 holds
+        places where stability changes between neighbours but no crossing was found, and why.
+        ``critical_stiffness`` is there if K is on an axis and K_c has a closed form. Every
+        variable has `units` and `long_name`; fixed numbers are scalar coordinates.
+
+    Raises
+    ------
+    InputError
+        If a number is missing, unknown, given twice, or breaks its rule.
+
+    Notes
+    -----
+    The boundary consists of points at which ln|m| = 0 within 1e-6 of the axes; between neighbours
+    it deviates from a straight line by less than 1e-4 of them. The attribute
+    ``boundary_unresolved_chords`` counts the exceptions: chords where it bends too much for the
+    grid. A feature within one cell that changes no stability at its corners is not detected.
+    """
+    plane, origins = _plane(law, numbers, x, y)
+    grid = _solved(plane, None, function(progress, "progress") or _silent, _CHUNK)
+    traced = trace_boundary(plane, grid) if switch(boundary, "boundary") else MapBoundary.empty()
+    return as_dataset(plane, grid, traced, origins)
+
+
+def write_map(
+    out: Path,
+    law: str,
+    numbers: Mapping[str, Any],
+    *,
+    x: Axis,
+    y: Axis,
+    resume: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+    block: int = _CHUNK,
+) -> xarray.Dataset:
+    """`response_map` to a NetCDF file; an interruption keeps the finished chunks.
+
+    Parameters
+    ----------
+    out : Path
+        Written when everything is done; until then finished chunks are in ``OUT.partial``.
+    law, numbers, x, y, progress
+        As for `response_map`.
+    resume : bool
+        Continue an interrupted map; without one, start from the first point.
+    block : int
+        Points of a chunk: solved and kept at a time.
+
+    Raises
+    ------
+    InputError
+        As `response_map`, and if `out` cannot be written.
+    Interrupted
+        On Ctrl-C.
+    """
+    plane, origins = _plane(law, numbers, x, y)
+    target = output_file(out, example="map.nc")
+    axes = {name: dataclasses.asdict(getattr(plane, name)) for name in ("x", "y")}
+    kept = UnfinishedText(target, {"law": plane.law.name, "numbers": dict(plane.fixed), **axes})
+    kept.start(resume)
+    with kept.interruptible("points", x.count * y.count):
+        grid = _solved(plane, kept, progress or _silent, block)
+        dataset = as_dataset(plane, grid, trace_boundary(plane, grid), origins)
+        with written_file(target) as file:
+            dataset.to_netcdf(file, engine="h5netcdf")
+    kept.discard()
+    return dataset
+
+
+def _solved(
+    plane: MapPlane,
+    kept: UnfinishedText | None,
+    progress: Callable[[int, int], None],
+    chunk: int,
+) -> Answers:
+    """Responses at the points of the grid; those of finished chunks are lines of `kept`."""
+    nodes = plane.nodes()
+    grid = Answers.empty(OUTPUTS, len(nodes))
+    if kept is not None:
+        for i, row in enumerate(csv.reader(kept.text().splitlines())):
+            *numbers, outcome, detail = row
+            for name, cell in zip(OUTPUTS, numbers, strict=True):
+                grid.numbers[name][i] = float(cell)
+            grid.outcome[i], grid.detail[i] = int(outcome), float(detail)
+
+    def solve(start: int, stop: int, advance: Callable[[int], None]) -> None:
+        part = plane.solve(nodes[start:stop], advance)
+        grid.put(slice(start, stop), part)
+        if kept is not None:
+            columns: list[Any] = [*part.numbers.values(), part.outcome, part.detail]
+            kept.append_rows(list(zip(*(c.tolist() for c in columns), strict=True)))
+
+    solve_here(len(nodes), chunk, solve, progress, 0 if kept is None else kept.rows)
+    return grid
+
+
+def _plane(
+    law: str, numbers: Mapping[str, Any], x: Axis, y: Axis
+) -> tuple[MapPlane, dict[str, str]]:
+    """The checked plane, and the origin of each fixed number."""
+    advice = "build one as asperity.study.map.Axis('epsilon', 0.0, 0.5, 20)"
+    x, y = instance(x, Axis, "x", advice), instance(y, Axis, "y", advice)
+    advice = "give a dictionary such as {'V': '1 um/s'}"
+    numbers = instance(numbers, Mapping, "numbers", advice)
+    if x.name == y.name:
+        raise InputError(
+            f"axes must be two numbers, got '{x.name}' on both; choose another one for y"
+        )
+    refuse_foreign(law, {x.name: "", y.name: ""})
+    known = point_parameters(get_law(law))
+    known_numbers = sourced_numbers(numbers, None, law=law)
+    for axis in (x, y):
+        if axis.kind != known[axis.name].kind:
+            raise InputError(
+                f"axis of {axis.name} must be {KINDS[known[axis.name].kind].noun} for {law}, got "
+                f"{KINDS[axis.kind].noun}; another registered law has a parameter of that name"
+            )
+        if axis.name in known_numbers:
+            raise InputError(
+                f"{axis.name} must be given once, got an axis and a fixed value; leave one out"
+            )
+    known_numbers |= {axis.name: SourcedNumber(float(axis.low), "axis") for axis in (x, y)}
+    of_law = numbers_for(law, known_numbers)
+    defaults = {
+        name: SourcedNumber(parameter.default, "default")
+        for name, parameter in known.items()
+        # What is not modulated needs no coordinate.
+        if parameter.default is not None and name not in MODULATION
+    }
+    require_memory(
+        x.count * y.count * _POINT_BYTES, "axes", f"{x.count:,} x {y.count:,} points",
+        "take fewer, or asperity sweep, which keeps none in memory",
+    )  # fmt: skip
+    fixed = {n: s for n, s in (defaults | of_law).items() if n not in (x.name, y.name)}
+    plane = MapPlane(get_law(law), {n: s.value for n, s in fixed.items()}, x, y)
+    plane.values(plane.nodes()[:1])
+    return plane, {n: s.origin for n, s in fixed.items()}
+
+
+def _silent(done: int, total: int) -> None:
+    """No report of progress."""

@@ -1,0 +1,183 @@
+"""What became of points: their numbers, and an outcome as a code, a word and a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.loads.modulated import no_contact
+from asperity.orbit.outcome import Outcome, sentence
+
+Float = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+
+class SweepOutcome(IntEnum):
+    """Outcomes beyond those of a periodic solve, which keep their codes."""
+
+    NOT_COMPUTED = -1
+    CONVERGED = 0
+    CONTACT_LOST = 50
+    SOLVER_ERROR = 51
+    WORKER_LOST = 52
+    STABLE_THROUGHOUT = 60
+    UNSTABLE_THROUGHOUT = 61
+    NO_CROSSING = 62
+    NO_RESPONSE = 63
+    STOPPED = 70
+    REFUSED = 71
+    FIT_FAILED = 80
+    NO_READINGS = 81
+
+
+_SENTENCES = {
+    SweepOutcome.NOT_COMPUTED: "not computed yet",
+    SweepOutcome.CONVERGED: "converged",
+    SweepOutcome.SOLVER_ERROR: (
+        "the solver stopped with an error of its own; the log of the run holds its message"
+    ),
+    SweepOutcome.WORKER_LOST: (
+        "the process that solved this point died each time, perhaps for want of memory; try "
+        "again with --retry-failed and fewer workers"
+    ),
+    SweepOutcome.STABLE_THROUGHOUT: (
+        "no threshold: stable at every stiffness looked at, from {detail:.4g} K_c; extend "
+        "threshold.between"
+    ),
+    SweepOutcome.UNSTABLE_THROUGHOUT: (
+        "no threshold: unstable at the stiffest spring looked at, {detail:.4g} K_c; extend "
+        "threshold.between"
+    ),
+    SweepOutcome.NO_CROSSING: (
+        "stability changes between two neighbouring stiffnesses, near {detail:.6g} K_c, but no "
+        "multiplier crosses the unit circle there"
+    ),
+    SweepOutcome.NO_RESPONSE: (
+        "no periodic response at some of the stiffnesses looked at, the first of them "
+        "{detail:.4g} K_c"
+    ),
+    SweepOutcome.STOPPED: "the transient stopped before its end, at {detail:.6g} s",
+    SweepOutcome.REFUSED: (
+        "the numbers or the data of this point cannot be solved with; the log of the run says why"
+    ),
+    SweepOutcome.FIT_FAILED: (
+        "the fit did not converge; asperity fit with the numbers of this point says more"
+    ),
+    SweepOutcome.NO_READINGS: (
+        "no readings to fit: at the true values some row of the table has no periodic response"
+    ),
+}
+
+
+def words() -> dict[int, str]:
+    """A word for each code, as the attribute ``flag_meanings`` has it."""
+    codes = {int(o): o.name.lower() for o in Outcome} | {
+        int(o): o.name.lower() for o in SweepOutcome
+    }
+    return dict(sorted(codes.items()))
+
+
+def reason(outcome: int, detail: float) -> str:
+    """The sentence for a point."""
+    if outcome == SweepOutcome.CONTACT_LOST:
+        return no_contact(detail)
+    if outcome in _SENTENCES:
+        return _SENTENCES[SweepOutcome(outcome)].format(detail=detail)
+    return sentence(outcome, detail)
+
+
+def flag_attributes() -> dict[str, Any]:
+    """Attributes by which any reader understands the codes."""
+    known = words()
+    return {
+        "units": "1",
+        "long_name": "what became of the point",
+        "flag_values": list(known),
+        "flag_meanings": " ".join(known.values()),
+    }
+
+
+def reasons(outcome: Any, detail: Any) -> NDArray[np.object_]:
+    """What became of points, as sentences.
+
+    Parameters
+    ----------
+    outcome, detail : array
+        Variables of a store, or parts of them.
+    """
+    outcome, detail = np.broadcast_arrays(np.asarray(outcome), np.asarray(detail))
+    texts = np.full(outcome.shape, "converged", dtype=object)
+    for i in map(tuple, np.argwhere(outcome != SweepOutcome.CONVERGED)):
+        texts[i] = reason(int(outcome[i]), float(detail[i]))
+    return texts
+
+
+@dataclass
+class Answers:
+    """Numbers and outcomes of some points.
+
+    Attributes
+    ----------
+    numbers : dict of str to array, shape (points,)
+        Outputs by name; NaN where a point failed.
+    outcome : int16 array, shape (points,)
+        A `SweepOutcome`, or an `asperity.orbit.outcome.Outcome`.
+    detail : array, shape (points,)
+        The number in the sentence of the outcome; 0 where there is none.
+    """
+
+    numbers: dict[str, Float]
+    outcome: NDArray[np.int16]
+    detail: Float
+
+    @classmethod
+    def empty(cls, names: Sequence[str], count: int) -> Answers:
+        """Room for `count` points, none of them computed."""
+        return cls(
+            {name: np.full(count, np.nan) for name in names},
+            np.full(count, SweepOutcome.NOT_COMPUTED, dtype=np.int16),
+            np.zeros(count),
+        )
+
+    def __len__(self) -> int:
+        return len(self.outcome)
+
+    def __getitem__(self, name: str) -> Float:
+        return self.numbers[name]
+
+    def take(self, index: Any) -> Answers:
+        """The answers of the points `index`, by number or by a mask."""
+        numbers = {name: values[index] for name, values in self.numbers.items()}
+        return Answers(numbers, self.outcome[index], self.detail[index])
+
+    def put(self, index: Any, others: Answers) -> None:
+        """Take over `others` at the places `index`."""
+        for name, values in others.numbers.items():
+            self.numbers[name][index] = values
+        self.outcome[index], self.detail[index] = others.outcome, others.detail
+
+    def fail(self, index: Any, outcome: int, detail: Any = 0.0) -> None:
+        """Give the points `index` an outcome without numbers."""
+        for values in self.numbers.values():
+            values[index] = np.nan
+        self.outcome[index], self.detail[index] = outcome, detail
+
+    @property
+    def converged(self) -> NDArray[np.bool_]:
+        """Points with an answer."""
+        return np.asarray(self.outcome == SweepOutcome.CONVERGED)
+
+    @property
+    def failed(self) -> int:
+        """Number of points without an answer."""
+        return int(np.count_nonzero(~self.converged))
+
+    @property
+    def result(self) -> NDArray[np.object_]:
+        """The word "converged", or why not, as sentences."""
+        return reasons(self.outcome, self.detail)

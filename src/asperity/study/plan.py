@@ -1,0 +1,315 @@
+"""The plan of a sweep as a file has it, checked field by field."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    PositiveInt,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
+
+from asperity.errors import InputError, MistakesError, closest
+from asperity.parameters.arguments import shown
+
+#: A number in SI, a text with its unit, or a switch.
+Given = bool | float | str
+
+_STRICT = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+
+
+class PlanError(MistakesError):
+    """A plan that cannot be run."""
+
+    subject = "plan"
+
+
+class AxisTable(BaseModel):
+    """An axis as a plan writes it: exactly one of five forms.
+
+    Attributes
+    ----------
+    from_, to, count, spacing
+        A grid with both ends, written ``from``; ``spacing`` is ``"linear"`` or ``"log"``.
+    values : tuple
+        Its values one by one.
+    zip : mapping of str to tuple
+        Several numbers that vary together, all of one length.
+    cases : tuple of mapping
+        Rows one after the other; where a case has lists, all their combinations.
+    draw : {"random", "sobol", "halton"}
+        ``count`` draws of the numbers in ``over``.
+    over : mapping of str to mapping
+        For each drawn number ``from``, ``to`` and ``spacing``, or ``mean`` and ``std``.
+    """
+
+    model_config = _STRICT
+
+    from_: Given | None = Field(default=None, alias="from")
+    to: Given | None = None
+    count: PositiveInt | None = None
+    spacing: Literal["linear", "log"] | None = None
+    values: tuple[Given, ...] | None = None
+    zip: Mapping[str, tuple[Given, ...]] | None = None
+    cases: tuple[Mapping[str, Any], ...] | None = None
+    draw: Literal["random", "sobol", "halton"] | None = None
+    over: Mapping[str, Mapping[str, Any]] | None = None
+
+    @model_validator(mode="after")
+    def _one_form(self) -> AxisTable:
+        allowed = {
+            "from": {"from_", "to", "count", "spacing"},
+            "values": {"values"},
+            "zip": {"zip"},
+            "cases": {"cases"},
+            "draw": {"draw", "over", "count"},
+        }
+        fields = {name for name in type(self).model_fields if getattr(self, name) is not None}
+        forms = [form for form in allowed if form.replace("from", "from_") in fields]
+        if len(forms) != 1 or fields - allowed[forms[0]]:
+            shown = ", ".join(sorted(name.rstrip("_") for name in fields)) or "nothing"
+            raise InputError(
+                f"axis must have one of from-to-count, values, zip, cases or draw, got {shown}; "
+                "write it like { from = 0.01, to = 0.5, count = 20 } or { values = [0.1, 0.2] }"
+            )
+        needed = {"from": ("to", "count"), "draw": ("over", "count")}.get(forms[0], ())
+        missing = [name for name in needed if getattr(self, name) is None]
+        if missing:
+            raise InputError(
+                f"axis must have {' and '.join(needed)} beside {forms[0]}, got no "
+                f"{' and no '.join(missing)}; add it"
+            )
+        return self
+
+
+class ThresholdTable(BaseModel):
+    """How thresholds of stiffness are looked for.
+
+    Attributes
+    ----------
+    between : pair of float
+        Stiffnesses over K_c = (B - A) W0/D0 of the same point.
+    scan : int
+        Stiffnesses looked at before the search, at equal ratios.
+    """
+
+    model_config = _STRICT
+
+    between: tuple[float, float] = (0.3, 4.0)
+    scan: PositiveInt = 24
+
+
+class NumberTable(BaseModel):
+    """A number read from a transient.
+
+    Attributes
+    ----------
+    of : str
+        A channel: ``friction``, ``force``, ``load``, ``velocity``, ``slip_velocity``,
+        ``displacement``.
+    take : str
+        ``mean``, ``min``, ``max``, ``range``, ``std``, ``first`` or ``last``.
+    from_, to : float or str, optional
+        Times between which it is taken (s), written ``from``; the whole transient by default.
+    """
+
+    model_config = _STRICT
+
+    of: str
+    take: str
+    from_: float | str | None = Field(default=None, alias="from")
+    to: float | str | None = None
+
+
+class TransientTable(BaseModel):
+    """A transient, and the numbers that are read from it.
+
+    Attributes
+    ----------
+    steps : tuple of str
+        Lines as those of a protocol; ``{epsilon}`` stands for the value at the point.
+    numbers : mapping of str to NumberTable
+    sampling : float or str
+        Samples per second (Hz).
+    rtol : float
+    most_steps : float
+    """
+
+    model_config = _STRICT
+
+    steps: tuple[str, ...]
+    numbers: Mapping[str, NumberTable]
+    sampling: float | str
+    rtol: float = 1e-9
+    most_steps: float = 2e6
+
+
+class PriorTable(BaseModel):
+    """A normal prior of a free parameter.
+
+    Attributes
+    ----------
+    mean, std : float or str
+    """
+
+    model_config = _STRICT
+
+    mean: float | str
+    std: float | str
+
+
+class FitTable(BaseModel):
+    """A fit at every point.
+
+    Attributes
+    ----------
+    free : tuple of str
+        Free parameters.
+    data : tuple of str
+        Tables of readings, all in one likelihood, where no axis has a column ``data``.
+    prior : str or mapping of str to PriorTable
+        A material with published uncertainties, or priors by name.
+    profile : bool
+        Intervals by profile likelihood.
+    starts, seed : int
+        Starts that are drawn besides the first one, and their seed.
+    """
+
+    model_config = _STRICT
+
+    free: tuple[str, ...]
+    data: tuple[str, ...] | None = None
+    prior: str | Mapping[str, PriorTable] | None = None
+    profile: bool = False
+    starts: PositiveInt = 64
+    seed: int = Field(default=0, ge=0)
+
+    @field_validator("data", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: Any) -> Any:
+        return (value,) if isinstance(value, str) else value
+
+
+class SweepPlan(BaseModel):
+    """What a sweep computes.
+
+    Attributes
+    ----------
+    axes : mapping of str to AxisTable
+        In the order of the dimensions. The grid is the product of all of them.
+    law : str
+        Friction law, where no axis has a column ``law``.
+    material : str
+        Where numbers come from that neither an axis nor `parameters` has.
+    parameters : mapping of str to float, str or bool
+        Numbers that are the same at every point, by the names of tables, and ratios.
+    solve : {"periodic", "threshold", "transient", "fit"}
+    outputs : tuple of str
+        What is kept of each point; all that the solve has by default.
+    seed : int
+        Of drawn axes.
+    chunk : int, optional
+        Points solved and written together, about.
+    threshold, transient, fit
+        How these are solved.
+    title : str
+    folder : Path
+        Where files that the plan names lie.
+
+    Raises
+    ------
+    PlanError
+        An `InputError` with all mistakes.
+    """
+
+    model_config = _STRICT
+
+    axes: Mapping[str, AxisTable]
+    law: str = ""
+    material: str = ""
+    parameters: Mapping[str, Given] = {}
+    solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
+    outputs: tuple[str, ...] | None = None
+    seed: int = Field(default=0, ge=0)
+    chunk: PositiveInt | None = None
+    threshold: ThresholdTable = ThresholdTable()
+    transient: TransientTable | None = None
+    fit: FitTable | None = None
+    title: str = ""
+    folder: Path = Path()
+
+    def __init__(self, /, **fields: Any) -> None:
+        models: dict[str, type[BaseModel]] = {
+            "": SweepPlan,
+            "axes": AxisTable,
+            "threshold": ThresholdTable,
+            "transient": TransientTable,
+            "fit": FitTable,
+        }
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise PlanError(_sentences(error, models)) from None
+
+    @property
+    def columns(self) -> dict[str, tuple[Any, ...]]:
+        """What the axes vary, as the plan writes it: listed values by name, none of draws."""
+        columns: dict[str, tuple[Any, ...]] = {}
+        for name, table in self.axes.items():
+            if table.values is not None or table.from_ is not None:
+                columns[name] = (*columns.get(name, ()), *(table.values or ()))
+            for column, values in (table.zip or {}).items():
+                columns[column] = (*columns.get(column, ()), *values)
+            for case in table.cases or ():
+                for column, value in case.items():
+                    values = tuple(value) if isinstance(value, list | tuple) else (value,)
+                    columns[column] = (*columns.get(column, ()), *values)
+            for column in table.over or {}:
+                columns.setdefault(column, ())
+        return columns
+
+    @property
+    def laws(self) -> list[str]:
+        """Laws as the plan writes them, in their order."""
+        return [str(law) for law in (self.law, *self.columns.get("law", ())) if law]
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A plan with some fields replaced, checked as any other."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **(update or {})})
+
+
+def _sentences(error: ValidationError, models: Mapping[str, type[BaseModel]]) -> list[str]:
+    """The mistakes that pydantic reports, as ``<field> must <rule>, got <value>; <what to do>``.
+
+    Parameters
+    ----------
+    error : ValidationError
+    models : mapping of str to type of BaseModel
+        Model of each table by its name, that of the plan under ``""``.
+    """
+    return [_sentence(mistake, models) for mistake in error.errors(include_url=False)]
+
+
+def _sentence(mistake: Any, models: Mapping[str, type[BaseModel]]) -> str:
+    raised = mistake.get("ctx", {}).get("error")
+    if isinstance(raised, InputError):
+        return str(raised)
+    place = mistake["loc"]
+    field = ".".join(map(str, place)) or "plan"
+    if mistake["type"] == "extra_forbidden":
+        model = models[str(place[0]) if len(place) > 1 else ""]
+        known = [f.alias or name for name, f in model.model_fields.items()]
+        advice = closest(str(place[-1]), known)
+        return f"{field} must be a known field, got {shown(mistake['input'])}; {advice}"
+    if mistake["type"] == "missing":
+        return f"{field} must be given, got nothing; add it"
+    rule = " ".join(mistake["msg"].split()).removeprefix("Input should be ")
+    return f"{field} must be {rule}, got {shown(mistake['input'])}; correct the value"

@@ -1,0 +1,271 @@
+"""A plan in SI, with everything looked up: what two runs are compared by.
+
+A record is a tree of JSON values. It names no file, so that a worker on another machine needs
+nothing but the record.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from collections.abc import Iterator, Mapping, Sequence, Set
+from pathlib import Path
+from typing import Any
+
+from asperity import materials
+from asperity.errors import InputError
+from asperity.laws import get_law, known_law
+from asperity.operating_point import known_parameters, sourced_numbers
+from asperity.parameters import Parameter, canonical_name, point_parameters
+from asperity.study.axes import TEXTS, axis_record, checked_value, columns_of, law_name, law_place
+from asperity.study.plan import PlanError, SweepPlan
+from asperity.study.points import RATIOS
+from asperity.study.solve import SOLVES
+
+#: Variables of every store with a number for each point, and with one for each chunk.
+OF_POINTS, OF_CHUNKS = ("outcome", "detail"), ("checksum", "status")
+#: Group of every store that has its attributes once more.
+ATTRIBUTES = "attributes"
+#: Names that no axis may have.
+_TAKEN = (*OF_POINTS, *OF_CHUNKS, ATTRIBUTES, *TEXTS)
+
+
+def plan_record(plan: SweepPlan) -> dict[str, Any]:
+    """The record of a plan.
+
+    Raises
+    ------
+    PlanError
+        With all mistakes that concern the meaning of its fields.
+    """
+    mistakes: list[str] = []
+    axes: dict[str, Any] = {}
+    laws = laws_named(plan, mistakes)
+    known = known_names(laws, plan.solve)
+    for name, table in plan.axes.items():
+        try:
+            written, axis = axis_record(name, table, known, plan)
+            if written in axes:
+                raise InputError(
+                    f"axis must be given once, got '{written}' under two names; leave one out"
+                )
+            axes[written] = axis
+        except InputError as error:
+            mistakes.append(f"axes.{name}: {error}")
+    if not plan.axes:
+        mistakes.append("axes must have at least one axis, got none; add a table like [axes.K]")
+    numbers: dict[str, float] = {}
+    origins: dict[str, str] = {}
+    try:
+        numbers, origins = _numbers(plan, axes, laws, known)
+    except InputError as error:
+        mistakes.append(str(error))
+    solve = SOLVES[plan.solve]
+    settings: dict[str, Any] = {}
+    outputs: tuple[str, ...] = ()
+    supplied: tuple[str, ...] = ()
+    try:
+        named = plan.model_copy(update={"law": laws[0]}) if plan.law and laws else plan
+        settings = solve.settings(named)
+        outputs = solve.chosen_outputs(named)
+        supplied = solve.supplied(named)
+    except InputError as error:
+        mistakes.append(str(error))
+    if not mistakes:
+        mistakes += _missing(laws, axes, numbers, supplied)
+        mistakes += _twice(axes)
+        mistakes += _misnamed(axes, {*known, *outputs, *_TAKEN})
+    if mistakes:
+        raise PlanError(mistakes)
+    return {
+        "solve": plan.solve,
+        **({"settings": settings} if settings else {}),
+        "laws": laws,
+        **({"law_files": files} if (files := _law_files(plan)) else {}),
+        "numbers": numbers,
+        "origins": origins,
+        "axes": axes,
+        "outputs": list(outputs),
+        **({"chunk": plan.chunk} if plan.chunk else {}),
+    }
+
+
+def known_names(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
+    """Every name that an axis or a fixed number may have."""
+    parameters = {**known_parameters(laws[0] if laws else None), **SOLVES[solve].parameters()}
+    return {**parameters, **{name: ratio.parameter for name, ratio in RATIOS.items()}}
+
+
+def law_places(plan: SweepPlan) -> tuple[str, ...]:
+    """Places of the laws that the plan names by one; files by their whole path."""
+    named = dict.fromkeys(law_place(law, plan.folder) for law in plan.laws)
+    return tuple(text for text in named if ":" in text)
+
+
+def _law_files(plan: SweepPlan) -> dict[str, str]:
+    """SHA-256 of the file of each law that is named by its place, by its name."""
+    digests = {}
+    for place in law_places(plan):
+        module = sys.modules[get_law(known_law(place)).__module__]
+        content = Path(str(module.__file__)).read_bytes()
+        digests[known_law(place)] = hashlib.sha256(content).hexdigest()
+    return digests
+
+
+def laws_named(plan: SweepPlan, mistakes: list[str]) -> list[str]:
+    """Laws of the plan, without repetition, in their order."""
+    names = []
+    for law in dict.fromkeys(plan.laws):
+        try:
+            names.append(law_name(law, plan.folder))
+        except InputError as error:
+            mistakes.append(str(error))
+    if not plan.laws:
+        mistakes.append(
+            "law must be given, got nothing; add law = 'elasto-plastic' or an axis of laws"
+        )
+    return names
+
+
+def _numbers(
+    plan: SweepPlan,
+    axes: Mapping[str, Any],
+    laws: Sequence[str],
+    known: Mapping[str, Parameter],
+) -> tuple[dict[str, float], dict[str, str]]:
+    """Numbers that are the same everywhere, in SI, and where each comes from."""
+    material = None
+    if plan.material:
+        file = plan.material.endswith(".toml")
+        material = materials.load(plan.folder / plan.material if file else plan.material)
+    ratios = {
+        ratio: checked_value(RATIOS[ratio].parameter, value)
+        for name, value in plan.parameters.items()
+        if (ratio := str(canonical_name(name, known))) in RATIOS
+    }
+    written = {n: v for n, v in plan.parameters.items() if canonical_name(n, known) not in ratios}
+    varied = {column for axis in axes.values() for column in columns_of(axis)}
+    targets = {RATIOS[n].target: n for n in {*ratios, *varied} & set(RATIOS)}
+    offered = sourced_numbers(written, material, "plan", laws[0] if laws else None)
+    explicit = {canonical_name(name, known) for name in written}
+    for name in sorted({*explicit, *ratios} & varied, key=str):
+        raise InputError(
+            f"parameters.{name} must be given once, got an axis too; leave one of them out"
+        )
+    for target, ratio in targets.items():
+        if target in explicit | varied:
+            raise InputError(
+                f"{target} must be given once, got {ratio} too, which determines it; leave one out"
+            )
+    wanted: set[str] = set(SOLVES[plan.solve].parameters())
+    for law in laws:
+        wanted |= set(point_parameters(get_law(law)))
+    for name in targets.values():
+        wanted |= set(RATIOS[name].needs)
+    for name in sorted(explicit - wanted, key=str):
+        raise InputError(
+            f"parameters.{name} must belong to the laws of the plan, got {', '.join(laws)}; leave "
+            "it out"
+        )
+    kept = {
+        n: s for n, s in offered.items() if n in wanted and n not in varied and n not in targets
+    }
+    numbers = {n: s.value for n, s in kept.items()} | ratios
+    origins = {n: s.origin for n, s in kept.items()} | dict.fromkeys(ratios, "plan")
+    return dict(sorted(numbers.items())), dict(sorted(origins.items()))
+
+
+def _missing(
+    laws: Sequence[str],
+    axes: Mapping[str, Any],
+    numbers: Mapping[str, float],
+    supplied: Sequence[str],
+) -> Iterator[str]:
+    """What a law of the plan needs and no point of it has."""
+    for law in laws:
+        present = {*numbers, *supplied}
+        for axis in axes.values():
+            present |= _present(axis, law)
+        for name in [n for n in RATIOS if n in present]:
+            lacking = [n for n in RATIOS[name].needs if n not in present]
+            if lacking:
+                yield (
+                    f"{name} must have the numbers that it is made of, got none for "
+                    f"{', '.join(lacking)}; add them to parameters or name a material"
+                )
+            present.add(RATIOS[name].target)
+        known = point_parameters(get_law(law))
+        missing = [n for n, p in known.items() if p.default is None and n not in present]
+        if missing:
+            example = known[missing[0]].example
+            yield (
+                f"parameters must have all numbers of {law}, got none for {', '.join(missing)}; "
+                f"name a material that has them or give each one, like {missing[0]} = '{example}'"
+            )
+
+
+def _present(axis: Mapping[str, Any], law: str) -> set[str]:
+    """Columns of an axis that have a value in every row for a law."""
+    if "over" in axis:
+        return set(axis["over"])
+    columns = axis["columns"]
+    laws = columns.get("law")
+    rows = [i for i, value in enumerate(laws) if value == law] if laws is not None else None
+    present = set()
+    for name, values in columns.items():
+        chosen = values if rows is None else [values[i] for i in rows]
+        if chosen and all(value is not None for value in chosen):
+            present.add(name)
+    return present
+
+
+def _misnamed(axes: Mapping[str, Any], taken: Set[str]) -> Iterator[str]:
+    """Axes of several columns whose name is no name of a dimension, or is that of a variable."""
+    for name, axis in axes.items():
+        if columns_of(axis) == (name,):
+            continue
+        if not name.isidentifier():
+            yield (
+                f"axes.{name} must have a name of letters, digits and underscores, got '{name}'; "
+                "rename it"
+            )
+        elif name in taken:
+            yield (
+                f"axes.{name} must have a name of its own, got '{name}', which a number of the "
+                "store has; rename it, like 'sample'"
+            )
+
+
+def _twice(axes: Mapping[str, Any]) -> Iterator[str]:
+    """Columns that two axes have."""
+    owners: dict[str, str] = {}
+    for name, axis in axes.items():
+        for column in columns_of(axis):
+            if column in owners:
+                yield (
+                    f"axes.{name} must have numbers of its own, got '{column}', which "
+                    f"axes.{owners[column]} has too; leave one out"
+                )
+            owners[column] = name
+
+
+def is_extension(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Whether `new` has all points of `old`, and others only behind them along axes."""
+    others = [key for key in {*old, *new} if key not in ("axes", "laws")]
+    if any(old.get(key) != new.get(key) for key in others):
+        return False
+    if list(old["axes"]) != list(new["axes"]) or new["laws"][: len(old["laws"])] != old["laws"]:
+        return False
+    return all(_longer(old["axes"][name], new["axes"][name]) for name in old["axes"])
+
+
+def _longer(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    if "columns" in old and "columns" in new:
+        before, after = old["columns"], new["columns"]
+        return list(before) == list(after) and all(
+            after[name][: len(before[name])] == before[name] for name in before
+        )
+    if "over" in old and "over" in new:
+        same = all(old[key] == new[key] for key in ("draw", "seed", "over"))
+        return same and new["count"] >= old["count"]
+    return False

@@ -1,0 +1,113 @@
+"""Periodic responses at any operating points: what tables, maps, thresholds and sweeps solve."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.laws import Law, get_law
+from asperity.operating_point import lowest_loads, motions, respond, without_mass
+from asperity.orbit import PeriodicResponse
+from asperity.orbit.floquet import kind_of_crossing
+from asperity.orbit.outcome import Outcome
+from asperity.parameters import RULES, point_parameters
+from asperity.parameters.arguments import increments
+from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.points import Float, Index, Points
+
+
+def periodic_answers(
+    points: Points, outputs: Sequence[str], progress: Callable[[int], None] | None = None
+) -> Answers:
+    """Periodic responses of points of any registered laws.
+
+    Parameters
+    ----------
+    points : Points
+    outputs, progress
+        As for `answers_of_law`.
+    """
+    answers = Answers.empty(outputs, len(points))
+    for law, rows in points.by_law():
+        values = points.take(rows).of_law(law)
+        answers.put(rows, answers_of_law(get_law(law), values, outputs, progress))
+    return answers
+
+
+def answers_of_law(
+    law: type[Law],
+    values: Mapping[str, Float],
+    outputs: Sequence[str],
+    progress: Callable[[int], None] | None = None,
+) -> Answers:
+    """Periodic responses, each group of points with one equation of motion on its own.
+
+    Parameters
+    ----------
+    law : type of Law
+    values : mapping of str to array, shape (points,)
+        SI numbers by the names of `point_parameters`.
+    outputs : sequence of str
+        Attributes of a `PeriodicResponse` with one number a point, or one of ``log_multiplier``
+        and ``multiplier_argument``: ln|m| of the leading multiplier, -inf for a law without
+        dynamics, and its arg m (rad).
+    progress : callable, optional
+        Called with the number of points finished since the last call.
+    """
+    rows = np.arange(len(values["V"]))
+    answers = Answers.empty(outputs, len(rows))
+    sound = solvable(law, values, rows, answers)
+    if progress is not None and len(sound) < len(rows):
+        progress(len(rows) - len(sound))
+    for group in motions({n: v[sound] for n, v in values.items()}) if len(sound) else []:
+        index = sound[group]
+        some = {n: v[index] for n, v in values.items()}
+        response = respond(law, some, increments(progress), workers=1)
+        answers.put(index, _answers_of(response, outputs))
+    return answers
+
+
+def solvable(law: type[Law], values: Mapping[str, Float], rows: Index, answers: Answers) -> Index:
+    """Which of the points can be solved; the others get their outcome in `answers` at `rows`."""
+    wrong = without_mass(values)
+    for name, parameter in point_parameters(law).items():
+        if name in values:
+            with np.errstate(invalid="ignore"):
+                holds = RULES[parameter.rule].holds(values[name])
+            wrong = wrong | ~(np.isfinite(values[name]) & holds)
+    if not law.rate_dependent:
+        wrong = wrong | (values["inertia"] > 0) | (values["eta"] > 0)
+    answers.fail(rows[wrong], Outcome.INVALID)
+    sound = np.flatnonzero(~wrong)
+    lowest = lowest_loads({n: v[sound] for n, v in values.items()})
+    lost = ~(lowest > 0)
+    answers.fail(rows[sound[lost]], SweepOutcome.CONTACT_LOST, lowest[lost])
+    return sound[~lost]
+
+
+def is_stable(answers: Answers) -> NDArray[np.bool_]:
+    """Whether all multipliers are inside the unit circle; False where not converged."""
+    return answers.converged & (answers["log_multiplier"] < 0)
+
+
+def bifurcation_kinds(answers: Answers) -> NDArray[np.object_]:
+    """Bifurcation of the leading multiplier at the unit circle; "" where not known."""
+    return kind_of_crossing(answers["log_multiplier"] + 1j * answers["multiplier_argument"])
+
+
+def _answers_of(response: PeriodicResponse, outputs: Sequence[str]) -> Answers:
+    converged = response.converged
+    # A phase of a point that failed may be 0 where its modulus is NaN.
+    numbers = {n: np.where(converged, _output(response, n), np.nan) for n in outputs}
+    detail = np.where(converged, 0.0, response.detail)
+    return Answers(numbers, response.outcome.astype(np.int16), detail)
+
+
+def _output(response: PeriodicResponse, name: str) -> NDArray[np.float64]:
+    if name not in ("log_multiplier", "multiplier_argument"):
+        return np.asarray(getattr(response, name), dtype=float)
+    logs = response.log_multipliers
+    leading = logs[..., 0] if logs.shape[-1] else np.full(len(logs), -np.inf + 0j)
+    return np.asarray(leading.real if name == "log_multiplier" else leading.imag)

@@ -1,0 +1,343 @@
+"""A sweep from its plan to its store."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import os
+import platform
+import shutil
+import socket
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from asperity._version import __version__
+from asperity.errors import InputError, listed
+from asperity.laws import get_law
+from asperity.materials import cited_works
+from asperity.orbit.search import available_cores
+from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
+from asperity.parameters.arguments import file_path, whole_number
+from asperity.parameters.file_content import file_content
+from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
+from asperity.study.grid import SweepGrid
+from asperity.study.job import Job, numerics, package_version
+from asperity.study.load import load_plan
+from asperity.study.plan import SweepPlan
+from asperity.study.record import is_extension, law_places
+from asperity.study.store.layout import create, extend, fresh_folder, lay_out
+from asperity.study.store.lock import StoreLock, lock_file
+from asperity.study.store.root import read_root
+from asperity.study.store.store import SweepStore
+from asperity.study.workers import Workers, local_cluster, local_processes, scheduler
+
+#: Seconds between signs of life in the lock file.
+_REFRESH = 5.0
+#: Packages whose versions the store records.
+_PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "zarr", "loky", "distributed")
+
+
+@dataclass(frozen=True)
+class SweepSummary:
+    """How a run went.
+
+    Attributes
+    ----------
+    out : Path
+    points, failed : int
+        All points of the store, and those without a converged answer.
+    solved : int
+        Points that this run solved.
+    seconds : float
+    memory : float
+        Largest resident memory of a worker (bytes).
+    lost : int
+        Times that a worker process died.
+    """
+
+    out: Path
+    points: int
+    failed: int
+    solved: int
+    seconds: float
+    memory: float
+    lost: int
+
+
+def run_sweep(
+    plan: SweepPlan | str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    workers: int | Workers | None = None,
+    cluster: int | None = None,
+    address: str | None = None,
+    extend_store: bool = False,
+    retry_failed: bool = False,
+    progress: Callable[[SweepProgress], None] | None = None,
+    log: Callable[[str], None] | None = None,
+) -> SweepSummary:
+    """Solve every point of a plan and write it to a Zarr store.
+
+    The same call goes on after an interruption of any kind: chunks that are done and sound are
+    read and kept, whatever the number of workers.
+
+    Parameters
+    ----------
+    plan : SweepPlan or path
+    out : path
+        Folder of the store.
+    workers : int or Workers, optional
+        Processes of this machine; one for each core by default. Or any other
+        `asperity.study.workers.Workers`.
+    cluster : int, optional
+        Workers of a Dask cluster on this machine, instead.
+    address : str, optional
+        Of a Dask scheduler, instead.
+    extend_store : bool
+        The plan may have more rows than the store's, behind those that it has.
+    retry_failed : bool
+        Solve chunks with failed points again, with this version of the package.
+    progress : callable, optional
+        Called with a `SweepProgress` at least once a second.
+    log : callable, optional
+        Called with lines about what went wrong on the way.
+
+    Raises
+    ------
+    InputError
+        If the plan has mistakes, the store has another plan or is in use, or the disk is full.
+    """
+    path = file_path(out, "out").resolve()
+    require_short(path, (fresh_folder(path), lock_file(path)))
+    log = log or _silent
+    text = ""
+    if not isinstance(plan, SweepPlan):
+        file, plan = plan, load_plan(plan)
+        # A pipe has been read.
+        text = file_content(Path(file)).decode("utf-8-sig") if Path(file).is_file() else ""
+    grid = SweepGrid.of(plan)
+    pool = _workers(workers, cluster, address)
+    with StoreLock(path) as lock, ExitStack() as stack:
+        fresh = not path.exists()
+        _require_coordinates(grid, path.parent)
+        with _writing(path):
+            store = _opened(path, plan, text, grid, extend_store, retry_failed, log)
+            swept = store.sweep_orphans()
+        if swept:
+            log(f"{swept} files that killed writers had left half-written were removed")
+        try:
+            require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
+                         "choose another disk or fewer outputs")  # fmt: skip
+            pool_workers = stack.enter_context(pool)
+        except InputError:
+            # A refused start leaves nothing behind.
+            if fresh:
+                shutil.rmtree(path)
+            raise
+        job = Job(
+            str(store.path), store.grid.digest, lock.token, retry_failed, law_places(plan),
+            str(plan.folder.resolve()), numerics(),
+        )  # fmt: skip
+        return _run(store, lock, pool_workers, job, progress, log)
+
+
+def _workers(
+    workers: int | Workers | None, cluster: int | None, address: str | None
+) -> AbstractContextManager[Workers]:
+    choices = [n for n, v in (("workers", workers), ("cluster", cluster), ("scheduler", address))
+             if v is not None]  # fmt: skip
+    if len(choices) > 1:
+        raise InputError(
+            f"{choices[0]} must be the only choice of where to run, got {' and '.join(choices)}; "
+            "leave all but one out"
+        )
+    if cluster is not None:
+        return local_cluster(whole_number(cluster, "cluster", least=1))
+    if address is not None:
+        return scheduler(address)
+    if isinstance(workers, Workers):
+        return nullcontext(workers)
+    count = available_cores() if workers is None else whole_number(workers, "workers", least=1)
+    return local_processes(count)
+
+
+def _silent(line: str) -> None:
+    """No lines about what went wrong."""
+
+
+def _opened(
+    path: Path,
+    plan: SweepPlan,
+    text: str,
+    grid: SweepGrid,
+    extending: bool,
+    retry: bool,
+    log: Callable[[str], None],
+) -> SweepStore:
+    """The store of the plan: a new one, or one of the same plan, repaired."""
+    if not path.exists() or (path.is_dir() and not any(path.iterdir())):
+        if path.exists():
+            path.rmdir()
+        if not path.parent.is_dir():
+            raise InputError(
+                f"out must lie in a folder that exists, got '{path}'; make the folder or choose "
+                "another"
+            )
+        create(path, grid, _attributes(plan, text, grid))
+        return SweepStore(path)
+    root = read_root(path)
+    made = root.attributes["numerics"]
+    if made != numerics() and not retry:
+        raise InputError(
+            f"out must be continued by what began it, got '{path.name}' with "
+            f"{differences(made, numerics())}, so that last digits may differ; finish it with "
+            "those versions, or choose another store"
+        )
+    pending = root.attributes.get("extending")
+    if pending:
+        longer = SweepGrid(pending["record"], root.grid.chunks)
+        extend(path, root, longer, pending["attributes"])
+        root = read_root(path)
+    old = root.grid.record
+    if old == grid.record:
+        written = [root.damage] if root.damage else []
+        written += lay_out(path, root.grid, {**root.attributes, "runs": root.runs})
+        if written:
+            log(
+                "missing or damaged files of the store were written again: "
+                + listed(written, most=5)
+            )
+        return SweepStore(path)
+    if extending and is_extension(old, grid.record):
+        grid = SweepGrid(grid.record, root.grid.chunks)
+        extend(path, root, grid, _attributes(plan, text, grid))
+        return SweepStore(path)
+    changed = differences(old, grid.record)
+    way = "its axes may only become longer" if extending else (
+        "change the plan back, choose another store, or add points to the end of axes with --extend"
+    )  # fmt: skip
+    raise InputError(f"{path.name} must have the same plan, got {changed}; {way}")
+
+
+def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
+    works: dict[str, str] = {}
+    for law in grid.record["laws"]:
+        works |= cited_works(get_law(law).source)
+    return {
+        "title": plan.title or f"Sweep of {grid.points:,} points",
+        "source": f"asperity {__version__}",
+        "asperity_version": __version__,
+        "numerics": numerics(),
+        "plan_text": text,
+        "relative_tolerance": 1e-8,
+        "convention": "F/W0 = mean_friction + sum mu_n cos(n w t + phase_n), w(t) = W/W0",
+        "references": [works[key] for key in sorted(works)],
+    }
+
+
+def _require_coordinates(grid: SweepGrid, folder: Path) -> None:
+    """Refuse coordinates that the disk has no room for: they are written before all else."""
+    numbers = sum(axis.length * len(axis.names) for axis in grid.axes)
+    require_disk(
+        8.0 * numbers, folder, "axes", f"{numbers:.3g} numbers along them", "shorten them",
+    )  # fmt: skip
+
+
+def _bytes_left(store: SweepStore) -> float:
+    """Bytes that the chunks which are not done will take, uncompressed, at most."""
+    return (1 - store.share_done()) * store.grid.bytes
+
+
+def _run(
+    store: SweepStore,
+    lock: StoreLock,
+    workers: Workers,
+    job: Job,
+    progress: Callable[[SweepProgress], None] | None,
+    log: Callable[[str], None],
+) -> SweepSummary:
+    grid = store.grid
+    counts = SweepProgress(total=grid.points, chunk_total=grid.chunk_count)
+    if not job.retry:
+        counts.stored = round(store.share_done() * grid.points)
+    runs = [*store.root.runs, _started(workers)]
+    # With --retry-failed these may be others than before; the runs have them all.
+    store.update_attributes(runs=runs, numerics=numerics())
+    refreshed = time.monotonic()
+
+    def tick(now: SweepProgress) -> None:
+        nonlocal refreshed
+        if time.monotonic() - refreshed > _REFRESH:
+            lock.refresh()
+            refreshed = time.monotonic()
+        if progress is not None:
+            progress(now)
+
+    try:
+        with _writing(store.path, counts):
+            solve_chunks(job, range(grid.chunk_count), workers, counts, tick, log)
+    except WorkersGoneError:
+        raise InputError(
+            f"workers must run until the sweep ends, got no answer any more ({workers.about}) "
+            f"after {counts.points:,} of {counts.total:,} points; start a cluster and repeat the "
+            "command, which goes on from there"
+        ) from None
+    finally:
+        with contextlib.suppress(OSError):
+            runs[-1] |= _ended(counts)
+            store.update_attributes(runs=runs)
+    return SweepSummary(
+        out=store.path,
+        points=counts.points,
+        failed=counts.failed,
+        solved=counts.points - counts.kept,
+        seconds=counts.seconds,
+        memory=counts.memory,
+        lost=counts.lost,
+    )
+
+
+@contextmanager
+def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
+    """Turn an error of the file system into a sentence about the store."""
+    try:
+        yield
+    except OSError as error:
+        room = size_text(free_disk(path))
+        full = error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
+        why = "the disk is full" if full else (error.strerror or str(error)).lower()
+        done = f" after {counts.points:,} of {counts.total:,} points" if counts else ""
+        raise InputError(
+            f"out must be a folder that can be written, got '{path.name}' ({why}, {room} free)"
+            f"{done}; make room and repeat the command, which goes on from there"
+        ) from None
+
+
+def _started(workers: Workers) -> dict[str, Any]:
+    return {
+        "started": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "ended": None,
+        "host": socket.gethostname(),
+        "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
+        "workers": workers.about,
+        "asperity": __version__,
+        "python": platform.python_version(),
+        **{name: number for name in _PACKAGES if (number := package_version(name))},
+    }
+
+
+def _ended(counts: SweepProgress) -> Mapping[str, Any]:
+    return {
+        "ended": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        "seconds": round(counts.seconds, 3),
+        "points_solved": counts.points - counts.kept,
+        "points_kept": counts.kept,
+        "failed": counts.failed,
+        "worker_seconds": round(counts.spent, 3),
+        "worker_memory": round(counts.memory),
+        "workers_lost": counts.lost,
+    }

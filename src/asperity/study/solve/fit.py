@@ -1,0 +1,392 @@
+"""Fits: a law fitted at every point to a table of readings, or to readings drawn anew."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from asperity import materials
+from asperity.errors import InputError, closest
+from asperity.laws import get_law, registered
+from asperity.operating_point import respond
+from asperity.parameters import (
+    MODULATION,
+    Output,
+    Parameter,
+    all_parameters,
+    canonical_name,
+    point_parameters,
+)
+from asperity.parameters.arguments import some_of
+from asperity.parameters.file_content import file_content
+from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.plan import FitTable, SweepPlan
+from asperity.study.points import Points
+from asperity.study.solve.kind import SolveKind
+
+if TYPE_CHECKING:
+    from asperity.inference import Fit, LockInTable
+
+#: Outputs of a fit as a whole.
+_QUALITY = (
+    Output("chi2", "1", "chi-squared of data and priors"),
+    Output("dof", "1", "degrees of freedom"),
+    Output(
+        "p_value", "1", "probability of a larger chi-squared if law and uncertainties are right"
+    ),
+    Output("log_likelihood", "1", "logarithm of the likelihood"),
+    Output("aicc", "1", "Akaike's criterion, corrected"),
+    Output("undetermined", "1", "free parameters of which the data say nothing"),
+    Output("other_minima", "1", "further minima of chi-squared that the data do not exclude"),
+    Output("warnings", "1", "warnings of the fit"),
+)
+#: Outputs of each free parameter: what is put behind its name.
+_ESTIMATE = {
+    "fit": "estimate",
+    "se": "standard error",
+    "low": "lower end of the 95 % interval",
+    "high": "upper end of the 95 % interval",
+}
+#: What a table may hold in a column or leave to the plan.
+_OPERATING = {"V": 1e-6, "epsilon": 0.1, "frequency": 1.0}
+NOISE_SEED = Parameter(
+    "noise_seed",
+    "dimensionless",
+    "not negative",
+    "seed of the noise of readings that are drawn",
+    place="drive",
+    label="noise_seed",
+)
+
+
+class FitSolve(SolveKind):
+    """`asperity.inference.fit` at every point.
+
+    The numbers of a point are fixed in its fit, but for the free parameters: there they are the
+    start values. Where a point has a ``noise_seed``, they are the true values, and the readings of
+    the table give way to readings of the law at these, with noise of the table's uncertainties.
+    """
+
+    name = "fit"
+    outputs = ()
+    defaults = ()
+
+    def parameters(self) -> dict[str, Parameter]:
+        """As in `SolveKind`."""
+        from asperity.inference.unknowns import EPS_RATIO
+
+        return {one.name: one for one in (EPS_RATIO, NOISE_SEED)}
+
+    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+        """As in `SolveKind`."""
+        super().settings(plan)
+        table = _table(plan)
+        free = _free(table)
+        if "M" in free and not _all_inertial(plan):
+            raise InputError(
+                "fit.free must be parameters that count, got 'M', which has no influence without "
+                "inertia; add inertia = true to parameters or fix M"
+            )
+        return {
+            "free": free,
+            "prior": _priors(plan, table, free),
+            "profile": table.profile,
+            "starts": table.starts,
+            "seed": table.seed,
+            "data": list(table.data or ()),
+            "files": {name: _digest(plan.folder / name) for name in data_files(plan)},
+        }
+
+    def supplied(self, plan: SweepPlan) -> tuple[str, ...]:
+        """Free parameters, and what all tables have columns of."""
+        table = _table(plan)
+        columns = [set(_read(str(plan.folder / n), "", ()).points) for n in data_files(plan)]
+        common = set.intersection(*columns) if columns else set()
+        drawn = "noise_seed" in {*plan.parameters, *plan.columns}
+        # What is free has a start of its own; readings are drawn from true values.
+        return tuple(sorted(common | (set() if drawn else set(_free(table)))))
+
+    def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
+        """As in `SolveKind`."""
+        known = list(_outputs(_free(_table(plan)), {}))
+        if plan.outputs is None:
+            return tuple(known)
+        return tuple(dict.fromkeys(some_of(plan.outputs, known, "outputs")))
+
+    def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
+        """As in `SolveKind`."""
+        known = {**all_parameters(map(get_law, record["laws"])), **self.parameters()}
+        return _outputs(record["settings"]["free"], known)
+
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
+        """As in `SolveKind`."""
+        return max(1, min(64, points // 8))
+
+    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+        """As in `SolveKind`."""
+        answers = Answers.empty(record["outputs"], len(points))
+        for law, rows in points.by_law():
+            for row in rows:
+                one = {n: float(v[row]) for n, v in points.values.items() if np.isfinite(v[row])}
+                files = [] if points.data is None else [str(points.data[row])]
+                _fit_point(law, one, files, int(row), record, answers)
+        return answers
+
+
+def data_files(plan: SweepPlan) -> list[str]:
+    """Files of data that a plan names, without repetition.
+
+    Raises
+    ------
+    InputError
+        If there is none, or an axis names some besides those of the table ``fit``.
+    """
+    axis = [str(name) for name in plan.columns.get("data", ())]
+    table = _table(plan)
+    if axis and table.data:
+        raise InputError(
+            "fit.data must be left out where an axis has data, got both; leave one of them out"
+        )
+    files = list(dict.fromkeys([*(table.data or ()), *axis]))
+    if not files:
+        raise InputError(
+            "fit.data must name a table of readings, got nothing; write it like "
+            "data = ['readings.csv'], or add an axis of files: [axes.data] values = [...]"
+        )
+    return files
+
+
+def _table(plan: SweepPlan) -> FitTable:
+    if plan.fit is None:
+        raise InputError(
+            "fit must be given where solve is 'fit', got nothing; add the table [fit] with data "
+            "and free"
+        )
+    return plan.fit
+
+
+def _all_inertial(plan: SweepPlan) -> bool:
+    """Whether every point of a plan has inertia."""
+    values = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
+    return all(value in (True, "true", "yes", 1) for value in values)
+
+
+def _free(table: FitTable) -> list[str]:
+    """Free parameters by their one names."""
+    from asperity.inference.unknowns import EPS_RATIO
+
+    known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
+    names = []
+    for name in table.free:
+        canonical = canonical_name(name, known)
+        if canonical is None:
+            raise InputError(f"fit.free must name parameters, got '{name}'; {closest(name, known)}")
+        names.append(canonical)
+    if not names:
+        raise InputError("fit.free must name parameters, got none; write it like ['A', 'B']")
+    return list(dict.fromkeys(names))
+
+
+def _priors(plan: SweepPlan, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
+    """Mean, standard deviation (SI) and source of each prior."""
+    from asperity.inference.unknowns import EPS_RATIO, material_priors
+    from asperity.parameters import obeying
+
+    if isinstance(table.prior, str):
+        file = table.prior.endswith(".toml")
+        material = materials.load(plan.folder / table.prior if file else table.prior)
+        return {n: [p.mean, p.sd, p.source] for n, p in material_priors(material, free).items()}
+    known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
+    priors: dict[str, list[Any]] = {}
+    for name, prior in (table.prior or {}).items():
+        canonical = canonical_name(name, known)
+        if canonical is None or canonical not in free:
+            raise InputError(
+                f"fit.prior must be of free parameters, got '{name}'; free it or leave it out"
+            )
+        mean = float(known[canonical].check(prior.mean, f"fit.prior.{name}.mean"))
+        std = float(obeying(prior.std, f"fit.prior.{name}.std", known[canonical].kind, "positive"))
+        priors[canonical] = [mean, std, "plan"]
+    return priors
+
+
+def _outputs(free: Sequence[str], known: Mapping[str, Parameter]) -> dict[str, Output]:
+    estimates = [
+        Output(f"{name}_{what}", known[name].unit or "1" if name in known else "1",
+               f"{words} of {name}")
+        for name in free
+        for what, words in _ESTIMATE.items()
+    ]  # fmt: skip
+    return {output.name: output for output in (*estimates, *_QUALITY)}
+
+
+def _digest(path: Path) -> str:
+    try:
+        return hashlib.sha256(file_content(path)).hexdigest()
+    except OSError as error:
+        raise InputError(
+            f"data must be a readable table, got '{path}': {error.strerror}; give a CSV file"
+        ) from None
+
+
+@lru_cache(maxsize=256)
+def _read(path: str, digest: str, for_all: tuple[tuple[str, float], ...]) -> LockInTable:
+    """A table, whose file must be the one that the plan was checked with."""
+    from asperity.inference import read_table
+
+    if digest and _digest(Path(path)) != digest:
+        raise InputError(
+            f"data must not change while a sweep runs, got another '{path}' than at its begin; "
+            "restore the file, or choose another store"
+        )
+    # Without a digest the columns are of interest, whatever the plan has for all rows.
+    return read_table(path, dict(for_all) if digest else _OPERATING)
+
+
+def _fit_point(
+    law: str,
+    values: dict[str, float],
+    files: Sequence[str],
+    row: int,
+    record: Mapping[str, Any],
+    answers: Answers,
+) -> None:
+    from asperity.inference import Prior, fit
+
+    settings = record["settings"]
+    known = {**point_parameters(get_law(law)), **FitSolve().parameters()}
+    # Of several laws each has its own of the free parameters.
+    elsewhere = set(all_parameters(map(get_law, record["laws"])))
+    free = [n for n in settings["free"] if n in known or n not in elsewhere]
+    for_all = tuple((n, values[n]) for n in _OPERATING if n in values)
+    tables = [
+        _read(str(Path(record["folder"], name)), settings["files"][name], for_all)
+        for name in files or settings["data"]
+    ]
+    fixed = _fixed(values, [n for n in known if n not in free], record["origins"], tables)
+    truth = {name: values[name] for name in free if name in values}
+    inertia = values.get("inertia", 0.0) > 0
+    if "noise_seed" in values:
+        noise = np.random.default_rng(round(values["noise_seed"]))
+        drawn = [_drawn(t, law, {**fixed, **truth}, inertia, noise) for t in tables]
+        tables = [table for table in drawn if table is not None]
+        if len(tables) < len(drawn):
+            answers.fail(np.array([row]), SweepOutcome.NO_READINGS)
+            return
+    priors = {n: Prior(*p) for n, p in settings["prior"].items() if n in free}
+    fitted = fit(
+        tables, law, free, fixed=fixed, start=truth, prior=priors or None,
+        inertia=inertia, radiation_damping=values.get("eta", 0.0) > 0 or "eta" in free,
+        profile=settings["profile"], starts=settings["starts"], seed=settings["seed"],
+        # Only the number of warnings is kept, and this one takes another fit.
+        check_stiffness=False,
+    )  # fmt: skip
+    if not fitted.converged:
+        answers.fail(np.array([row]), SweepOutcome.FIT_FAILED)
+        return
+    numbers = _numbers(fitted)
+    for name in answers.numbers:
+        answers.numbers[name][row] = numbers.get(name, np.nan)
+    answers.outcome[row] = SweepOutcome.CONVERGED
+
+
+def _fixed(
+    values: Mapping[str, float],
+    names: Sequence[str],
+    origins: Mapping[str, str],
+    tables: Sequence[LockInTable],
+) -> dict[str, float]:
+    """Numbers of a point that its fit does not change.
+
+    Those of the plan come before columns of the data, which come before those of a material.
+    """
+    columns = set().union(*(table.points for table in tables))
+    return {
+        name: value
+        for name, value in values.items()
+        if name in names
+        and name not in (*MODULATION, "inertia", "noise_seed")
+        and (origins.get(name, "plan") == "plan" or name not in columns)
+    }
+
+
+def _numbers(fitted: Fit) -> dict[str, float]:
+    numbers: dict[str, float] = {}
+    for name, p in fitted.parameters.items():
+        ends = p.interval_95
+        numbers |= {f"{name}_fit": p.value, f"{name}_se": p.se}
+        numbers |= {f"{name}_low": ends[0], f"{name}_high": ends[1]}
+    return numbers | {
+        "chi2": fitted.chi2,
+        "dof": fitted.dof,
+        "p_value": fitted.p_value,
+        "log_likelihood": fitted.log_likelihood,
+        "aicc": fitted.aicc,
+        "undetermined": len(fitted.undetermined),
+        "other_minima": len(fitted.optima),
+        "warnings": len(fitted.warnings),
+    }
+
+
+def _drawn(
+    table: LockInTable,
+    law: str,
+    truth: Mapping[str, float],
+    inertia: bool,
+    noise: np.random.Generator,
+) -> LockInTable | None:
+    """The table with readings of the law at `truth`, with noise of its uncertainties.
+
+    Errors of the observables of a row are normal, with the correlations that the table gives, and
+    harmonics with a phase are disturbed in the complex plane. None where a row has no response.
+    """
+    known = point_parameters(get_law(law))
+    at = {}
+    for name, parameter in known.items():
+        value = truth.get(name, table.points.get(name, parameter.default))
+        at[name] = np.broadcast_to(np.asarray(value, dtype=float), (table.rows,)).copy()
+    at["epsilon"] *= truth.get("eps_ratio", 1.0)
+    at["inertia"][:] = inertia
+    response = respond(get_law(law), at, workers=1)
+    if not np.all(response.converged):
+        return None
+    root = np.linalg.cholesky(table.correlations())
+    normal = np.einsum("rij,rj->ri", root, noise.standard_normal(root.shape[:2]))
+    return _disturbed(table, {n: np.asarray(getattr(response, n)) for n in table.values}, normal)
+
+
+def _disturbed(
+    table: LockInTable, exact: Mapping[str, np.ndarray], normal: np.ndarray
+) -> LockInTable:
+    """Exact observables with errors `normal` times the uncertainties, where the table has some."""
+    from asperity.inference.tables.table import OBSERVABLES
+
+    values = {n: np.where(np.isfinite(table.values[n]), exact[n], np.nan) for n in table.values}
+    errors = dict(table.errors)
+    units = dict(zip(OBSERVABLES, normal.T, strict=True))
+    for name in ("mean_friction", "delta_mu"):
+        if name in values:
+            values[name] = values[name] + errors[name] * units[name]
+    for amplitude, phase in (("mu1", "phase1"), ("mu2", "phase2")):
+        if amplitude not in values:
+            continue
+        turned = values[amplitude] + errors[amplitude] * units[amplitude] + 0j
+        if phase in values:
+            # The uncertainty across is that of the reading, whatever amplitude is drawn.
+            across = table.values[amplitude] * errors[phase]
+            both = np.isfinite(values[phase])
+            turned = turned + 1j * np.where(both, across * units[phase], 0.0)
+            values[phase] = values[phase] + np.angle(turned)
+            errors[phase] = np.where(both, across / np.maximum(np.abs(turned), 1e-300), np.nan)
+        values[amplitude] = np.abs(turned)
+    scale = {n: errors[n] / table.errors[n] for n in errors}
+    covariances = {
+        (a, b): table.covariances[a, b] * scale[a] * scale[b] for a, b in table.covariances
+    }
+    return replace(table, values=values, errors=errors, covariances=covariances)

@@ -1,0 +1,49 @@
+"""Periodic responses, with their stability."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from asperity.parameters import OUTPUTS
+from asperity.study.axes import columns_of
+from asperity.study.outcome import Answers
+from asperity.study.points import Points
+from asperity.study.responses import periodic_answers
+from asperity.study.solve.kind import SolveKind
+
+#: Outputs with one number a point.
+_NAMES = (
+    *("mean_friction", "delta_mu", "mu_ss", "mu1", "mu2", "phase1", "phase2"),
+    *("log_multiplier", "floquet_max", "mode_frequency", "growth_rate", "stable"),
+)
+
+#: Points of a chunk: at least a call of the fast method, at most half a second of it.
+_FEWEST, _MOST = 960, 19_200
+#: Chunks that a small plan is cut into, so that several workers have something to do.
+_SHARES = 8
+#: Times that a point takes longer where the mass counts.
+_INERTIAL = 16
+
+
+class PeriodicSolve(SolveKind):
+    """`asperity.periodic_response` at every point."""
+
+    name = "periodic"
+    outputs = tuple(OUTPUTS[name] for name in _NAMES)
+    defaults = (
+        *("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2"),
+        *("log_multiplier", "mode_frequency", "stable"),
+    )
+
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
+        """As in `SolveKind`."""
+        inertial = record["numbers"].get("inertia", 0) or any(
+            "inertia" in columns_of(axis) for axis in record["axes"].values()
+        )
+        most = _MOST // _INERTIAL if inertial else _MOST
+        return max(min(_FEWEST, most), min(most, points // _SHARES))
+
+    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+        """As in `SolveKind`."""
+        return periodic_answers(points, record["outputs"])

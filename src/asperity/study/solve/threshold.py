@@ -1,0 +1,101 @@
+"""Thresholds of stiffness: where modulated sliding loses stability when its spring is softened."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.laws import get_law
+from asperity.parameters import Output
+from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.plan import SweepPlan
+from asperity.study.points import Points
+from asperity.study.responses import solvable
+from asperity.study.solve.kind import SolveKind
+from asperity.study.threshold import require_scan, search_thresholds
+
+#: Points of a chunk: enough to share the fixed costs of a search, and some seconds of work.
+_FEWEST, _MOST = 24, 480
+#: Codes of the bifurcations, in the order of `flag_meanings`.
+KINDS = ("fold", "period doubling", "Neimark-Sacker")
+
+
+class ThresholdSolve(SolveKind):
+    """`asperity.study.threshold.stiffness_threshold` at every point; K and K/K_c are its answers.
+
+    Stiffnesses are looked for between multiples of K_c = (B - A) W0/D0 of the same point.
+    """
+
+    name = "threshold"
+    outputs = (
+        Output("K_threshold", "N/m", "stiffness below which modulated sliding is unstable", "K^*"),
+        Output("threshold_ratio", "1", "threshold over K_c = (B - A) W0/D0", "K^*/K_c"),
+        Output("mode_frequency", "Hz", "frequency of the mode that starts to grow, modulo f"),
+        Output("bifurcation", "1", "0: fold, 1: period doubling, 2: Neimark-Sacker"),
+    )
+    defaults = tuple(output.name for output in outputs)
+    supplies = ("K",)
+
+    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+        """As in `SolveKind`."""
+        super().settings(plan)
+        low, high = plan.threshold.between
+        if not 0 < low < high:
+            raise InputError(
+                f"threshold.between must go from a softer to a stiffer spring, got {low:g} to "
+                f"{high:g}; write it like [0.3, 4.0]"
+            )
+        return {"between": [low, high], "scan": plan.threshold.scan}
+
+    def require_memory(self, points: int, record: Mapping[str, Any]) -> None:
+        """As in `SolveKind`, and for the stiffnesses of a chunk."""
+        super().require_memory(points, record)
+        require_scan(points, record["settings"]["scan"], "threshold.scan")
+
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
+        """As in `SolveKind`."""
+        return max(_FEWEST, min(_MOST, points // 8))
+
+    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+        """As in `SolveKind`."""
+        answers = Answers.empty(record["outputs"], len(points))
+        between = record["settings"]["between"]
+        for law, rows in points.by_law():
+            values = points.take(rows).of_law(law)
+            critical = np.full(len(rows), np.nan)
+            if {"A", "B", "D0"} <= set(values):
+                critical = (values["B"] - values["A"]) * values["W0"] / values["D0"]
+            # The softest spring stands for the stiffness, which a point has none of.
+            values["K"] = between[0] * critical
+            sound = solvable(get_law(law), values, rows, answers)
+            if len(sound):
+                values = {n: v[sound] for n, v in values.items()}
+                answers.put(rows[sound], _search(law, values, critical[sound], record))
+        return answers
+
+
+def _search(
+    law: str, values: dict[str, np.ndarray], critical: np.ndarray, record: Mapping[str, Any]
+) -> Answers:
+    settings = record["settings"]
+    low, high = settings["between"]
+    searched = search_thresholds(
+        get_law(law), values, low * critical, high * critical, settings["scan"]
+    )
+    numbers = {
+        "K_threshold": searched.K,
+        "threshold_ratio": searched.K / critical,
+        "mode_frequency": searched.turn * values["frequency"],
+        "bifurcation": np.array(
+            [KINDS.index(k) if k in KINDS else np.nan for k in searched.kind], dtype=float
+        ),
+    }
+    good = searched.outcome == SweepOutcome.CONVERGED
+    return Answers(
+        {name: np.where(good, numbers[name], np.nan) for name in record["outputs"]},
+        searched.outcome,
+        np.where(good, 0.0, searched.where / critical),
+    )

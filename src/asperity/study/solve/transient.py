@@ -1,0 +1,206 @@
+"""Transients, reduced to named numbers."""
+
+from __future__ import annotations
+
+import string
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError, closest
+from asperity.laws import get_law
+from asperity.loads import Programme
+from asperity.parameters import EXPERIMENT, Output, all_parameters
+from asperity.parameters.arguments import number
+from asperity.protocol.steps import plan as planned_steps
+from asperity.slider.named import slider_from
+from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.plan import SweepPlan, TransientTable
+from asperity.study.points import Points
+from asperity.study.responses import solvable
+from asperity.study.solve.kind import SolveKind
+from asperity.transients import Trajectory, transient
+
+#: Channels of a trajectory and their units.
+CHANNELS = {
+    "friction": "1",
+    "force": "N",
+    "load": "N",
+    "velocity": "m/s",
+    "slip_velocity": "m/s",
+    "displacement": "m",
+}
+#: What can be taken of a channel.
+TAKEN: dict[str, Callable[[np.ndarray], float]] = {
+    "mean": lambda x: float(np.mean(x)),
+    "min": lambda x: float(np.min(x)),
+    "max": lambda x: float(np.max(x)),
+    "range": lambda x: float(np.ptp(x)),
+    "std": lambda x: float(np.std(x)),
+    "first": lambda x: float(x[0]),
+    "last": lambda x: float(x[-1]),
+}
+
+
+class TransientSolve(SolveKind):
+    """`asperity.transient` at every point, from steady sliding at V under W0."""
+
+    name = "transient"
+    outputs = ()
+    defaults = ()
+    # A programme need not have a modulation.
+    supplies = ("epsilon", "frequency")
+
+    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+        """As in `SolveKind`."""
+        super().settings(plan)
+        table = plan.transient
+        if table is None:
+            raise InputError(
+                "transient must be given where solve is 'transient', got nothing; add the table "
+                "[transient] with steps, sampling and numbers"
+            )
+        if not table.numbers:
+            raise InputError(
+                "transient.numbers must have at least one number, got none; write it like "
+                "numbers.peak = { of = 'friction', take = 'max' }"
+            )
+        numbers = {name: _number(name, one) for name, one in table.numbers.items()}
+        _check_steps(plan, table)
+        return {
+            "steps": list(table.steps),
+            "sampling": number(table.sampling, "transient.sampling", "frequency", "positive"),
+            "rtol": table.rtol,
+            "most_steps": table.most_steps,
+            "numbers": numbers,
+        }
+
+    def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
+        """The numbers that the plan names."""
+        if plan.outputs is not None:
+            raise InputError(
+                "outputs must be left out where solve is 'transient', got "
+                f"{len(plan.outputs)}; transient.numbers names them"
+            )
+        return tuple(plan.transient.numbers) if plan.transient is not None else ()
+
+    def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
+        """As in `SolveKind`."""
+        return {
+            name: Output(name, CHANNELS[one["of"]], f"{one['take']} of {one['of']}")
+            for name, one in record["settings"]["numbers"].items()
+        }
+
+    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
+        """As in `SolveKind`."""
+        return max(1, min(64, points // 8))
+
+    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+        """As in `SolveKind`."""
+        answers = Answers.empty(record["outputs"], len(points))
+        for law, rows in points.by_law():
+            some = points.take(rows)
+            values = _values(some, law)
+            for k in solvable(get_law(law), values, rows, answers):
+                one = {n: float(v[k]) for n, v in values.items()}
+                named = {n: float(v[k]) for n, v in some.values.items()} | one
+                _integrate(law, one, named, int(rows[k]), record["settings"], answers)
+        return answers
+
+
+def _values(points: Points, law: str) -> dict[str, np.ndarray]:
+    """Values of the points; without a modulation its amplitude is 0."""
+    values = points.of_law(law)
+    for name, absent in (("epsilon", 0.0), ("frequency", 1.0)):
+        values[name] = np.where(np.isnan(values[name]), absent, values[name])
+    return values
+
+
+def _integrate(
+    law: str,
+    values: dict[str, float],
+    named: Mapping[str, float],
+    row: int,
+    settings: Mapping[str, Any],
+    answers: Answers,
+) -> None:
+    lines = [line.format_map(_WithUnits(named)) for line in settings["steps"]]
+    steps, mistakes = planned_steps(lines, Path())
+    if mistakes:
+        raise InputError("; ".join(mistakes))
+    programme = Programme(*(one.step for one in steps), load=values["W0"], velocity=values["V"])
+    trajectory = transient(
+        slider_from(get_law(law), values),
+        programme,
+        sampling=settings["sampling"],
+        inertia=bool(values["inertia"]),
+        radiation_damping=values["eta"] if values["eta"] > 0 else None,
+        rtol=settings["rtol"],
+        most_steps=settings["most_steps"],
+    )
+    if trajectory.termination is not None:
+        answers.fail(np.array([row]), SweepOutcome.STOPPED, trajectory.termination.time)
+        return
+    for name, one in settings["numbers"].items():
+        answers.numbers[name][row] = _reduced(trajectory, one)
+    answers.outcome[row] = SweepOutcome.CONVERGED
+
+
+def _reduced(trajectory: Trajectory, one: Mapping[str, Any]) -> float:
+    """A number of a trajectory; NaN where no sample lies between its times."""
+    channel = np.asarray(getattr(trajectory, one["of"]))
+    inside = np.ones(len(channel), dtype=bool)
+    if one["from"] is not None:
+        inside &= trajectory.time >= one["from"]
+    if one["to"] is not None:
+        inside &= trajectory.time <= one["to"]
+    return TAKEN[one["take"]](channel[inside]) if inside.any() else float("nan")
+
+
+class _WithUnits(dict[str, Any]):
+    """Values by name as a protocol writes them: with their SI units."""
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        known = all_parameters([])
+        units = {n: known[n].unit if n in known else "" for n in values}
+        super().__init__({n: f"{v!r} {units[n]}".strip() for n, v in values.items()})
+
+
+def _number(name: str, one: Any) -> dict[str, Any]:
+    place = f"transient.numbers.{name}"
+    if one.of not in CHANNELS:
+        raise InputError(
+            f"{place}.of must be a channel, got '{one.of}'; {closest(one.of, CHANNELS)}"
+        )
+    if one.take not in TAKEN:
+        raise InputError(
+            f"{place}.take must be one of {', '.join(TAKEN)}, got '{one.take}'; "
+            f"{closest(one.take, TAKEN)}"
+        )
+    if not name.isidentifier():
+        raise InputError(
+            f"{place} must have a name of letters, digits and underscores, got '{name}'; rename it"
+        )
+    times = {
+        side: None if value is None else number(value, f"{place}.{side}", "time", "not negative")
+        for side, value in (("from", one.from_), ("to", one.to))
+    }
+    return {"of": one.of, "take": one.take, **times}
+
+
+def _check_steps(plan: SweepPlan, table: TransientTable) -> None:
+    """Names in braces are known, and the lines are steps with any numbers in their places."""
+    known = {**all_parameters([get_law(plan.law)] if plan.law else []), **EXPERIMENT}
+    for line in table.steps:
+        for _, name, *_ in string.Formatter().parse(line):
+            if name is not None and name not in known:
+                raise InputError(
+                    f"transient.steps must name parameters in braces, got '{{{name}}}'; "
+                    f"{closest(name, known)}"
+                )
+    examples = _WithUnits(dict.fromkeys(known, 0.5))
+    _, mistakes = planned_steps([line.format_map(examples) for line in table.steps], plan.folder)
+    if mistakes:
+        raise InputError("; ".join(mistakes))

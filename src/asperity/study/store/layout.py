@@ -1,0 +1,312 @@
+"""A store without its answers: arrays, coordinates and attributes, which follow from the plan.
+
+The same plan gives the same files to the last bit. A store is made by writing them all, made longer
+by writing those of the longer plan, and repaired by writing those that differ.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import shutil
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import zarr
+from zarr.codecs import Crc32cCodec, ZstdCodec
+from zarr.storage import MemoryStore
+
+from asperity.errors import InputError
+from asperity.study.axes import TEXTS
+from asperity.study.grid import SweepGrid
+from asperity.study.outcome import SweepOutcome, flag_attributes
+from asperity.study.points import RATIOS
+from asperity.study.record import OF_CHUNKS, OF_POINTS
+from asperity.study.solve import SOLVES
+from asperity.study.store import durable
+from asperity.study.store.root import FORMAT, KIND, Root, write_root
+
+#: What `status` holds for a chunk that is not done; otherwise its failed points.
+NOT_DONE = -1
+
+#: What the columns of texts are.
+_TEXTS_ARE = {"law": "friction law", "data": "file of the readings"}
+
+#: Coordinates that follow from ratios are stored where they have at most this many values.
+_MOST_DERIVED = 1_000_000
+
+#: A chunk of fill values would otherwise leave no file, like one that was never computed.
+ALL_CHUNKS: Any = {"write_empty_chunks": True}
+
+
+def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
+    """Make an empty store; it has its name when it is complete.
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written.
+    """
+    fresh = fresh_folder(path)
+    shutil.rmtree(fresh, ignore_errors=True)
+    try:
+        fresh.mkdir()
+        lay_out(fresh, grid, attributes)
+        fresh.rename(path)
+        durable.sync_folder(path.parent)
+    except OSError as error:
+        shutil.rmtree(fresh, ignore_errors=True)
+        raise InputError(
+            f"out must be a folder that can be written, got '{path}' "
+            f"({(error.strerror or str(error)).lower()}); choose another place with room"
+        ) from None
+
+
+def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
+    """Give a store the arrays, coordinates and attributes of a plan; answers in it stay.
+
+    Parameters
+    ----------
+    path : Path
+        A folder, which may hold all of it already.
+    grid : SweepGrid
+    attributes : mapping
+        Those that do not follow from the grid.
+
+    Returns
+    -------
+    list of str
+        Files that were missing or differed, and were written.
+    """
+    written: list[str] = []
+    arrays: dict[str, Any] = {}
+    checksums: dict[str, Any] = {}
+    for name, content in _skeleton(grid):
+        file, array = path / name, name.split("/")[0]
+        if file.name == "zarr.json":
+            arrays[array] = json.loads(content)
+        else:
+            checksums.setdefault(array, checksum()).update(content)
+        if not _holds(file, content):
+            durable.put(file, content)
+            durable.sync_file(file)
+            durable.sync_folder(file.parent)
+            written.append(name)
+    for folder in {(path / name).parents[1] for name in written}:
+        durable.sync_folder(folder)
+    write_root(
+        path,
+        {
+            **attributes,
+            KIND: FORMAT,
+            "Conventions": "CF-1.11",
+            "plan": json.dumps(grid.record),
+            "plan_sha256": grid.digest,
+            "chunk_shape": list(grid.chunks),
+            "coordinates": " ".join(_coordinates(arrays, grid)),
+            "coordinate_checksums": {name: c.hexdigest() for name, c in checksums.items()},
+        },
+        arrays,
+    )
+    return written
+
+
+def _holds(file: Path, content: bytes) -> bool:
+    try:
+        return file.read_bytes() == content
+    except OSError:
+        return False
+
+
+def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
+    """Give a store more points; can be repeated after an interruption at any moment.
+
+    Chunks that get new points are no longer done; all others keep theirs.
+
+    Parameters
+    ----------
+    path : Path
+    root : Root
+        Of the store as it is.
+    grid : SweepGrid
+        Of a plan for which `is_extension` holds.
+    attributes : mapping
+        Of the longer store, besides those that follow from its grid.
+
+    Returns
+    -------
+    list of str
+        As of `lay_out`.
+    """
+    pending = {"record": grid.record, "attributes": dict(attributes)}
+    write_root(path, {**root.attributes, "extending": pending}, root.arrays)
+    for chunk in _touched(root.grid, grid):
+        reset(path, root.grid, chunk)
+    return lay_out(path, grid, {"runs": root.runs, **attributes})
+
+
+def _touched(old: SweepGrid, new: SweepGrid) -> list[int]:
+    """Chunks at the end of an axis that were not full and get new points."""
+    shape = old.chunk_shape
+    touched = np.zeros(shape, dtype=bool) if math.prod(shape) else np.zeros(0, dtype=bool)
+    for axis, (before, after, length) in enumerate(
+        zip(old.shape, new.shape, old.chunks, strict=True)
+    ):
+        if after > before and before % length:
+            index: list[Any] = [slice(None)] * len(shape)
+            index[axis] = -1
+            touched[tuple(index)] = True
+    return [int(i) for i in np.flatnonzero(touched)]
+
+
+def fresh_folder(store: Path) -> Path:
+    """Where a store is made, until it is complete."""
+    return store.with_name(store.name + ".new")
+
+
+def chunk_file(path: Path, name: str, place: tuple[int, ...]) -> Path:
+    """File of a chunk of an array, by its position among the chunks."""
+    return path.joinpath(name, "c", *map(str, place))
+
+
+def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
+    """Make a chunk of a store not done."""
+    file = chunk_file(path, "status", grid.place(chunk))
+    if file.is_file():
+        file.unlink()
+        durable.sync_folder(file.parent)
+
+
+def checksum(content: bytes = b"") -> Any:
+    """Of some bytes, and of those it is updated with."""
+    return hashlib.blake2b(content, digest_size=8)
+
+
+def _skeleton(grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
+    """Files by their path in the store: the description of each array, then its values if any.
+
+    One block of a coordinate is in memory at a time.
+    """
+    arrays = _Arrays()
+    dims = [axis.name for axis in grid.axes]
+    known = SOLVES[grid.record["solve"]].known_outputs(grid.record)
+    for name in grid.record["outputs"]:
+        arrays.add(name, grid.shape, grid.chunks, dims, "float64", known[name].attributes)
+    arrays.add("outcome", grid.shape, grid.chunks, dims, "int16", flag_attributes(),
+               fill=int(SweepOutcome.NOT_COMPUTED))  # fmt: skip
+    about = {"units": "1", "long_name": "number in the sentence of the outcome"}
+    arrays.add("detail", grid.shape, grid.chunks, dims, "float64", about)
+    ones, dims = (1,) * len(dims), [f"{d}_chunk" for d in dims]
+    about = {"units": "1", "long_name": "checksum of the files of the chunk"}
+    arrays.add("checksum", grid.chunk_shape, ones, dims, "int64", about, fill=0)
+    about = {"units": "1", "long_name": "failed points of the chunk; -1: not done"}
+    arrays.add("status", grid.chunk_shape, ones, dims, "int64", about, fill=NOT_DONE)
+    yield from arrays.files()
+    yield from _axes(arrays, grid)
+    _numbers(arrays, grid)
+    _derived(arrays, grid)
+    yield from arrays.files()
+
+
+class _Arrays:
+    """Arrays in memory, whose files are handed out and forgotten."""
+
+    def __init__(self) -> None:
+        self._kept: dict[str, Any] = {}
+        self._group = zarr.create_group(MemoryStore(self._kept), zarr_format=3)
+
+    def add(
+        self,
+        name: str,
+        shape: tuple[int, ...],
+        chunks: tuple[int, ...],
+        dims: list[str],
+        dtype: str,
+        attributes: Mapping[str, Any],
+        fill: Any = np.nan,
+    ) -> Any:
+        """An array without values."""
+        return self._group.create_array(
+            name,
+            shape=shape,
+            chunks=chunks,
+            dtype=dtype,
+            fill_value="" if dtype == "string" else fill,
+            dimension_names=dims,
+            # The checksum last, over what is on the disk: without it a turned bit is read as a
+            # number.
+            compressors=[ZstdCodec(level=1), Crc32cCodec()],
+            attributes=dict(attributes),
+            config=ALL_CHUNKS,
+        )
+
+    def files(self) -> Iterator[tuple[str, bytes]]:
+        """Files since the last call."""
+        made = {path: v.to_bytes() for path, v in self._kept.items() if path != "zarr.json"}
+        self._kept.clear()
+        yield from made.items()
+
+
+def _axes(arrays: _Arrays, grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
+    """Columns of the axes; drawn ones are drawn block by block."""
+    for axis, chunk in zip(grid.axes, grid.chunks, strict=True):
+        # Few and large: labels are read at once when the store is opened.
+        length = min(axis.length, max(chunk, 65_536))
+        made = {
+            name: arrays.add(
+                name, (axis.length,), (length,), [axis.name],
+                "string" if name in TEXTS else "float64", _about(name, grid),
+            )
+            for name in axis.names
+        }  # fmt: skip
+        for start in range(0, axis.length, length):
+            stop = min(start + length, axis.length)
+            for name, values in axis.rows(start, stop).items():
+                made[name][start:stop] = values
+            yield from arrays.files()
+
+
+def _about(name: str, grid: SweepGrid) -> dict[str, Any]:
+    if name in TEXTS:
+        return {"units": "1", "long_name": _TEXTS_ARE[name]}
+    return dict(grid.known[name].attributes)
+
+
+def _numbers(arrays: _Arrays, grid: SweepGrid) -> None:
+    """Numbers that are the same at every point, and the law if it is."""
+    for name, value in grid.record["numbers"].items():
+        about = _about(name, grid)
+        if name in grid.record["origins"]:
+            about["origin"] = grid.record["origins"][name]
+        arrays.add(name, (), (), [], "float64", about)[...] = value
+    if "law" not in {name for axis in grid.axes for name in axis.names}:
+        arrays.add("law", (), (), [], "string", _about("law", grid))[...] = grid.record["laws"][0]
+
+
+def _derived(arrays: _Arrays, grid: SweepGrid) -> None:
+    """Parameters that follow from ratios, along the axes that they depend on."""
+    varied = {name: i for i, axis in enumerate(grid.axes) for name in axis.names}
+    along: dict[str, set[int]] = {n: {i} for n, i in varied.items()}
+    present = {*varied, *grid.record["numbers"]}
+    for name, ratio in RATIOS.items():
+        if name not in present:
+            continue
+        axes = sorted(set().union(*(along.get(n, set()) for n in (name, *ratio.needs))))
+        along[ratio.target] = set(axes)
+        shape = tuple(grid.shape[i] for i in axes)
+        if np.prod(shape, dtype=float) > _MOST_DERIVED:
+            continue
+        whole = tuple(slice(0, axis.length if i in axes else 1) for i, axis in enumerate(grid.axes))
+        values = grid.between(whole).values[ratio.target].reshape(shape)
+        dims = [grid.axes[i].name for i in axes]
+        array = arrays.add(ratio.target, shape, shape, dims, "float64", _about(ratio.target, grid))
+        array[...] = values
+
+
+def _coordinates(metadata: Mapping[str, Any], grid: SweepGrid) -> list[str]:
+    """Arrays that are neither answers nor labels of a dimension."""
+    others = {*grid.record["outputs"], *OF_POINTS, *OF_CHUNKS, *(axis.name for axis in grid.axes)}
+    return [name for name in metadata if name not in others]

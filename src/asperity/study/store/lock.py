@@ -1,0 +1,177 @@
+"""One driver a store: a lock that ends with its process, and a token that workers check."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import time
+import uuid
+from pathlib import Path
+from typing import Any
+
+from asperity.errors import InputError
+from asperity.outputs.json import json_content
+
+try:
+    import fcntl
+except ImportError:  # pragma: no cover  Windows: the age of the file decides
+    fcntl = None  # type: ignore[assignment]
+
+#: Seconds after which a lock of another machine, which nothing has refreshed, counts as left over.
+STALE = 60.0
+
+#: What a lock file says of its holder.
+_HOLDER = {"token": str, "host": str, "process": int, "since": str}
+
+
+class StoreLock:
+    """The lock file next to a store, ``STORE.lock``.
+
+    The operating system drops the lock when the process ends, however it ends. Some shared file
+    systems keep locks to one machine: there the driver's refreshing of the file tells others that
+    it is at work.
+
+    Parameters
+    ----------
+    store : Path
+
+    Attributes
+    ----------
+    path : Path
+    token : str
+        Of this driver; workers write nothing for a driver whose token is no longer in the file.
+    """
+
+    def __init__(self, store: Path) -> None:
+        self.path = lock_file(store)
+        self.token = uuid.uuid4().hex
+        self._descriptor: int | None = None
+
+    def acquire(self) -> None:
+        """Take the lock.
+
+        Raises
+        ------
+        InputError
+            If another driver has it, or the file cannot be written.
+        """
+        while self._descriptor is None:
+            try:
+                descriptor = os.open(self.path, os.O_RDWR | os.O_CREAT, 0o644)
+            except OSError as error:
+                raise InputError(
+                    f"out must lie in a folder that can be written, got '{self.path}' "
+                    f"({(error.strerror or str(error)).lower()}); choose another folder"
+                ) from None
+            try:
+                self._lock(descriptor)
+                # The file may have been removed by its last holder before it was locked here.
+                same = os.fstat(descriptor).st_ino == self.path.stat().st_ino
+            except FileNotFoundError:
+                same = False
+            except BaseException:
+                os.close(descriptor)
+                raise
+            if same:
+                self._descriptor = descriptor
+            else:
+                os.close(descriptor)
+        record = {
+            "token": self.token,
+            "host": socket.gethostname(),
+            "process": os.getpid(),
+            "since": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
+        }
+        os.ftruncate(self._descriptor, 0)
+        os.pwrite(self._descriptor, json.dumps(record).encode(), 0)
+
+    def _lock(self, descriptor: int) -> None:
+        holder = holder_of(self.path)
+        if fcntl is not None:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise self._refused(holder) from None
+            except OSError:
+                pass  # a file system without locks: the age of the file decides
+            else:
+                if holder.get("host") in (None, socket.gethostname()):
+                    return
+        age = time.time() - os.fstat(descriptor).st_mtime
+        if holder and age < STALE:
+            raise self._refused(holder)
+
+    def _refused(self, holder: dict[str, Any]) -> InputError:
+        who = (
+            f"process {holder['process']} on {holder['host']} since {holder['since']}"
+            if holder
+            else "another process"
+        )
+        return InputError(
+            f"out must not be in use, got '{self.path.with_suffix('').name}', on which {who} is "
+            "at work; wait for it or stop it (asperity sweep status shows how far it is)"
+        )
+
+    def refresh(self) -> None:
+        """Show that the driver is at work; to be called every few seconds."""
+        if self._descriptor is not None:
+            os.utime(self._descriptor)
+
+    def release(self) -> None:
+        """Give the lock back and remove its file."""
+        if self._descriptor is not None:
+            if holder_of(self.path).get("token") == self.token:
+                self.path.unlink(missing_ok=True)
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def __enter__(self) -> StoreLock:
+        self.acquire()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.release()
+
+
+def lock_file(store: Path) -> Path:
+    """The lock file of a store."""
+    return store.with_name(store.name + ".lock")
+
+
+def is_held(path: Path) -> bool:
+    """Whether a driver is at work: a killed one leaves its file, but not its lock."""
+    holder = holder_of(path)
+    if not holder:
+        return False
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except OSError:
+        return False
+    try:
+        if holder.get("host") == socket.gethostname() and fcntl is not None:
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            except BlockingIOError:
+                return True
+            except OSError:
+                pass  # a file system without locks: the age of the file decides
+            else:
+                return False
+        return time.time() - os.fstat(descriptor).st_mtime < STALE
+    finally:
+        os.close(descriptor)
+
+
+def holder_of(path: Path) -> dict[str, Any]:
+    """What the lock file says of its holder; empty where it says nothing."""
+    holder = json_content(path)
+    if not isinstance(holder, dict):
+        return {}
+    whole = all(isinstance(holder.get(name), kind) for name, kind in _HOLDER.items())
+    return holder if whole else {}
+
+
+def current_token(store: Path) -> str:
+    """Token of the driver that works on a store; empty where none does."""
+    return str(holder_of(lock_file(store)).get("token", ""))

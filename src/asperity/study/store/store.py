@@ -1,0 +1,245 @@
+"""Reading and writing the store of a sweep.
+
+Every variable is a Zarr array with named dimensions and units. ``status``, with one number for each
+chunk, alone says which chunks are done: it is written after the data and their folders have
+reached the disk.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import zarr
+
+from asperity.errors import InputError
+from asperity.outputs.json import json_content
+from asperity.study.outcome import Answers
+from asperity.study.record import OF_CHUNKS, OF_POINTS
+from asperity.study.store import durable
+from asperity.study.store.layout import ALL_CHUNKS, NOT_DONE, checksum, chunk_file, reset
+from asperity.study.store.root import Root, read_root, write_root
+
+#: Reading a damaged chunk raises one of these, by the codec that finds out.
+_DAMAGED = (ValueError, RuntimeError, OSError, KeyError, TypeError)
+
+
+class SweepStore:
+    """A store that exists.
+
+    Parameters
+    ----------
+    path : Path
+    mode : {"r", "r+"}
+        Whether it is only read. Then all but the answers must be whole; a driver has repaired it
+        before workers write.
+
+    Attributes
+    ----------
+    root : Root
+    grid : SweepGrid
+    arrays, labels : dict of str to zarr.Array
+        Answers by name; columns of the axes, and numbers that are the same at every point.
+
+    Raises
+    ------
+    InputError
+        If there is no store of a sweep, or it is to be read and is damaged.
+    """
+
+    def __init__(self, path: Path, mode: Literal["r", "r+"] = "r+") -> None:
+        self.path = path
+        self.root = read_root(path)
+        self.grid = self.root.grid
+        self.record: dict[str, Any] = self.grid.record
+        if mode == "r":
+            _require_whole(path, self.root)
+        group = zarr.open_group(path, mode=mode, use_consolidated=False)
+        names = (*self.record["outputs"], *OF_POINTS)
+        self.arrays = {name: _array(group, name) for name in names}
+        self.checksum, self.status = (_array(group, name) for name in OF_CHUNKS)
+        labels = [name for name in self.root.arrays if name not in self._of_chunks]
+        self.labels = {name: _array(group, name) for name in labels}
+        if mode == "r":
+            self._require_labels()
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """The attributes of the store."""
+        return self.root.attributes
+
+    @property
+    def _of_chunks(self) -> tuple[str, ...]:
+        return (*self.arrays, *OF_CHUNKS)
+
+    def _require_labels(self) -> None:
+        """Refuse to read a store whose coordinates are not those that were written."""
+        for name, array in self.labels.items():
+            digest = checksum()
+            try:
+                for place in np.ndindex(*array.cdata_shape):
+                    digest.update(chunk_file(self.path, name, place).read_bytes())
+            except OSError:
+                digest = None
+            if (
+                digest is None
+                or digest.hexdigest() != self.attributes["coordinate_checksums"][name]
+            ):
+                raise _damaged(self.path, f"coordinate '{name}'")
+
+    # Chunks
+
+    def failed_in(self, chunk: int) -> int:
+        """Failed points of a chunk, -1 where it is not done or its status is damaged."""
+        return self._of(self.status, chunk, NOT_DONE)
+
+    def share_done(self) -> float:
+        """Share of the chunks that are done, from the number of files."""
+        files = sum(len(names) for _, _, names in os.walk(self.path / "status" / "c"))
+        return min(1.0, files / self.grid.chunk_count)
+
+    def is_done(self, chunk: int) -> bool:
+        """Whether the status of a chunk says that it is done."""
+        return self.failed_in(chunk) != NOT_DONE
+
+    def is_sound(self, chunk: int) -> bool:
+        """Whether all files of a chunk are those that were written together with its status."""
+        try:
+            return self._of(self.checksum, chunk, 0) == self._digest(chunk, self.failed_in(chunk))
+        except OSError:
+            return False
+
+    def done(self) -> Iterator[tuple[int, int]]:
+        """Chunks that are done, with their failed points.
+
+        Raises
+        ------
+        InputError
+            At one whose files are not those that were written.
+        """
+        for chunk in range(self.grid.chunk_count):
+            failed = self.failed_in(chunk)
+            if failed != NOT_DONE:
+                if self.is_damaged(chunk):
+                    raise _damaged(self.path, f"chunk {chunk}")
+                yield chunk, failed
+
+    def is_damaged(self, chunk: int) -> bool:
+        """Whether a chunk has the status of one that is done and is not sound.
+
+        One that a driver writes just now may look so; looked at again it does not.
+        """
+        return all(self.is_done(chunk) and not self.is_sound(chunk) for _ in range(2))
+
+    def _of(self, array: Any, chunk: int, otherwise: int) -> int:
+        try:
+            return int(array[self.grid.place(chunk)])
+        except _DAMAGED:
+            return otherwise
+
+    def _digest(self, chunk: int, failed: int) -> int:
+        """Of the part of the grid, the failed points and the files of a chunk."""
+        digest = checksum(repr((self.grid.slices(chunk), failed)).encode())
+        for name in self.arrays:
+            content = self._file(name, chunk).read_bytes()
+            digest.update(f"{name} {len(content)} ".encode() + content)
+        return int.from_bytes(digest.digest(), "little", signed=True)
+
+    def write(self, chunk: int, answers: Answers) -> None:
+        """Write a chunk; when this returns it is on the disk and done.
+
+        Raises
+        ------
+        OSError
+            If the disk is full or cannot be written: the chunk is then not done.
+        """
+        self.reset(chunk)
+        slices = self.grid.slices(chunk)
+        shape = tuple(s.stop - s.start for s in slices)
+        values: dict[str, Any] = {
+            **answers.numbers,
+            "outcome": answers.outcome,
+            "detail": answers.detail,
+        }
+        for name in self._of_chunks:
+            durable.make_way(self._file(name, chunk))
+        for name, array in self.arrays.items():
+            array[slices] = values[name].reshape(shape)
+        self.checksum[self.grid.place(chunk)] = self._digest(chunk, answers.failed)
+        self._sync([self._file(name, chunk) for name in (*self.arrays, "checksum")])
+        self.status[self.grid.place(chunk)] = answers.failed
+        self._sync([self._file("status", chunk)])
+
+    def reset(self, chunk: int) -> None:
+        """Make a chunk not done."""
+        reset(self.path, self.grid, chunk)
+
+    def read(self, chunk: int, names: tuple[str, ...] | None = None) -> dict[str, Any]:
+        """The variables of a chunk as arrays of its shape."""
+        slices = self.grid.slices(chunk)
+        return {n: self.arrays[n][slices] for n in names or tuple(self.arrays)}
+
+    def _file(self, name: str, chunk: int) -> Path:
+        return chunk_file(self.path, name, self.grid.place(chunk))
+
+    def _sync(self, files: list[Path]) -> None:
+        for file in files:
+            durable.sync_file(file)
+        for folder in self._folders(files):
+            durable.sync_folder(folder)
+
+    def _folders(self, files: list[Path]) -> Iterator[Path]:
+        """Folders of the files, up to their arrays, each once and inner ones first."""
+        seen = set()
+        for file in files:
+            folder = file.parent
+            while folder not in seen and folder != self.path:
+                seen.add(folder)
+                yield folder
+                folder = folder.parent
+
+    def sweep_orphans(self) -> int:
+        """Remove files that killed writers have left half-written; returns how many."""
+        count = 0
+        for folder, _, names in os.walk(self.path):
+            for name in names:
+                if name.endswith(".partial"):
+                    Path(folder, name).unlink(missing_ok=True)
+                    count += 1
+        return count
+
+    # Attributes
+
+    def update_attributes(self, **changed: Any) -> None:
+        """Replace attributes of the store; the file is on the disk when this returns."""
+        self.attributes.update(changed)
+        write_root(self.path, self.attributes, self.root.arrays)
+
+
+def _require_whole(path: Path, root: Root) -> None:
+    """Refuse to read a store whose descriptions of arrays are not those that were written."""
+    if root.attributes.get("extending"):
+        raise InputError(
+            f"store must be extended to its end, got '{path.name}', on which that is under way or "
+            "was interrupted; wait, or repeat asperity sweep with its plan, --out and --extend"
+        )
+    if root.damage:
+        raise _damaged(path, root.damage)
+    for name, described in root.arrays.items():
+        if json_content(path / name / "zarr.json") != described:
+            raise _damaged(path, f"{name}/zarr.json")
+
+
+def _damaged(path: Path, what: str) -> InputError:
+    return InputError(
+        f"store must be whole, got '{path.name}', whose {what} is missing or damaged; repeat "
+        "asperity sweep with its plan and --out, which writes it again"
+    )
+
+
+def _array(group: Any, name: str) -> Any:
+    """An array that writes every chunk, which is no part of its file."""
+    return group[name].with_config(ALL_CHUNKS)

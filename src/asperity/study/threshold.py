@@ -1,0 +1,324 @@
+"""The stiffness above which modulated sliding is stable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity.errors import InputError
+from asperity.laws import Law
+from asperity.outputs import require_memory
+from asperity.parameters import DRIVE, law_parameters
+from asperity.parameters.arguments import number, pair, switch, whole_number
+from asperity.slider import Slider
+from asperity.slider.named import slider_values
+from asperity.slider.problem import checked_slider
+from asperity.study.crossing import STABILITY, find_crossings
+from asperity.study.outcome import Answers, SweepOutcome
+from asperity.study.points import POINT_BYTES, Float
+from asperity.study.responses import answers_of_law, bifurcation_kinds
+from asperity.units import format_si
+
+#: Limits of the search, over K_c.
+_BETWEEN = (0.3, 4.0)
+
+
+@dataclass(frozen=True)
+class StiffnessThreshold:
+    """Stiffness at which the response loses stability when the spring is softened.
+
+    Attributes
+    ----------
+    K : array, shape (...)
+        The stiffness (N/m); NaN where none was found.
+    ratio : array, shape (...)
+        K/K_c, with K_c = (B - A) W0/D0 of unmodulated sliding on rigid asperities; NaN for a law
+        without A, B and D0 too.
+    kind : str array, shape (...)
+        "fold", "period doubling" or "Neimark-Sacker".
+    mode_frequency : array, shape (...)
+        Frequency of the mode that starts to grow (Hz), modulo the modulation frequency.
+    result : str array, shape (...)
+        "converged", or why there is no threshold.
+    """
+
+    K: Float
+    ratio: Float
+    kind: NDArray[np.object_]
+    mode_frequency: Float
+    result: NDArray[np.object_]
+
+
+def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, float]:
+    """K_c (N/m) and the stick-slip frequency f_c (Hz) at K_c, of rigid asperities.
+
+    K_c = (B - A) W0/D0 and f_c = sqrt((B - A)/A) V/(2 pi D0), Eqs. (18) and (19) of
+    Bureau et al. (2000).
+
+    Parameters
+    ----------
+    slider : Slider
+        Of a law with A, B and D0; numbers, no arrays.
+    velocity : float or str
+        Pulling velocity V (m/s).
+
+    Raises
+    ------
+    InputError
+        If the law has no A, B or D0.
+    """
+    checked_slider(slider)
+    if not {"A", "B", "D0"} <= set(law_parameters(type(slider.law))):
+        raise InputError(
+            f"law must have A, B and D0 for a critical stiffness in closed form, got "
+            f"{slider.law.name}; give the limits of the search as between=(softest, stiffest)"
+        )
+    p = _numbers(slider)
+    V = number(velocity, "velocity", "velocity", "positive")
+    excess = p["B"] - p["A"]
+    frequency = np.sqrt(max(excess, 0.0) / p["A"]) * V / (2 * np.pi * p["D0"])
+    return excess * p["W0"] / p["D0"], float(frequency)
+
+
+def stiffness_threshold(
+    slider: Slider,
+    *,
+    velocity: ArrayLike | str,
+    epsilon: Any,
+    frequency: Any,
+    inertia: bool = False,
+    radiation_damping: ArrayLike | str | None = None,
+    between: tuple[Any, Any] | None = None,
+    scan: int = 24,
+) -> StiffnessThreshold:
+    """The highest stiffness at which the leading multiplier passes the unit circle.
+
+    Parameters
+    ----------
+    slider : Slider
+        Numbers, no arrays; its own stiffness has no effect.
+    velocity : float or str
+        Pulling velocity V (m/s).
+    epsilon, frequency : array
+        Amplitude on the contacts and frequency (Hz); they broadcast.
+    inertia : bool
+        Whether the mass is included.
+    radiation_damping : float or str, optional
+        eta (N s/m).
+    between : pair of float or str, optional
+        Softest and stiffest spring of the search (N/m); 0.3 and 4 times K_c by default.
+    scan : int
+        Stiffnesses solved before the search, at equal ratios: narrower features are not detected.
+
+    Raises
+    ------
+    InputError
+        If a number breaks its rule, or the law has no K_c and `between` is not given.
+    """
+    checked_slider(slider)
+    inertia, scan = switch(inertia, "inertia"), whole_number(scan, "scan", least=2)
+    eps, f = DRIVE["epsilon"].check(epsilon), DRIVE["frequency"].check(frequency)
+    try:
+        eps, f = np.broadcast_arrays(eps, f)
+    except ValueError:
+        raise InputError(
+            f"epsilon and frequency must have shapes that broadcast, got {np.shape(eps)} and "
+            f"{np.shape(f)}; give arrays of one shape"
+        ) from None
+    low, high = _ends(slider, velocity, between)
+    values = _numbers(slider) | {
+        "V": number(velocity, "velocity", "velocity", "positive"),
+        "eta": 0.0
+        if radiation_damping is None
+        else number(radiation_damping, "radiation_damping", "damping", "not negative"),
+        "inertia": float(inertia),
+    }
+    count = eps.size
+    require_scan(count, scan, "scan")
+    searched = search_thresholds(
+        type(slider.law),
+        {name: np.full(count, float(value)) for name, value in values.items()}
+        | {"epsilon": eps.ravel(), "frequency": f.ravel()},
+        np.full(count, low),
+        np.full(count, high),
+        scan,
+    )
+    ratio = searched.K / _critical(slider, velocity)
+    return StiffnessThreshold(
+        K=searched.K.reshape(eps.shape),
+        ratio=ratio.reshape(eps.shape),
+        kind=searched.kind.reshape(eps.shape),
+        mode_frequency=searched.turn.reshape(eps.shape) * f,
+        result=searched.result.reshape(eps.shape),
+    )
+
+
+def require_scan(points: int, scan: int, name: str) -> None:
+    """Refuse more stiffnesses at each of some points than memory can hold.
+
+    Raises
+    ------
+    InputError
+        Which calls the number of stiffnesses `name`.
+    """
+    require_memory(
+        points * scan * POINT_BYTES, name, f"{scan:,} stiffnesses at each of {points:,} points",
+        "lower it",
+    )  # fmt: skip
+
+
+class SearchedThresholds(NamedTuple):
+    """Thresholds of many operating points, each along its own line of stiffnesses.
+
+    Attributes
+    ----------
+    K : array, shape (points,)
+        Threshold (N/m); NaN where none was found.
+    turn : array, shape (points,)
+        |arg m| / (2 pi) of the leading multiplier there.
+    kind : object array, shape (points,)
+        Bifurcation; "" where none was found.
+    result : object array, shape (points,)
+        "converged", or why there is no threshold.
+    outcome : int16 array, shape (points,)
+        A `SweepOutcome`.
+    where : array, shape (points,)
+        Stiffness (N/m) of the threshold, of what stands in its way, or the end that `outcome` is
+        about.
+    """
+
+    K: Float
+    turn: Float
+    kind: NDArray[np.object_]
+    result: NDArray[np.object_]
+    outcome: NDArray[np.int16]
+    where: Float
+
+
+def search_thresholds(
+    law: type[Law], values: Mapping[str, Float], low: Float, high: Float, scan: int
+) -> SearchedThresholds:
+    """The highest stiffness at which each operating point loses stability.
+
+    Parameters
+    ----------
+    law : type of Law
+    values : mapping of str to array, shape (points,)
+        All numbers but K in SI, by name.
+    low, high : array, shape (points,)
+        Stiffnesses to look between (N/m).
+    scan : int
+        Stiffnesses looked at before the search, at equal ratios.
+    """
+    lines = _StiffnessLines(law, values, low, high)
+    count = len(low)
+    steps = np.linspace(0.0, 1.0, scan)
+    grid = np.stack([a.ravel() for a in np.meshgrid(steps, np.arange(count, dtype=float))], -1)
+    seen = lines.solve(grid)
+    g = seen["log_multiplier"].reshape(count, scan)
+    reasons = np.where(seen.converged, "", seen.result).reshape(count, scan)
+    with np.errstate(invalid="ignore"):
+        crossed = (g[:, :-1] > 0) & (g[:, 1:] < 0)
+    # The stable side must reach up to the stiffest spring, with a response everywhere.
+    last = scan - 2 - np.argmax(crossed[:, ::-1], axis=1)
+    stiffer = np.array([(g[i, k + 1 :] < 0).all() for i, k in enumerate(last)], dtype=bool)
+    usable = crossed.any(axis=1) & stiffer
+    line = np.flatnonzero(usable)
+    k = last[line]
+    crossings = find_crossings(
+        lines,
+        np.stack([steps[k], line], axis=-1),
+        np.stack([steps[k + 1], line], axis=-1),
+        g[line, k],
+        g[line, k + 1],
+    )
+    stiffness, turn, where = np.full((3, count), np.nan)
+    kind, result = (np.full(count, "", dtype=object) for _ in range(2))
+    outcome = np.zeros(count, dtype=np.int16)
+    at = lines.stiffness(crossings.where)
+    stiffness[line] = np.where(crossings.located, at, np.nan)
+    where[line] = at
+    outcome[line] = np.where(crossings.located, SweepOutcome.CONVERGED, SweepOutcome.NO_CROSSING)
+    turn[line] = np.abs(crossings.points["multiplier_argument"]) / (2 * np.pi)
+    kind[line], result[line] = bifurcation_kinds(crossings.points), crossings.reason
+    for i in np.flatnonzero(~usable):
+        failed = np.flatnonzero(reasons[i] != "")
+        if len(failed):
+            outcome[i], result[i] = SweepOutcome.NO_RESPONSE, reasons[i][failed[-1]]
+            where[i] = low[i] * (high[i] / low[i]) ** steps[failed[0]]
+        elif g[i, -1] > 0:
+            outcome[i], where[i] = SweepOutcome.UNSTABLE_THROUGHOUT, high[i]
+            result[i] = f"no threshold: unstable up to {format_si(float(high[i]), 'stiffness')}"
+        else:
+            outcome[i], where[i] = SweepOutcome.STABLE_THROUGHOUT, low[i]
+            result[i] = f"no threshold: stable from {format_si(float(low[i]), 'stiffness')}"
+    return SearchedThresholds(stiffness, turn, kind, result, outcome, where)
+
+
+def _numbers(slider: Slider) -> dict[str, float]:
+    """Parameters of a slider by name, numbers only."""
+    values = slider_values(slider)
+    arrays = [name for name, value in values.items() if np.size(value) != 1]
+    if arrays:
+        raise InputError(
+            f"slider must have numbers for a threshold, got an array for {', '.join(arrays)}; "
+            "call it once for each"
+        )
+    return {name: float(np.ravel(value)[0]) for name, value in values.items()}
+
+
+def _critical(slider: Slider, velocity: Any) -> float:
+    """K_c, NaN for a law that has none."""
+    try:
+        return natural_scales(slider, velocity)[0]
+    except InputError:
+        return np.nan
+
+
+def _ends(slider: Slider, velocity: Any, between: tuple[Any, Any] | None) -> tuple[float, float]:
+    """Limits of the search, in ascending order."""
+    if between is None:
+        critical, _ = natural_scales(slider, velocity)
+        if critical <= 0:
+            raise InputError(
+                f"between must be given for a law that strengthens with velocity, got none and "
+                f"K_c = {critical:g} N/m; give two stiffnesses"
+            )
+        return _BETWEEN[0] * critical, _BETWEEN[1] * critical
+    low, high = (
+        number(end, "between", "stiffness", "positive") for end in pair(between, "between")
+    )
+    if not low < high:
+        raise InputError(
+            f"between must go from a softer to a stiffer spring, got {low:g} to {high:g} N/m; "
+            "swap them"
+        )
+    return low, high
+
+
+class _StiffnessLines:
+    """Lines of increasing stiffness, each with the other numbers of its operating point."""
+
+    outputs = STABILITY
+
+    def __init__(
+        self, law: type[Law], values: Mapping[str, Float], low: Float, high: Float
+    ) -> None:
+        self.law, self.values = law, values
+        self.low, self.high = low, high
+
+    def stiffness(self, where: Float) -> Float:
+        """K (N/m) at (fraction, number of the line)."""
+        line = np.round(where[:, 1]).astype(int)
+        return np.asarray(self.low[line] * (self.high[line] / self.low[line]) ** where[:, 0])
+
+    def solve(self, where: Float) -> Answers:
+        """Responses at (fraction, number of the line)."""
+        line = np.round(where[:, 1]).astype(int)
+        values = {name: numbers[line] for name, numbers in self.values.items()}
+        values["K"] = self.stiffness(where)
+        return answers_of_law(self.law, values, STABILITY)

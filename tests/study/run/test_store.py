@@ -1,0 +1,475 @@
+"""The store: what is in it, what survives, and what is refused."""
+
+import errno
+import json
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray
+
+import asperity.study.run as run_module
+from asperity.errors import InputError
+from asperity.study import (
+    export_store,
+    open_store,
+    reasons,
+    run_sweep,
+    store_status,
+    summary_statistics,
+)
+from asperity.study.store import durable
+from asperity.study.store.lock import StoreLock
+from asperity.study.store.store import SweepStore
+from references.closed_form_sweep import ClosedForm, ThisProcess, files_of, plan_of
+
+POINTS, FAILED = 60, 24
+
+
+def run(out: Path, **options: Any) -> Any:
+    plan = options.pop("plan", None) or plan_of()
+    return run_sweep(plan, out, workers=ThisProcess(), **options)
+
+
+def test_numbers_labels_units_and_reasons(tmp_path: Path, closed_form: ClosedForm) -> None:
+    summary = run(tmp_path / "s.zarr")
+    assert (summary.points, summary.failed, summary.solved) == (POINTS, FAILED, POINTS)
+    with open_store(tmp_path / "s.zarr") as found:
+        K, epsilon = np.meshgrid(found["K"], found["epsilon"], indexing="ij")
+        good = (K != 3.0) & (epsilon <= 0.9)
+        assert np.array_equal(found["mu1"].values[good], (epsilon * K)[good])
+        assert np.isnan(found["mu2"].values[~good]).all()
+        assert found["K"].attrs["units"] == "N/m"
+        assert float(found["A"]) == 0.013
+        words = dict(
+            zip(
+                found["outcome"].attrs["flag_values"],
+                found["outcome"].attrs["flag_meanings"].split(),
+                strict=True,
+            )
+        )
+        assert words[int(found["outcome"].sel(K=3.0)[0])] == "folded"
+        last = found.isel(K=0, epsilon=-1)
+        assert reasons(last["outcome"], last["detail"])[()] == (
+            "the transient stopped before its end, at 2.5 s"
+        )
+
+
+def test_another_reader_needs_neither_asperity_nor_xarray(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    run(tmp_path / "s.zarr")
+    script = (
+        "import sys, zarr; g = zarr.open_group(sys.argv[1], mode='r');"
+        "a = g['mu1']; print(a.shape, a.metadata.dimension_names, a.attrs['units'], a[1, 3]);"
+        "print([m for m in sys.modules if m.startswith(('asperity', 'xarray'))])"
+    )
+    lines = subprocess.run(
+        [sys.executable, "-W", "error", "-c", script, str(tmp_path / "s.zarr")],
+        capture_output=True, text=True, check=True, cwd=tmp_path,
+    ).stdout.splitlines()  # fmt: skip
+    epsilon = open_store(tmp_path / "s.zarr")["epsilon"].values[3]
+    assert lines == [f"(3, 20) ('K', 'epsilon') 1 {2.0 * float(epsilon)!r}", "[]"]
+
+
+@pytest.mark.parametrize("consolidated", [None, False, True])
+def test_xarray_opens_it_as_it_is(
+    tmp_path: Path, closed_form: ClosedForm, consolidated: bool | None
+) -> None:
+    run(tmp_path / "s.zarr")
+    # Warnings are errors here: nothing is to be explained to the reader first.
+    found = xarray.open_zarr(tmp_path / "s.zarr", consolidated=consolidated, chunks=None)
+    assert set(found.dims) == {"K", "epsilon", "K_chunk", "epsilon_chunk"}
+    assert {"A", "B", "law", "frequency"} <= set(found.coords)
+    assert str(found["law"].values) == "rice-ruina"
+
+
+def test_a_chunk_without_one_number_is_a_chunk_that_is_done(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    run(tmp_path / "s.zarr")
+    closed_form.solved.clear()
+    again = run(tmp_path / "s.zarr")
+    assert (again.solved, closed_form.solved) == (0, set())
+    assert again.failed == FAILED
+
+
+class Killed(BaseException):
+    """Stands for a SIGKILL: no handler of errors may see it."""
+
+
+def killed_at(step: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Everything stops at the `step`-th time that something has to reach the disk."""
+    count = 0
+
+    def dying(real: Callable[[Path], None]) -> Callable[[Path], None]:
+        def sync(path: Path) -> None:
+            nonlocal count
+            count += 1
+            if count == step:
+                raise Killed
+            real(path)
+
+        return sync
+
+    for name in ("sync_file", "sync_folder"):
+        monkeypatch.setattr(durable, name, dying(getattr(durable, name)))
+
+
+def test_killed_at_any_step_the_next_run_ends_with_the_same_bits(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    run(tmp_path / "whole.zarr")
+    whole = files_of(tmp_path / "whole.zarr")
+    out = tmp_path / "s.zarr"
+    kills = 0
+    for step in range(1, 400, 7):
+        with pytest.MonkeyPatch.context() as patch:
+            killed_at(step, patch)
+            try:
+                run(out)
+            except Killed:
+                kills += 1
+                # The file that a killed writer of zarr leaves.
+                if (out / "mu1").is_dir():
+                    (out / "mu1" / "c.0123.partial").write_bytes(b"half")
+                continue
+        break
+    assert kills > 5
+    run(out)
+    assert files_of(out) == whole
+    assert not (tmp_path / "s.zarr.lock").exists()
+
+
+def test_what_is_done_is_never_solved_again(tmp_path: Path, closed_form: ClosedForm) -> None:
+    out = tmp_path / "s.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        killed_at(100, patch)
+        with pytest.raises(Killed):
+            run(out)
+    store = SweepStore(out)
+    done = [chunk for chunk in range(6) if store.is_done(chunk)]
+    assert 0 < len(done) < 6
+    kept = set()
+    for chunk in done:
+        values = store.grid.at(chunk).values
+        kept |= set(zip(values["K"].tolist(), values["epsilon"].tolist(), strict=True))
+    closed_form.solved.clear()
+    assert run(out).points == POINTS
+    assert closed_form.solved
+    assert not closed_form.solved & kept
+
+
+def test_a_full_disk_is_a_sentence_and_costs_nothing(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    out = tmp_path / "s.zarr"
+    written = 0
+
+    def full(path: Path) -> None:
+        nonlocal written
+        written += 1
+        if written > 60:
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(durable, "sync_file", full)
+        with pytest.raises(InputError, match=r"the disk is full.*goes on from there"):
+            run(out)
+    assert store_status(out).done < POINTS
+    run(out)
+    run(tmp_path / "whole.zarr")
+    assert files_of(out) == files_of(tmp_path / "whole.zarr")
+
+
+def test_a_refused_start_leaves_no_store(tmp_path: Path, closed_form: ClosedForm) -> None:
+    out = tmp_path / "s.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module, "_bytes_left", lambda store: 1e30)
+        with pytest.raises(InputError, match="what there is room for"):
+            run(out)
+        assert not out.exists()
+    assert run(out).points == POINTS
+    before = files_of(out)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(run_module, "_bytes_left", lambda store: 1e30)
+        with pytest.raises(InputError, match="what there is room for"):
+            run(out)
+    assert files_of(out) == before
+
+
+@pytest.mark.parametrize("name", ["mu1", "outcome", "status"])
+@pytest.mark.parametrize("fault", ["empty", "cut", "bit", "missing"])
+def test_a_damaged_chunk_alone_is_solved_again(
+    tmp_path: Path, closed_form: ClosedForm, name: str, fault: str
+) -> None:
+    out = tmp_path / "s.zarr"
+    run(out)
+    whole = files_of(out)
+    file = out / name / "c" / "1" / "0"
+    content = bytearray(file.read_bytes())
+    if fault == "bit":
+        content[len(content) // 2] ^= 0x10
+    file.write_bytes(bytes(content)[: {"empty": 0, "cut": len(content) // 2}.get(fault)])
+    if fault == "missing":
+        file.unlink()
+    closed_form.solved.clear()
+    again = run(out)
+    assert len(closed_form.solved) == again.solved == 10
+    assert files_of(out) == whole
+
+
+def test_the_second_driver_is_refused(tmp_path: Path, closed_form: ClosedForm) -> None:
+    out = tmp_path / "s.zarr"
+    # A lock of another process of this machine: locks of one process do not exclude each other
+    # on every system.
+    script = (
+        "import sys, time, pathlib; from asperity.study.store.lock import StoreLock;"
+        "lock = StoreLock(pathlib.Path(sys.argv[1])); lock.acquire(); print('held', flush=True);"
+        "sys.stdin.read()"
+    )
+    run(out)
+    other = subprocess.Popen(
+        [sys.executable, "-c", script, str(out)],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    try:
+        assert other.stdout is not None
+        assert other.stdout.readline() == "held\n"
+        with pytest.raises(InputError, match=rf"not be in use.*process {other.pid} on"):
+            run(out)
+        assert f"process {other.pid} on" in store_status(out).running
+    finally:
+        other.kill()
+        other.communicate()
+    # A killed driver holds nothing.
+    assert store_status(out).running == ""
+    assert run(out).points == POINTS
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_lock_file_of_another_form_holds_nothing(
+    tmp_path: Path, closed_form: ClosedForm, seed: int
+) -> None:
+    """What a killed driver, another program or a full disk may leave in its place."""
+    out, lock = tmp_path / "s.zarr", tmp_path / "s.zarr.lock"
+    draw = np.random.default_rng(seed)
+    run(out, plan=plan_of(4, (1.0,)))
+    record = {"token": "x", "host": "h", "process": 3, "since": "now"}
+    others = [None, 7, 0.5, [], {}, ["x"], True]
+    texts = [b"", b"null", b"[" * 10**5, b"\xff\xfe", b"9" * 5000, b"{}", draw.bytes(40)]
+    for name in record:
+        left = {n: v for n, v in record.items() if n != name}
+        texts.append(json.dumps(left).encode())
+        # True is a number of a process as far as Python is concerned.
+        other = others[draw.integers(len(others) - (name == "process"))]
+        if not (name == "process" and other == 7):
+            texts.append(json.dumps({**record, name: other}).encode())
+    for text in texts:
+        lock.write_bytes(text)
+        assert store_status(out).running == ""
+        assert run(out, plan=plan_of(4, (1.0,))).solved == 0
+        assert not lock.exists()
+
+
+def test_a_worker_of_an_older_driver_writes_nothing(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    from asperity.study.job import Job, SupersededError
+
+    out = tmp_path / "s.zarr"
+    run(out)
+    digest = json.loads((out / "zarr.json").read_text())["attributes"]["plan_sha256"]
+    SweepStore(out).reset(0)
+    with StoreLock(out), pytest.raises(SupersededError):
+        Job(str(out), digest, "the token of another driver")((0,), 1.0)
+    assert not SweepStore(out).is_done(0)
+
+
+def test_another_plan_is_refused_with_the_difference(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    out = tmp_path / "s.zarr"
+    run(out)
+    other = plan_of().model_copy(update={"parameters": {"V": 2e-6, "frequency": 120.0}})
+    with pytest.raises(InputError, match=r"numbers\.V = 1e-06 there and 2e-06 here"):
+        run(out, plan=other)
+    with pytest.raises(InputError, match=r"numbers\.V.*may only become longer"):
+        run(out, plan=other, extend_store=True)
+
+
+def test_extended_it_is_what_the_longer_plan_gives(tmp_path: Path, closed_form: ClosedForm) -> None:
+    out = tmp_path / "s.zarr"
+    run(out)
+    # The step of this grid is another one, although it begins and ends with the same values.
+    finer = plan_of().model_copy(
+        update={
+            "axes": {
+                "K": {"values": (1.0, 2.0, 3.0)},
+                "epsilon": {"from": 0.05, "to": 0.98, "count": 26},
+            }
+        }
+    )
+    with pytest.raises(InputError, match="axes may only become longer"):
+        run(out, plan=finer, extend_store=True)
+    with pytest.raises(InputError, match="--extend"):
+        run(out, plan=plan_of(20, (1.0, 2.0, 3.0, 4.0)))
+    closed_form.solved.clear()
+    stiff = plan_of(20, (1.0, 2.0, 3.0, 4.0))
+    assert run(out, plan=stiff, extend_store=True).solved == 20
+    run(tmp_path / "whole.zarr", plan=stiff)
+    assert files_of(out) == files_of(tmp_path / "whole.zarr")
+
+
+def test_an_axis_whose_last_chunk_was_not_full_is_extended(
+    tmp_path: Path, closed_form: ClosedForm
+) -> None:
+    out, values = tmp_path / "s.zarr", [0.01 * i for i in range(1, 22)]
+
+    def plan(count: int) -> Any:
+        return plan_of().model_copy(
+            update={"axes": {"epsilon": {"values": values[:count]}, "K": {"values": [1.0]}}}
+        )
+
+    run(out, plan=plan(14))
+    killed = 0
+    for step in range(1, 60, 3):
+        # Stopped anywhere on the way it is taken up again.
+        with pytest.MonkeyPatch.context() as patch:
+            killed_at(step, patch)
+            try:
+                run(out, plan=plan(21), extend_store=True)
+            except Killed:
+                killed += 1
+                continue
+        break
+    assert killed > 2
+    run(out, plan=plan(21), extend_store=True)
+    with open_store(out) as found:
+        assert np.array_equal(found["epsilon"], values)
+        assert np.array_equal(found["mu1"][:, 0], values)
+    assert store_status(out).done == 21
+
+
+def test_repairs_of_an_extension_keep_its_chunks(tmp_path: Path, closed_form: ClosedForm) -> None:
+    """Whatever is lost of an extended store but its answers, none is solved again."""
+    out, longer = tmp_path / "s.zarr", plan_of(20, (1.0, 2.0, 3.0, 4.0))
+    run(out)
+    run(out, plan=longer, extend_store=True)
+    whole = files_of(out)
+    for name in ("zarr.json", "attributes", "K", "epsilon/zarr.json", "mu1/zarr.json"):
+        file = out / name
+        shutil.rmtree(file) if file.is_dir() else file.unlink()
+        with pytest.raises(InputError, match=r"whole, got 's\.zarr', whose .*repeat asper"):
+            summary_statistics(out)
+        closed_form.solved.clear()
+        lines: list[str] = []
+        assert run(out, plan=longer, log=lines.append).solved == 0
+        assert closed_form.solved == set()
+        assert f"again: {name}" in lines[0]
+        assert files_of(out) == whole
+    runs = store_status(out).runs
+    assert runs[-1]["points_solved"] == 0
+
+
+def test_an_interrupted_extension_is_not_read(tmp_path: Path, closed_form: ClosedForm) -> None:
+    out, longer = tmp_path / "s.zarr", plan_of(20, (1.0, 2.0, 3.0, 4.0))
+    run(out)
+    with pytest.MonkeyPatch.context() as patch:
+        # Behind the six syncs of the attributes, which say first that it is under way.
+        killed_at(9, patch)
+        with pytest.raises(Killed):
+            run(out, plan=longer, extend_store=True)
+    for answer in (store_status, summary_statistics, open_store):
+        with pytest.raises(InputError, match="must be extended to its end"):
+            answer(out)
+    run(out, plan=longer, extend_store=True)
+    run(tmp_path / "whole.zarr", plan=longer)
+    assert files_of(out) == files_of(tmp_path / "whole.zarr")
+
+
+def test_failed_points_are_tried_again_when_asked(tmp_path: Path, closed_form: ClosedForm) -> None:
+    out = tmp_path / "s.zarr"
+    run(out)
+    whole = files_of(out)
+    closed_form.solved.clear()
+    assert run(out, retry_failed=True).solved > 0
+    # Of the six chunks two have no failed point.
+    assert files_of(out) == whole
+    assert store_status(out).outcomes == {"converged": 36, "folded": 18, "stopped": 6}
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path: Path, closed_form: ClosedForm) -> None:
+    (tmp_path / "thesis").mkdir()
+    (tmp_path / "thesis" / "chapter1.tex").write_text("...")
+    with pytest.raises(InputError, match="must be the folder of a sweep"):
+        run(tmp_path / "thesis")
+    assert (tmp_path / "thesis" / "chapter1.tex").read_text() == "..."
+
+
+def test_an_error_of_the_solver_is_the_outcome_of_its_point(
+    tmp_path: Path, closed_form: ClosedForm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    solve = closed_form.solve
+
+    def fragile(points: Any, record: Any) -> Any:
+        if (points.values["epsilon"] == 0.05).any():
+            raise ZeroDivisionError("of the solver")
+        return solve(points, record)
+
+    monkeypatch.setattr(closed_form, "solve", fragile)
+    lines: list[str] = []
+    run(tmp_path / "s.zarr", log=lines.append)
+    status = store_status(tmp_path / "s.zarr")
+    assert status.outcomes["solver_error"] == 3
+    assert status.done == POINTS
+    assert "ZeroDivisionError: of the solver" in lines[0]
+
+
+def test_statistics_are_those_of_all_numbers(tmp_path: Path, closed_form: ClosedForm) -> None:
+    run(tmp_path / "s.zarr")
+    values = open_store(tmp_path / "s.zarr")["mu1"].values
+    found = summary_statistics(tmp_path / "s.zarr")["mu1"]
+    assert found["count"] == POINTS - FAILED
+    assert found["mean"] == pytest.approx(np.nanmean(values), rel=1e-14)
+    assert found["std"] == pytest.approx(np.nanstd(values), rel=1e-14)
+    assert (found["min"], found["max"]) == (np.nanmin(values), np.nanmax(values))
+
+
+def test_exports_hold_what_the_store_holds(tmp_path: Path, closed_form: ClosedForm) -> None:
+    import pandas as pd
+
+    out = tmp_path / "s.zarr"
+    run(out)
+    values = open_store(out)["mu1"].values
+    for suffix in ("nc", "csv", "parquet"):
+        assert export_store(out, tmp_path / f"s.{suffix}") == POINTS
+    with xarray.open_dataset(tmp_path / "s.nc") as found:
+        assert np.array_equal(found["mu1"].values, values, equal_nan=True)
+        assert found["mu1"].attrs["units"] == "1"
+        assert str(found["law"].values) == "rice-ruina"
+        assert set(open_store(out).coords) == set(found.coords)
+    for table in (pd.read_csv(tmp_path / "s.csv"), pd.read_parquet(tmp_path / "s.parquet")):
+        both = table.merge(pd.DataFrame({"K": [1.0, 2.0, 3.0]}), on="K")
+        wide = both.pivot_table(index="K", columns="epsilon", values="mu1", dropna=False)
+        assert np.array_equal(wide.to_numpy(), values, equal_nan=True)
+        assert set(table["outcome"]) == {"converged", "folded", "stopped"}
+    with pytest.raises(InputError, match=r"end in \.nc, \.csv, \.parquet"):
+        export_store(out, tmp_path / "s.xlsx")
+
+
+def test_every_run_is_on_record(tmp_path: Path, closed_form: ClosedForm) -> None:
+    run(tmp_path / "s.zarr")
+    run(tmp_path / "s.zarr")
+    first, second = store_status(tmp_path / "s.zarr").runs
+    assert (first["points_solved"], second["points_solved"]) == (POINTS, 0)
+    assert first["workers"] == "this process"
+    assert first["jax"]
+    attributes = open_store(tmp_path / "s.zarr").attrs
+    assert "Bureau" in "".join(attributes["references"])
+    assert json.loads(attributes["plan"])["numbers"]["W0"] == 7.0
