@@ -99,7 +99,7 @@ def test_points_go_from_method_to_method_until_one_solves_them():
 
 def test_an_unresolved_orbit_of_another_branch_is_not_reported(monkeypatch):
     problem = points(np.array([2.0]) * KC, 40.0, 0.6)
-    another = InitialGuess.none(problem, 1)._replace(found=np.array([True]))
+    another = InitialGuess.none(problem, 1)._replace(solved=np.array([True]))
 
     def unresolved(problem, solution, orbit, index, options, meshes):
         solution.outcome[index], solution.detail[index] = Outcome.NOT_RESOLVED, np.inf
