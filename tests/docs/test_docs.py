@@ -71,6 +71,18 @@ def test_the_nomenclature_has_the_response_and_the_machine() -> None:
     assert "omega" in code(PAGES["nomenclature.md"])
 
 
+def test_every_proof_that_the_page_names_is_there() -> None:
+    page = PAGES["what_is_proven.md"]
+    rows = [row.split(" | ")[2] for row in page.splitlines() if row.count(" | ") == 3]
+    named = {name for row in rows for name in re.findall(r"`([\w/]+(?:\.py)?)`", row)}
+    assert len(named) > 30
+    assert {name for name in named if not (ROOT / "tests" / name).exists()} == set()
+    rooms = {path.name for path in (ROOT / "tests").iterdir() if path.is_dir()}
+    assert {name.split("/")[0] for name in named} <= rooms | {"test_architecture.py"}
+    for name in re.findall(r"`benchmarks\.(\w+)`", page):
+        assert (ROOT / "benchmarks" / f"{name}.py").is_file()
+
+
 @pytest.mark.parametrize("command", sorted(main.modules))
 def test_every_command_and_option_has_its_place(command) -> None:
     page = PAGES["command_line.md"]
