@@ -6,6 +6,7 @@ from asperity.experiment.amplitudes.series import amplitude_series
 from asperity.experiment.exciter import Exciter
 from asperity.experiment.gain import channel_gain
 from asperity.experiment.loading import ElasticLength, elastic_length, loading_recording
+from asperity.experiment.motion import DISPLACEMENT, DRIVE, FORCE, LOAD
 from asperity.experiment.recipes import (
     SlideHoldSlide,
     VelocitySteps,
@@ -14,6 +15,10 @@ from asperity.experiment.recipes import (
 )
 
 __all__ = [
+    "DISPLACEMENT",
+    "DRIVE",
+    "FORCE",
+    "LOAD",
     "AmplitudeMotion",
     "AmplitudePoint",
     "AmplitudeSeries",

@@ -16,7 +16,7 @@ from asperity._version import __version__
 #: Packages that the numbers come from.
 _PACKAGES = ("jax", "jaxlib", "numpy", "scipy")
 #: Parts of this package that do not compute a number of a sweep.
-_ASIDE = ("app", "cli", "experiment", "figures", "fit_report", "papers", "recording")
+_ASIDE = ("app", "cli", "experiment", "figures", "fit_report", "ledger", "recording")
 
 
 def package_version(package: str) -> str:
