@@ -95,7 +95,7 @@ def test_a_mistake_in_the_words_is_refused(installed, old, new, message):
         ("checks.py", '{"weight": 9.80665 * numbers.M}', "9.8", "that returns numbers by name"),
         ("claims.toml", "{weight:.1f}", "{wight:.1f}", "got '{wight}'; did you mean 'weight'?"),
         ("checks.py", "import math", "import nothing_here", "toy_papers_2020.checks must be code"),
-        ("figures.py", "return WORDS", "return 1 or WORDS", "swing must be a PaperFigure"),
+        ("figures.py", "return figure_words", "return 1 or figure_words", "swing must be a PaperFigure"),
         ("figures.py", '"block", "t"', '"ball", "t"', "curves must be computed, got 'block'"),
         ("figures.toml", 'color = "grey"', 'colour = "grey"', "draw must be code that"),
         ("figures.toml", 'y = "x"', 'z = "x"', "swing.plot.panel.0.y must be valid"),

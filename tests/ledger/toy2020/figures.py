@@ -5,7 +5,6 @@ import pandas as pd
 
 from asperity.ledger import FigureNumbers, FigureTable, figure_words
 
-WORDS = figure_words(__package__).figures
 COLUMNS = {"curve": "name of the curve", "t": "s; time", "x": "m; position"}
 
 
@@ -14,7 +13,7 @@ def swing():
     data = pd.DataFrame({"curve": "block", "t": t, "x": np.cos(10.0 * t)})
     numbers = FigureNumbers("swing", data, COLUMNS, {"frequency": 10.0 / (2 * np.pi)})
     table = FigureTable("swing", data, ("the block's motion",), COLUMNS)
-    return WORDS["swing"].figure(numbers, (table,))
+    return figure_words(__package__).figures["swing"].figure(numbers, (table,))
 
 
 FIGURES = (swing,)
