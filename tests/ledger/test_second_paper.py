@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from asperity.app.api import paper as paper_tab
 from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.ledger import available, find_paper
@@ -67,6 +68,18 @@ def test_the_second_paper_is_reproduced_by_its_name(installed, tmp_path):
     assert record["counts"]["test"]["reproduced"] == 1
 
 
+def test_the_page_of_the_browser_has_the_second_paper_by_its_name(installed):
+    overview = paper_tab.overview(paper_tab.ChosenPaper(paper="toy2020"))
+    assert {"name": "toy2020", "short": "Toy (2020)"} in overview["papers"]
+    assert overview["paper"]["title"] == "A block on a spring"
+    assert overview["figures"] == []  # none that can be moved
+    sent = []
+    answer = paper_tab.ledger({"paper": "toy2020"}, lambda **message: sent.append(message))
+    assert [claim["computed"] for claim in answer["claims"]] == ["1.592 Hz", "9.8 N"]
+    assert sent[-1] == {"finished": 2, "total": 2}
+    assert find_paper().name == "bureau2000"  # the first in alphabetical order
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -95,7 +108,12 @@ def test_a_mistake_in_the_words_is_refused(installed, old, new, message):
         ("checks.py", '{"weight": 9.80665 * numbers.M}', "9.8", "that returns numbers by name"),
         ("claims.toml", "{weight:.1f}", "{wight:.1f}", "got '{wight}'; did you mean 'weight'?"),
         ("checks.py", "import math", "import nothing_here", "toy_papers_2020.checks must be code"),
-        ("figures.py", "return figure_words", "return 1 or figure_words", "swing must be a PaperFigure"),
+        (
+            "figures.py",
+            "return figure_words",
+            "return 1 or figure_words",
+            "swing must be a PaperFigure",
+        ),
         ("figures.py", '"block", "t"', '"ball", "t"', "curves must be computed, got 'block'"),
         ("figures.toml", 'color = "grey"', 'colour = "grey"', "draw must be code that"),
         ("figures.toml", 'y = "x"', 'z = "x"', "swing.plot.panel.0.y must be valid"),

@@ -89,7 +89,7 @@ class RecipeNumber:
     published_place : str
         Section of the paper.
     upper_limit : float or None
-        At 95 % confidence, of a number of which only that is asked.
+        At 95 % confidence, of a number that is only bounded.
     """
 
     name: str

@@ -1,8 +1,8 @@
 """Acceptance rules: when a computed number counts as what the paper states.
 
 The meaning of each word is fixed here, once, before anything is computed, and holds for every claim
-that uses the word. claims.toml names the rule and the word; nobody writes a tolerance beside a
-result.
+that uses the word. claims.toml names the rule and the word; nobody writes a tolerance next to
+a result.
 
 ==============================  =========================================================
 the paper writes                accepted

@@ -25,9 +25,9 @@ class _Filler(Formatter):
 
 
 def _parts(field: str) -> tuple[str | None, str]:
-    found = _FIELD.fullmatch(field)
-    assert found is not None  # the pattern takes every text
-    return found[1], found[2]
+    match = _FIELD.fullmatch(field)
+    assert match is not None  # the pattern takes every text
+    return match[1], match[2]
 
 
 def names_in(sentence: str) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The paper's own way from measurements to numbers, step by step, on data of the same kind.
+"""The paper's way from measurements to numbers, step by step, on data of the same kind.
 
 1. A - B is the slope of the mean friction with ln V, without modulation (section III).
 2. At the bifurcation between steady sliding and stick-slip, K/W0 = (B - A)/D0 and
@@ -308,7 +308,7 @@ def _start_of_least_squares(steady: LockInTable, log_v: Float, thresholds: Thres
     )
 
 
-#: Step of each number of steady sliding and bifurcation, and how it is found.
+#: Step of each number of steady sliding and bifurcation, and what it is read from.
 _HOW = {
     "mu0": (1, "mean friction at V0"),
     "B - A": (1, "slope of the mean friction with ln V"),
@@ -422,13 +422,13 @@ class _SingleFits:
 
 
 def _with_published(
-    name: str, value: float, se: float, own: float, step: int, how: str
+    name: str, value: float, se: float, se_alone: float, step: int, how: str
 ) -> RecipeNumber:
     """A number with the paper's."""
     material = printed()
     unit = {"D0": "m", "lambda": "m"}.get(name, "")
     if name not in _PUBLISHED:
-        return RecipeNumber(name, unit, value, se, own, step, how, None, None, "")
+        return RecipeNumber(name, unit, value, se, se_alone, step, how, None, None, "")
     key, uncertain = _PUBLISHED[name]
     number, with_uncertainty = material[key], material[uncertain or key]
     uncertainty = with_uncertainty.si_uncertainty
@@ -437,7 +437,7 @@ def _with_published(
         unit,
         value,
         se,
-        own,
+        se_alone,
         step,
         how,
         float(number.si),

@@ -101,7 +101,7 @@ def ratio(a: Read, b: Read) -> Read:
 
 
 def with_model(points: pd.DataFrame, lines: pd.DataFrame) -> pd.DataFrame:
-    """Points with the model's values, from the lines' own operating points.
+    """Points with the model's values, from the operating points of the lines.
 
     Raises
     ------
