@@ -31,6 +31,8 @@ from asperity_papers.bureau2000 import checks
 from asperity_papers.bureau2000.checks import features, perturbation
 from asperity_papers.bureau2000.machine import APPLIED, EXT, Machine
 
+pytestmark = pytest.mark.slow
+
 #: What is not reproduced. A verdict that turns has to be looked at, and its `why` rewritten.
 MISPRINTS = {
     "steady-position",
@@ -240,7 +242,7 @@ def test_inertia_depends_on_lambda(varied):
     assert (low, high) == (pytest.approx(-0.11, abs=0.01), pytest.approx(0.17, abs=0.01))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("uncertainty", PAPER.contents.uncertainty, ids=lambda u: u.quantity)
 def test_every_number_that_rests_on_an_uncertain_quantity_says_so(claims, uncertainty):
     """Differences of formulas from an integration and identities rest on it in name only."""

@@ -10,6 +10,8 @@ from asperity_papers.bureau2000.figures import draw
 from asperity_papers.bureau2000.harmonics import late_over_early_slope, pulse_limit
 from asperity_papers.bureau2000.machine import Machine
 
+pytestmark = pytest.mark.slow
+
 SLOW, FAST = "1 um/s", "10 um/s"
 
 

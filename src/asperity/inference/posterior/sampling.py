@@ -35,7 +35,7 @@ from asperity.inference.posterior.nuts import (
 )
 from asperity.inference.posterior.posterior import Posterior, posterior_of
 from asperity.inference.posterior.prior_density import PriorDensity
-from asperity.orbit.processes import available_cores
+from asperity.orbit.search import available_cores
 from asperity.outputs import Interrupted, UnfinishedText
 
 Float = NDArray[np.float64]
