@@ -1,6 +1,7 @@
 """Imports point one way, and nothing of one machine is left in a file."""
 
 import ast
+import importlib
 import re
 import shutil
 import subprocess
@@ -49,17 +50,20 @@ MAY_IMPORT: dict[str, set[str]] = {
     "study": _RESULTS | {"operating_point", "protocol", "inference"},  # varies all of these
     "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material
-    "papers": _RESULTS | _STUDIES | {"figures", "inference"},
+    "ledger": _BASE | {"materials", "figures"},  # knows no paper: papers are users of the library
     "app": _RESULTS
     | _STUDIES
-    | {"inference", "figures", "operating_point", "papers", "fit_report"},
+    | {"inference", "figures", "operating_point", "ledger", "fit_report"},
     "cli": _RESULTS
     | _STUDIES
-    | {"inference", "figures", "operating_point", "papers", "app", "fit_report"},
+    | {"inference", "figures", "operating_point", "ledger", "app", "fit_report"},
     "__main__": {"cli"},
     # The package itself names its rooms as text, and imports them when they are asked for.
     "__init__": {"_version"},
 }
+
+#: The papers: users of the library, found by an entry point.
+PAPERS = ROOT / "src" / "asperity_papers"
 
 # Put together here, so that this file does not hold what it looks for.
 _HOSTS = ["pypi" + ".org", "files.python" + "hosted", "test.pypi" + ".org"]
@@ -148,6 +152,27 @@ def rooms_in_a_cycle(allowed: dict[str, set[str]]) -> set[str]:
     return set(rest)
 
 
+def private_names(source: str) -> list[str]:
+    """What a module imports from the library that is not public, with the line.
+
+    Public are the package, its rooms, and the names that a room lists in ``__all__``.
+    """
+    rooms = importlib.import_module("asperity").__all__
+    private = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            names = [a.name for a in node.names if a.name.startswith("asperity.")]
+        elif isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "asperity":
+            module = node.module or ""
+            is_public = module == "asperity" or module.removeprefix("asperity.") in rooms
+            listed = importlib.import_module(module).__all__ if is_public else ()
+            names = [f"{module}.{a.name}" for a in node.names if a.name not in listed]
+        else:
+            continue
+        private += [f"{node.lineno}: {name}" for name in names]
+    return private
+
+
 def repository_files() -> list[Path]:
     """Text files that are, or would be, part of the repository."""
     if shutil.which("git") and (ROOT / ".git").exists():
@@ -227,6 +252,38 @@ def test_a_planted_wrong_import_is_caught(
     (tmp_path / room / "planted.py").write_text(line, encoding="utf-8")
     (found,) = wrong_imports(tmp_path)
     assert found.endswith(f"{room} -> {target}")
+
+
+def test_papers_use_public_names_only() -> None:
+    modules = sorted(PAPERS.rglob("*.py"))
+    assert len(modules) > 10
+    private = {str(m.relative_to(PAPERS)): private_names(m.read_text("utf-8")) for m in modules}
+    assert {name: lines for name, lines in private.items() if lines} == {}
+
+
+def test_the_library_imports_no_paper() -> None:
+    modules = {str(m.relative_to(PACKAGE)): m.read_text("utf-8") for m in PACKAGE.rglob("*.py")}
+    assert [name for name, text in modules.items() if "asperity_papers" in text] == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "import asperity.orbit.search",
+        "from asperity.orbit.search import find_orbits",
+        "from asperity.orbit import search",
+        "from asperity import _version",
+        "from asperity.errors import closest",
+        "def f():\n    from asperity.inference.tables.term import Forward",
+    ],
+)
+def test_a_planted_private_name_is_caught(line: str) -> None:
+    assert len(private_names(line)) == 1
+
+
+def test_public_names_pass() -> None:
+    public = "import asperity as asp\nfrom asperity import Slider, theory\n"
+    assert private_names(f"{public}from asperity.theory import closed_forms as cf\n") == []
 
 
 def test_right_imports_pass(tmp_path: Path) -> None:

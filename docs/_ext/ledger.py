@@ -16,7 +16,7 @@ from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 
 if TYPE_CHECKING:
-    from asperity.papers.ledger import Claim
+    from asperity.ledger import Claim
 
 _WHICH = ("counts", "exceptions", "reproduced")
 _KINDS = {"fit": "fits", "arithmetic": "arithmetic", "identity": "identities"}
@@ -24,7 +24,7 @@ _KINDS = {"fit": "fits", "arithmetic": "arithmetic", "identity": "identities"}
 
 @cache
 def _claims() -> Sequence[Claim]:
-    from asperity.papers import find_paper
+    from asperity.ledger import find_paper
 
     return find_paper("bureau2000").ledger(sensitivity=True)
 
@@ -54,7 +54,7 @@ class Claims(SphinxDirective):
 
 def _found(claim: Claim) -> str:
     """What was computed, and what becomes of it within the uncertainties."""
-    from asperity.papers.report.ledger import sensitivity_text
+    from asperity.ledger.page import sensitivity_text
 
     text = sensitivity_text(claim)
     return f"{claim.computed}. Within the uncertainties: {text}" if text else claim.computed

@@ -5,13 +5,16 @@ from pathlib import Path
 import numpy as np
 
 from asperity.figures.style import style
-from asperity.papers.bureau2000.figures.stabilisation import draw_stabilisation
-from asperity.papers.bureau2000.numbers.machine import slider
-from asperity.papers.bureau2000.stabilisation import resonance_map, stabilisation_diagram
 from asperity.study.map import Axis
 from asperity.study.threshold import natural_scales
+from asperity_papers.bureau2000.machine import Machine
+from asperity_papers.bureau2000.stability import (
+    draw_stabilisation,
+    resonance_map,
+    stabilisation_diagram,
+)
 
-_, f_c = natural_scales(slider("elasto-plastic"), 1e-6)
+_, f_c = natural_scales(Machine().slider("elasto-plastic"), 1e-6)
 frequencies = f_c * np.concatenate([np.geomspace(1.0, 4.2, 22), np.geomspace(5.0, 300.0, 9)])
 cuts = stabilisation_diagram(np.linspace(0.005, 0.3, 25), frequencies)
 plane = resonance_map(Axis("frequency", 600.0, 1100.0, 51), Axis("epsilon", 0.02, 0.3, 29))

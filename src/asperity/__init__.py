@@ -17,12 +17,12 @@ if TYPE_CHECKING:
         figures,
         inference,
         laws,
+        ledger,
         loads,
         lock_in,
         materials,
         measurement,
         orbit,
-        papers,
         parameters,
         protocol,
         recording,
@@ -47,6 +47,7 @@ if TYPE_CHECKING:
     from asperity.recording.readers import read
     from asperity.slider import Slider
     from asperity.study.map import response_map as map
+    from asperity.study.threshold import stiffness_threshold
     from asperity.theory import perturbation_response
     from asperity.transients import transient
 
@@ -67,6 +68,7 @@ _HOMES = {
     "run": ("protocol.run", "run_experiment"),
     "sensitivities": ("orbit", "sensitivities"),
     "stability_boundary": ("branches", "stability_boundary"),
+    "stiffness_threshold": ("study.threshold", "stiffness_threshold"),
     "transient": ("transients", "transient"),
 }
 
@@ -84,6 +86,7 @@ __all__ = [
     "figures",
     "inference",
     "laws",
+    "ledger",
     "loads",
     "lock_in",
     "map",
@@ -91,7 +94,6 @@ __all__ = [
     "measure",
     "measurement",
     "orbit",
-    "papers",
     "parameters",
     "periodic_response",
     "perturbation_response",
@@ -103,6 +105,7 @@ __all__ = [
     "sensitivities",
     "slider",
     "stability_boundary",
+    "stiffness_threshold",
     "study",
     "theory",
     "transient",
@@ -118,7 +121,7 @@ def __getattr__(name: str) -> object:
     if name in _HOMES:
         room, there = _HOMES[name]
         value = getattr(import_module(f"asperity.{room}"), there)
-    elif name == "sweep":  # the earlier name of the room
+    elif name == "sweep":  # what a study is called where it is run
         value = import_module("asperity.study")
     elif name in __all__:
         value = import_module(f"asperity.{name}")

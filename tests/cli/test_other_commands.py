@@ -1,8 +1,6 @@
 """`asperity air`, `materials` and `reproduce`."""
 
 import json
-import sys
-import types
 from pathlib import Path
 
 import pytest
@@ -108,9 +106,7 @@ def test_reproduce_prints_the_summary(
         (out / "index.html").write_text("", encoding="utf-8")
         return Summary(failed)
 
-    paper = types.ModuleType("asperity.papers.report")
-    paper.reproduce = reproduce  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "asperity.papers.report", paper)
+    monkeypatch.setattr("asperity.ledger.reproduce", reproduce)
     out = tmp_path / "new" / "report"
     shown = asperity("reproduce", "--out", out)
     assert shown.exit_code == code
@@ -125,9 +121,7 @@ def test_an_interrupted_reproduction_says_how_to_go_on(
     def reproduce(paper, out: Path, progress, data) -> Summary:
         raise KeyboardInterrupt
 
-    paper = types.ModuleType("asperity.papers.report")
-    paper.reproduce = reproduce  # type: ignore[attr-defined]
-    monkeypatch.setitem(sys.modules, "asperity.papers.report", paper)
+    monkeypatch.setattr("asperity.ledger.reproduce", reproduce)
     shown = asperity("reproduce", "--out", tmp_path)
     assert shown.exit_code == 130
     assert "is as it was, repeat the command" in shown.stderr

@@ -6,9 +6,9 @@ from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity import materials
-from asperity.papers.bureau2000.stabilisation import resonance_map
 from asperity.study.map import Axis
 from asperity.study.threshold import natural_scales, stiffness_threshold
+from asperity_papers.bureau2000.stability import resonance_map
 
 PMMA = materials.load("bureau2000")
 SLIDERS = {

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import importlib.util
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +11,7 @@ from asperity.cli.options import json_option, settings_of
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
-    from asperity.papers.bureau2000.recipe import RecipeResult
+    from asperity.ledger import RecipeResult
 
 _EPILOG = """\b
 Example:
@@ -56,30 +54,31 @@ def recipe(
     from asperity.cli.progress import bar
     from asperity.cli.report import to_json
     from asperity.inference.tables.table import joined
-    from asperity.papers import find_paper
+    from asperity.ledger import available, find_paper
 
-    package = find_paper(paper).package
-    if importlib.util.find_spec(f"{package}.recipe") is None:
+    if not find_paper(paper).has("recipe"):
+        others = [name for name in available() if find_paper(name).has("recipe")]
         raise InputError(
-            f"paper must have a recipe, got '{paper}', which has none; bureau2000 has one"
+            f"paper must have a recipe, got '{paper}', which has none; "
+            f"name {' or '.join(others) or 'another paper'}"
         )
-    steps: Any = importlib.import_module(f"{package}.recipe")
+    steps: Any = find_paper(paper).module("recipe")
     bifurcations = steps.read_thresholds(thresholds)
     tables = [inference.read_table(path) for path in readings]
     table = tables[0] if len(tables) == 1 else joined(tables)[0]
     fixed = settings_of(fixes, "--fix")
     with bar("step") as update:
-        found = steps.paper_procedure(table, bifurcations, fixed=fixed, progress=update)
-    click.echo(to_json(found.record()) if as_json else recipe_text(found))
+        result = steps.paper_procedure(table, bifurcations, fixed=fixed, progress=update)
+    click.echo(to_json(result.record()) if as_json else recipe_text(result))
     return 0
 
 
-def recipe_text(found: RecipeResult) -> str:
+def recipe_text(result: RecipeResult) -> str:
     """Numbers beside the paper's, as a person reads them."""
     from asperity.cli.report import aligned
 
     rows = [("step", "", "here", "paper", "", "from")]
-    for name, r in found.numbers.items():
+    for name, r in result.numbers.items():
         here = f"{r.value:.4g} +- {r.se:.2g} {r.unit}".rstrip()
         if r.upper_limit is not None:
             here = f"below {r.upper_limit:.3g} (95 %)"
@@ -91,4 +90,4 @@ def recipe_text(found: RecipeResult) -> str:
             paper = f"{paper} {r.unit}".rstrip() + f" ({r.published_place})"
         apart = "" if r.deviation is None else f"{r.deviation:+.1f} s.d."
         rows.append((str(r.step), name, here, paper, apart, r.how))
-    return "\n".join([aligned(rows), *(f"warning: {w}" for w in found.warnings)])
+    return "\n".join([aligned(rows), *(f"warning: {w}" for w in result.warnings)])

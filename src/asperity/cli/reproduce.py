@@ -8,7 +8,7 @@ import click
 
 
 @click.command(epilog="Example: asperity reproduce --out report")
-@click.argument("paper", default="bureau2000")
+@click.argument("paper", required=False)
 @click.option(
     "--out", type=Path, metavar="DIR", required=True, help="Folder for the report; made if absent."
 )
@@ -19,22 +19,21 @@ import click
     help="Measured or digitised points to draw and to compare with the curves; columns figure, "
     "observable, series, x, y, y_err, source.",
 )
-def reproduce(paper: str, out: Path, data: Path | None) -> int:
-    """Reproduce a PAPER; bureau2000, Bureau, Baumberger and Caroli (2000), if none is named.
+def reproduce(paper: str | None, out: Path, data: Path | None) -> int:
+    """Reproduce a PAPER, the first one in alphabetical order if none is named.
 
     Writes the figures (PNG, PDF and CSV), claims.json, claims.csv and index.html, which is the
-    place to start reading; with --data also agreement.json and data/points.csv. Other papers are
-    found as entry points of the group asperity.papers.
+    place to start reading; with --data also agreement.json and data/points.csv. Papers are found
+    as entry points of the group asperity.papers.
     """
     from asperity.cli.progress import bar
-    from asperity.papers import find_paper
-    from asperity.papers.report import reproduce as reproduce_paper
+    from asperity.ledger import find_paper
+    from asperity.ledger import reproduce as reproduce_paper
 
-    found = find_paper(paper)
     try:
         with bar("step") as update:
             summary = reproduce_paper(
-                found,
+                find_paper(paper),
                 out,
                 progress=update,
                 data=data,

@@ -9,6 +9,7 @@ from asperity.experiment.amplitudes import (
 )
 from asperity.experiment.exciter import Exciter
 from asperity.experiment.loading import ElasticLength, elastic_length, loading_recording
+from asperity.experiment.motion import DISPLACEMENT, DRIVE, FORCE, LOAD
 from asperity.experiment.recipes import (
     SlideHoldSlide,
     VelocitySteps,
@@ -18,6 +19,10 @@ from asperity.experiment.recipes import (
 from asperity.tribometer.tribometer import channel_gain
 
 __all__ = [
+    "DISPLACEMENT",
+    "DRIVE",
+    "FORCE",
+    "LOAD",
     "AmplitudeMotion",
     "AmplitudePoint",
     "AmplitudeSeries",

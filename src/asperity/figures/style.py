@@ -10,9 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.resources import as_file, files
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
-from matplotlib.figure import Figure
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 RICE_RUINA = "#0072B2"
 LINKER_DIETERICH = "#D55E00"
@@ -24,12 +25,34 @@ GREY = "#767676"
 #: Curves that count the mass of the slider, beside the same law without it.
 INERTIA = "#2B2B33"
 
+#: A variant of a law, or of the machine.
+VARIANT = "#C05A00"
+#: Measured and simulated points.
+POINTS = "#B3261E"
+
 SLOW, FAST = "solid", "dashed"
+
+#: The same by name, for figures that are described in a file.
+COLOURS = {
+    "rice-ruina": RICE_RUINA,
+    "linker-dieterich": LINKER_DIETERICH,
+    "linker-dieterich-low": LINKER_DIETERICH_LOW,
+    "elasto-plastic": ELASTO_PLASTIC,
+    "inertia": INERTIA,
+    "variant": VARIANT,
+    "stated": STATED,
+    "stated-fill": STATED_FILL,
+    "points": POINTS,
+    "grey": GREY,
+}
+DASHES = {"slow": SLOW, "fast": FAST}
 
 
 @contextmanager
 def style() -> Iterator[None]:
     """The project's style, for making and for saving figures; the user's own is left as it was."""
+    import matplotlib as mpl
+
     with as_file(files("asperity.figures") / "asperity.mplstyle") as path:
         settings = mpl.rc_params_from_file(path, use_default_template=True)
     # The template holds the backend and would switch it; files are written by the figure itself.
@@ -40,4 +63,6 @@ def style() -> Iterator[None]:
 
 def new_figure(width: float = 5.0, height: float = 3.5) -> Figure:
     """An empty figure (inches), not registered with pyplot."""
+    from matplotlib.figure import Figure
+
     return Figure(figsize=(width, height))

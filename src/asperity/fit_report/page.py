@@ -19,7 +19,7 @@ def document(title: str, kicker: str, heading: str, sections: Mapping[str, str])
     sections : mapping of str to str
         HTML by heading.
     """
-    style = files("asperity.papers.report").joinpath("page.css").read_text(encoding="utf-8")
+    style = files("asperity.ledger").joinpath("page.css").read_text(encoding="utf-8")
     body = "\n".join(
         f'<section aria-label="{escape(name)}"><h2>{escape(name)}</h2>\n{content}\n</section>'
         for name, content in sections.items()

@@ -3,7 +3,9 @@
 from asperity.inference.comparison.compare import Comparison, Judged, compare
 from asperity.inference.design import Design, DesignPlan, design, plan_of, read_plan
 from asperity.inference.fitting.fit import fit
+from asperity.inference.fitting.intervals import bounded_interval
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
+from asperity.inference.fitting.shift import shift_of_estimates
 from asperity.inference.fitting.windows import WindowedFit, WindowEstimate, fit_windows
 from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.posterior import Posterior, sample_posterior
@@ -31,6 +33,7 @@ __all__ = [
     "RunOptions",
     "WindowEstimate",
     "WindowedFit",
+    "bounded_interval",
     "compare",
     "design",
     "fit",
@@ -41,5 +44,6 @@ __all__ = [
     "read_table",
     "recorded_run",
     "sample_posterior",
+    "shift_of_estimates",
     "table_of",
 ]

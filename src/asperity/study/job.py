@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 #: Packages that the numbers come from.
 _PACKAGES = ("jax", "jaxlib", "numpy", "scipy")
 #: Parts of this package that do not compute a number of a sweep.
-_ASIDE = ("app", "cli", "experiment", "figures", "fit_report", "papers", "recording")
+_ASIDE = ("app", "cli", "experiment", "figures", "fit_report", "ledger", "recording")
 
 
 class SupersededError(RuntimeError):

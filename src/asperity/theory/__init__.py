@@ -1,5 +1,15 @@
 """Closed forms and limits: averaged, adiabatic, first and second order in eps."""
 
+from asperity.theory import closed_forms
+from asperity.theory.ageing_response import AgeingResponse, ageing_response
+from asperity.theory.closed_forms import SmallModulation
 from asperity.theory.perturbation import PerturbationResponse, perturbation_response
 
-__all__ = ["PerturbationResponse", "perturbation_response"]
+__all__ = [
+    "AgeingResponse",
+    "PerturbationResponse",
+    "SmallModulation",
+    "ageing_response",
+    "closed_forms",
+    "perturbation_response",
+]

@@ -3,9 +3,12 @@
 import numpy as np
 import pytest
 
-from asperity.papers.bureau2000 import numbers as study
-from asperity.papers.bureau2000.numbers.bands import band, variations
-from asperity.papers.bureau2000.numbers.harmonics import late_over_early_slope, pulse_limit
+from asperity.figures.style import style
+from asperity.ledger import FigureNumbers
+from asperity_papers.bureau2000.curves import WORDS, variations
+from asperity_papers.bureau2000.figures import draw
+from asperity_papers.bureau2000.harmonics import late_over_early_slope, pulse_limit
+from asperity_papers.bureau2000.machine import Machine
 
 pytestmark = pytest.mark.slow
 
@@ -25,8 +28,9 @@ def test_every_figure_with_curves_is_there(figures):
     assert sorted(figures) == [f"figure-{n:02}" for n in numbers]
     for figure in figures.values():
         assert list(figure.data.columns) == list(figure.columns)
-        assert figure.caption
-        assert figure.alt
+        words = WORDS.figures[figure.name].figure(figure, ())
+        assert words.caption
+        assert words.alt
     for figure in over_amplitude(figures):
         assert not figure.data[["V", "epsilon_eff", "mean_friction", "mu1"]].isna().any().any()
 
@@ -127,8 +131,10 @@ def test_rice_ruina_harmonics_are_proportional_to_velocity_and_saturate(figures)
     for curve, V in ((SLOW, 1e-6), (FAST, 1e-5)):
         assert late_over_early_slope(figure, curve, "mu1") < 0.1
         assert late_over_early_slope(figure, curve, "mu2") < 0.3
-        assert 0.95 * pulse_limit(V) < end(figure, curve, "mu1") < pulse_limit(V)
-        assert end(figure, curve, "mu2") < pulse_limit(V) / 2
+        assert (
+            0.95 * pulse_limit(Machine(), V) < end(figure, curve, "mu1") < pulse_limit(Machine(), V)
+        )
+        assert end(figure, curve, "mu2") < pulse_limit(Machine(), V) / 2
 
 
 def test_linker_dieterich(figures):
@@ -159,14 +165,25 @@ def test_uncertainties_move_the_drop_as_computed_elsewhere(figures):
     assert -200 * read["drop A high"] == pytest.approx(19.0, abs=0.05)
 
 
-def test_a_band_holds_every_curve_that_it_is_made_of(figures):
-    figure = figures["figure-11"]
-    low, high = band(figure, SLOW, "mu1", ("A", "B", "lambda"))
-    for name in [SLOW, *(f"{SLOW}, {end}" for end in variations())]:
-        rows = figure.curve(name)["mu1"].to_numpy()
-        assert (low <= rows).all()
-        assert (rows <= high).all()
-    assert (high > low)[1:].all()
+def test_bands_are_of_the_curves_at_the_ends_of_the_uncertainties():
+    ends = variations(Machine())
+    for name, groups in {
+        "figure-02": [("A", "B", "lambda")],
+        "figure-04": [("A", "B", "lambda")],
+        "figure-11": [("lambda",), ("A", "B")],
+    }.items():
+        bands = [set(item.curves) for item in WORDS.figures[name].plot.draw if item.kind == "band"]
+        for band, group in zip(bands, groups, strict=True):
+            assert band == {SLOW, *(f"{SLOW}, {end}" for end in ends if end.split()[0] in group)}
+
+
+def test_a_band_is_drawn_from_the_lowest_to_the_highest_curve(figures):
+    with style():
+        figure = draw(figures["figure-11"])
+    lengths, _ = figure.axes[1].collections
+    highest = figures["figure-11"].curve(f"{SLOW}, lambda high")
+    low, high = lengths.get_datalim(figure.axes[1].transData).intervaly
+    assert (low, high) == (0, pytest.approx(1e3 * highest["mu1"].max(), rel=1e-12))
 
 
 # At 10 um/s and eps_eff = 0.24, in percent: by a SciPy shooting of the equations with the mass.
@@ -240,17 +257,17 @@ def test_elasto_plastic_mean_is_that_of_rice_ruina(figures):
 
 
 def test_what_the_text_states():
-    seen = study.stated()
+    seen = Machine().stated()
     assert seen.epsilon_eff == pytest.approx(0.24)
     # 20 % of 0.5 at V0 = 1 um/s, and of 0.5 - 0.013 ln 10 at 10 um/s.
     assert seen.drops == pytest.approx((-0.1, -0.2 * (0.5 - 0.013 * np.log(10))))
     assert seen.mu1[0] < 1e-3 < seen.mu1[1]
     assert seen.ratio == (0.1, 0.2)
     assert seen.mu2 == pytest.approx((10**-4.5, 2 * 10**-3.5))
-    assert (seen.onset, seen.share, seen.collapse) == (0.05, 0.48, 0.4)
+    assert (seen.share, seen.collapse) == (0.48, 0.4)
 
 
 def test_a_point_that_fails_is_counted(figures):
     data = figures["figure-07"].data.copy()
     data.loc[3, "converged"] = False
-    assert study.FigureNumbers("x", "Figure 0", "", data).failed == 1
+    assert FigureNumbers("x", data, {}).failed == 1

@@ -8,7 +8,7 @@ import pytest
 from asperity import Slider, laws, periodic_response
 from asperity.errors import InputError
 from asperity.inference import table_of
-from asperity.papers.bureau2000.recipe import Thresholds, paper_procedure, read_thresholds
+from asperity_papers.bureau2000.recipe import Thresholds, paper_procedure, read_thresholds
 
 #: Not the paper's central values, so that nothing is recovered by starting there.
 TRUTH = {"mu0": 0.52, "A": 0.015, "B": 0.027, "D0": 0.45e-6, "lambda": 0.6e-6, "eps_ratio": 0.55}

@@ -11,10 +11,15 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from asperity.papers.bureau2000.numbers import stability
-from asperity.papers.bureau2000.numbers.machine import EXT, RR, slider
-from asperity.papers.bureau2000.numbers.steady import floquet_max, growth_rate, stiffness_ratio
 from asperity.slider import Slider
+from asperity_papers.bureau2000 import stability
+from asperity_papers.bureau2000.machine import (
+    EXT,
+    RR,
+    Machine,
+    steady_growth,
+    steady_multiplier,
+)
 
 MU0, A, B, D0, V0, W0, K = 0.5, 0.013, 0.026, 4e-7, 1e-6, 7.0, 2e5
 PERIOD = 1 / 120
@@ -84,7 +89,7 @@ class Equations:
 
 @pytest.fixture(scope="module")
 def figure():
-    return stability.floquet_figure()
+    return stability.floquet_figure(Machine())
 
 
 def test_rice_ruina_is_stabilised_between_10_and_15_percent(figure):
@@ -118,7 +123,7 @@ def test_stable_above_and_unstable_below(figure):
 
 def test_unmodulated_sliding_is_unstable_at_the_central_values(figure):
     assert figure.scalars["K_over_Kc"] == pytest.approx(0.88, abs=0.005)
-    assert stiffness_ratio(slider(RR)) < 1
+    assert Machine().stiffness_ratio < 1
     assert figure.scalars["steady 1e-06"] == pytest.approx(1.00125995, abs=1e-8)
 
 
@@ -126,18 +131,20 @@ def test_unmodulated_sliding_is_unstable_at_the_central_values(figure):
 @pytest.mark.parametrize("V", [1e-6, 1e-5])
 def test_closed_form_of_steady_sliding(law, lambda_, V):
     steady = Equations(V, 0.0, lambda_=lambda_)
-    assert floquet_max(slider(law), V, 120.0) == pytest.approx(steady.multiplier(), rel=1e-10)
+    assert steady_multiplier(Machine().slider(law), V, 120.0) == pytest.approx(
+        steady.multiplier(), rel=1e-10
+    )
 
 
 def test_growth_rate_vanishes_at_the_critical_stiffness():
-    chosen = slider(RR)
-    stiffness = float(chosen.K) / stiffness_ratio(chosen)
+    chosen = Machine().slider(RR)
+    stiffness = float(chosen.K) / Machine().stiffness_ratio
     critical = Slider(chosen.law, spring=stiffness, load=float(chosen.W0))
-    assert abs(growth_rate(critical, 1e-6)) < 1e-10
-    assert growth_rate(chosen, 1e-6) > 0
+    assert abs(steady_growth(critical, 1e-6)) < 1e-10
+    assert steady_growth(chosen, 1e-6) > 0
 
 
 def test_a_threshold_outside_its_bracket_is_not_invented():
     V = np.array([1e-6])
-    found = stability.thresholds("RR", V, (np.array([0.02]), np.array([0.05])))
+    found = stability.thresholds(Machine(), "RR", V, (np.array([0.02]), np.array([0.05])))
     assert np.isnan(found).all()

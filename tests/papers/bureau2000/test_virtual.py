@@ -7,11 +7,17 @@ from scipy.stats import binom
 
 import asperity as asp
 from asperity.air import AirLayer, effective_modulation
-from asperity.papers.bureau2000 import virtual as study
-from asperity.papers.bureau2000.virtual import recordings
-from asperity.papers.bureau2000.virtual.numbers import RecoveredQuantity, ratio, with_model
-from asperity.papers.bureau2000.virtual.pressure import collapse
-from asperity.papers.bureau2000.virtual.recordings import QUANTITIES
+from asperity_papers.bureau2000 import virtual as study
+from asperity_papers.bureau2000.curves import WORDS
+from asperity_papers.bureau2000.virtual import RecoveredQuantity, recordings
+from asperity_papers.bureau2000.virtual.figures import (
+    NORMAL,
+    collapse,
+    last_point,
+    ratio,
+    with_model,
+)
+from asperity_papers.bureau2000.virtual.recordings import QUANTITIES
 
 PMMA = asp.materials.load("bureau2000")
 SLOW, FAST = "1 um/s", "10 um/s"
@@ -22,7 +28,8 @@ SLIDER = asp.Slider(PMMA.law("elasto-plastic", B=B), spring=PMMA.K, load=PMMA.W0
 
 @pytest.fixture(scope="module")
 def simulated(experiment):
-    return {figure.name: figure for figure in (compute(experiment) for compute in study.VIRTUAL)}
+    figures = [compute(experiment) for compute in study.VIRTUAL]
+    return {figure.numbers.name: figure for figure in figures}
 
 
 def borne(frequency, vacuum=False):
@@ -69,12 +76,12 @@ def test_the_load_is_read_as_commanded(experiment):
 
 def test_bars_hold_the_orbits(experiment, simulated):
     """The orbits are solved without a recording; no bar is wide enough to hold anything."""
-    points = pd.concat([figure.points for figure in simulated.values()])
+    points = pd.concat([figure.numbers.points for figure in simulated.values()])
     points = points[points["epsilon_set"] > 0].drop_duplicates(["series", "epsilon_set"])
     assert len(points) == sum(map(len, experiment.values()))
     for name in QUANTITIES:
         error = np.abs(points[name] - points[f"{name}_model"])
-        hits = error < study.NORMAL * points[f"{name}_uncertainty"]
+        hits = error < NORMAL * points[f"{name}_uncertainty"]
         # At least what 95 % intervals hold, within what so many can tell at 1e-3.
         assert hits.sum() >= binom.ppf(1e-3, len(hits), 0.95), name
     for rows in experiment.values():
@@ -100,22 +107,29 @@ def test_runs_scatter_as_their_noise_asks(experiment):
 
 def test_the_table_of_points(simulated):
     for figure in simulated.values():
-        assert list(figure.points.columns) == list(study.POINT_COLUMNS)
-        assert "SIMULATED" in figure.caption
-        assert figure.alt.startswith("Simulated")
-        assert figure.failed == 0
-        uncertainty = figure.points[["mean_friction_stated", "mean_friction_scatter"]].max(axis=1)
-        np.testing.assert_array_equal(figure.points["mean_friction_uncertainty"], uncertainty)
+        assert list(figure.numbers.points.columns) == list(study.POINT_COLUMNS)
+        words = WORDS.figures[figure.numbers.name]
+        assert "SIMULATED" in words.caption
+        assert "SIMULATED" in words.plot.panel[0].title
+        assert words.alt.startswith("Simulated")
+        assert figure.numbers.failed == 0
+        uncertainty = figure.numbers.points[["mean_friction_stated", "mean_friction_scatter"]].max(
+            axis=1
+        )
+        np.testing.assert_array_equal(
+            figure.numbers.points["mean_friction_uncertainty"], uncertainty
+        )
 
 
 def test_the_model_beside_a_point_is_that_of_its_operating_point(simulated):
     for figure in simulated.values():
-        for _, row in figure.points.iterrows():
+        for _, row in figure.numbers.points.iterrows():
             if row["epsilon_set"] == 0:
                 assert row["mean_friction_model"] == pytest.approx(
                     0.5 - (B - 0.013) * np.log(row["V"] / 1e-6), rel=1e-12
                 )
-    row = simulated["virtual-05"].of("1 mbar").iloc[-1]
+    points = simulated["virtual-05"].numbers.points
+    row = points[points["series"] == "1 mbar"].iloc[-1]
     orbit = asp.periodic_response(
         SLIDER, velocity=1e-5, epsilon=0.5 * borne(200.0, vacuum=True), frequency=200.0
     )
@@ -125,9 +139,9 @@ def test_the_model_beside_a_point_is_that_of_its_operating_point(simulated):
 
 def test_a_point_without_a_line_is_an_error(simulated):
     figure = simulated["virtual-02"]
-    off = figure.points.assign(V=2e-6)
+    off = figure.numbers.points.assign(V=2e-6)
     with pytest.raises(KeyError, match="no operating point at 2e-06 m/s"):
-        with_model(off, figure.data)
+        with_model(off, figure.numbers.data)
 
 
 def test_what_the_recordings_say_is_what_the_machine_has(simulated):
@@ -141,10 +155,11 @@ def test_what_the_recordings_say_is_what_the_machine_has(simulated):
 def test_the_statements_of_the_paper_on_the_simulated_points(simulated):
     share = {f.what: f.value for f in simulated["virtual-02"].recovered}
     assert share[f"Share of the mean that ε = 0.5 takes, {SLOW}"] == pytest.approx(0.2, abs=0.01)
-    slopes = simulated["virtual-03"].scalars
+    slopes = simulated["virtual-03"].numbers.scalars
     assert slopes["slope_0"] == pytest.approx(0.013 - B, rel=0.02)
-    second = [simulated["virtual-04"].last_point(name, "mu2")[0] for name in (SLOW, FAST)]
-    first = [simulated["virtual-04"].last_point(name, "mu1")[0] for name in (SLOW, FAST)]
+    points = simulated["virtual-04"].numbers.points
+    second = [last_point(points, name, "mu2")[0] for name in (SLOW, FAST)]
+    first = [last_point(points, name, "mu1")[0] for name in (SLOW, FAST)]
     assert second[0] < second[1]
     assert all(0.1 < b / a < 0.2 for a, b in zip(first, second, strict=True))
 

@@ -7,8 +7,8 @@ import xarray
 
 from asperity.figures.map import KIND_LINES, axis_unit, draw_map, keys
 from asperity.figures.style import style
-from asperity.papers.bureau2000.figures.stabilisation import draw_stabilisation
 from asperity.study.map import SHOWN
+from asperity_papers.bureau2000.stability import draw_stabilisation
 
 
 def planted(**changes) -> xarray.Dataset:

@@ -17,7 +17,7 @@ const REST = 200;
 const KINDS = ["test", "fit", "arithmetic", "identity"];
 
 export function create(page) {
-  const view = { show: "figures", figure: "figure-02", numbers: {}, status: "", kind: "", section: "", search: "" };
+  const view = { paper: "", show: "figures", figure: "", numbers: {}, status: "", kind: "", section: "", search: "" };
   let paper = null;
   let answer = null;
   let verdicts = null;
@@ -49,13 +49,15 @@ export function create(page) {
   const switches = el("div", { class: "switch", role: "group", "aria-label": "What is shown" });
   const heading = el("h2", {}, title);
   const cite = el("p", { class: "note" });
+  const papers = el("div", { class: "papers" });
   const element = el("section", { class: "tab paper", "aria-label": title },
-    el("div", { class: "paper-head" }, heading, cite, switches), figures, ledgerView);
+    el("div", { class: "paper-head" }, papers, heading, cite, switches), figures, ledgerView);
 
   // --- The address -----------------------------------------------------------------------------
 
   function link() {
     const found = new URLSearchParams();
+    if (view.paper) found.set("paper", view.paper);
     if (view.show !== "figures") found.set("show", view.show);
     if (view.show === "figures") {
       found.set("figure", view.figure);
@@ -66,9 +68,11 @@ export function create(page) {
 
   function fromParameters(parameters) {
     view.show = parameters.get("show") === "ledger" ? "ledger" : "figures";
+    if (!paper.figures.some((f) => f.name === view.figure)) view.figure = paper.figures[0]?.name || "";
     if (paper.figures.some((f) => f.name === parameters.get("figure"))) view.figure = parameters.get("figure");
+    if (!view.figure) view.show = "ledger";
     view.numbers = {};
-    for (const { name: n } of current().numbers) {
+    for (const { name: n } of current()?.numbers || []) {
       if (!parameters.has(n)) continue;
       const text = parameters.get(n);
       view.numbers[n] = Number.isFinite(Number(text)) ? Number(text) : text;
@@ -84,7 +88,7 @@ export function create(page) {
     link();
     stopMass();
     sentence.textContent = asSentence();
-    latest.ask({ figure: view.figure, numbers: view.numbers }, null);
+    latest.ask({ paper: view.paper, figure: view.figure, numbers: view.numbers }, null);
   }
 
   function asSentence() {
@@ -102,7 +106,7 @@ export function create(page) {
     message.textContent = "";
     if (found.preparing) {
       page.say(`Preparing ${found.preparing}, once; this takes some seconds.`);
-      setTimeout(() => latest.ask({ figure: view.figure, numbers: view.numbers }, null), 500);
+      setTimeout(() => latest.ask({ paper: view.paper, figure: view.figure, numbers: view.numbers }, null), 500);
       return;
     }
     page.say("");
@@ -130,7 +134,7 @@ export function create(page) {
     massBar.removeAttribute("value");
     massStatus.textContent = "Solving the curves with the slider's mass…";
     try {
-      await run("paper/inertia", { figure: view.figure, numbers: view.numbers }, (part) => {
+      await run("paper/inertia", { paper: view.paper, figure: view.figure, numbers: view.numbers }, (part) => {
         if (signal.aborted) return;
         if (part.progress !== undefined) massBar.value = part.progress;
         if (!part.curve) return;
@@ -268,13 +272,13 @@ export function create(page) {
         el("div", { class: "choice" }, el("label", { for: id }, "Text"), filters.search)),
       el("div", { class: "summary" }, count, ledgerMessage, el("div", { class: "actions" },
         el("button", { type: "button", click: (e) => copyText(location.href, e.currentTarget) }, "Copy link"),
-        el("button", { type: "button", click: (e) => copyText(LEDGER_PYTHON, e.currentTarget) }, "Copy as Python"),
-        el("button", { type: "button", click: (e) => copyText("asperity reproduce bureau2000 --out report", e.currentTarget) }, "Copy as command"),
+        el("button", { type: "button", click: (e) => copyText(ledgerPython(), e.currentTarget) }, "Copy as Python"),
+        el("button", { type: "button", click: (e) => copyText(`asperity reproduce ${paper.paper.name} --out report`, e.currentTarget) }, "Copy as command"),
         el("button", { type: "button", click: saveLedger }, "CSV"))),
       list);
   }
 
-  const LEDGER_PYTHON = 'from asperity.papers import find_paper\n\nfor claim in find_paper("bureau2000").ledger():\n    print(claim.verdict, claim.place, claim.statement, claim.computed, sep=" | ")\n';
+  const ledgerPython = () => `from asperity.ledger import find_paper\n\nfor claim in find_paper("${paper.paper.name}").ledger():\n    print(claim.verdict, claim.place, claim.statement, claim.computed, sep=" | ")\n`;
 
   function shownClaims() {
     const words = view.search.toLowerCase().split(/\s+/).filter(Boolean);
@@ -311,7 +315,7 @@ export function create(page) {
     if (verdicts || computing) return;
     computing = new AbortController();
     try {
-      const last = await run("paper/ledger", {}, (m) => {
+      const last = await run("paper/ledger", { paper: view.paper }, (m) => {
         if (m.finished) page.say(`${m.finished} of ${m.total} claims computed`);
       }, computing.signal);
       if (last.result) verdicts = new Map(last.result.claims.map((c) => [c.id, c]));
@@ -326,10 +330,33 @@ export function create(page) {
   }
 
   function buildSwitches() {
-    fill(switches, [["figures", "Figures"], ["ledger", "Ledger"]].map(([key, text]) => el("button", {
+    const views = [["figures", "Figures"], ["ledger", "Ledger"]].filter(([key]) => key === "ledger" || paper.figures.length);
+    fill(switches, views.map(([key, text]) => el("button", {
       type: "button", "aria-pressed": String(view.show === key),
       click: () => { view.show = key; stopMass(); present(); link(); },
     }, text)));
+  }
+
+  /** Which paper, where more than one is installed. */
+  function buildPapers() {
+    fill(papers, paper.papers.length > 1 && choice("Paper", paper.papers.map((p) => [p.name, p.short]), paper.paper.name, async (value) => {
+      Object.assign(view, { paper: value, figure: "", numbers: {} });
+      await open(new URLSearchParams());
+      link();
+    }).element);
+  }
+
+  /** Ask for the words of the chosen paper, and show them. */
+  async function open(parameters) {
+    stopMass();
+    computing?.abort();
+    [answer, verdicts, computing] = [null, null, null];
+    paper = await ask("paper", { paper: view.paper });
+    heading.textContent = paper.paper.title;
+    cite.textContent = `${paper.paper.authors}, ${paper.paper.journal}`;
+    fromParameters(parameters);
+    buildPapers();
+    present();
   }
 
   function present() {
@@ -350,10 +377,11 @@ export function create(page) {
   return {
     element,
     async show(parameters) {
-      if (!paper) {
-        paper = await ask("paper", {});
-        heading.textContent = paper.paper.title;
-        cite.textContent = `${paper.paper.authors}, ${paper.paper.journal}`;
+      const wanted = parameters.get("paper") || "";
+      if (!paper || wanted !== view.paper) {
+        view.paper = wanted;
+        await open(parameters);
+        return;
       }
       fromParameters(parameters);
       present();

@@ -1,0 +1,264 @@
+"""Paper: the figures of a published paper with its numbers moved, and the ledger of its claims."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from functools import cache, partial
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from asperity.app.api.operating_point import Name, Value
+from asperity.app.endpoints import Answer, Job, Question
+from asperity.app.preparation import Preparation
+from asperity.errors import InputError, closest
+from asperity.ledger import Paper, altered, available, find_paper
+from asperity.materials import Material
+from asperity.parameters import obeying
+from asperity.units import KINDS, from_si
+
+#: A number is moved by this factor to both sides, where its slider says nothing else.
+_FACTOR = 4.0
+#: What is written into a field may differ from the printed number by this factor: farther away the
+#: equations are so stiff that curves take minutes.
+_BEYOND = 100.0
+
+_preparation: Preparation | None = None
+
+
+class ChosenPaper(Question):
+    """A request about a paper.
+
+    Attributes
+    ----------
+    paper : str
+        Its name; the first one in alphabetical order if it is empty.
+    """
+
+    paper: Name = ""
+
+
+class MovedFigure(ChosenPaper):
+    """A figure of a paper, and the numbers that are moved.
+
+    Attributes
+    ----------
+    figure : str
+    numbers : mapping of str to number or str
+        SI, or texts with units, by the names of the paper's numbers; the others are as printed.
+    """
+
+    figure: Name
+    numbers: Annotated[dict[Name, Value], Field(max_length=20, default_factory=dict)]
+
+
+@cache
+def _paper(name: str) -> Paper:
+    return find_paper(name or None)
+
+
+def use(preparation: Preparation) -> None:
+    """Let programs be compiled before they are needed."""
+    global _preparation
+    _preparation = preparation
+
+
+def preparations() -> dict[str, Callable[[], Any]]:
+    """Programs of each figure."""
+    tasks: dict[str, Callable[[], Any]] = {}
+    for name in available():
+        try:
+            figures = list(_paper(name).tab)
+        except InputError:
+            continue  # the page says what is wrong with that paper when it is opened
+        tasks |= {_task(_paper(name), f): partial(_printed_lines, name, f) for f in figures}
+    return tasks
+
+
+def _task(paper: Paper, figure: str) -> str:
+    return f"{paper.words.figures[figure].place} of {paper.name}"
+
+
+@cache
+def _printed_lines(paper: str, figure: str) -> list[dict[str, Any]]:
+    return _paper(paper).tab[figure].lines(_paper(paper).numbers)
+
+
+def overview(asked: ChosenPaper) -> dict[str, Any]:
+    """Papers, figures with their sliders, and the words of all claims; nothing is solved."""
+    paper = _paper(asked.paper)
+    about = paper.contents.paper
+    return {
+        "papers": [
+            {"name": name, "short": _paper(name).contents.paper.short} for name in available()
+        ],
+        "paper": {
+            "name": paper.name, "title": about.title, "authors": about.authors,
+            "journal": about.journal,
+        },
+        "figures": [
+            {
+                "name": name,
+                "place": words.place,
+                "title": words.short or words.title,
+                "numbers": [_slider(paper, number) for number in words.numbers],
+                "inertia": bool(paper.tab[name].slow),
+            }
+            for name, words in paper.words.figures.items()
+            if name in paper.tab
+        ],
+        "claims": [
+            {
+                "id": c.id, "place": c.place, "section": _section(c.place),
+                "statement": c.statement, "stated": c.stated, "kind": c.kind,
+                "how": " ".join(c.how.split()), "why": " ".join(c.why.split()),
+            }
+            for c in paper.contents.claim
+        ],
+    }  # fmt: skip
+
+
+def _section(place: str) -> str:
+    """The section that a place such as "Section III.A.2; Fig. 7" names first."""
+    section = re.search(r"Abstract|Appendix|Section [IVX]+(\.[A-Z])?", place)
+    return section[0] if section else "Captions"
+
+
+def _slider(paper: Paper, name: str) -> dict[str, Any]:
+    """What the page shows of a number: symbol, meaning, slider and where it is printed."""
+    number, words = paper.numbers[name], paper.words.slider.get(name)
+    symbol, meaning = paper.contents.paper.parameters.get(name, (name, ""))
+    low, high = number.si / _FACTOR, number.si * _FACTOR
+    if words is not None:
+        symbol, meaning, low, high = words.label, words.meaning, words.low, words.high
+    return {
+        "name": name,
+        "kind": number.dimension,
+        "label": symbol,
+        "meaning": meaning or number.note or name,
+        "slider": {"value": number.si, "low": low, "high": high, "log": words is None},
+        "origin": f"{number.kind}, {number.place}",
+    }
+
+
+def check(asked: MovedFigure) -> None:
+    """Refuse what cannot be drawn, before a process is asked."""
+    known = _paper(asked.paper).tab
+    if asked.figure not in known:
+        raise InputError(
+            f"figure must be one of the paper's with curves, got '{asked.figure}'; "
+            f"{closest(asked.figure, known)}"
+        )
+    _changes(asked)
+
+
+def _moved_numbers(asked: MovedFigure) -> Material:
+    """The paper's numbers with those that are moved."""
+    return altered(_paper(asked.paper).numbers, _changes(asked))
+
+
+def _changes(asked: MovedFigure) -> dict[str, float]:
+    """The moved numbers, in the units that they are printed in."""
+    paper = _paper(asked.paper)
+    known = paper.words.figures[asked.figure].numbers
+    changes = {}
+    for name, value in asked.numbers.items():
+        if name not in known:
+            raise InputError(
+                f"numbers must be those of the figure, got '{name}'; {closest(name, known)}"
+            )
+        number, slider = paper.numbers[name], paper.words.slider.get(name)
+        si = float(obeying(value, name, number.dimension, "positive"))
+        if slider is not None and not si <= slider.high:
+            raise InputError(f"{name} must be at most {slider.high:g}, got {si:g}; lower it")
+        if not number.si / _BEYOND <= si <= number.si * _BEYOND:
+            raise InputError(
+                f"{name} must be within a factor of {_BEYOND:g} of the printed {number}, got "
+                f"{f'{si:.3g} {KINDS[number.dimension].si}'.strip()}; move it nearer"
+            )
+        changes[name] = float(from_si(si, number.unit, number.dimension))
+    return changes
+
+
+def figure(asked: MovedFigure) -> dict[str, Any]:
+    """Curves of a figure as printed and with the moved numbers, and what the text states."""
+    check(asked)
+    paper, numbers = _paper(asked.paper), _moved_numbers(asked)
+    words, chosen = paper.words, paper.tab[asked.figure]
+    answer: dict[str, Any] = {
+        "numbers": {n: numbers[n].si for n in words.figures[asked.figure].numbers},
+        "python": chosen.python(_changes(asked)),
+        "command": f"asperity reproduce {paper.name} --out report",
+    }
+    task = _task(paper, asked.figure)
+    if _preparation is not None and not _preparation.want(task):
+        return {**answer, "preparing": task}
+    before = _printed_lines(paper.name, asked.figure)
+    after = chosen.lines(numbers) if asked.numbers else before
+
+    def axis(column: str) -> dict[str, Any]:
+        label = words.label.get(column, column)
+        return {"column": column, "label": label, "log": column in chosen.logarithmic}
+
+    return {
+        **answer,
+        **chosen.extras(numbers),
+        "x": axis(chosen.x),
+        "rows": [axis(column) for column in chosen.rows],
+        "printed": before,
+        "moved": after,
+        "stated": chosen.marks(numbers),
+    }
+
+
+_slow_as_printed: dict[tuple[str, str, str], dict[str, Any]] = {}
+
+
+def inertia(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
+    """Lines that take seconds, a message each: ``curve``, and ``printed`` next to it."""
+    asked = MovedFigure.model_validate(argument)
+    paper, numbers = _paper(asked.paper), _moved_numbers(asked)
+    chosen = paper.tab[asked.figure]
+    for done, name in enumerate(chosen.slow):
+        assert chosen.slow_line is not None  # a figure with slow lines has what computes them
+
+        def on_progress(points: int, total: int, done: int = done) -> None:
+            report(progress=(done + points / total) / len(chosen.slow))
+
+        key = paper.name, asked.figure, name
+        if key not in _slow_as_printed:
+            _slow_as_printed[key] = chosen.slow_line(paper.numbers, name, on_progress)
+        before = after = _slow_as_printed[key]
+        if asked.numbers:
+            after = chosen.slow_line(numbers, name, on_progress)
+        report(curve=after, printed=before, progress=(done + 1) / len(chosen.slow))
+    return {}
+
+
+_judged: dict[str, list[dict[str, Any]]] = {}
+
+
+def ledger(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
+    """Verdicts by claim, which a worker computes once; the number of finished ones is reported."""
+    paper = _paper(ChosenPaper.model_validate(argument).paper)
+    if paper.name not in _judged:
+
+        def on_progress(done: int, total: int) -> None:
+            report(finished=done, total=total)
+
+        fields = ("id", "computed", "rule", "verdict")
+        claims = paper.ledger(progress=on_progress)
+        _judged[paper.name] = [{f: getattr(c, f) for f in fields} for c in claims]
+    return {"claims": _judged[paper.name]}
+
+
+ENDPOINTS = (
+    Answer("paper", ChosenPaper, overview),
+    Answer("paper/figure", MovedFigure, figure),
+    Job(
+        "paper/inertia", MovedFigure, "asperity.app.api.paper:inertia", lane="search",
+        check=check, seconds=120,
+    ),
+    Job("paper/ledger", ChosenPaper, "asperity.app.api.paper:ledger", lane="paper", seconds=300),
+)  # fmt: skip

@@ -1,0 +1,69 @@
+"""Papers reproduced: claims, rules, verdicts and a report page for any paper.
+
+A paper is a package of its own that is found by an entry point; see `asperity.ledger.paper`.
+"""
+
+from asperity.ledger.claims import (
+    VERDICTS,
+    Claim,
+    Headline,
+    Sensitivity,
+    Verdict,
+    altered,
+    check,
+    find_checks,
+    judge_claims,
+)
+from asperity.ledger.contents import KINDS, Contents, Kind
+from asperity.ledger.figures import (
+    FigureNumbers,
+    FigureTable,
+    FigureWords,
+    Observable,
+    PaperFigure,
+    Section,
+    figure_words,
+)
+from asperity.ledger.markup import rich, table
+from asperity.ledger.paper import Paper, available, find_paper
+from asperity.ledger.recipe import RecipeNumber, RecipeResult, read_columns
+from asperity.ledger.report import ReproductionSummary, reproduce
+from asperity.ledger.rules import WORDS, AcceptanceRule
+from asperity.ledger.sentences import fill
+from asperity.ledger.tab import TabFigure
+
+__all__ = [
+    "KINDS",
+    "VERDICTS",
+    "WORDS",
+    "AcceptanceRule",
+    "Claim",
+    "Contents",
+    "FigureNumbers",
+    "FigureTable",
+    "FigureWords",
+    "Headline",
+    "Kind",
+    "Observable",
+    "Paper",
+    "PaperFigure",
+    "RecipeNumber",
+    "RecipeResult",
+    "ReproductionSummary",
+    "Section",
+    "Sensitivity",
+    "TabFigure",
+    "Verdict",
+    "altered",
+    "available",
+    "check",
+    "figure_words",
+    "fill",
+    "find_checks",
+    "find_paper",
+    "judge_claims",
+    "read_columns",
+    "reproduce",
+    "rich",
+    "table",
+]

@@ -1,0 +1,449 @@
+"""Claims of a paper: what is computed for each, and the verdict that its rule gives."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from fnmatch import fnmatchcase
+from numbers import Real
+from types import ModuleType
+from typing import Any, Literal, TypeAlias, TypeVar, get_args
+
+from asperity.errors import InputError, closest
+from asperity.ledger import rules
+from asperity.ledger.contents import Contents, Entry, HeadlineWords, Kind, Uncertainty
+from asperity.ledger.sentences import fill
+from asperity.materials import Material
+from asperity.outputs.json import plain
+from asperity.parameters.arguments import counted, shown
+
+Verdict: TypeAlias = Literal["reproduced", "misprint", "differs"]
+VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
+
+#: What a check returns: numbers by name, and texts that stand for more than one number.
+Computed: TypeAlias = Mapping[str, float | str]
+Check: TypeAlias = Callable[[Any], Computed]
+
+_MARK = "checked_claims"
+Function = TypeVar("Function", bound=Callable[..., Any])
+
+
+def check(claim: str, *arguments: Any) -> Callable[[Function], Function]:
+    """Mark a function as the computation of a claim; it returns numbers by name.
+
+    Parameters
+    ----------
+    claim : str
+        The claim's ``id`` in claims.toml.
+    *arguments
+        Passed to the function after the paper's model; a function may compute several claims,
+        with one mark each.
+    """
+
+    def mark(function: Function) -> Function:
+        marks = (*getattr(function, _MARK, ()), (claim, arguments))
+        setattr(function, _MARK, marks)
+        return function
+
+    return mark
+
+
+def find_checks(module: ModuleType) -> dict[str, Check]:
+    """Marked functions of a module, or of all modules of a package, by the id of their claim.
+
+    Raises
+    ------
+    InputError
+        If two functions compute one claim.
+    """
+    modules = [module]
+    for info in pkgutil.walk_packages(getattr(module, "__path__", []), f"{module.__name__}."):
+        modules.append(importlib.import_module(info.name))
+    checks: dict[str, Check] = {}
+    for part in modules:
+        for value in vars(part).values():
+            if getattr(value, "__module__", None) != part.__name__:
+                continue  # imported there, defined elsewhere
+            for claim, arguments in getattr(value, _MARK, ()):
+                if claim in checks:
+                    raise InputError(
+                        f"checks.{claim} must be computed by one function, got two; "
+                        "remove one of the marks"
+                    )
+                checks[claim] = _bound(value, arguments)
+    return checks
+
+
+def _bound(function: Callable[..., Computed], arguments: tuple[Any, ...]) -> Check:
+    return lambda model: function(model, *arguments)
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """What a claim becomes at the ends of the published uncertainty of one quantity.
+
+    Attributes
+    ----------
+    quantity : str
+        What is varied.
+    ends : (str, str)
+        The two values, with what changes along.
+    numbers : mapping of str to (float, float)
+        The claim's numbers there.
+    verdicts : (str, str)
+    """
+
+    quantity: str
+    ends: tuple[str, str]
+    numbers: Mapping[str, tuple[float, float]]
+    verdicts: tuple[Verdict, Verdict]
+
+
+@dataclass(frozen=True)
+class Claim:
+    """An entry of the ledger: words, numbers and verdict.
+
+    Attributes
+    ----------
+    id : str
+        Short name, unique in the ledger.
+    place : str
+        Section, equation, figure or appendix of the paper.
+    statement : str
+        What the paper says.
+    stated : str
+        The number, or the word that takes its place.
+    kind : {"test", "fit", "arithmetic", "identity"}
+        "test": the models could have contradicted the statement. "fit": a parameter was fitted to
+        the quantity that is judged. "arithmetic": the paper's printed numbers alone decide.
+        "identity": true of the model by construction.
+    computed : str
+        What the checks give, with units.
+    how : str
+        Law or formula, parameters and method.
+    rule : str
+        What would make it "reproduced", fixed beforehand.
+    verdict : {"reproduced", "misprint", "differs"}
+        "misprint": the printed formula fails where the one derived from the paper's own equations
+        agrees with an integration of them.
+    why : str
+        What to make of the verdict.
+    numbers : mapping of str to float
+        The numbers that the rule was applied to.
+    depends_on : tuple of str
+        Uncertain quantities that the numbers rest on.
+    sensitivity : tuple of Sensitivity
+        One for each of `depends_on`; empty where it was not asked for.
+    """
+
+    id: str
+    place: str
+    statement: str
+    stated: str
+    kind: Kind
+    computed: str
+    how: str
+    rule: str
+    verdict: Verdict
+    why: str
+    numbers: Mapping[str, float]
+    depends_on: tuple[str, ...] = ()
+    sensitivity: tuple[Sensitivity, ...] = ()
+
+    @property
+    def is_test(self) -> bool:
+        """Whether the statement could have been contradicted by the models."""
+        return self.kind == "test"
+
+    @property
+    def decided(self) -> bool:
+        """Whether the verdict is the same at the ends of all published uncertainties.
+
+        Never, where it rests on uncertain quantities and the sensitivity was not computed.
+        """
+        known = {ends.quantity for ends in self.sensitivity} >= set(self.depends_on)
+        return known and all(v == self.verdict for ends in self.sensitivity for v in ends.verdicts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Fields by name, for JSON; a number that is not finite is None."""
+        return dict(plain(asdict(self)))
+
+
+def judge(entry: Entry, computed: Computed, stated: Mapping[str, float]) -> Claim:
+    """The claim that an entry becomes with what was computed for it.
+
+    Parameters
+    ----------
+    entry : Entry
+    computed : mapping of str to float or str
+    stated : mapping of str to float
+        The paper's printed numbers (SI), which a rule may name.
+
+    Raises
+    ------
+    InputError
+        If a number that the rule judges or that the sentence quotes is not computed or is not
+        finite, or if the rule cannot be built.
+    """
+    numbers = judged_numbers(entry, computed)
+    words = {
+        name: value
+        for name, value in entry.model_dump(exclude={"rule", "computed"}).items()
+        if name in Claim.__dataclass_fields__
+    }
+    return Claim(
+        **words,
+        computed=fill(entry.computed, computed, f"{entry.id}.computed"),
+        rule=_rule_text(entry, stated, several=len(numbers) > 1),
+        verdict=verdict(entry, numbers, stated),
+        numbers=numbers,
+    )
+
+
+def judged_numbers(entry: Entry, computed: Computed) -> dict[str, float]:
+    """Those of the computed numbers that the entry's rule judges, in the order of the check."""
+    if not isinstance(computed, Mapping):
+        raise InputError(
+            f"the check of '{entry.id}' must be a function that returns numbers by name, got "
+            f"{shown(computed)}; return {{'name': number}}"
+        )
+    for name, value in computed.items():
+        if not isinstance(value, str) and not (isinstance(value, Real) and math.isfinite(value)):
+            raise InputError(
+                f"checks must compute finite numbers, got {value!r} for '{name}' of "
+                f"'{entry.id}'; correct the check"
+            )
+    numbers = {name: float(v) for name, v in computed.items() if not isinstance(v, str)}
+    patterns = entry.judged or (_FORMULA if entry.rule.is_formula else ("*",))
+    for pattern in entry.judged:
+        if not any(fnmatchcase(name, pattern) for name in numbers):
+            raise InputError(
+                f"{entry.id}.judged must name numbers of its check, got '{pattern}'; "
+                f"{closest(pattern, numbers)}"
+            )
+    return {n: v for n, v in numbers.items() if any(fnmatchcase(n, p) for p in patterns)}
+
+
+_FORMULA = ("printed", "derived", "independent")
+
+
+def verdict(entry: Entry, numbers: Mapping[str, float], stated: Mapping[str, float]) -> Verdict:
+    """The verdict that an entry's rule gives on the numbers computed for it."""
+    if entry.rule.is_formula:
+        missing = {"printed", "independent"} - set(numbers)
+        if missing or entry.rule.tolerance is None:
+            lacking = ", ".join(sorted(missing)) or "a tolerance"
+            raise InputError(
+                f"{entry.id}.rule must have the numbers 'printed' and 'independent' and a "
+                f"tolerance, got none of: {lacking}; add it"
+            )
+        return formula_verdict(
+            numbers["printed"],
+            numbers.get("derived", math.nan),
+            numbers["independent"],
+            entry.rule.tolerance,
+        )
+    rule = entry.rule.build(stated, entry.id)
+    kept = bool(numbers) and all(rule.holds(value) for value in numbers.values())
+    return "reproduced" if kept else "differs"
+
+
+def _rule_text(entry: Entry, stated: Mapping[str, float], *, several: bool) -> str:
+    if entry.rule.is_formula:
+        return rules.formula_text(entry.rule.tolerance or math.nan)
+    text = entry.rule.build(stated, entry.id).text
+    return f"every one of: {text}" if several else text
+
+
+def formula_verdict(
+    printed: float, derived: float, independent: float, tolerance: float
+) -> Verdict:
+    """The verdict on a printed formula, decided by an independent number.
+
+    "reproduced" if what is printed agrees with `independent`; "misprint" if only what is derived
+    does; "differs" if neither does. A number that is not finite agrees with nothing.
+
+    Parameters
+    ----------
+    printed, derived, independent : float
+        The same quantity from the formula as printed, as derived here (NaN: nothing derived), and
+        from a method that uses neither formula.
+    tolerance : float
+        Relative, of `independent`.
+    """
+
+    def confirmed(value: float) -> bool:
+        return abs(value - independent) <= tolerance * abs(independent)
+
+    if confirmed(printed):
+        return "reproduced"
+    return "misprint" if confirmed(derived) else "differs"
+
+
+def judge_claims(
+    contents: Contents,
+    checks: Mapping[str, Check],
+    numbers: Material,
+    model: Callable[[Material], Any],
+    *,
+    sensitivity: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Claim]:
+    """Compute all claims of a paper, in the order of its claims.toml.
+
+    Parameters
+    ----------
+    contents : Contents
+    checks : mapping of str to function
+        What computes each claim, by its id.
+    numbers : Material
+        The paper's numbers at their central values.
+    model : function
+        From the paper's numbers to what the checks are given.
+    sensitivity : bool
+        Whether to compute each claim at the ends of the uncertainties that it depends on too.
+    progress : callable, optional
+        Called with the number of claims computed so far and of all claims.
+
+    Raises
+    ------
+    InputError
+        If a claim has no check, or a check no claim.
+    """
+    _check_pairs(contents.claim, checks)
+    stated = printed_numbers(numbers)
+    report = counted(progress, len(contents.claim))
+    central = model(numbers)
+    claims = []
+    for entry in contents.claim:
+        claims.append(judge(entry, checks[entry.id](central), stated))
+        report(1)
+    if not sensitivity:
+        return claims
+    varied: dict[str, list[Sensitivity]] = {entry.id: [] for entry in contents.claim}
+    for uncertainty in contents.uncertainty:
+        resting = [e for e in contents.claim if uncertainty.quantity in e.depends_on]
+        ends = [model(altered(numbers, end)) for end in (uncertainty.low, uncertainty.high)]
+        for entry in resting:
+            numbers_there = [judged_numbers(entry, checks[entry.id](end)) for end in ends]
+            varied[entry.id].append(_sensitivity(entry, uncertainty, numbers_there, stated))
+    return [replace(claim, sensitivity=tuple(varied[claim.id])) for claim in claims]
+
+
+def _sensitivity(
+    entry: Entry,
+    uncertainty: Uncertainty,
+    numbers: Sequence[Mapping[str, float]],
+    stated: Mapping[str, float],
+) -> Sensitivity:
+    low, high = numbers
+    return Sensitivity(
+        quantity=uncertainty.quantity,
+        ends=(_text(uncertainty.low), _text(uncertainty.high)),
+        numbers={name: (float(low[name]), float(high[name])) for name in low if name in high},
+        verdicts=(verdict(entry, low, stated), verdict(entry, high, stated)),
+    )
+
+
+def _text(end: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value:g}" for name, value in end.items())
+
+
+def printed_numbers(numbers: Material) -> dict[str, float]:
+    """The paper's single values in SI, and the ends of its ranges as NAME.low and NAME.high."""
+    stated = {
+        name: number.si for name, number in numbers.numbers.items() if number.value is not None
+    }
+    for name, number in numbers.numbers.items():
+        if number.si_range is not None:
+            stated[f"{name}.low"], stated[f"{name}.high"] = number.si_range
+    return stated
+
+
+def altered(numbers: Material, changes: Mapping[str, float]) -> Material:
+    """The paper's numbers with some values replaced, in the units that they are printed in."""
+    new = {
+        name: numbers[name].model_copy(update={"value": value}) for name, value in changes.items()
+    }
+    return numbers.model_copy(update={"numbers": {**numbers.numbers, **new}})
+
+
+def _check_pairs(entries: Sequence[Entry], checks: Mapping[str, Check]) -> None:
+    ids = {entry.id for entry in entries}
+    for name in sorted(ids - set(checks)):
+        raise InputError(
+            f"checks must compute every claim of claims.toml, got none for '{name}'; "
+            f'mark a function with @check("{name}")'
+        )
+    for name in sorted(set(checks) - ids):
+        raise InputError(
+            f"claims.toml must hold every claim that is computed, got none for '{name}'; "
+            "add [[claim]] with that id"
+        )
+
+
+Standing: TypeAlias = Literal["holds", "holds at the central values", "undecided", "does not hold"]
+
+
+@dataclass(frozen=True)
+class Headline:
+    """A conclusion of the paper.
+
+    Attributes
+    ----------
+    claim : str
+        What the paper concludes.
+    found : str
+        What was computed.
+    standing : str
+        "holds": every claim is reproduced, at the ends of all published uncertainties too.
+        "holds at the central values": every claim is reproduced there, not at all ends.
+        "undecided": a claim is not reproduced at the central values, but is within the
+        uncertainties. "does not hold": a claim is reproduced nowhere.
+    claims : tuple of str
+        Ids of the claims that decide.
+    """
+
+    claim: str
+    found: str
+    standing: Standing
+    claims: tuple[str, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether every claim is reproduced at the central values."""
+        return self.standing in ("holds", "holds at the central values")
+
+
+def headlines(words: Sequence[HeadlineWords], claims: Sequence[Claim]) -> list[Headline]:
+    """The paper's conclusions in the order of its claims.toml.
+
+    Parameters
+    ----------
+    words : sequence of HeadlineWords
+    claims : sequence of Claim
+        The whole ledger of that paper.
+    """
+    ledger = {claim.id: claim for claim in claims}
+    computed = {name: claim.computed for name, claim in ledger.items()}
+    return [
+        Headline(
+            claim=one.statement,
+            found=fill(one.found, computed, "headline.found"),
+            standing=_standing([ledger[name] for name in one.claims]),
+            claims=one.claims,
+        )
+        for one in words
+    ]
+
+
+def _standing(claims: Sequence[Claim]) -> Standing:
+    failed = [claim for claim in claims if claim.verdict != "reproduced"]
+    if any(claim.decided for claim in failed):
+        return "does not hold"
+    if failed:
+        return "undecided"
+    return "holds" if all(claim.decided for claim in claims) else "holds at the central values"

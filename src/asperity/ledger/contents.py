@@ -1,0 +1,261 @@
+"""What a paper's claims.toml holds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.resources.abc import Traversable
+from typing import Literal, TypeAlias, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from asperity.errors import InputError, closest
+from asperity.ledger import rules
+from asperity.ledger.sentences import names_in
+from asperity.parameters.toml_file import parsed_toml
+
+
+class _Table(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+Kind: TypeAlias = Literal["test", "fit", "arithmetic", "identity"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+
+
+class RuleWords(_Table):
+    """A rule as claims.toml writes it: its name, what it is about, and its numbers.
+
+    A number may be a word of `asperity.ledger.rules.WORDS` or the name of one of the paper's
+    numbers.
+    """
+
+    accept: str
+    what: str = "the value"
+    stated: float | str | None = None
+    last_digit: float | None = None
+    limit: float | str | None = None
+    low: float | str | None = None
+    high: float | str | None = None
+    tolerance: float | None = None
+
+    @property
+    def is_formula(self) -> bool:
+        """Whether it judges a printed formula by an independent number."""
+        return self.accept == "formula"
+
+    def build(self, numbers: Mapping[str, float], claim: str) -> rules.AcceptanceRule:
+        """The rule with its numbers.
+
+        Raises
+        ------
+        InputError
+            If the rule is unknown or a number of it is missing or unknown.
+        """
+        if self.accept not in rules.RULES:
+            raise InputError(
+                f"{claim}.rule.accept must be a rule of the ledger, got '{self.accept}'; "
+                f"{closest(self.accept, (*rules.RULES, 'formula'))}"
+            )
+        make, names = rules.RULES[self.accept]
+        values = []
+        for name in names:
+            value = getattr(self, name)
+            if value is None:
+                raise InputError(
+                    f"{claim}.rule.{name} must be given for '{self.accept}', got nothing; add it"
+                )
+            values.append(rules.number(value, numbers, f"{claim}.rule.{name}"))
+        return make(*values, self.what)
+
+
+class Entry(_Table):
+    """A claim as claims.toml holds it; see `Claim` for the fields that both have.
+
+    Attributes
+    ----------
+    rule : RuleWords
+    computed : str
+        What is written of the numbers that the check computes, see `asperity.ledger.sentences`.
+    judged : tuple of str
+        Names of the numbers that the rule judges, ``*`` standing for any text: every one of them
+        has to pass. All by default. A rule on a formula judges ``printed``, ``independent`` and,
+        where a corrected formula exists, ``derived``.
+    """
+
+    id: str
+    place: str
+    statement: str
+    stated: str
+    computed: str
+    how: str
+    why: str
+    kind: Kind
+    rule: RuleWords
+    judged: tuple[str, ...] = ()
+    depends_on: tuple[str, ...] = ()
+
+
+class About(_Table):
+    """The paper itself.
+
+    Attributes
+    ----------
+    title, authors, journal : str
+    short : str
+        Authors and year, as one would cite it.
+    source : str
+        Key of the paper in the bibliography of `asperity.materials`; may be empty.
+    numbers : str
+        A material of the package by name, or a material file of the paper's folder.
+    citations : tuple of str
+        Keys of what else the report cites.
+    method : str
+        How the numbers were computed, for the end of the report.
+    parameters : mapping of str to (str, str)
+        Symbol and meaning of each number that the report lists.
+    """
+
+    title: str
+    authors: str
+    journal: str
+    short: str
+    source: str = ""
+    numbers: str
+    citations: tuple[str, ...] = ()
+    method: str = ""
+    parameters: Mapping[str, tuple[str, str]] = Field(default_factory=dict)
+
+
+class Uncertainty(_Table):
+    """The ends of the published uncertainty of a quantity.
+
+    Attributes
+    ----------
+    quantity : str
+    low, high : mapping of str to float
+        The paper's numbers that differ there, in the units of the material file.
+    note : str
+        Where the ends come from.
+    """
+
+    quantity: str
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+    note: str
+
+
+class HeadlineWords(_Table):
+    """A conclusion of the paper, and the claims that decide it.
+
+    Attributes
+    ----------
+    statement : str
+    found : str
+        What was found; ``{id}`` stands for what was computed for that claim.
+    claims : tuple of str
+        Ids of the claims whose verdicts decide.
+    """
+
+    statement: str
+    found: str
+    claims: tuple[str, ...]
+
+
+class SummaryWords(_Table):
+    """A paragraph at the head of the report.
+
+    Attributes
+    ----------
+    title : str
+    sentences : tuple of str
+        ``{id}`` stands for what was computed for that claim.
+    verdict : str
+        All claims of this verdict are listed below, with links; none by default.
+    """
+
+    title: str
+    sentences: tuple[str, ...]
+    verdict: str = ""
+
+
+class Contents(_Table):
+    """All of claims.toml: the paper, its uncertainties, summary, conclusions and claims."""
+
+    paper: About
+    summary: tuple[SummaryWords, ...] = ()
+    uncertainty: tuple[Uncertainty, ...] = ()
+    headline: tuple[HeadlineWords, ...] = ()
+    claim: tuple[Entry, ...] = ()
+
+
+Words = TypeVar("Words", bound=BaseModel)
+
+
+def read_words(file: Traversable, kind: type[Words]) -> Words:
+    """Read a TOML file of a paper's folder as a record.
+
+    Raises
+    ------
+    InputError
+        If the file is not TOML, or has unknown or missing fields.
+    """
+    try:
+        text = file.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            f"{file} must be a readable text, got {type(error).__name__}; write the words there"
+        ) from None
+    try:
+        content = parsed_toml(text, file.name)
+    except InputError as error:
+        raise InputError(f"{file} must be TOML, got: {error}") from None
+    try:
+        return kind.model_validate(content)
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join(str(part) for part in first["loc"])
+        raise InputError(
+            f"{file}: {where} must be valid, got: {first['msg'].lower()}; see the page on papers"
+        ) from None
+
+
+def read_contents(file: Traversable) -> Contents:
+    """Read and check a claims.toml.
+
+    Raises
+    ------
+    InputError
+        If the file is not TOML, has unknown or missing fields, two claims of one id, or refers to
+        a claim or an uncertainty that it does not have.
+    """
+    contents = read_words(file, Contents)
+    _check_names(contents, str(file))
+    return contents
+
+
+def _check_names(contents: Contents, file: str) -> None:
+    ids = [entry.id for entry in contents.claim]
+    for name in ids:
+        if ids.count(name) > 1:
+            raise InputError(f"{file}: claim.id must be unique, got '{name}' twice; rename one")
+    quantities = {u.quantity for u in contents.uncertainty}
+    for entry in contents.claim:
+        for quantity in set(entry.depends_on) - quantities:
+            raise InputError(
+                f"{file}: {entry.id}.depends_on must name an uncertainty of the file, got "
+                f"'{quantity}'; add [[uncertainty]] with that quantity"
+            )
+    for words in contents.summary:
+        for name in {n for sentence in words.sentences for n in names_in(sentence)} - set(ids):
+            raise InputError(
+                f"{file}: summary.sentences must quote claims of the file, got '{{{name}}}'; "
+                "correct it"
+            )
+    for headline in contents.headline:
+        quoted = set(names_in(headline.found))
+        for field, names in (("claims", set(headline.claims)), ("found", quoted)):
+            for name in sorted(names - set(ids)):
+                raise InputError(
+                    f"{file}: headline.{field} must name claims of the file, got '{name}'; "
+                    "correct it"
+                )

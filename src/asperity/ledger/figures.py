@@ -1,0 +1,330 @@
+"""Figures of a paper: numbers, words and pictures, and the sections of the report that show them.
+
+A function computes the numbers of a figure; figures.toml in the paper's folder has its words and
+what is drawn, as `asperity.figures.plot` describes it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+from pydantic import BaseModel, ConfigDict, Field
+
+from asperity.errors import InputError
+from asperity.figures.plot import Plot
+from asperity.ledger.contents import read_words
+from asperity.ledger.sentences import fill
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Observable:
+    """A quantity that a figure shows, and where.
+
+    Attributes
+    ----------
+    column : str
+        Of the figure's table, also what a file of points calls it.
+    x : str
+        Column of the abscissa.
+    kind : str
+        Dimension of the abscissa, a key of `asperity.units.KINDS`; texts in other than pure
+        numbers carry a unit.
+    panel : int
+        Index of the axes in the Matplotlib figure.
+    x_scale, y_scale : float
+        Factors from SI to what the axes show.
+    """
+
+    column: str
+    x: str
+    kind: str = "dimensionless"
+    panel: int = 0
+    x_scale: float = 1.0
+    y_scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class FigureTable:
+    """The numbers behind a figure, as a CSV file.
+
+    Attributes
+    ----------
+    name : str
+        Of the file, without its ending.
+    data : DataFrame
+    header : sequence of str
+        What the first lines of the file say.
+    columns : mapping of str to str
+        Unit and meaning of each column.
+    """
+
+    name: str
+    data: pd.DataFrame
+    header: Sequence[str]
+    columns: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class FigureNumbers:
+    """The numbers that a figure shows.
+
+    Attributes
+    ----------
+    name : str
+        Of its files, and of its words in figures.toml.
+    data : DataFrame
+        One operating point, or one instant, a row; ``curve`` names the line that it belongs to.
+    columns : mapping of str to str
+        Unit and meaning of the columns of `data`.
+    scalars : mapping of str to float
+        Numbers read off the curves, which the head of the table lists.
+    quoted : mapping of str to float
+        Further numbers that the words or the picture quote.
+    points : DataFrame, optional
+        Simulated or measured points.
+    """
+
+    name: str
+    data: pd.DataFrame
+    columns: Mapping[str, str]
+    scalars: Mapping[str, float] = field(default_factory=dict)
+    quoted: Mapping[str, float] = field(default_factory=dict)
+    points: pd.DataFrame | None = None
+
+    @property
+    def numbers(self) -> dict[str, float]:
+        """All named numbers."""
+        return {**self.scalars, **self.quoted}
+
+    def curve(self, name: str) -> pd.DataFrame:
+        """The rows of one curve."""
+        return self.data[self.data["curve"] == name]
+
+    def last(self, curve: str, column: str) -> float:
+        """A quantity at the end of a curve."""
+        return float(self.curve(curve)[column].iloc[-1])
+
+    def at(self, curve: str, column: str, value: float, x: str) -> float:
+        """A quantity on a curve at a value of `x`, linear between the curve's points."""
+        rows = self.curve(curve)
+        return float(np.interp(value, rows[x], rows[column]))
+
+    @property
+    def failed(self) -> int:
+        """Number of points that were not solved."""
+        return int((~self.data["converged"].astype(bool)).sum()) if "converged" in self.data else 0
+
+
+@dataclass(frozen=True)
+class PaperFigure:
+    """A figure of the report.
+
+    Attributes
+    ----------
+    name : str
+        Of its files.
+    place : str
+        The paper's number for it, such as "Figure 2".
+    title, caption : str
+    alt : str
+        What someone who cannot see the figure needs to know.
+    draw : function
+        Returns the Matplotlib figure.
+    tables : sequence of FigureTable
+    points : int
+        Operating points that were solved for it.
+    failed : int
+        Those of them that did not converge.
+    """
+
+    name: str
+    place: str
+    title: str
+    caption: str
+    alt: str
+    draw: Callable[[], Figure]
+    tables: Sequence[FigureTable] = ()
+    points: int = 0
+    failed: int = 0
+
+
+class FigureWords(BaseModel):
+    """What figures.toml holds of a figure.
+
+    Attributes
+    ----------
+    place, title : str
+    caption, alt : str
+        Sentences of `asperity.ledger.sentences` that quote the figure's numbers.
+    short : str
+        Title on the browser page; that above by default.
+    numbers : tuple of str
+        The paper's numbers that the figure rests on, with which the browser page moves it.
+    plot : Plot
+        What is drawn; without it the paper's own function draws.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    place: str
+    title: str
+    caption: str
+    alt: str
+    short: str = ""
+    numbers: tuple[str, ...] = ()
+    plot: Plot | None = None
+
+    @cached_property
+    def observables(self) -> tuple[Observable, ...]:
+        """The quantities of its panels that measured points can be drawn on."""
+        panels = () if self.plot is None else self.plot.panel
+        return tuple(
+            Observable(p.y, p.x, p.x_kind, n, p.x_scale, p.y_scale)
+            for n, p in enumerate(panels)
+            if "/" not in p.y and not p.less
+        )
+
+    def draw(self, numbers: FigureNumbers) -> Figure:
+        """The picture; the style must be active."""
+        if self.plot is None:
+            raise InputError(
+                f"figures.{numbers.name} must say what is drawn, got no plot; add "
+                f"[[{numbers.name}.plot.panel]]"
+            )
+        return self.plot.figure(numbers.data, numbers.numbers, numbers.points)
+
+    def figure(
+        self,
+        numbers: FigureNumbers,
+        tables: Sequence[FigureTable],
+        draw: Callable[[FigureNumbers], Figure] | None = None,
+    ) -> PaperFigure:
+        """The figure of the report.
+
+        Parameters
+        ----------
+        numbers : FigureNumbers
+        tables : sequence of FigureTable
+            The first one is that of the curves, with which measured points are compared.
+        draw : function, optional
+            Draws in place of the plot.
+        """
+        caption, alt = (
+            _minus(fill(text, numbers.numbers, f"figures.{numbers.name}"))
+            for text in (self.caption, self.alt)
+        )
+        return PaperFigure(
+            numbers.name, self.place, self.title, caption, alt,
+            draw=lambda: (draw or self.draw)(numbers), tables=tables,
+            points=len(numbers.data), failed=numbers.failed,
+        )  # fmt: skip
+
+
+def _minus(text: str) -> str:
+    """Negative numbers with the sign that printers use."""
+    return re.sub(r"(?<=[ =])-(?=\d)", "−", text)
+
+
+class SectionWords(BaseModel):
+    """What figures.toml holds of a section of the report.
+
+    Attributes
+    ----------
+    title : str
+    before : tuple of str
+        Paragraphs in front of its figures, which may quote numbers.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    title: str
+    before: tuple[str, ...] = ()
+
+
+class SliderWords(BaseModel):
+    """A slider of the browser page that is not made from the paper's parameter alone.
+
+    Attributes
+    ----------
+    label, meaning : str
+    low, high : float
+        Its ends; the scale is linear.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    label: str
+    meaning: str
+    low: float
+    high: float
+
+
+class FiguresFile(BaseModel):
+    """All of figures.toml: sections, and a table for each figure.
+
+    Attributes
+    ----------
+    section : mapping of str to SectionWords
+    label : mapping of str to str
+        What the browser page calls a column.
+    slider : mapping of str to SliderWords
+        By the name of the paper's number.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    __pydantic_extra__: dict[str, FigureWords] = Field(init=False)
+
+    section: dict[str, SectionWords] = Field(default_factory=dict)
+    label: dict[str, str] = Field(default_factory=dict)
+    slider: dict[str, SliderWords] = Field(default_factory=dict)
+
+    @property
+    def figures(self) -> Mapping[str, FigureWords]:
+        """Words of the figures by their names, in the order of the file."""
+        return self.__pydantic_extra__
+
+
+def figure_words(package: str) -> FiguresFile:
+    """What the figures.toml of a paper's package holds.
+
+    Raises
+    ------
+    InputError
+        If the file is not TOML, or has unknown or missing fields.
+    """
+    return read_words(files(package).joinpath("figures.toml"), FiguresFile)
+
+
+@dataclass(frozen=True)
+class Section:
+    """A section of the report that shows figures.
+
+    Attributes
+    ----------
+    key : str
+        Of the section in addresses within the page.
+    title : str
+    figures : sequence of functions
+        Each computes one figure.
+    observables : mapping of str to sequence of Observable
+        By the name of a figure that takes measured points: the quantities of its first table.
+    before, after : functions
+        From the figures of the section to HTML that goes before and after them.
+    """
+
+    key: str
+    title: str
+    figures: Sequence[Callable[[], PaperFigure]]
+    observables: Mapping[str, Sequence[Observable]] = field(default_factory=dict)
+    before: Callable[[Sequence[PaperFigure]], str] = lambda _: ""
+    after: Callable[[Sequence[PaperFigure]], str] = lambda _: ""

@@ -1,0 +1,108 @@
+"""Plain text to HTML: Greek letters, subscripts and powers as a printer would set them."""
+
+from __future__ import annotations
+
+import base64
+import re
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+
+_GREEK = {
+    "alpha": "α",
+    "Delta": "Δ",
+    "eps": "ε",
+    "eta": "η",
+    "gamma": "γ",
+    "kappa": "κ",
+    "lambda": "λ",
+    "mu": "μ",
+    "omega": "ω",
+    "Phi": "Φ",
+    "pi": "π",
+    "Sigma": "Σ",
+    "sigma": "σ",
+}
+_RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
+    (re.compile(pattern), shown)
+    for pattern, shown in (
+        (r"\bum\b", "µm"),
+        # A number in powers of ten, before minus signs change.
+        (r"\b(\d+(?:\.\d+)?)e([+-]?)0*(\d+)\b", r"\1 × 10^\g<2>\g<3>"),
+        (r"(?<![\d.])1 × 10\^", "10^"),
+        (r"10\^\+", "10^"),
+        (r"\^\(([^()]*)\)", r"<sup>\1</sup>"),
+        (r"\^(-?\d+(?:\.\d+)?)", r"<sup>\1</sup>"),
+        (r"(?<=\w)_(eff|asp|ss|st|pl|el|r|s|c|p|z|0z)\b", r"<sub>\1</sub>"),
+        (r"\b([ΔWKVDPRhμσΣΦωwFXJ])([012])(z?)\b", r"\1<sub>\2\3</sub>"),
+        (r"\bKc\b", "K<sub>c</sub>"),
+        (r"(?<![\w.&#])-(?=[\dA-Zμελκ])", "−"),
+        (r"(?<= )-(?= )", "−"),
+        (r"&gt;&gt;", "≫"),
+        (r"&lt;&lt;", "≪"),
+        (r"&gt;=", "≥"),
+        (r"&lt;=", "≤"),
+        (r"\+−|\+-", "±"),
+        (r"\bsqrt\(", "√("),
+        (r"(?<=\w)'", "’"),
+        # A number stays with its unit, and with the symbol that it is the value of.
+        (r"(?<=\d) (?=(?:%|[µmkc]?m\b|m?bar|atm|[kM]?Hz|N\b|kg|Pa|K\b|s\b))", "\u00a0"),
+        (r"(?<=[\w>]) ([=≈×]) (?=[−\d])", "\u00a0\\1\u00a0"),
+    )
+)
+_NAMES = re.compile(rf"\b({'|'.join(_GREEK)})(?=\b|[_\d])")
+
+
+def rich(text: str) -> str:
+    """Escape a plain text and set eps_eff, 1e-3 and mu1 in signs and subscripts."""
+    shown = _NAMES.sub(lambda m: _GREEK[m[1]], escape(str(text), quote=False))
+    for pattern, replacement in _RULES:
+        shown = pattern.sub(replacement, shown)
+    return shown
+
+
+def table(
+    heads: Mapping[str, str], rows: Iterable[Sequence[str]], label: str, kind: str = "ledger"
+) -> str:
+    """A table whose cells carry their column's head along, for screens too narrow for columns.
+
+    Parameters
+    ----------
+    heads : mapping of str to str
+        Head of each column, and the class of its cells.
+    rows : iterable of sequence of str
+        HTML of the cells.
+    label : str
+        What the table is, for those who cannot see it.
+    kind : str
+        Class of the table.
+    """
+    head = "".join(f'<th scope="col" role="columnheader">{name}</th>' for name in heads)
+    body = "\n".join(
+        '<tr role="row">'
+        + "".join(
+            f'<td role="cell" class="{name}" data-head="{escape(column)}">{cell}</td>'
+            for (column, name), cell in zip(heads.items(), row, strict=True)
+        )
+        + "</tr>"
+        for row in rows
+    )
+    return (
+        f'<table class="{kind}" role="table" aria-label="{label}">'
+        f'<thead role="rowgroup"><tr role="row">{head}</tr></thead>'
+        f'<tbody role="rowgroup">\n{body}\n</tbody></table>'
+    )
+
+
+def embedded_png(path: Path, alt: str) -> str:
+    """An image element that holds the whole picture."""
+    content = path.read_bytes()
+    pixels = struct.unpack(">II", content[16:24])
+    data = base64.b64encode(content).decode("ascii")
+    # Pictures have 200 pixels an inch, pages 96.
+    width, height = (round(side * 96 / 200) for side in pixels)
+    return (
+        f'<img src="data:image/png;base64,{data}" alt="{escape(alt)}" '
+        f'width="{width}" height="{height}">'
+    )

@@ -1,0 +1,408 @@
+"""The one page that shows everything, with nothing to fetch from elsewhere."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from asperity._version import __version__
+from asperity.ledger.claims import Claim, Headline
+from asperity.ledger.markup import embedded_png, rich, table
+from asperity.ledger.points import RULE, CurveComparison
+from asperity.ledger.sentences import fill, names_in
+from asperity.materials import Number, citation
+
+if TYPE_CHECKING:
+    from asperity.ledger.contents import About, SummaryWords
+    from asperity.ledger.paper import Paper
+
+#: Verdicts in the order of the page, with the sign that goes before each and what it means.
+VERDICT_TEXTS: Mapping[str, tuple[str, str]] = {
+    "reproduced": ("✓", "the models give what the paper states"),
+    "misprint": ("✎", "a printed formula fails, the one derived from the paper's equations holds"),
+    "differs": ("≠", "the models do not give what the paper states"),
+}
+#: What each kind of claim is.
+KIND_TEXTS: Mapping[str, str] = {
+    "test": "the models could have contradicted the statement",
+    "fit": "a parameter was fitted to what is judged",
+    "arithmetic": "the paper's printed numbers alone decide",
+    "identity": "true of the model by construction",
+}
+
+
+@dataclass(frozen=True)
+class Plate:
+    """A figure as the page shows it, and its files."""
+
+    name: str
+    place: str
+    title: str
+    caption: str
+    alt: str
+    png: Path
+    files: Sequence[str]
+
+
+@dataclass(frozen=True)
+class PlateGroup:
+    """A section of figures, with the HTML before and after them."""
+
+    key: str
+    title: str
+    before: str
+    plates: Sequence[Plate]
+    after: str
+
+
+def build_page(
+    paper: Paper,
+    groups: Sequence[PlateGroup],
+    claims: Sequence[Claim],
+    headlines: Sequence[Headline],
+    agreement: Sequence[CurveComparison] = (),
+) -> str:
+    """The page as text.
+
+    Parameters
+    ----------
+    paper : Paper
+    groups : sequence of PlateGroup
+        The sections of figures, in their order on the page.
+    claims : sequence of Claim
+    headlines : sequence of Headline
+    agreement : sequence of CurveComparison
+        Of measured points with the curves, where points were given.
+    """
+    about = paper.contents.paper
+    parts = {
+        "In brief": ("brief", _brief(paper.contents.summary, headlines, claims)),
+        **{
+            group.title: (group.key, group.before + _figures(group.plates) + group.after)
+            for group in groups
+        },
+        **({"Measured points": ("points", _agreement(agreement))} if agreement else {}),
+        "Claims": ("claims", _ledger(paper, claims)),
+        "Parameters": ("parameters", _parameters(paper)),
+        "Sources": ("sources", _sources(about)),
+    }
+    sections = "\n".join(
+        f'<section id="{key}" aria-labelledby="{key}-head"><h2 id="{key}-head">{name}</h2>\n'
+        f"{content}\n</section>"
+        for name, (key, content) in parts.items()
+    )
+    links = "".join(f'<a href="#{key}">{name}</a>' for name, (key, _) in parts.items())
+    style = files("asperity.ledger").joinpath("page.css").read_text(encoding="utf-8")
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        '<meta name="color-scheme" content="light dark">\n'
+        f"<title>Reproduced: {escape(about.title)}</title>\n<style>\n{style}</style>\n</head>\n"
+        "<body>\n"
+        f"{_header(about, claims)}\n"
+        f'<nav aria-label="Sections">{links}</nav>\n<main>\n{sections}\n</main>\n'
+        f"<footer>Written by asperity {__version__}. Figures (PNG, PDF), their numbers (CSV) and "
+        "the claims (JSON, CSV) lie beside this page.</footer>\n</body>\n</html>\n"
+    )
+
+
+def _header(about: About, claims: Sequence[Claim]) -> str:
+    tests = sum(claim.is_test for claim in claims)
+    return (
+        f'<header><p class="kicker">A reproduction</p><h1>{escape(about.title)}</h1>'
+        f'<p class="by">{escape(about.authors)}, {escape(about.journal)}</p>'
+        f"<p>{len(claims)} quantitative and comparative statements of the paper, each computed "
+        f"again from its own equations and numbers. {tests} of them could have come out "
+        f"otherwise; each number leads to its entries:</p>{_tiles(claims)}"
+        f"<p>{escape(_counted_apart(claims))}</p></header>"
+    )
+
+
+def _agreement(agreement: Sequence[CurveComparison]) -> str:
+    chips = {"agrees": ("reproduced", "✓"), "disagrees": ("differs", "≠")}
+    rows = [
+        (
+            rich(one.figure.replace("-0", " ").replace("-", " ").capitalize()) or "all",
+            rich(f"{one.observable}, {one.law}".lstrip(", ")),
+            f"{one.chi_squared:.4g} for {one.points}, p = {one.p_value:.2g}",
+            _chip(*chips.get(one.verdict, ("misprint", "?")), one.verdict),
+        )
+        for one in agreement
+    ]
+    heads = {"Points": "statement", "Quantity": "statement", "χ²": "computed", "Verdict": "verdict"}
+    return (
+        f"<p>The points that were given, against the curves. Rule: {rich(RULE)}.</p>"
+        f"{table(heads, rows, 'Agreement of measured points')}"
+        '<p class="files"><a href="data/points.csv">CSV</a> <a href="agreement.json">JSON</a></p>'
+    )
+
+
+def _chip(kind: str, sign: str, word: str) -> str:
+    """A verdict as a coloured word with its sign, for eyes that do not see the colour."""
+    return f'<span class="chip {kind}"><span aria-hidden="true">{sign}</span> {word}</span>'
+
+
+def _figures(plates: Iterable[Plate]) -> str:
+    return "\n".join(map(_figure, plates))
+
+
+def _figure(plate: Plate) -> str:
+    links = " ".join(f'<a href="{escape(name)}">{_kind(name)}</a>' for name in plate.files)
+    return (
+        f'<figure id="{plate.name}">{embedded_png(plate.png, plate.alt)}'
+        f'<figcaption><p class="kicker">{plate.place}</p><h3>{rich(plate.title)}</h3>'
+        f'<p>{rich(plate.caption)}</p><p class="files">{links}</p></figcaption></figure>'
+    )
+
+
+def _kind(name: str) -> str:
+    kind = name.rsplit(".", 1)[1].upper()
+    return f"{kind} of the model" if "-model." in name else kind
+
+
+def _ledger(paper: Paper, claims: Sequence[Claim]) -> str:
+    ends = "; ".join(rich(f"{u.quantity}: {u.note}") for u in paper.contents.uncertainty)
+    varied = (
+        "\n<p>Numbers that rest on uncertain quantities are computed at the ends of the "
+        f"uncertainties too ({ends}).</p>"
+    )
+    return (
+        "<p>Verdicts follow from a rule that was fixed beforehand for each claim. The measured "
+        "points of a paper are in its figures only, not in its text; no claim here rests on "
+        f"them.</p>{varied if ends else ''}\n{_entries(claims)}"
+    )
+
+
+def _sources(about: About) -> str:
+    keys = [key for key in (about.source, *about.citations) if key]
+    entries = "\n".join(f"<li>{_reference(citation(key))}</li>" for key in keys)
+    method = f"\n<p>{rich(about.method)}</p>" if about.method else ""
+    return f"<ul>\n{entries}\n</ul>{method}"
+
+
+def _reference(entry: str) -> str:
+    """A BibTeX entry as a line of text; its DOI is the only address on the page."""
+    field = {name: value.strip("{}") for name, value in re.findall(r"(\w+)\s*=\s*(\{.*\})", entry)}
+    field = {name: value.replace("{", "").replace("}", "") for name, value in field.items()}
+    where = " ".join(field[name] for name in ("journal", "volume") if name in field)
+    text = f"{field['author'].replace(' and ', '; ')} ({field['year']}). {field['title']}. {where}"
+    text = escape(f"{text}, {field['pages']}.".replace("--", "–"))
+    if "doi" not in field:
+        return text
+    return f'{text} <a href="https://doi.org/{field["doi"]}">doi:{field["doi"]}</a>'
+
+
+# --- The head of the page: what the paper comes to ------------------------------------------------
+
+
+def _brief(
+    words: Sequence[SummaryWords], headlines: Sequence[Headline], claims: Sequence[Claim]
+) -> str:
+    """The paragraphs of the summary, then the table of conclusions."""
+    known = {claim.id: claim for claim in claims}
+    paragraphs = "\n".join(_paragraph(one, known) for one in words)
+    return f'<div class="summary">\n{paragraphs}\n</div>\n{_conclusions(headlines, known)}'
+
+
+def _paragraph(words: SummaryWords, claims: dict[str, Claim]) -> str:
+    computed = {name: claim.computed for name, claim in claims.items()}
+    several = len(words.sentences) > 1
+    items = [
+        rich(fill(sentence, computed, "summary.sentences")) + _links(names_in(sentence), claims)
+        for sentence in words.sentences
+    ]
+    text = _list(items, "ol") if several else f"<p>{items[0]}</p>"
+    listed = [claim for claim in claims.values() if claim.verdict == words.verdict]
+    if words.verdict:
+        entries = [
+            f'<a href="#{escape(claim.id)}">{rich(claim.place)}</a>: {rich(claim.statement)}'
+            for claim in listed
+        ]
+        text += _list(entries, "ul")
+    return f'<div class="card"><h3>{rich(words.title)}</h3>{text}</div>'
+
+
+def _list(items: Sequence[str], kind: str) -> str:
+    return f"<{kind}>" + "".join(f"<li>{item}</li>" for item in items) + f"</{kind}>"
+
+
+def _links(names: Sequence[str], claims: dict[str, Claim]) -> str:
+    """A link to the entry of each claim that a sentence quotes."""
+    return "".join(
+        f' <a class="entry" href="#{escape(name)}">{rich(claims[name].place)}</a>' for name in names
+    )
+
+
+def _conclusions(headlines: Sequence[Headline], claims: dict[str, Claim]) -> str:
+    rows = [(rich(h.claim), rich(h.found), _standing(h) + _basis(h, claims)) for h in headlines]
+    heads = {"The paper concludes": "statement", "Found here": "computed", "Holds?": "verdict"}
+    return (
+        "<h3>The paper’s conclusions</h3>"
+        f"{table(heads, rows, 'Conclusions of the paper', 'ledger brief')}"
+    )
+
+
+def _standing(headline: Headline) -> str:
+    kind, sign = ("reproduced", "✓") if headline.holds else ("differs", "≠")
+    if headline.standing == "undecided":
+        kind, sign = "misprint", "?"
+    return _chip(kind, sign, headline.standing)
+
+
+def _basis(headline: Headline, claims: dict[str, Claim]) -> str:
+    """Links to the claims that decide."""
+    links = ", ".join(
+        f'<a href="#{escape(name)}" aria-label="claim {escape(name)}">{n}</a>'
+        for n, name in enumerate((n for n in headline.claims if n in claims), 1)
+    )
+    return f'<p class="note">by claims {links}</p>' if links else ""
+
+
+# --- The claims ----------------------------------------------------------------------------------
+
+
+def counts(claims: Sequence[Claim]) -> dict[str, int]:
+    """Number of claims by verdict, zero included."""
+    number = Counter[str](claim.verdict for claim in claims)
+    return {verdict: number[verdict] for verdict in VERDICT_TEXTS}
+
+
+def _counted_apart(claims: Sequence[Claim]) -> str:
+    """How many claims are no tests, in a sentence; empty if all are."""
+    parts = []
+    for kind, one, several in (
+        ("fit", "fit", "fits"),
+        ("arithmetic", "calculation with printed numbers", "calculations with printed numbers"),
+        ("identity", "identity", "identities"),
+    ):
+        number = counts([c for c in claims if c.kind == kind])
+        total, others = sum(number.values()), sum(number.values()) - number["reproduced"]
+        if total:
+            name = one if total == 1 else several
+            parts.append(f"{total} {name}" + f" ({others} not as stated)" * bool(others))
+    return f"Counted apart: {', '.join(parts)}." if parts else ""
+
+
+#: Filters: name in addresses, and what they show.
+_FILTERS = (
+    ("all", "all"),
+    ("reproduced", "reproduced"),
+    ("misprint", "misprint"),
+    ("differs", "differs"),
+    ("apart", "fits, arithmetic, identities"),
+)
+
+
+def _tiles(claims: Sequence[Claim]) -> str:
+    """Numbers of tests by verdict, each a link that shows those claims alone."""
+    number = counts([claim for claim in claims if claim.is_test])
+    tiles = "".join(
+        f'<li class="{verdict}"><a href="#show-{verdict}"><b>{number[verdict]}</b> {verdict}'
+        f"<span>{rich(meaning)}</span></a></li>"
+        for verdict, (_, meaning) in VERDICT_TEXTS.items()
+    )
+    return f'<ul class="tiles">{tiles}</ul>'
+
+
+def _entries(claims: Sequence[Claim]) -> str:
+    """The ledger, each claim folded, with links that filter it without any script.
+
+    A link to ``#show-misprint`` makes that element the page's target, and the style sheet hides
+    the claims of other verdicts. Without such a target what is not as stated is shown; a link to a
+    claim always shows it.
+    """
+    totals = counts([claim for claim in claims if claim.is_test])
+    totals |= {"all": len(claims), "apart": sum(not claim.is_test for claim in claims)}
+    anchors = "".join(f'<span class="filter" id="show-{key}"></span>' for key, _ in _FILTERS)
+    links = "".join(
+        f'<a href="#show-{key}">{name} <b>{totals[key]}</b></a>' for key, name in _FILTERS
+    )
+    others = sum(claim.verdict != "reproduced" for claim in claims)
+    rows = "\n".join(_entry(claim) for claim in claims)
+    return (
+        f'{anchors}<p class="filters" role="group" aria-label="Show claims">'
+        f'<a href="#claims">not as stated <b>{others}</b></a>{links}</p>\n'
+        f'<div class="claims">\n{rows}\n</div>'
+    )
+
+
+def _entry(claim: Claim) -> str:
+    kind = "test" if claim.is_test else "apart"
+    counted_as = "" if claim.is_test else f' <span class="kind">{claim.kind}</span>'
+    chip = _chip(claim.verdict, VERDICT_TEXTS[claim.verdict][0], claim.verdict)
+    notes = (
+        ("", claim.why),
+        ("Stated", claim.stated),
+        ("Computed", claim.computed),
+        ("How", claim.how),
+        ("Rule", claim.rule),
+        ("Within the uncertainties", sensitivity_text(claim)),
+    )
+    return (
+        f'<details class="claim {claim.verdict} {kind}" id="{escape(claim.id)}">'
+        f'<summary><span class="place">{rich(claim.place)}</span>'
+        f'<span class="statement">{rich(claim.statement)}</span>'
+        f'<span class="verdict">{chip}{counted_as}</span></summary>'
+        f"{''.join(_note(head, text) for head, text in notes)}"
+        f'<p class="note"><a href="#{escape(claim.id)}">Link to this entry</a></p></details>'
+    )
+
+
+def _note(head: str, text: str) -> str:
+    if not text:
+        return ""
+    return f"<p>{f'<b>{head}:</b> ' if head else ''}{rich(text)}</p>"
+
+
+def sensitivity_text(claim: Claim) -> str:
+    """The claim's numbers at the ends of the published uncertainties, in a line."""
+    parts = []
+    for varied in claim.sensitivity:
+        low, high = varied.ends
+        ranges = [f"{name} {a:.3g} to {b:.3g}" for name, (a, b) in _leading(varied.numbers)]
+        changed = [
+            f"{verdict} at {end}"
+            for end, verdict in zip((low, high), varied.verdicts, strict=True)
+            if verdict != claim.verdict
+        ]
+        text = f"{low} to {high}: {', '.join(ranges)}"
+        parts.append(text + (f" ({', '.join(changed)})" if changed else ""))
+    return "; ".join(parts)
+
+
+def _leading(numbers: Mapping[str, tuple[float, float]]) -> list[tuple[str, tuple[float, float]]]:
+    """The first and the last number: what lies between is in claims.json."""
+    items = list(numbers.items())
+    return items if len(items) <= 2 else [items[0], items[-1]]
+
+
+# --- The numbers that the figures rest on --------------------------------------------------------
+
+
+def _parameters(paper: Paper) -> str:
+    """The numbers with uncertainty, kind and place."""
+    rows = [
+        _parameter(*words, paper.numbers[name])
+        for name, words in paper.contents.paper.parameters.items()
+    ]
+    heads = {
+        "Symbol": "symbol", "What it is": "statement", "Value": "stated", "Kind": "kind",
+        "Place": "place", "Remark": "note",
+    }  # fmt: skip
+    return (
+        "<p>As the paper gives them. <em>Fitted</em> by its authors; <em>assumed</em> here, "
+        "because the paper does not give it.</p>"
+        f"{table(heads, rows, 'Parameters', 'ledger numbers')}"
+    )
+
+
+def _parameter(symbol: str, meaning: str, number: Number) -> tuple[str, ...]:
+    value = str(number).replace(" um", " µm")
+    texts = (rich(symbol), rich(meaning), rich(value), number.kind, rich(number.place))
+    return (*texts, rich(number.note) or "–")

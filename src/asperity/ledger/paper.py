@@ -1,0 +1,244 @@
+"""A published paper as a folder of claims, checks and figures, found by its name.
+
+A paper is a Python package, registered as an entry point of the group ``asperity.papers``,
+NAME = "package". It holds
+
+- ``claims.toml``: what the paper is, its claims in words, their rules and kinds, its conclusions
+  and the ends of its published uncertainties (`asperity.ledger.contents`);
+- ``checks``, a module or package: one function a claim, marked with `asperity.ledger.check`, from
+  the paper's numbers to computed numbers by name. A function ``model`` there, if any, turns the
+  paper's numbers into what the checks are given, so that they can share what is computed once;
+- ``figures.toml``: titles, captions and alternative texts of its figures, and what is drawn;
+- ``figures``, a module or package: ``FIGURES``, functions that return a
+  `asperity.ledger.PaperFigure`; or ``sections``, a context manager that gives a sequence of
+  `asperity.ledger.Section`;
+- ``tab``, a module, if the paper has figures with sliders on the browser page
+  (`asperity.ledger.tab`), and ``recipe``, a module, if it has a procedure from measurements to
+  numbers (``asperity recipe``).
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from functools import cached_property
+from importlib.metadata import entry_points
+from importlib.resources import as_file, files
+from typing import TYPE_CHECKING, Any
+
+from asperity import materials
+from asperity.errors import InputError, closest, printable
+from asperity.ledger.claims import (
+    Claim,
+    Headline,
+    find_checks,
+    headlines,
+    judge_claims,
+    printed_numbers,
+)
+from asperity.ledger.contents import Contents, read_contents
+from asperity.ledger.figures import FiguresFile, PaperFigure, Section, figure_words
+from asperity.parameters.arguments import instance, shown
+
+if TYPE_CHECKING:
+    from types import ModuleType
+
+    from asperity.ledger.rules import AcceptanceRule
+    from asperity.ledger.tab import TabFigure
+    from asperity.materials import Material
+
+GROUP = "asperity.papers"
+
+
+@dataclass(frozen=True)
+class Paper:
+    """A paper's claims, checks and figures.
+
+    What code of the paper raises becomes an `InputError` that names the code.
+
+    Attributes
+    ----------
+    name : str
+        What `find_paper` knows it by.
+    package : str
+        The importable package that holds it.
+    """
+
+    name: str
+    package: str
+
+    @cached_property
+    def words(self) -> FiguresFile:
+        """What figures.toml holds; nothing if there is none."""
+        self.module("")
+        if not files(self.package).joinpath("figures.toml").is_file():
+            return FiguresFile()
+        return figure_words(self.package)
+
+    @cached_property
+    def tab(self) -> Mapping[str, TabFigure]:
+        """The figures that the browser page can move, by name."""
+        return self.module("tab").FIGURES if self.has("tab") else {}
+
+    def module(self, name: str) -> ModuleType:
+        """A module of the paper's package.
+
+        Raises
+        ------
+        InputError
+            If it is missing or cannot be imported.
+        """
+        with _running(f"{self.package}.{name}".rstrip(".")):
+            return importlib.import_module(f"{self.package}.{name}".rstrip("."))
+
+    def has(self, name: str) -> bool:
+        """Whether the paper's package has a module."""
+        self.module("")
+        return importlib.util.find_spec(f"{self.package}.{name}") is not None
+
+    @cached_property
+    def contents(self) -> Contents:
+        """What claims.toml holds."""
+        self.module("")
+        return read_contents(files(self.package).joinpath("claims.toml"))
+
+    @cached_property
+    def numbers(self) -> Material:
+        """The paper's printed numbers."""
+        source = self.contents.paper.numbers
+        if not source.endswith(".toml"):
+            return materials.load(source)
+        with as_file(files(self.package).joinpath(source)) as path:
+            return materials.load(path)
+
+    def parameter_lines(self) -> list[str]:
+        """Name, value and kind of every number that the report lists, for the heads of tables."""
+        return [
+            f"  {name} = {self.numbers[name]} ({self.numbers[name].kind})"
+            for name in self.contents.paper.parameters
+        ]
+
+    def rule(self, claim: str) -> AcceptanceRule:
+        """The rule of one of the paper's claims, for what else is judged by it."""
+        entry = next(entry for entry in self.contents.claim if entry.id == claim)
+        return entry.rule.build(printed_numbers(self.numbers), claim)
+
+    def ledger(
+        self, *, sensitivity: bool = False, progress: Callable[[int, int], None] | None = None
+    ) -> list[Claim]:
+        """Compute all claims; see `asperity.ledger.claims.judge_claims`."""
+        module = self.module("checks")
+        model: Callable[[Material], Any] = getattr(module, "model", lambda numbers: numbers)
+        where = f"{self.package}.checks"
+        return judge_claims(
+            self.contents,
+            {
+                name: _guarded(check, f"{where}, the check of '{name}'")
+                for name, check in find_checks(module).items()
+            },
+            self.numbers,
+            _guarded(model, f"{where}.model"),
+            sensitivity=sensitivity,
+            progress=progress,
+        )
+
+    def headlines(self, claims: Sequence[Claim]) -> list[Headline]:
+        """The paper's conclusions, decided by the verdicts on its claims."""
+        return headlines(self.contents.headline, claims)
+
+    @contextmanager
+    def sections(self) -> Iterator[Sequence[Section]]:
+        """The sections of its figures, in a context that ends what computes them."""
+        module, where = self.module("figures"), f"{self.package}.figures"
+        if hasattr(module, "sections"):
+            with module.sections() as sections:
+                yield tuple(_guarded_section(section, where) for section in sections)
+            return
+        figures = getattr(module, "FIGURES", None)
+        if not isinstance(figures, Sequence) or not all(callable(f) for f in figures):
+            raise InputError(
+                f"{where} must have FIGURES, a tuple of functions, or sections, got "
+                f"{shown(figures)}; write FIGURES = (first_figure,)"
+            )
+        yield (_guarded_section(Section("figures", "Figures", tuple(figures)), where),)
+
+
+def available() -> dict[str, str]:
+    """Names of the papers that can be reproduced, and the package of each."""
+    papers: dict[str, str] = {}
+    for point in sorted(entry_points(group=GROUP), key=lambda point: point.name):
+        if papers.setdefault(point.name, point.value) != point.value:
+            raise InputError(
+                f"paper must have a name that no other has, got '{point.name}' of {point.value} "
+                f"and of {papers[point.name]}; rename one of the entry points"
+            )
+    return papers
+
+
+def find_paper(name: str | None = None) -> Paper:
+    """A paper by its name; without a name the first in alphabetical order.
+
+    Raises
+    ------
+    InputError
+        If there is no such paper, or none at all.
+    """
+    papers = available()
+    if not papers:
+        raise InputError(
+            f"a paper must be installed, got no entry point of the group {GROUP}; install asperity "
+            "again, which brings its papers along"
+        )
+    if name is None:
+        name = next(iter(papers))
+    if name not in papers:
+        raise InputError(
+            f"paper must be one of the papers that are installed, got '{name}'; "
+            f"{closest(name, papers)}"
+        )
+    return Paper(name, papers[name])
+
+
+@contextmanager
+def _running(what: str) -> Iterator[None]:
+    """Run code of a paper; what it raises becomes an `InputError` that names it."""
+    try:
+        yield
+    except InputError:
+        raise
+    except Exception as error:  # code of a paper may raise anything
+        text = printable(" ".join(str(error).split()), 200)
+        raise InputError(
+            f"{what} must be code that runs, got {type(error).__name__}: {text}; correct it"
+        ) from error
+
+
+def _guarded(function: Callable[..., Any], what: str) -> Callable[..., Any]:
+    """A function of a paper, whose errors are sentences."""
+
+    def run(*arguments: Any) -> Any:
+        with _running(what):
+            return function(*arguments)
+
+    return run
+
+
+def _guarded_section(section: Any, where: str) -> Section:
+    """A section of a paper, whose figures are computed and drawn with their errors as sentences."""
+    checked: Section = instance(section, Section, where, "yield Sections")
+    return replace(checked, figures=tuple(_guarded_figure(f, where) for f in checked.figures))
+
+
+def _guarded_figure(compute: Callable[[], Any], where: str) -> Callable[[], PaperFigure]:
+    name = f"{where}.{getattr(compute, '__name__', 'figure')}"
+
+    def run() -> PaperFigure:
+        with _running(name):
+            made = compute()
+        figure: PaperFigure = instance(made, PaperFigure, name, "return a PaperFigure")
+        return replace(figure, draw=_guarded(figure.draw, f"{name}, draw"))
+
+    return run

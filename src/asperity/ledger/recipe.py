@@ -1,0 +1,158 @@
+"""A paper's procedure from measurements to numbers: its tables, and what comes out of them."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity._version import __version__
+from asperity.errors import InputError
+from asperity.parameters.file_content import file_content
+
+Float = NDArray[np.float64]
+
+
+def read_columns(path: Path, columns: Sequence[str], row: str) -> dict[str, Float]:
+    """Columns of a CSV of plain numbers in SI; lines that begin with ``#`` are skipped.
+
+    Parameters
+    ----------
+    path : Path
+    columns : sequence of str
+    row : str
+        What a row is, such as ``"a bifurcation"``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, a column is missing, or a cell is no number.
+    """
+    try:
+        text = file_content(path).decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        reason = getattr(error, "strerror", None) or "not text in UTF-8"
+        raise InputError(
+            f"{path.stem} must be a readable table, got '{path}': {reason}; give a CSV file"
+        ) from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    rows = list(csv.DictReader(lines, skipinitialspace=True))
+    if not rows:
+        raise InputError(
+            f"{path.name} must have a header and rows, got {len(lines)} lines; give {row} on each"
+        )
+    missing = [column for column in columns if column not in rows[0]]
+    if missing:
+        raise InputError(
+            f"{path.name} must have the columns {', '.join(columns)}, got none for "
+            f"{', '.join(missing)}; add them in SI"
+        )
+    return {
+        column: np.array(
+            [_number(cells[column], column, n, path.name) for n, cells in enumerate(rows, 1)]
+        )
+        for column in columns
+    }
+
+
+def _number(cell: str | None, column: str, row: int, name: str) -> float:
+    try:
+        return float(cell or "")
+    except ValueError:
+        raise InputError(
+            f"{name} must have numbers in SI without unit in column {column}, got '{cell}' in row "
+            f"{row}; correct the cell"
+        ) from None
+
+
+@dataclass(frozen=True)
+class RecipeNumber:
+    """A number that a paper's procedure gives, and the paper's, in SI.
+
+    Attributes
+    ----------
+    name, unit : str
+    value, se : float
+        Estimate and standard error, with the errors of all earlier steps.
+    se_own : float
+        Standard error by the readings of this step alone.
+    step : int
+    how : str
+        What it is read from.
+    published, published_uncertainty : float or None
+    published_place : str
+        Section of the paper.
+    upper_limit : float or None
+        At 95 % confidence, of a number that is only bounded.
+    """
+
+    name: str
+    unit: str
+    value: float
+    se: float
+    se_own: float
+    step: int
+    how: str
+    published: float | None
+    published_uncertainty: float | None
+    published_place: str
+    upper_limit: float | None = None
+
+    @property
+    def deviation(self) -> float | None:
+        """Difference from the paper in standard errors of both together; None without either."""
+        if self.published is None or self.upper_limit is not None:
+            return None
+        spread = math.hypot(self.se, self.published_uncertainty or 0.0)
+        return (self.value - self.published) / spread if spread > 0 else None
+
+
+@dataclass(frozen=True, eq=False)
+class RecipeResult:
+    """All numbers of a paper's procedure.
+
+    Attributes
+    ----------
+    paper : str
+        Name of the paper.
+    numbers : mapping of str to RecipeNumber
+    warnings : tuple of str
+    data : tuple of str
+        Names of the tables.
+    """
+
+    paper: str
+    numbers: Mapping[str, RecipeNumber]
+    warnings: tuple[str, ...]
+    data: tuple[str, ...]
+
+    def record(self) -> dict[str, Any]:
+        """Everything as plain numbers and texts, for JSON."""
+        return {
+            "recipe": self.paper,
+            "numbers": {
+                n: {
+                    "value": r.value,
+                    "unit": r.unit,
+                    "se": r.se,
+                    "se_own": r.se_own,
+                    "upper_limit_95": r.upper_limit,
+                    "step": r.step,
+                    "how": r.how,
+                    "published": r.published,
+                    "published_uncertainty": r.published_uncertainty,
+                    "published_place": r.published_place,
+                    "deviation": r.deviation,
+                }
+                for n, r in self.numbers.items()
+            },
+            "warnings": list(self.warnings),
+            "data": list(self.data),
+            "asperity_version": __version__,
+        }

@@ -1,0 +1,261 @@
+"""A paper reproduced: figures, tables, the ledger of its claims, and a page that shows all."""
+
+from __future__ import annotations
+
+import csv
+import json
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from asperity._version import __version__
+from asperity.ledger.claims import VERDICTS, Claim
+from asperity.ledger.contents import KINDS
+from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, Plate, PlateGroup, build_page, counts
+from asperity.ledger.points import CurveComparison, MeasuredPoints
+from asperity.materials import citation
+from asperity.outputs import written_folder
+from asperity.parameters.display import count_text
+
+if TYPE_CHECKING:
+    from asperity.ledger.figures import PaperFigure, Section
+    from asperity.ledger.paper import Paper
+
+#: Called with the steps done, all steps, and what is being done.
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class ReproductionSummary:
+    """Outcome of `reproduce`.
+
+    Attributes
+    ----------
+    paper : str
+        Authors and year.
+    folder : Path
+        Where the report lies.
+    figures : int
+        Number of figures drawn.
+    points : int
+        Operating points solved for them.
+    failed : int
+        Those of them that did not converge; what is drawn leaves them out.
+    claims : int
+        Number of claims.
+    tests : mapping of str to int
+        Number of claims that the models could have contradicted, by verdict.
+    exceptions : tuple of (str, str, str)
+        Verdict, place and statement of each claim that is not reproduced.
+    agreement : tuple of CurveComparison
+        Of measured points with the curves, where points were given.
+    seconds : float
+    """
+
+    paper: str
+    folder: Path
+    figures: int
+    points: int
+    failed: int
+    claims: int
+    tests: Mapping[str, int]
+    exceptions: tuple[tuple[str, str, str], ...]
+    agreement: tuple[CurveComparison, ...]
+    seconds: float
+
+    @property
+    def page(self) -> Path:
+        """The page to open first."""
+        return self.folder / "index.html"
+
+    def lines(self) -> list[str]:
+        """Lines of the table that the command prints."""
+        tests = ", ".join(f"{count} {verdict}" for verdict, count in self.tests.items())
+        tested = count_text(sum(self.tests.values()), "test")
+        rows = [
+            ("figures", f"{self.figures} in figures/ (PNG, PDF), their numbers in data/ (CSV)"),
+            ("solved", f"{self.points} points" + (f", {self.failed} failed" * bool(self.failed))),
+            ("claims", f"{self.claims}, of which {tested}: {tests}"),
+            *(("points", one.text) for one in self.agreement if not one.figure),
+            ("time", f"{self.seconds:.1f} s"),
+        ]
+        head = f"{self.paper}, reproduced by asperity {__version__}"
+        return [head, *(f"  {name:<9}{text}" for name, text in rows), *self._exception_lines()]
+
+    def _exception_lines(self) -> list[str]:
+        if not self.exceptions:
+            return []
+        width = max(len(place) for _, place, _ in self.exceptions)
+        return [
+            "Not reproduced as printed:",
+            *(
+                f"  {verdict:<9} {place:<{width}}  {statement}"
+                for verdict, place, statement in self.exceptions
+            ),
+        ]
+
+
+class _StepCounter:
+    """Counts the steps of the work and reports them."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self._progress = progress or (lambda *_: None)
+        self._done, self._total = 0, total
+
+    def begin(self, label: str) -> None:
+        self._progress(self._done, self._total, label)
+        self._done += 1
+
+    def end(self) -> None:
+        self._progress(self._total, self._total, "done")
+
+
+def reproduce(
+    paper: Paper,
+    out: Path,
+    progress: Progress | None = None,
+    *,
+    data: Path | None = None,
+) -> ReproductionSummary:
+    """Write a paper's figures, their numbers, the ledger of its claims and the page that shows all.
+
+    Parameters
+    ----------
+    paper : Paper
+    out : Path
+        Folder, made if absent. It receives figures/ (PNG, PDF), data/ (CSV), claims.json,
+        claims.csv and index.html, all of them or none; other files in it are left alone.
+    progress : callable, optional
+        Called before each step with the steps done, all steps, and a label of the step.
+    data : Path, optional
+        CSV of measured or digitised points (`asperity.ledger.points.read_points`), which
+        are drawn on the figures and compared with their curves; data/points.csv and
+        agreement.json are written too.
+
+    Returns
+    -------
+    ReproductionSummary
+
+    Raises
+    ------
+    InputError
+        If the folder cannot be written, or the file of points breaks a rule; before any work,
+        but for points of a curve that is not there or beyond its ends.
+    """
+    start = time.perf_counter()
+    out = Path(out)
+    points = MeasuredPoints() if data is None else MeasuredPoints.read(Path(data))
+    with written_folder(out) as folder, paper.sections() as sections:
+        points.check({k: v for section in sections for k, v in section.observables.items()})
+        steps = _StepCounter(progress, sum(2 * len(section.figures) for section in sections) + 2)
+        for name in ("figures", "data"):
+            (folder / name).mkdir()
+        shown = [_show(section, folder, steps, points) for section in sections[:1]]
+        # What the later sections show may be computed in another process meanwhile.
+        steps.begin("claims")
+        claims = paper.ledger(sensitivity=True)
+        shown += [_show(section, folder, steps, points) for section in sections[1:]]
+        steps.begin("page")
+        _write_json(paper, claims, folder / "claims.json")
+        _write_csv(claims, folder / "claims.csv")
+        agreement = points.write(folder)
+        page = build_page(
+            paper, [group for group, _ in shown], claims, paper.headlines(claims), agreement
+        )
+        (folder / "index.html").write_text(page, encoding="utf-8", newline="\n")
+    steps.end()
+    figures = [figure for _, drawn in shown for figure in drawn]
+    return _summary(paper, out, figures, claims, agreement, time.perf_counter() - start)
+
+
+def _show(
+    section: Section, folder: Path, steps: _StepCounter, points: MeasuredPoints
+) -> tuple[PlateGroup, list[PaperFigure]]:
+    """Compute and draw the figures of a section, and write their tables."""
+    from asperity.figures.style import style
+
+    figures = []
+    for compute in section.figures:
+        steps.begin(f"numbers of {section.title.lower()}")
+        figures.append(points.add(compute(), section.observables))
+    plates = []
+    # The style also says how pictures are saved.
+    with style():
+        for figure in figures:
+            steps.begin(figure.place)
+            plates.append(_draw(figure, folder))
+    group = PlateGroup(
+        section.key, section.title, section.before(figures), plates, section.after(figures)
+    )
+    return group, figures
+
+
+def _draw(figure: PaperFigure, folder: Path) -> Plate:
+    from asperity.figures.files import save_picture, save_table
+
+    png, _ = save_picture(figure.draw(), folder / "figures" / figure.name)
+    for table in figure.tables:
+        path = folder / "data" / f"{table.name}.csv"
+        save_table(table.data, path, header=list(table.header), columns=table.columns)
+    files = [f"figures/{figure.name}.{kind}" for kind in ("png", "pdf")]
+    files += [f"data/{table.name}.csv" for table in figure.tables]
+    return Plate(
+        figure.name, figure.place, figure.title, figure.caption, figure.alt, png, tuple(files)
+    )
+
+
+_FIELDS = (
+    "id", "place", "statement", "stated", "kind", "computed", "verdict", "rule", "how", "why"
+)  # fmt: skip
+
+
+def _write_json(paper: Paper, claims: Sequence[Claim], path: Path) -> None:
+    """All claims with their numbers and sensitivities, and what they are about."""
+    about = paper.contents.paper
+    record = {
+        "paper": citation(about.source) if about.source else about.short,
+        "asperity_version": __version__,
+        "verdicts": {name: meaning for name, (_, meaning) in VERDICT_TEXTS.items()},
+        "kinds": dict(KIND_TEXTS),
+        "counts": {k: counts([c for c in claims if c.kind == k]) for k in KINDS},
+        "uncertainties": {u.quantity: u.note for u in paper.contents.uncertainty},
+        "claims": [claim.as_dict() for claim in claims],
+    }
+    text = json.dumps(record, indent=2, ensure_ascii=False, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def _write_csv(claims: Sequence[Claim], path: Path) -> None:
+    """One claim a row, without its separate numbers."""
+    with path.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(_FIELDS)
+        table.writerows([getattr(claim, name) for name in _FIELDS] for claim in claims)
+
+
+def _summary(
+    paper: Paper,
+    out: Path,
+    figures: Sequence[PaperFigure],
+    claims: Sequence[Claim],
+    agreement: Sequence[CurveComparison],
+    seconds: float,
+) -> ReproductionSummary:
+    tests = Counter[str](claim.verdict for claim in claims if claim.is_test)
+    return ReproductionSummary(
+        paper=paper.contents.paper.short,
+        folder=out,
+        figures=len(figures),
+        points=sum(figure.points for figure in figures),
+        failed=sum(figure.failed for figure in figures),
+        claims=len(claims),
+        tests={verdict: tests[verdict] for verdict in VERDICTS},
+        exceptions=tuple(
+            (c.verdict, c.place, c.statement) for c in claims if c.verdict != "reproduced"
+        ),
+        agreement=tuple(agreement),
+        seconds=seconds,
+    )

@@ -1,0 +1,163 @@
+"""Acceptance rules: when a computed number counts as what the paper states.
+
+The meaning of each word is fixed here, once, before anything is computed, and holds for every claim
+that uses the word. claims.toml names the rule and the word; nobody writes a tolerance next to
+a result.
+
+==============================  =========================================================
+the paper writes                accepted
+==============================  =========================================================
+a number with its digits        what rounds to it: half a unit of the last digit stated
+"about", "approximately"        within 5 %
+"~", "of order", "k orders"     within half a decade: the nearest power of ten is the same
+"much larger", ">>"             by a factor of 10 or more; "much smaller", "<<" likewise
+"negligible", "very close"      a change of less than 5 %
+"independent of", "weakly",     a change of less than 10 %; so for "very weakly dependent
+"satisfactory"                  on V" and "quasi-independent of V", which say the same
+"substantial", "relevant"       10 % or more
+"significant", "sizeable"       20 % or more; so is a distance from something, "away"
+"strongly", "crucially"         a factor of 1.5 or more, or an exponent above 1/2
+"quasi-linear" in V             an exponent within 0.1 of 1; "much weaker": below 1/2
+"quasi-linear" curve            within 5 % of a line, relative to its highest point
+"saturates"                     a logarithmic slope below 1/4; "does not": above 1/2
+==============================  =========================================================
+
+A statement about a range is judged at both ends of the range and between. Where the paper states
+one number twice, the more precise statement is judged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from asperity.errors import InputError, closest
+
+#: Relative tolerance of "about".
+ABOUT = 0.05
+#: Decades to either side of "of order".
+HALF_A_DECADE = 0.5
+#: What the words mean that a rule may name as its limit.
+WORDS: Mapping[str, float] = {
+    "negligible": 0.05,
+    "weak": 0.10,
+    "substantial": 0.10,
+    "sizeable": 0.20,
+    "strong": 1.5,
+    "much larger": 10.0,
+    "much smaller": 0.1,
+    "half a decade": HALF_A_DECADE,
+    "saturated": 0.25,
+    "unsaturated": 0.5,
+    "nearly one, low": 0.9,
+    "nearly one, high": 1.1,
+}
+#: A tie counts as inside, whatever its last bit: 0.485 rounds to 0.48 or 0.49.
+_TIE = 1e-9
+
+
+@dataclass(frozen=True)
+class AcceptanceRule:
+    """A test of a number, and the sentence that says what it tests.
+
+    Attributes
+    ----------
+    text : str
+    accepts : callable
+        Number to bool; never sees a number that is not finite.
+    """
+
+    text: str
+    accepts: Callable[[float], bool]
+
+    def holds(self, value: float) -> bool:
+        """Whether `value` is finite and accepted."""
+        return math.isfinite(value) and bool(self.accepts(value))
+
+
+def rounds_to(stated: float, last_digit: float, what: str = "the value") -> AcceptanceRule:
+    """Half a unit of the last digit stated, `last_digit` being one unit of it."""
+    half = last_digit / 2
+    return AcceptanceRule(
+        f"{what} within {half:g} of {stated:g}, half a unit of the last digit stated",
+        lambda value: abs(value - stated) <= half + _TIE * abs(stated),
+    )
+
+
+def about(stated: float, what: str = "the value") -> AcceptanceRule:
+    """Within 5 %."""
+    return AcceptanceRule(
+        f"{what} within {100 * ABOUT:g} % of {stated:g}",
+        lambda value: abs(value / stated - 1) <= ABOUT + _TIE,
+    )
+
+
+def of_order(stated: float, what: str = "the value") -> AcceptanceRule:
+    """Within half a decade."""
+    return AcceptanceRule(
+        f"{what} within half a decade of {stated:g}",
+        lambda value: value > 0 and abs(math.log10(value / stated)) <= HALF_A_DECADE,
+    )
+
+
+def below(limit: float, what: str) -> AcceptanceRule:
+    """Less than `limit`."""
+    return AcceptanceRule(f"{what} below {limit:g}", lambda value: value < limit)
+
+
+def above(limit: float, what: str) -> AcceptanceRule:
+    """More than `limit`."""
+    return AcceptanceRule(f"{what} above {limit:g}", lambda value: value > limit)
+
+
+def between(low: float, high: float, what: str) -> AcceptanceRule:
+    """From `low` to `high`, both included."""
+    return AcceptanceRule(f"{what} from {low:g} to {high:g}", lambda value: low <= value <= high)
+
+
+def change_below(limit: float, what: str) -> AcceptanceRule:
+    """A relative change, of either sign, of less than `limit`."""
+    return AcceptanceRule(
+        f"{what} changes by less than {100 * limit:g} %", lambda value: abs(value) < limit
+    )
+
+
+def formula_text(tolerance: float) -> str:
+    """The rule for a printed formula, as a sentence."""
+    return (
+        f"reproduced if the printed formula is within {tolerance:.2g} (relative) of an "
+        "independent determination; a misprint if only the derived one is"
+    )
+
+
+#: Rules that claims.toml may name, with the names of their numbers in the order of arguments.
+RULES: Mapping[str, tuple[Callable[..., AcceptanceRule], tuple[str, ...]]] = {
+    "rounds-to": (rounds_to, ("stated", "last_digit")),
+    "about": (about, ("stated",)),
+    "of-order": (of_order, ("stated",)),
+    "below": (below, ("limit",)),
+    "above": (above, ("limit",)),
+    "between": (between, ("low", "high")),
+    "change-below": (change_below, ("limit",)),
+}
+
+
+def number(value: float | str, numbers: Mapping[str, float], place: str) -> float:
+    """A number of a rule: itself, a word of `WORDS`, or the name of one of the paper's numbers.
+
+    Raises
+    ------
+    InputError
+        If a text is neither.
+    """
+    if isinstance(value, float | int):
+        return float(value)
+    if value in WORDS:
+        return WORDS[value]
+    if value in numbers:
+        return numbers[value]
+    raise InputError(
+        f"{place} must be a number, a word of the rules or one of the paper's numbers, got "
+        f"'{value}'; {closest(value, {**WORDS, **numbers})}"
+    )

@@ -1,0 +1,57 @@
+"""Figures of a paper whose numbers can be moved on the browser page.
+
+A paper's module ``tab`` has ``FIGURES``, a `TabFigure` by the name of each; figures.toml says which
+of the paper's numbers a figure rests on (``numbers``) and how the page labels its columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+if TYPE_CHECKING:
+    from asperity.materials import Material
+
+#: A line of a figure: ``name``, and ``values``, columns by their names.
+Line: TypeAlias = dict[str, Any]
+#: What a text states at one abscissa: ``x``, ``ends``, one number or two, and ``text``.
+Mark: TypeAlias = dict[str, Any]
+Progress: TypeAlias = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class TabFigure:
+    """A figure that is computed again for other numbers of the paper.
+
+    Attributes
+    ----------
+    x : str
+        Column of the abscissa.
+    rows : sequence of str
+        Columns of the ordinates, one panel each.
+    logarithmic : tuple of str
+        Those of the columns whose axis is logarithmic.
+    lines : function
+        From the paper's numbers to the lines that take milliseconds each.
+    marks : function
+        From the paper's numbers to what the text states, by the column of the ordinate.
+    python : function
+        From the names and values of the moved numbers to code that computes the same.
+    slow : tuple of str
+        Names of further lines, which take seconds each.
+    slow_line : function
+        From the paper's numbers, one of these names and a progress to that line.
+    extras : function
+        From the paper's numbers to more that the answer holds.
+    """
+
+    x: str
+    rows: Sequence[str]
+    lines: Callable[[Material], list[Line]]
+    python: Callable[[Mapping[str, float]], str]
+    logarithmic: tuple[str, ...] = ()
+    marks: Callable[[Material], Mapping[str, Sequence[Mark]]] = lambda _: {}
+    slow: tuple[str, ...] = ()
+    slow_line: Callable[[Material, str, Progress], Line] | None = None
+    extras: Callable[[Material], Mapping[str, Any]] = lambda _: {}

@@ -1,0 +1,363 @@
+"""Claims of the appendix: the contacts in the normal direction, and the air layer."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_banded
+
+from asperity.air import (
+    NormalContact,
+    bessel_ratio,
+    mindlin_length_ratio,
+    normal_length,
+    shear_viscosity_ratio,
+)
+from asperity.ledger import check
+from asperity_papers.bureau2000.machine import RR, Float, Machine
+
+Numbers = dict[str, float]
+Mixed = dict[str, float | str]
+
+
+# --- The contacts in the normal direction, and the gap between them ------------------------------
+
+
+@check("only-fitting-parameter")
+def only_fitting_parameter(machine: Machine) -> Mixed:
+    p = machine.numbers
+    fitted = [n for n in ("A", "B", "D0", "lambda", "transmission") if p[n].kind == "fitted"]
+    return {"fitted": len(fitted), "names": " and ".join(fitted)}
+
+
+@check("normal-length-of-roughness")
+@check("normal-length")
+def length_of_the_contacts(machine: Machine) -> Numbers:
+    """The unrounded length: the stated 0.4 um has one digit."""
+    p = machine.numbers
+    length = float(normal_length(p.lambda_, p.lambda_over_lambda_z))
+    return {"lambda_z": length, "over the roughness": length / p.roughness}
+
+
+def _contact(machine: Machine) -> NormalContact:
+    return NormalContact(W0=machine.numbers.W0, lambda_z=machine.numbers.lambda_z)
+
+
+@check("normal-stiffness")
+def normal_stiffness(machine: Machine) -> Numbers:
+    contact, p = _contact(machine), machine.numbers
+    step = 1e-6 * p.lambda_z
+    slope = float(contact.load(step) - contact.load(-step)) / (2 * step)
+    return {"printed": p.W0 / p.lambda_z, "independent": slope}
+
+
+@check("restoring-force-sign")
+def restoring_force_sign(machine: Machine) -> Numbers:
+    p = machine.numbers
+    closure = 0.01 * p.lambda_z
+    downwards = p.W0 - float(_contact(machine).load(closure))
+    return {"printed": p.W0 * -closure / p.lambda_z, "independent": downwards}
+
+
+@check("length-ratio")
+def length_ratio(machine: Machine) -> Numbers:
+    ratio = float(mindlin_length_ratio(machine.numbers.poisson_ratio))
+    return {"nu = 0.44": ratio, "nu = 1/2": float(mindlin_length_ratio(0.5))}
+
+
+@check("measured-lambda")
+def measured_lambda(machine: Machine) -> Mixed:
+    p = machine.numbers
+    lengths = {"measured": str(p["lambda_quasi_static"]), "fitted": str(p["lambda"])}
+    return {"quasi-static": p.lambda_quasi_static, **lengths}
+
+
+@check("gap")
+def gap(machine: Machine) -> Numbers:
+    return {"h0": machine.numbers.gap_over_roughness * machine.numbers.roughness}
+
+
+@check("radius-of-area")
+def radius_of_area(machine: Machine) -> Numbers:
+    return {"R": machine.nominal_radius, "area of 3.9 cm": np.pi * machine.numbers.R**2}
+
+
+@check("pressure-over-modulus")
+def pressure_over_modulus(machine: Machine) -> Numbers:
+    p = machine.numbers
+    pressure = p.W0 / p.Sigma0
+    return {"modulus": pressure / p.pressure_over_modulus, "pressure": pressure}
+
+
+@check("contact-pressure")
+def contact_pressure(machine: Machine) -> Numbers:
+    return {"pressure": machine.numbers.W0 / machine.numbers.Sigma0}
+
+
+@check("small-pressure")
+def small_pressure(machine: Machine) -> Numbers:
+    p, (_, epsilon) = machine.numbers, machine.range_of("epsilon_range")
+    return {"eps = 0.5": epsilon * p.W0 / p.Sigma0 / p.P0}
+
+
+# --- The formulas of the air layer, Eqs. (35) to (40) --------------------------------------------
+
+
+def _layer_by_differences(machine: Machine) -> tuple[Float, NDArray[np.complex128], np.complex128]:
+    """Radii, delta P/delta h of Eq. (35) at 120 Hz by finite volumes, and its sum over rings."""
+    p, layer, cells = machine.numbers, machine.air_layer(), 1000
+    omega = 2 * np.pi * p.frequency
+    R, h0 = float(layer.R), float(layer.h0)
+    dr = R / cells
+    faces = dr * np.arange(cells + 1)
+    radius = faces[:-1] + dr / 2
+    conductance = h0**2 / (12 * p.eta_air) * faces / dr
+    # The rim, where the pressure excess is zero, is half a cell from the last centre.
+    conductance[-1] *= 2
+    volume = radius * dr
+    banded = np.zeros((3, cells), dtype=complex)
+    banded[0, 1:] = banded[2, :-1] = conductance[1:-1]
+    banded[1] = -conductance[:-1] - conductance[1:] - 1j * omega * volume / p.P0
+    pressure = np.asarray(solve_banded((1, 1), banded, 1j * omega * volume / h0))
+    return np.asarray(radius), pressure, np.sum(pressure * 2 * np.pi * radius)
+
+
+@check("pressure-profile")
+def pressure_profile(machine: Machine) -> Numbers:
+    radius, by_differences, _ = _layer_by_differences(machine)
+    formula = machine.air_layer().pressure(radius, 2 * np.pi * machine.numbers.frequency)
+    distance = np.abs(formula - by_differences).max()
+    return {"difference": float(distance / np.abs(by_differences).max())}
+
+
+@check("pressure-force")
+def pressure_force(machine: Machine) -> Numbers:
+    radius, _, rings = _layer_by_differences(machine)
+    layer, omega = machine.air_layer(), 2 * np.pi * machine.numbers.frequency
+    integral = rings * (float(layer.R) / radius.size)
+    formula = complex(-layer.dynamic_stiffness(omega))
+    return {
+        "difference": abs(formula / integral - 1),
+        "formula, real": formula.real / 1e6,
+        "formula, imaginary": formula.imag / 1e6,
+        "integrated, real": integral.real / 1e6,
+        "integrated, imaginary": integral.imag / 1e6,
+    }
+
+
+@check("elastic-limit")
+def elastic_limit(machine: Machine) -> Numbers:
+    value = complex(bessel_ratio(1e6))
+    return {"difference": abs(value + 1), "real": value.real, "imaginary": value.imag}
+
+
+@check("viscous-limit")
+def viscous_limit(machine: Machine) -> Numbers:
+    p, layer = machine.numbers, machine.air_layer(R=1e-4)
+    omega = 2 * np.pi * p.frequency
+    expected = -1j * omega * 3 * p.eta_air * float(layer.R) ** 2 / (2 * p.P0 * p.h0**2)
+    ratio = complex(bessel_ratio(layer.squeeze(omega))) / expected
+    film = 1j * omega * 3 * np.pi * p.eta_air * float(layer.R) ** 4 / (2 * p.h0**3)
+    force = complex(layer.dynamic_stiffness(omega)) / film
+    return {
+        "J2/J0": abs(ratio - 1),
+        "force of an incompressible squeeze film": abs(force - 1),
+        "ratio": abs(ratio),
+        "force over it": abs(force),
+    }
+
+
+@check("spring-and-damper")
+def spring_and_damper(machine: Machine) -> Numbers:
+    ratios = bessel_ratio(np.geomspace(0.1, 100, 61))
+    stiffness = machine.air_layer().dynamic_stiffness(2 * np.pi * machine.numbers.frequency)
+    return {
+        "spring": float((-ratios.real).min()),
+        "damper": float((-ratios.imag).min()),
+        "real at 120 Hz": float(stiffness.real / 1e6),
+        "imaginary at 120 Hz": float(stiffness.imag / 1e6),
+    }
+
+
+@check("equation-of-motion-sign")
+def equation_of_motion_sign(machine: Machine) -> Numbers:
+    p, epsilon = machine.numbers, 0.01
+    closure = float(_contact(machine).closure(p.W0 * (1 + epsilon)))
+    printed = epsilon * p.lambda_z
+    return {"printed": printed, "derived": -printed, "independent": -closure}
+
+
+@check("borne-fraction-formula")
+def borne_fraction_formula(machine: Machine) -> Numbers:
+    p, omega = machine.numbers, 2 * np.pi * machine.numbers.frequency
+    radius, _, rings = _layer_by_differences(machine)
+    force = rings * float(machine.air_layer().R) / radius.size
+    kappa = p.W0 / p.lambda_z
+    independent = abs(kappa / (kappa - p.M * omega**2 - force))
+    printed = machine.borne(p.frequency, machine.air_layer())
+    return {"printed": printed, "independent": float(independent)}
+
+
+@check("pressure-equation-gap")
+def pressure_equation_gap(machine: Machine) -> Numbers:
+    p = machine.numbers
+    narrowest = p.h0 - machine.strongest * p.lambda_z
+    printed, derived = (h**2 / (12 * p.eta_air) for h in (narrowest, p.h0))
+    # Poiseuille's mass flow over rho0 h0, per pressure gradient, at vanishing amplitude.
+    gap, pressure, gradient = p.h0 * (1 - 1e-9), p.P0 * (1 + 1e-9), 1e-3
+    mass_flow = pressure / p.P0 * gap**3 / (12 * p.eta_air) * gradient
+    independent = mass_flow / (p.h0 * gradient)
+    shares = {"printed over it": printed / independent, "derived over it": derived / independent}
+    return {"printed": printed, "derived": derived, "independent": independent, **shares}
+
+
+# --- Stiffnesses, the borne fraction at 120 Hz, the shear of the air -----------------------------
+
+
+@check("air-stiffness")
+def air_stiffness(machine: Machine) -> Numbers:
+    return {"kappa_air": float(machine.air_layer(R=machine.nominal_radius).stiffness)}
+
+
+@check("air-stiffer-than-contacts")
+def air_stiffer_than_contacts(machine: Machine) -> Numbers:
+    p, layer = machine.numbers, machine.air_layer(R=machine.nominal_radius)
+    return {"kappa_air/kappa_z": float(layer.stiffness) * p.lambda_z / p.W0}
+
+
+def _normal_frequency(machine: Machine) -> float:
+    p = machine.numbers
+    return float(np.sqrt(p.W0 / (p.lambda_z * p.M)) / (2 * np.pi))
+
+
+@check("normal-resonance")
+def normal_resonance(machine: Machine) -> Numbers:
+    return {"resonance": _normal_frequency(machine)}
+
+
+@check("normal-inertia")
+def normal_inertia(machine: Machine) -> Numbers:
+    return {"120 Hz": (machine.numbers.frequency / _normal_frequency(machine)) ** 2}
+
+
+@check("squeeze-number")
+def squeeze_number(machine: Machine) -> Numbers:
+    layer = machine.air_layer()
+    value = complex(layer.gamma(2 * np.pi * machine.numbers.frequency) * layer.R)
+    return {"real": value.real, "imaginary": -value.imag}
+
+
+@check("borne-fraction-120")
+def borne_fraction_120(machine: Machine) -> Numbers:
+    f = machine.numbers.frequency
+    nominal = machine.borne(f, machine.air_layer(R=machine.nominal_radius))
+    return {"120 Hz": machine.borne(f, machine.air_layer()), "with 49 cm^2": nominal}
+
+
+@check("borne-fraction-order")
+def borne_fraction_order(machine: Machine) -> Numbers:
+    p = machine.numbers
+    value = machine.borne(p.frequency, machine.air_layer())
+    return {"120 Hz": value, "factor": p.transmission / value}
+
+
+@check("small-effective-amplitude")
+def small_effective_amplitude(machine: Machine) -> Numbers:
+    p, (_, epsilon) = machine.numbers, machine.range_of("epsilon_range")
+    return {
+        "air, 120 Hz": epsilon * p.transmission,
+        "vacuum, 200 Hz": epsilon * machine.borne(p.frequency_vacuum, None),
+    }
+
+
+def _two_forces(machine: Machine) -> float:
+    """Viscous over rate-dependent force of one oscillation, each from its own definition."""
+    p, V = machine.numbers, machine.numbers.shear_viscosity_velocity
+    law, omega, amplitude = machine.slider(RR).law, 2 * np.pi * p.frequency, 1e-9
+    velocity = omega * amplitude
+    viscous = p.eta_air * velocity * p.Sigma0 / p.h0
+    state, nudge = law.steady_state(V), 1e-4 * V
+    change = law.friction(V + nudge, state, 1.0) - law.friction(V - nudge, state, 1.0)
+    return viscous / (p.W0 * float(change / (2 * nudge)) * velocity)
+
+
+@check("shear-viscosity-ratio")
+def shear_viscosity(machine: Machine) -> Numbers:
+    p, layer = machine.numbers, machine.air_layer(R=machine.nominal_radius)
+    printed, derived = (
+        float(
+            shear_viscosity_ratio(
+                p.shear_viscosity_velocity, W0=p.W0, A=p.A, layer=layer, as_printed=as_printed
+            )
+        )
+        for as_printed in (True, False)
+    )
+    return {"printed": printed, "derived": derived, "independent": _two_forces(machine)}
+
+
+@check("shear-negligible")
+def shear_negligible(machine: Machine) -> Numbers:
+    return {"100 um/s": _two_forces(machine)}
+
+
+# --- The control experiment in vacuo, and the patch of contacts ----------------------------------
+
+
+@check("vacuum-stiffness")
+def vacuum_stiffness(machine: Machine) -> Numbers:
+    p = machine.numbers
+    layer = machine.air_layer(P0=p.P_vacuum, R=machine.nominal_radius)
+    return {"1 mbar": float(layer.stiffness) * p.lambda_z / p.W0}
+
+
+@check("vacuum-mean-free-path")
+def vacuum_mean_free_path(machine: Machine) -> Numbers:
+    p = machine.numbers
+    layer = machine.air_layer(P0=p.P_vacuum, temperature=p.gas_temperature)
+    return {"mean free path": float(layer.mean_free_path), "over the gap": float(layer.knudsen)}
+
+
+@check("vacuum-fraction")
+def vacuum_fraction(machine: Machine) -> Numbers:
+    return {"200 Hz": machine.borne(machine.numbers.frequency_vacuum, None)}
+
+
+@check("air-fraction-200")
+def air_fraction_200(machine: Machine) -> Numbers:
+    f, nominal = machine.numbers.frequency_vacuum, machine.air_layer(R=machine.nominal_radius)
+    stated = machine.borne(f, machine.air_layer())
+    return {"200 Hz": machine.borne(f, nominal), "with R = 3.9 cm": stated}
+
+
+@check("scaling-ratio")
+def scaling_ratio(machine: Machine) -> Numbers:
+    f, nominal = machine.numbers.frequency_vacuum, machine.air_layer(R=machine.nominal_radius)
+    vacuum = machine.borne(f, None)
+    return {
+        "200 Hz": machine.borne(f, nominal) / vacuum,
+        "with R = 3.9 cm": machine.borne(f, machine.air_layer()) / vacuum,
+    }
+
+
+@check("same-amount")
+def same_amount(machine: Machine) -> Numbers:
+    p, layer = machine.numbers, machine.air_layer()
+    at_120 = p.transmission / machine.borne(p.frequency, layer)
+    ratio = machine.borne(p.frequency_vacuum, layer) / machine.borne(p.frequency_vacuum, None)
+    at_200 = p.transmission_air_over_vacuum / ratio
+    return {"relative difference": at_200 / at_120 - 1, "120 Hz": at_120, "200 Hz": at_200}
+
+
+@check("patch-radius")
+def patch_radius(machine: Machine) -> Numbers:
+    p, patch = machine.numbers, machine.air_layer(R=machine.numbers.patch_radius)
+    vacuum = machine.borne(p.frequency_vacuum, None)
+    return {
+        "R = 2.5 cm": machine.borne(p.frequency, patch),
+        "air over vacuum": machine.borne(p.frequency_vacuum, patch) / vacuum,
+    }
+
+
+@check("patch-area")
+def patch_area(machine: Machine) -> Numbers:
+    return {"area fraction": np.pi * machine.numbers.patch_radius**2 / machine.numbers.Sigma0}

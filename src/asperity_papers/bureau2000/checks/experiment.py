@@ -1,0 +1,238 @@
+"""Claims of section II: the machine, the mean force and its harmonics as measured, and the air.
+
+What the paper's own final model (elasto-plastic, quasi-static) gives for a measurement is compared
+with what the text states of it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import brentq
+
+from asperity.air import AirLayer, NormalContact
+from asperity.ledger import check
+from asperity.orbit import PeriodicResponse
+from asperity.theory import closed_forms as cf
+from asperity_papers.bureau2000.machine import (
+    APPLIED,
+    EXT,
+    LD,
+    READ,
+    RR,
+    SPEEDS,
+    STRONGEST,
+    Float,
+    Machine,
+    Pair,
+    at,
+    by_speed,
+    relative,
+)
+
+Numbers = dict[str, float]
+
+
+# --- II.A: the machine, and the steadiness of sliding --------------------------------------------
+
+
+@check("spring-most-compliant")
+def most_compliant(machine: Machine) -> Numbers:
+    p = machine.numbers
+    lightest, _ = machine.range_of("W0_range")
+    return {"3 N": lightest / p.lambda_ / p.K, "7 N": p.W0 / p.lambda_ / p.K}
+
+
+@check("dead-weight")
+def dead_weight(machine: Machine) -> Numbers:
+    standard_gravity = 9.80665
+    return {"weight": machine.numbers.M * standard_gravity}
+
+
+@check("away-from-resonance")
+def away_from_resonance(machine: Machine) -> Numbers:
+    p = machine.numbers
+    stiffness = {"spring": p.K, "tangential": p.W0 / p.lambda_, "normal": p.W0 / p.lambda_z}
+    hertz = {name: float(np.sqrt(k / p.M) / (2 * np.pi)) for name, k in stiffness.items()}
+    distance = {
+        f"{f:g} Hz": min(abs(f / resonance - 1) for resonance in hertz.values())
+        for f in (p.frequency, p.frequency_vacuum)
+    }
+    return distance | hertz
+
+
+@check("no-stick-slip-under-modulation")
+def no_stick_slip(machine: Machine) -> Numbers:
+    Kc = float(cf.critical_stiffness(machine.small_modulation(machine.velocities[0])))
+    K = machine.numbers["K"].model_copy(
+        update={"value": Kc, "unit": machine.numbers["K"].si_unit, "uncertainty": None}
+    )
+    critical = Machine(
+        machine.numbers.model_copy(update={"numbers": {**machine.numbers.numbers, "K": K}})
+    )
+    multiplier = critical.curve(EXT).floquet_max
+    worst = {
+        name: max(at(multiplier, eps)[k] for eps in APPLIED if eps <= STRONGEST)
+        for k, name in enumerate(SPEEDS)
+    }
+    stable_from = by_speed(stabilising_amplitude(machine.curve(EXT)), "stable from, ")
+    return {**worst, "largest": max(worst.values()), **stable_from}
+
+
+def stabilising_amplitude(r: PeriodicResponse) -> Pair:
+    """Applied amplitude at which the leading multiplier of a curve enters the unit circle."""
+    # The logarithm falls with eps; np.interp wants its abscissae to rise.
+    slow, fast = (float(np.interp(0.0, row[::-1], APPLIED[::-1])) for row in np.log(r.floquet_max))
+    return slow, fast
+
+
+# --- II.B.1: the mean force ----------------------------------------------------------------------
+
+
+@check("systematic-lowering")
+def systematic_lowering(machine: Machine) -> Numbers:
+    curves = [machine.curve(law).delta_mu for law in (RR, LD, EXT)]
+    return {
+        "largest delta mu": max(float(np.max(drop)) for drop in curves),
+        "largest step": max(float(np.diff(drop, axis=1).max()) for drop in curves),
+    }
+
+
+@check("onset")
+def onset(machine: Machine) -> Numbers:
+    r = machine.curve(EXT)
+    drop, mu = at(-r.delta_mu, machine.numbers.epsilon_onset), at(r.mu_ss)
+    return {**by_speed((drop[0] / mu[0], drop[1] / mu[1])), "drop": drop[0]}
+
+
+def _line(machine: Machine) -> tuple[Float, Float, Float]:
+    """Straight lines through the drop from eps = 0.05 to 0.5: slopes, intercepts, residuals."""
+    span = slice(APPLIED.index(machine.numbers.epsilon_onset), APPLIED.index(STRONGEST) + 1)
+    eps, drop = np.array(APPLIED[span]), -machine.curve(EXT).delta_mu[:, span]
+    slope, intercept = np.polyfit(eps, drop.T, 1)
+    return slope, intercept, drop - (slope[:, None] * eps + intercept[:, None])
+
+
+@check("drop-quasi-linear")
+def drop_quasi_linear(machine: Machine) -> Numbers:
+    slope, intercept, residual = _line(machine)
+    worst = np.abs(residual).max(1) / (slope * STRONGEST + intercept)
+    return {**by_speed(worst), "worst": float(worst.max()), "slope": float(slope[0])}
+
+
+@check("drop-not-through-zero")
+def drop_not_through_zero(machine: Machine) -> Numbers:
+    slope, intercept, residual = _line(machine)
+    excess = by_speed(-intercept / np.abs(residual).max(1))
+    return excess | by_speed(-intercept / slope, "zero, ")
+
+
+@check("drop-velocity-independent")
+def drop_velocity_independent(machine: Machine) -> Numbers:
+    r = machine.curve(EXT)
+    amplitudes = [e for e in machine.numbers["epsilon_figure3"].si_values or () if e > 0]
+    changes = {f"eps = {e:g}": relative(at(r.delta_mu, e)) for e in amplitudes}
+    # The slope of the mean with V is that of steady sliding and what the drop adds to it.
+    slopes = {
+        f"slope, eps = {e:g}": relative_slope(at(r.mu_ss), at(r.delta_mu, e)) for e in amplitudes
+    }
+    return changes | slopes
+
+
+def relative_slope(mu_ss: Pair, delta_mu: Pair) -> float:
+    """Relative change of d mu/d ln V by the modulation, between the two velocities."""
+    return (delta_mu[1] - delta_mu[0]) / (mu_ss[1] - mu_ss[0])
+
+
+# --- II.B.2: the harmonics -----------------------------------------------------------------------
+
+
+@check("mu2-over-mu1")
+def weakly_anharmonic(machine: Machine) -> Numbers:
+    r = machine.curve(EXT)
+    ratios = {
+        f"eps = {e:g}, {name}": at(r.mu2 / r.mu1, e)[k]
+        for k, name in enumerate(SPEEDS)
+        for e in READ
+    }
+    return ratios | {"largest": max(at(r.mu2 / r.mu1, e)[1] for e in READ)}
+
+
+@check("mu1-monotonic", "mu1")
+@check("mu2-monotonic", "mu2")
+def monotonic(machine: Machine, name: str) -> Numbers:
+    return by_speed(np.diff(getattr(machine.curve(EXT), name), axis=1).min(1))
+
+
+@check("mu1-velocity-independent", "mu1")
+@check("mu2-lower-when-slow", "mu2")
+def change_with_velocity(machine: Machine, name: str) -> Numbers:
+    values = getattr(machine.curve(EXT), name)
+    return {f"eps = {e:g}": relative(at(values, e)) for e in READ}
+
+
+@check("mu1-order")
+def mu1_order(machine: Machine) -> Numbers:
+    return by_speed(machine.outputs(EXT).mu1)
+
+
+@check("drop-over-mu1")
+def two_orders(machine: Machine) -> Numbers:
+    return by_speed(machine.outputs(EXT).drop_over_mu1)
+
+
+# --- II.B.3: the air under the slider, and the control experiment in vacuo -----------------------
+
+
+@check("sheared-air")
+def sheared_air(machine: Machine) -> Numbers:
+    p = machine.numbers
+    R, V = machine.nominal_radius, machine.velocities[1]
+    viscous = p.eta_air * V * np.pi * R**2 / p.h0
+    return {"10 um/s": viscous / (p.mu0 * p.W0)}
+
+
+@check("larger-in-vacuum")
+def larger_in_vacuum(machine: Machine) -> Numbers:
+    p, applied = machine.numbers, 0.2
+    layers = {"air": machine.air_layer(), "vacuum": None}
+    shares = [machine.borne(p.frequency_vacuum, layer) for layer in layers.values()]
+    # `response` takes applied amplitudes in terms of the transmission fitted at 120 Hz.
+    amplitudes = [applied * share / p.transmission for share in shares]
+    r = machine.response(EXT, machine.velocities[1], amplitudes, frequency=p.frequency_vacuum)
+    air, vacuum = (float(x) for x in -r.delta_mu)
+    return {"eps = 0.2": vacuum / air, "air": air, "vacuum": vacuum}
+
+
+@check("collapse-order")
+def collapse_order(machine: Machine) -> Numbers:
+    f = machine.numbers.frequency_vacuum
+
+    def ratio(layer: AirLayer) -> float:
+        return machine.borne(f, layer) / machine.borne(f, None)
+
+    patch = machine.air_layer(R=machine.numbers.patch_radius)
+    return {"full area": ratio(machine.air_layer()), "patch": ratio(patch)}
+
+
+@check("linear-normal-response")
+def linear_normal_response(machine: Machine) -> Numbers:
+    low, high = machine.range_of("epsilon_range")
+    change = _share_at_amplitude(machine, high) / _share_at_amplitude(machine, low) - 1
+    share = machine.borne(machine.numbers.frequency, machine.air_layer())
+    return {"relative change": change, "gap over lambda_z": high * share}
+
+
+def _share_at_amplitude(machine: Machine, epsilon: float) -> float:
+    """eps_eff/eps at 120 Hz with the logarithmic law of the contacts, first harmonic only."""
+    p, omega = machine.numbers, 2 * np.pi * machine.numbers.frequency
+    contact = NormalContact(W0=p.W0, lambda_z=p.lambda_z)
+    others = machine.air_layer().dynamic_stiffness(omega) - p.M * omega**2
+
+    def contacts(amplitude: float) -> float:
+        return p.W0 * float(contact.load_harmonics(amplitude, count=1)[0])
+
+    def excess(amplitude: float) -> float:
+        return abs(contacts(amplitude) + others * amplitude) - epsilon * p.W0
+
+    amplitude = brentq(excess, 1e-9 * p.lambda_z, 10 * p.lambda_z, xtol=1e-18, rtol=1e-12)
+    return contacts(amplitude) / (epsilon * p.W0)

@@ -1,0 +1,225 @@
+"""Curves of a figure as rows of a table, one operating point a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from asperity import Slider, periodic_response
+from asperity.ledger import FigureNumbers, figure_words
+from asperity_papers.bureau2000.machine import (
+    EXT,
+    PAPER,
+    STRONGEST,
+    Float,
+    Machine,
+    steady_multiplier,
+)
+
+#: Words and pictures of figures and sections.
+WORDS = figure_words(PAPER.package)
+
+#: Columns of every table, with their units and meaning; "1" is a pure number.
+COLUMNS: Mapping[str, str] = {
+    "curve": "name of the curve",
+    "law": "friction law",
+    "alpha": "1; Linker-Dieterich coefficient",
+    "lambda": "m; shear elastic length",
+    "inertia": "whether the mass of the slider counts",
+    "damping": "N s/m; force per velocity of a damper between slider and track",
+    "V": "m/s; pulling velocity",
+    "frequency": "Hz; of the load modulation",
+    "epsilon_applied": "1; relative amplitude of the load",
+    "epsilon_eff": "1; part of it that the contacts bear, which the model receives",
+    "mean_friction": "1; mean of F/W0",
+    "delta_mu": "1; its change by the modulation",
+    "mu1": "1; amplitude of the first harmonic of F/W0",
+    "mu2": "1; amplitude of the second harmonic of F/W0",
+    "phase1": "rad; phase of the first harmonic against the load",
+    "phase2": "rad; phase of the second harmonic against the load",
+    "floquet_max": "1; largest modulus of the Floquet multipliers of one period",
+    "stable": "whether sliding is stable",
+    "converged": "whether the point was solved",
+}
+_SOLVED = (
+    "mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", "floquet_max", "stable",
+    "converged",
+)  # fmt: skip
+APPLIED, BORNE = "epsilon_applied", "epsilon_eff"
+
+
+@dataclass(frozen=True)
+class FigureCurve:
+    """One line of a figure.
+
+    Attributes
+    ----------
+    name : str
+    law : str
+    V : float or array
+        Pulling velocity (m/s).
+    applied : float or array
+        Applied amplitude eps.
+    share : float
+        eps_eff/eps.
+    frequency : float or array
+        In Hz; None is the 120 Hz of nearly all figures.
+    overrides : mapping of str to float or array
+        Parameters of the law that replace the paper's.
+    inertia : bool
+        Whether the mass counts.
+    damping : float
+        Of a damper between slider and track (N s/m); 0 for none.
+
+    All arrays broadcast against each other.
+    """
+
+    name: str
+    law: str
+    V: float | Float
+    applied: float | Float
+    share: float = 1.0
+    frequency: float | Float | None = None
+    overrides: Mapping[str, float | Float] = field(default_factory=dict)
+    inertia: bool = False
+    damping: float = 0.0
+
+
+def solve_curves(machine: Machine, curves: Iterable[FigureCurve], **options: Any) -> pd.DataFrame:
+    """Solve all points of all curves.
+
+    Parameters
+    ----------
+    machine : Machine
+    curves : iterable of FigureCurve
+    **options
+        As of `asperity.periodic_response`.
+
+    Returns
+    -------
+    DataFrame
+        With the columns of `COLUMNS`. A point that failed has ``converged`` False and NaN.
+    """
+    return pd.concat([_solve(machine, curve, options) for curve in curves], ignore_index=True)
+
+
+def _solve(machine: Machine, curve: FigureCurve, options: Mapping[str, Any]) -> pd.DataFrame:
+    f = machine.numbers.frequency if curve.frequency is None else curve.frequency
+    varied: dict[str, Float] = {
+        name: np.asarray(x, float) for name, x in curve.overrides.items() if np.ndim(x)
+    }
+    inputs = [curve.V, curve.applied, f, *varied.values()]
+    arrays = np.broadcast_arrays(*(np.atleast_1d(np.asarray(x, float)) for x in inputs))
+    V, applied, frequency = arrays[:3]
+    varied = dict(zip(varied, arrays[3:], strict=True))
+
+    def at(rows: np.ndarray) -> Slider:
+        """The slider at some of the operating points."""
+        values = {name: x[rows] for name, x in varied.items()}
+        return machine.slider(curve.law, **{**curve.overrides, **values})
+
+    still = applied == 0
+    law: Any = at(np.full(V.shape, True)).law
+    rows = pd.DataFrame(
+        {
+            "curve": curve.name,
+            "law": curve.law,
+            "alpha": getattr(law, "alpha", np.nan),
+            "lambda": np.asarray(law.elastic_length, float),
+            "inertia": curve.inertia,
+            "damping": curve.damping,
+            "V": V,
+            "frequency": frequency,
+            "epsilon_applied": applied,
+            "epsilon_eff": curve.share * applied,
+        }
+    )
+    rows["alpha"] = rows["alpha"].astype(float)
+    rows["mean_friction"] = np.asarray(law.mu_ss(V))
+    rows[["delta_mu", "mu1", "mu2"]] = 0.0
+    rows[["phase1", "phase2", "floquet_max"]] = np.nan
+    # Steady sliding is known in closed form, without inertia; an orbit of zero amplitude has no
+    # relative accuracy.
+    if still.any() and not curve.inertia:
+        rows.loc[still, "floquet_max"] = steady_multiplier(at(still), V[still], frequency[still])
+    rows["stable"] = rows["floquet_max"] < 1
+    rows["converged"] = True
+    response = periodic_response(
+        at(~still),
+        velocity=V[~still],
+        epsilon=curve.share * applied[~still],
+        frequency=frequency[~still],
+        inertia=curve.inertia,
+        radiation_damping=curve.damping or None,
+        **options,
+    )
+    for name in _SOLVED:
+        rows.loc[~still, name] = getattr(response, name)
+    return rows
+
+
+def with_inertia(name: str) -> str:
+    """Name of the curve that counts the mass, next to the curve `name`."""
+    return f"{name}, inertia"
+
+
+def figure_numbers(
+    machine: Machine,
+    name: str,
+    data: pd.DataFrame,
+    scalars: Mapping[str, float],
+    **others: Any,
+) -> FigureNumbers:
+    """A figure with curves, and what the text states for its captions and marks."""
+    seen = machine.stated()
+    stated = {
+        "share": seen.share,
+        "epsilon_eff at 0.5": seen.epsilon_eff,
+        "collapse": seen.collapse,
+        "onset": machine.numbers.epsilon_onset,
+    }
+    for quantity, pair in {"drop": seen.drops, "mu1": seen.mu1, "mu2": seen.mu2}.items():
+        stated[f"stated {quantity} 1"], stated[f"stated {quantity} 2"] = pair
+    stated["stated ratio 1"], stated["stated ratio 2"] = seen.ratio
+    quoted = stated | others.pop("quoted", {})
+    return FigureNumbers(name, data, others.pop("columns", COLUMNS), scalars, quoted, **others)
+
+
+# --- How far the published uncertainties of A, B and lambda move a curve --------------------------
+
+
+def variations(machine: Machine) -> dict[str, dict[str, float]]:
+    """Ends of each parameter's uncertainty: "A low", "A high", ... to what replaces the paper's.
+
+    A is moved at constant B - A, because that difference is measured by itself, as the slope of
+    the friction coefficient over ln V; B and lambda are moved alone. lambda is moved over 0.62 +-
+    0.15 um, what the quasi-static test gives, the fitted 0.7 um lying within.
+    """
+    p = machine.numbers
+    ends: dict[str, dict[str, float]] = {}
+    for k, word in enumerate(("low", "high")):
+        A = machine.ends_of("A")[k]
+        ends[f"A {word}"] = {"A": A, "B": A + p["B"].si - p["A"].si}
+        ends[f"B {word}"] = {"B": machine.ends_of("B")[k]}
+        ends[f"lambda {word}"] = {"lambda_": machine.ends_of("lambda_quasi_static")[k]}
+    return ends
+
+
+def band_curves(
+    machine: Machine, name: str, V: float, applied: Float, share: float = 1.0
+) -> list[FigureCurve]:
+    """Curves of the elasto-plastic law at the ends of `variations`, named "`name`, A low" etc."""
+    return [
+        FigureCurve(f"{name}, {end}", EXT, V, applied, share, overrides=overrides)
+        for end, overrides in variations(machine).items()
+    ]
+
+
+def band_ends(machine: Machine, numbers: FigureNumbers, name: str, column: str) -> dict[str, float]:
+    """Value at eps = 0.5 for each end of `variations`."""
+    at = STRONGEST * machine.share
+    return {end: numbers.at(f"{name}, {end}", column, at, BORNE) for end in variations(machine)}

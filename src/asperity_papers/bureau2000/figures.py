@@ -1,0 +1,145 @@
+"""The figures as the report shows them: those of the paper, then the virtual experiment's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import pandas as pd
+
+import asperity as asp
+from asperity.ledger import FigureNumbers, FigureTable, PaperFigure, Section
+from asperity_papers.bureau2000 import harmonics, mean, motion, schematics, stability
+from asperity_papers.bureau2000.curves import COLUMNS, WORDS, FigureCurve
+from asperity_papers.bureau2000.machine import PAPER, Machine
+from asperity_papers.bureau2000.virtual import (
+    POINT_COLUMNS,
+    VIRTUAL,
+    SimulatedPoints,
+    VirtualFigure,
+    experiment_in_background,
+)
+from asperity_papers.bureau2000.virtual.figures import introduction, provenance, recovered_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: What computes each figure, in the order of the paper; the last four are not in it.
+NUMBERS: Mapping[str, Callable[[Machine], FigureNumbers]] = {
+    "figure-02": mean.figure_2,
+    "figure-03": mean.figure_3,
+    "figure-04": harmonics.figure_4,
+    "figure-05": mean.figure_5,
+    "figure-06": mean.figure_6,
+    "figure-07": mean.figure_7,
+    "figure-08": harmonics.figure_8,
+    "figure-09": harmonics.figure_9,
+    "figure-11": harmonics.figure_11,
+    "figure-12": stability.floquet_figure,
+    "figure-13": motion.period_figure,
+    "figure-14": harmonics.phase_figure,
+    "figure-15": motion.resonance_figure,
+}
+#: Lines of each figure of the paper.
+CURVES: Mapping[str, Callable[[Machine], list[FigureCurve]]] = {
+    "figure-02": mean.curves_2,
+    "figure-03": mean.curves_3,
+    "figure-04": harmonics.curves_4,
+    "figure-05": mean.curves_5,
+    "figure-06": mean.curves_6,
+    "figure-07": mean.curves_7,
+    "figure-08": harmonics.curves_8,
+    "figure-09": harmonics.curves_9,
+    "figure-11": harmonics.curves_11,
+}
+#: Figures with more than their plot.
+DRAWN: Mapping[str, Callable[[FigureNumbers], Figure]] = {
+    "figure-03": mean.draw_3,
+    "figure-07": mean.draw_7,
+}
+#: Figures without numbers.
+SCHEMATICS: Mapping[str, Callable[[], Figure]] = {
+    "figure-01": schematics.draw_1,
+    "figure-10": schematics.draw_10,
+}
+
+
+@contextmanager
+def sections() -> Iterator[Sequence[Section]]:
+    """The report's sections; the virtual experiment is computed while the first one is."""
+    with experiment_in_background() as readings:
+        yield _of_the_paper(), _of_the_experiment(readings)
+
+
+def draw(numbers: FigureNumbers) -> Figure:
+    """The picture of a figure; the style must be active."""
+    return DRAWN.get(numbers.name, WORDS.figures[numbers.name].draw)(numbers)
+
+
+def _of_the_paper() -> Section:
+    makers: dict[str, Callable[[], PaperFigure]] = {
+        **{name: partial(_schematic, name) for name in SCHEMATICS},
+        **{name: partial(_figure, compute) for name, compute in NUMBERS.items()},
+    }
+    observables = {name: WORDS.figures[name].observables for name in CURVES}
+    in_order = [makers[name] for name in sorted(makers)]
+    return Section("figures", WORDS.section["figures"].title, in_order, observables)
+
+
+def _schematic(name: str) -> PaperFigure:
+    nothing = FigureNumbers(name, pd.DataFrame(), {})
+    return WORDS.figures[name].figure(nothing, (), lambda _: SCHEMATICS[name]())
+
+
+def _figure(compute: Callable[[Machine], FigureNumbers]) -> PaperFigure:
+    numbers = compute(Machine())
+    words = WORDS.figures[numbers.name]
+    in_paper = words.place.startswith("Figure")
+    head = [
+        f"{words.place} of Bureau, Baumberger and Caroli, Phys. Rev. E 62, 6810 (2000), as the "
+        "models have it; no measured points"
+        if in_paper
+        else f"{words.title}; a figure of asperity, not of the paper",
+        f"computed by asperity {asp.__version__}: quasi-static periodic orbits, to 1e-8 relative",
+        "parameters, where no column says otherwise (kind in brackets):",
+        *PAPER.parameter_lines(),
+        "read off the curves:",
+        *(f"  {name} = {value:.12g}" for name, value in numbers.scalars.items()),
+    ]
+    table = FigureTable(numbers.name, numbers.data, head, numbers.columns)
+    return words.figure(numbers, (table,), draw)
+
+
+def _of_the_experiment(readings: Callable[[], SimulatedPoints]) -> Section:
+    simulated: list[VirtualFigure] = []
+
+    def make(compute: Callable[[SimulatedPoints], VirtualFigure]) -> PaperFigure:
+        figure = compute(readings())
+        simulated.append(figure)
+        return _simulated(figure)
+
+    return Section(
+        "experiment",
+        WORDS.section["experiment"].title,
+        [partial(make, compute) for compute in VIRTUAL],
+        before=lambda _: introduction(simulated),
+        after=lambda _: recovered_table(simulated),
+    )
+
+
+def _simulated(figure: VirtualFigure) -> PaperFigure:
+    numbers, words = figure.numbers, WORDS.figures[figure.numbers.name]
+
+    def table(name: str, what: str, data: Any, columns: Mapping[str, str]) -> FigureTable:
+        head = provenance(figure, words.place, what, PAPER.parameter_lines())
+        return FigureTable(name, data, head, columns)
+
+    return words.figure(
+        numbers,
+        (
+            table(numbers.name, "points", numbers.points, POINT_COLUMNS),
+            table(f"{numbers.name}-model", "the model's lines", numbers.data, COLUMNS),
+        ),
+    )

@@ -1,0 +1,378 @@
+"""The paper's slider, drive and air layer at one set of its numbers, and what they respond.
+
+Amplitudes called `applied` are the experiment's eps, `borne` ones the eps_eff that the contacts
+carry and that the models receive: 0.48 eps at 120 Hz, the paper's fit. A statement that names no
+amplitude is about eps = 0.5, the strongest modulation, where the text quotes its own numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity import Slider, periodic_response
+from asperity.air import AirLayer, effective_modulation
+from asperity.ledger import Paper
+from asperity.materials import Material, load
+from asperity.orbit import PeriodicResponse
+from asperity.theory import SmallModulation
+from asperity_papers.bureau2000.integration import (
+    IntegratedOrbit,
+    IntegratedPoint,
+    periodic_orbit,
+)
+
+PAPER = Paper("bureau2000", "asperity_papers.bureau2000")
+
+Float = NDArray[np.float64]
+Pair = tuple[float, float]
+Result = TypeVar("Result")
+
+RR, LD, EXT = "rice-ruina", "linker-dieterich", "elasto-plastic"
+#: The elasto-plastic law with the plastic velocity in the age law too, which the paper does not.
+EXT_AGE = "elasto-plastic-age"
+
+#: Names of the two velocities, of curves and of the numbers of claims.
+SLOW, FAST = "1 um/s", "10 um/s"
+SPEEDS = (SLOW, FAST)
+STRONGEST = 0.5
+#: Applied amplitudes at which claims are judged; 0.625 is eps_eff = 0.3.
+APPLIED = (0.005, 0.02, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6, 0.625)
+#: Those at which a statement about the harmonics is judged: from where the drop of the mean
+#: emerges from the noise to the strongest.
+READ = (0.05, 0.1, 0.2, 0.3, 0.4, 0.5)
+
+
+@cache
+def printed() -> Material:
+    """The paper's numbers as printed."""
+    return load("bureau2000")
+
+
+class Machine:
+    """What the laws and the air layer predict at one set of the paper's numbers.
+
+    Parameters
+    ----------
+    numbers : Material, optional
+        The paper's numbers, as printed or altered.
+    steps : int
+        Intervals of a curve between its smallest and its largest amplitude: by default finer than
+        a line is wide, and 0.05, 0.2, 0.35 and 0.5 among them.
+    """
+
+    def __init__(self, numbers: Material | None = None, steps: int = 100) -> None:
+        self.numbers = printed() if numbers is None else numbers
+        self.steps = steps
+        self._solved: dict[Hashable, Any] = {}
+
+    def _once(self, key: Hashable, solve: Callable[[], Result]) -> Result:
+        """The result of `solve`, computed at the first call with this key."""
+        if key not in self._solved:
+            self._solved[key] = solve()
+        result: Result = self._solved[key]
+        return result
+
+    @property
+    def velocities(self) -> Pair:
+        """The two velocities of the figures (m/s), slow and fast."""
+        slow, fast = self.numbers["V_data"].si_values or (np.nan, np.nan)
+        return slow, fast
+
+    def range_of(self, name: str) -> Pair:
+        """Both ends of a printed range (SI)."""
+        return self.numbers[name].si_range or (np.nan, np.nan)
+
+    def ends_of(self, name: str) -> Pair:
+        """A printed number less and plus its uncertainty (SI)."""
+        number = self.numbers[name]
+        spread = number.si_uncertainty or 0.0
+        return number.si - spread, number.si + spread
+
+    # --- The slider ------------------------------------------------------------------------------
+
+    def slider(self, law: str, **overrides: Any) -> Slider:
+        """The paper's slider with one of the laws, some of its parameters replaced."""
+        p = self.numbers
+        return Slider(p.law(law, **overrides), spring=p.K, load=p.W0, mass=p.M)
+
+    def mu_ss(self, velocity: float) -> float:
+        """Friction coefficient of unmodulated sliding; the same in all the laws used here."""
+        return float(self.slider(RR).law.mu_ss(velocity))
+
+    @property
+    def stiffness_ratio(self) -> float:
+        """K/Kc with Kc = (B - A) W0/D0: sliding on rigid asperities is stable above 1."""
+        p = self.numbers
+        return float(p.K * p.D0 / ((p.B - p.A) * p.W0))
+
+    @property
+    def contact_resonance(self) -> float:
+        """Frequency (Hz) at which the mass oscillates on the asperities' shear stiffness."""
+        p = self.numbers
+        return float(np.sqrt(p.W0 / (p.lambda_ * p.M)) / (2 * np.pi))
+
+    # --- The drive -------------------------------------------------------------------------------
+
+    def applied_amplitudes(self) -> Float:
+        """Amplitudes of a curve, from steady sliding to the strongest modulation."""
+        return np.linspace(0.0, STRONGEST, self.steps + 1)
+
+    def borne_amplitudes(self) -> Float:
+        """Amplitudes of the figures drawn against eps_eff: up to 0.3, as the text has it."""
+        return np.linspace(0.0, self.numbers.no_saturation_below, self.steps + 1)
+
+    @property
+    def share(self) -> float:
+        """eps_eff/eps at 120 Hz: 0.48, the text's fit (III.A.2), in all figures.
+
+        The caption of Fig. 7 writes the same fit as eps/2.1.
+        """
+        return float(self.numbers.transmission)
+
+    @property
+    def strongest(self) -> float:
+        """eps_eff at eps = 0.5."""
+        return self.numbers.transmission * STRONGEST
+
+    def air_layer(self, **overrides: Any) -> AirLayer:
+        """The air layer of the appendix; its radius is the stated 3.9 cm."""
+        p = self.numbers
+        return AirLayer(**({"P0": p.P0, "h0": p.h0, "eta": p.eta_air, "R": p.R} | overrides))
+
+    def borne(self, frequency: float, layer: AirLayer | None) -> float:
+        """eps_eff/eps with or without an air layer: without, inertia and contacts alone."""
+        p = self.numbers
+        return float(
+            effective_modulation(frequency, W0=p.W0, M=p.M, lambda_z=p.lambda_z, layer=layer)
+        )
+
+    @property
+    def nominal_radius(self) -> float:
+        """Radius (m) of the disc of the stated area, 49 cm^2."""
+        return float(np.sqrt(self.numbers.Sigma0 / np.pi))
+
+    # --- Responses -------------------------------------------------------------------------------
+
+    def response(
+        self,
+        law: str,
+        velocity: Any,
+        applied: Any,
+        frequency: float | None = None,
+        **overrides: Any,
+    ) -> PeriodicResponse:
+        """Quasi-static response at eps_eff = 0.48 times `applied`."""
+        p = self.numbers
+        return periodic_response(
+            self.slider(law, **overrides),
+            velocity=velocity,
+            epsilon=p.transmission * np.asarray(applied),
+            frequency=p.frequency if frequency is None else frequency,
+        )
+
+    def curve(self, law: str, **overrides: float) -> PeriodicResponse:
+        """Response at the two velocities (axis 0) and at `APPLIED` (axis 1), 120 Hz."""
+        V, applied = np.array(self.velocities)[:, None], np.array(APPLIED)[None]
+        return self._once(
+            ("curve", law, *sorted(overrides.items())),
+            lambda: self.response(law, V, applied, **overrides),
+        )
+
+    def outputs(self, law: str, **overrides: float) -> Outputs:
+        """Quasi-static response of a law at eps = 0.5."""
+        r = self.curve(law, **overrides)
+        return Outputs(at(r.mu_ss), at(r.delta_mu), at(r.mu1), at(r.mu2))
+
+    def inertial_outputs(self) -> Outputs:
+        """Response of the elasto-plastic law at eps = 0.5 with the slider's inertia."""
+        return self._once("inertial", self._inertial_outputs)
+
+    def _inertial_outputs(self) -> Outputs:
+        r = periodic_response(
+            self.slider(EXT),
+            velocity=np.array(self.velocities),
+            epsilon=self.strongest,
+            frequency=self.numbers.frequency,
+            inertia=True,
+        )
+        pairs = ((float(a[0]), float(a[1])) for a in (r.mu_ss, r.delta_mu, r.mu1, r.mu2))
+        return Outputs(*pairs)
+
+    def ageless_changes(self, law: str) -> dict[str, float]:
+        """Relative changes of drop, mu1 and mu2 when friction no longer feels the age.
+
+        At eps = 0.5 and the fast velocity, with mu0 set so that the steady friction stays what it
+        was.
+        """
+        p, fast = self.numbers, self.velocities[1]
+        mu_fast = float(self.slider(law).law.mu_ss(fast))
+        full = self.response(law, fast, [STRONGEST])
+        without = self.response(
+            law, fast, [STRONGEST], B=0.0, mu0=mu_fast - p.A * float(np.log(fast / p.V0))
+        )
+        return {
+            "drop": float((without.delta_mu / full.delta_mu)[0]) - 1,
+            "mu1": float((without.mu1 / full.mu1)[0]) - 1,
+            "mu2": float((without.mu2 / full.mu2)[0]) - 1,
+        }
+
+    def velocity_exponent(self, values: Float, applied: float = STRONGEST) -> float:
+        """Logarithmic slope d ln y / d ln V between the two velocities, at one amplitude."""
+        slow, fast = at(np.abs(values), applied)
+        low, high = self.velocities
+        return float(np.log(fast / slow) / np.log(high / low))
+
+    # --- Closed forms and the reference integration ----------------------------------------------
+
+    def small_modulation(self, V: float, **overrides: float) -> SmallModulation:
+        """What the closed forms take; rigid asperities, no inertia."""
+        return SmallModulation(**self._point(V, **overrides))
+
+    def operating_point(self, V: float, **overrides: float) -> IntegratedPoint:
+        """What the reference integration takes; rigid asperities, no inertia."""
+        numbers = {k: v for k, v in self._point(V, **overrides).items() if k != "omega"}
+        return IntegratedPoint(**numbers, frequency=self.numbers.frequency)
+
+    def orbit(self, point: IntegratedPoint, epsilon: float, drop: float = 0.0) -> IntegratedOrbit:
+        """A periodic orbit of the reference integration, integrated once."""
+        return self._once((point, epsilon, drop), lambda: periodic_orbit(point, epsilon, drop))
+
+    def _point(self, V: float, **overrides: float) -> dict[str, Any]:
+        p = self.numbers
+        point: dict[str, Any] = {"A": p.A, "B": p.B, "D0": p.D0, "K": p.K, "W0": p.W0}
+        point |= {"V": V, "omega": 2 * np.pi * p.frequency}
+        point |= overrides
+        point.setdefault("mu", p.mu0 - (point["B"] - point["A"]) * float(np.log(V / p.V0)))
+        return point
+
+    # --- What the text states --------------------------------------------------------------------
+
+    def stated(self) -> Stated:
+        """The statements of section II and of the captions, as numbers."""
+        p = self.numbers
+        half_decade = 10**0.5
+        slow, fast = (-p.relative_drop * self.mu_ss(V) for V in self.velocities)
+        return Stated(
+            drops=(slow, fast),
+            mu1=(p.mu1_order / half_decade, p.mu1_order * half_decade),
+            ratio=p["mu2_over_mu1"].si_range or (0.0, 0.0),
+            share=self.share,
+            collapse=1 / p.collapse_divisor_200Hz,
+        )
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """A model's response at eps = 0.5, each at the slow and the fast velocity."""
+
+    mu_ss: Pair
+    delta_mu: Pair
+    mu1: Pair
+    mu2: Pair
+
+    @property
+    def relative_drop(self) -> Pair:
+        """Drop of the mean over the friction coefficient without modulation."""
+        return -self.delta_mu[0] / self.mu_ss[0], -self.delta_mu[1] / self.mu_ss[1]
+
+    @property
+    def drop_over_mu1(self) -> Pair:
+        """Drop of the mean over the first harmonic."""
+        return -self.delta_mu[0] / self.mu1[0], -self.delta_mu[1] / self.mu1[1]
+
+    @property
+    def mu2_over_mu1(self) -> Pair:
+        """Second over first harmonic."""
+        return self.mu2[0] / self.mu1[0], self.mu2[1] / self.mu1[1]
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What the text says about the measurements; nothing here is read off a figure.
+
+    Attributes
+    ----------
+    drops : (float, float)
+        "A typical magnitude of this effect is a 20 % decrease" of the mean; no velocity is named:
+        -20 % of the friction coefficient at 1 and at 10 um/s.
+    mu1 : (float, float)
+        "Of order 1e-3": half a decade to either side.
+    ratio : (float, float)
+        mu2/mu1.
+    share : float
+        eps_eff/eps at 120 Hz.
+    collapse : float
+        eps_eff in air over that in vacuum at 200 Hz (Fig. 5).
+    """
+
+    drops: Pair
+    mu1: Pair
+    ratio: Pair
+    share: float
+    collapse: float
+
+    @property
+    def epsilon_eff(self) -> float:
+        """Amplitude that the contacts bear at eps = 0.5."""
+        return STRONGEST * self.share
+
+    @property
+    def mu2(self) -> Pair:
+        """What "of order 1e-3" and "0.1 to 0.2 of it" leave to mu2."""
+        return self.mu1[0] * self.ratio[0], self.mu1[1] * self.ratio[1]
+
+
+def at(values: Float, applied: float = STRONGEST) -> Pair:
+    """Entries of a curve at one applied amplitude, for the slow and the fast velocity."""
+    slow, fast = values[:, APPLIED.index(applied)]
+    return float(slow), float(fast)
+
+
+def relative(values: Pair) -> float:
+    """Relative change from the slow to the fast velocity."""
+    slow, fast = values
+    return fast / slow - 1
+
+
+def by_speed(values: Any, prefix: str = "") -> dict[str, float]:
+    """Numbers at the two velocities by their names, with a prefix such as ``"mu1, "``."""
+    return {f"{prefix}{name}": float(x) for name, x in zip(SPEEDS, values, strict=True)}
+
+
+def amplitude_slopes(values: Float) -> Float:
+    """Logarithmic slopes d ln y / d ln eps between neighbouring amplitudes, (2, n - 1)."""
+    return np.diff(np.log(np.abs(values))) / np.diff(np.log(APPLIED))
+
+
+def steady_growth(slider: Slider, V: ArrayLike) -> Float:
+    """Growth rate (1/s) of a perturbation of unmodulated sliding; positive where it is unstable.
+
+    Linearised about steady sliding at V, with l = lambda K/W0 and perturbations growing as
+    e^{s t}, the quasi-static equations of section III give, the age law being on the slider's
+    velocity::
+
+        (1 + l) A W0/V s^2 + [K - (B - (1 + l) A) W0/D0] s + K V/D0 = 0.
+
+    For l = 0 the bracket changes sign at the paper's Kc = (B - A) W0/D0. Load rates are absent,
+    hence Linker-Dieterich ageing has the stability of Rice-Ruina's.
+    """
+    law: Any = slider.law
+    numbers = (law.A, law.B, law.D0, law.elastic_length, slider.K, slider.W0)
+    A, B, D0, length, K, W0 = (np.asarray(x, dtype=float) for x in numbers)
+    V = np.asarray(V, dtype=float)
+    A = A * (1 + length * K / W0)
+    quadratic, constant = A * W0 / V, K * V / D0
+    linear = K - (B - A) * W0 / D0
+    root = np.sqrt(linear**2 - 4 * quadratic * constant + 0j)
+    return np.asarray(((root - linear) / (2 * quadratic)).real)
+
+
+def steady_multiplier(slider: Slider, V: ArrayLike, frequency: ArrayLike) -> Float:
+    """Growth of a perturbation of steady sliding over one period 1/frequency (Hz)."""
+    return np.exp(steady_growth(slider, V) / np.asarray(frequency))

@@ -1,0 +1,254 @@
+"""Figures 2, 3, 5, 6 and 7: the mean friction."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pandas as pd
+
+from asperity.figures import COLOURS
+from asperity.ledger import FigureNumbers
+from asperity_papers.bureau2000.curves import (
+    APPLIED,
+    BORNE,
+    WORDS,
+    FigureCurve,
+    band_curves,
+    band_ends,
+    figure_numbers,
+    solve_curves,
+    with_inertia,
+)
+from asperity_papers.bureau2000.machine import EXT, RR, SLOW, SPEEDS, STRONGEST, Float, Machine
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+#: Velocities per decade in figure 3.
+_PER_DECADE = 12
+#: Degrees that a line is tilted in figure 3 as printed, for a slope of 1 in ln V.
+_TILT = 1180.0
+#: Curves of figure 5, with what bears the load.
+VACUUM, AIR, FULL_DISC = "1 mbar", "1 atm", "1 atm, full disc"
+
+
+def _bare(machine: Machine, data: pd.DataFrame) -> FigureNumbers:
+    """Curves to read numbers off."""
+    return figure_numbers(machine, "", data, {})
+
+
+def drops(numbers: FigureNumbers, suffix: str = "") -> list[float]:
+    """Change of the mean at the largest amplitude, slow and fast."""
+    return [numbers.last(name + suffix, "delta_mu") for name in SPEEDS]
+
+
+def relative_drops(machine: Machine, numbers: FigureNumbers, suffix: str = "") -> list[float]:
+    """The same as a drop over the friction coefficient, in percent."""
+    pairs = zip(drops(numbers, suffix), machine.velocities, strict=True)
+    return [-100 * drop / machine.mu_ss(V) for drop, V in pairs]
+
+
+# --- Figure 2: change of the mean against eps at 120 Hz ------------------------------------------
+
+
+def curves_2(machine: Machine) -> list[FigureCurve]:
+    """Both velocities, with the mass and at the ends of the uncertainties; the computed layer."""
+    eps, share, slow = machine.applied_amplitudes(), machine.share, machine.velocities[0]
+    named = list(zip(SPEEDS, machine.velocities, strict=True))
+    layer = machine.borne(machine.numbers.frequency, machine.air_layer())
+    return [
+        *(FigureCurve(name, EXT, V, eps, share) for name, V in named),
+        *(FigureCurve(with_inertia(name), EXT, V, eps, share, inertia=True) for name, V in named),
+        *band_curves(machine, SLOW, slow, eps, share),
+        FigureCurve("air layer", EXT, slow, eps, layer),
+    ]
+
+
+def figure_2(machine: Machine) -> FigureNumbers:
+    """Change of the mean against eps at 120 Hz."""
+    data = solve_curves(machine, curves_2(machine))
+    read, mu_slow = _bare(machine, data), machine.mu_ss(machine.velocities[0])
+    slope, intercept, straightness = _straight_line(read, machine.numbers.epsilon_onset)
+    drop = drops(read)
+    relative = relative_drops(machine, read)
+    inertial = relative_drops(machine, read, ", inertia")
+    ends = band_ends(machine, read, SLOW, "delta_mu")
+    scalars = {
+        "drop_slow": drop[0],
+        "drop_fast": drop[1],
+        "relative_drop_slow": relative[0] / 100,
+        "relative_drop_fast": relative[1] / 100,
+        "relative_drop_inertia_slow": inertial[0] / 100,
+        "relative_drop_inertia_fast": inertial[1] / 100,
+        **{f"drop {end}": value for end, value in ends.items()},
+        "slope": slope,
+        "intercept": intercept,
+        "departure_from_line": straightness,
+        "transmission_air": machine.borne(machine.numbers.frequency, machine.air_layer()),
+    }
+    by_A = {f"relative drop A {end}": -ends[f"A {end}"] / mu_slow for end in ("low", "high")}
+    return figure_numbers(machine, "figure-02", data, scalars, quoted=by_A)
+
+
+def _straight_line(read: FigureNumbers, onset: float) -> tuple[float, float, float]:
+    """Slope, intercept and largest departure of the line through the slow curve above `onset`."""
+    slow = read.curve(SLOW)
+    line = slow[slow[APPLIED] >= onset]
+    slope, intercept = np.polyfit(line[APPLIED], line["delta_mu"], 1)
+    departure = line["delta_mu"] - slope * line[APPLIED] - intercept
+    return float(slope), float(intercept), float(np.abs(departure).max())
+
+
+# --- Figure 3: mean against V for four amplitudes ------------------------------------------------
+
+
+def velocity_axis(machine: Machine) -> Float:
+    """Pulling velocities (m/s) of the lines."""
+    low, high = machine.range_of("V_range")
+    return np.geomspace(low, high, _PER_DECADE * round(np.log10(high / low)) + 1)
+
+
+def curves_3(machine: Machine) -> list[FigureCurve]:
+    """One for each amplitude of the figure."""
+    V = velocity_axis(machine)
+    amplitudes = machine.numbers["epsilon_figure3"].si_values or ()
+    return [FigureCurve(f"eps = {eps:g}", EXT, V, eps, machine.share) for eps in amplitudes]
+
+
+def figure_3(machine: Machine) -> FigureNumbers:
+    """Mean against V for four amplitudes."""
+    data = solve_curves(machine, curves_3(machine))
+    scalars = {
+        f"slope_{eps:g}": float(np.polyfit(np.log(rows["V"]), rows["mean_friction"], 1)[0])
+        for eps, rows in data.groupby(APPLIED, sort=False)
+    }
+    return figure_numbers(machine, "figure-03", data, scalars)
+
+
+def draw_3(numbers: FigureNumbers) -> Figure:
+    """The lines, each with its slope along it, and the stated slope."""
+    figure = WORDS.figures["figure-03"].draw(numbers)
+    axis = figure.axes[0]
+    names = list(numbers.data["curve"].unique())
+    for name in names:
+        rows, eps = numbers.curve(name), name.removeprefix("eps = ")
+        slope = numbers.scalars[f"slope_{eps}"]
+        # The strongest one has its name below: the stated slope lies above it.
+        below = name == names[-1]
+        axis.text(
+            1e6 * rows["V"].iloc[2], rows["mean_friction"].iloc[2] + (-0.004 if below else 0.003),
+            rf"$\epsilon={eps}$,  slope ${slope:.4f}$", rotation=_TILT * slope,
+            rotation_mode="anchor", va="top" if below else "bottom", fontsize=10,
+        )  # fmt: skip
+    # The slope without modulation, through the strongest modulation at 1 um/s.
+    strongest = numbers.curve(names[-1])
+    V, mean = 1e6 * strongest["V"].to_numpy(), strongest["mean_friction"].to_numpy()
+    through = float(np.interp(0.0, np.log(V), mean))
+    line = through + numbers.scalars["slope_0"] * np.log(V)
+    axis.plot(V, line, linewidth=1.1, color=COLOURS["stated"])
+    return figure
+
+
+# --- Figure 5: air and vacuum at 200 Hz ----------------------------------------------------------
+
+
+def vacuum_shares(machine: Machine) -> tuple[float, float]:
+    """eps_eff/eps at 200 Hz, in vacuum and in air.
+
+    In vacuum by the appendix, 1/|1 - (omega/omega_0)^2|; in air the same over 2.5, the factor by
+    which the paper's data collapse.
+    """
+    vacuum = machine.borne(machine.numbers.frequency_vacuum, None)
+    return vacuum, vacuum / machine.numbers.collapse_divisor_200Hz
+
+
+def curves_5(machine: Machine) -> list[FigureCurve]:
+    """In vacuum and in air, with the mass too, and under the layer's full disc."""
+    p, eps = machine.numbers, machine.applied_amplitudes()
+    V, f = p.V_vacuum, p.frequency_vacuum
+    shares = dict(zip((VACUUM, AIR), vacuum_shares(machine), strict=True))
+    return [
+        *(FigureCurve(name, EXT, V, eps, share, f) for name, share in shares.items()),
+        *(
+            FigureCurve(with_inertia(name), EXT, V, eps, share, f, inertia=True)
+            for name, share in shares.items()
+        ),
+        FigureCurve(FULL_DISC, EXT, V, eps, machine.borne(f, machine.air_layer()), f),
+    ]
+
+
+def figure_5(machine: Machine) -> FigureNumbers:
+    """Change of the mean in air and in vacuum, at 200 Hz."""
+    p, data = machine.numbers, solve_curves(machine, curves_5(machine))
+    vacuum, air = vacuum_shares(machine)
+    disc = machine.borne(p.frequency_vacuum, machine.air_layer())
+    read = _bare(machine, data)
+    ends = {name: read.last(name, "delta_mu") for name in data["curve"].unique()}
+    scalars = {
+        "transmission_vacuum": vacuum,
+        "transmission_air": disc,
+        "air_over_vacuum": disc / vacuum,
+        **{f"drop {name}": value for name, value in ends.items()},
+    }
+    mu = machine.mu_ss(p.V_vacuum)
+    percent = {f"relative drop {name}": -value / mu for name, value in ends.items()}
+    in_air = {"transmission in air": air}
+    return figure_numbers(machine, "figure-05", data, scalars, quoted=percent | in_air)
+
+
+# --- Figures 6 and 7: Rice-Ruina, before and after the fitted share ------------------------------
+
+
+def curves_6(machine: Machine) -> list[FigureCurve]:
+    """Both velocities, all of the load borne by the contacts."""
+    eps = machine.applied_amplitudes()
+    return [
+        FigureCurve(name, RR, V, eps) for name, V in zip(SPEEDS, machine.velocities, strict=True)
+    ]
+
+
+def figure_6(machine: Machine) -> FigureNumbers:
+    """Rice-Ruina: change of the mean against eps."""
+    data = solve_curves(machine, curves_6(machine))
+    read = _bare(machine, data)
+    drop, relative = drops(read), relative_drops(machine, read)
+    scalars = {
+        "drop_slow": drop[0],
+        "drop_fast": drop[1],
+        "relative_drop_slow": relative[0] / 100,
+        "relative_drop_fast": relative[1] / 100,
+    }
+    quoted = {
+        "slow over fast": drop[0] / drop[1] - 1, "points between": relative[0] - relative[1]
+    }  # fmt: skip
+    return figure_numbers(machine, "figure-06", data, scalars, quoted=quoted)
+
+
+def curves_7(machine: Machine) -> list[FigureCurve]:
+    """The slow velocity."""
+    return curves_6(machine)[:1]
+
+
+def figure_7(machine: Machine) -> FigureNumbers:
+    """Rice-Ruina at the slow velocity, and where the fitted share puts the stated drop."""
+    data = solve_curves(machine, curves_7(machine))
+    read, drop = _bare(machine, data), machine.stated().drops[0]
+    there = read.at(SLOW, "delta_mu", STRONGEST * machine.share, BORNE)
+    needed = float(np.interp(-drop, -data["delta_mu"], data[BORNE]))
+    scalars = {
+        "drop_at_scaled": there,
+        "epsilon_needed": needed,
+        "share_needed": needed / STRONGEST,
+    }
+    return figure_numbers(machine, "figure-07", data, scalars)
+
+
+def draw_7(numbers: FigureNumbers) -> Figure:
+    """An arrow from the applied amplitude of the stated drop to the scaled one."""
+    figure = WORDS.figures["figure-07"].draw(numbers)
+    drop, left = numbers.quoted["stated drop 1"], numbers.quoted["epsilon_eff at 0.5"]
+    arrow = {"arrowstyle": "-|>", "color": COLOURS["stated"], "linewidth": 1.2}
+    ends = (left + 0.022, drop), (STRONGEST - 0.02, drop)
+    figure.axes[0].annotate("", xy=ends[0], xytext=ends[1], arrowprops=arrow)
+    return figure

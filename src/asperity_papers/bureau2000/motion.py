@@ -1,0 +1,191 @@
+"""Figures 13 and 15, which are not in the paper: one period of the motion, and its resonance.
+
+At 0.5 of modulation, 1 um/s and 120 Hz the asperities' elasticity moves the slider to and fro much
+faster than it is pulled. The paper's age law is printed with that velocity; the variant has the
+plastic velocity of the joint in its place. The mass and the asperities' shear stiffness W0/lambda
+resonate at 400 Hz, between the third and the fourth harmonic of 120 Hz and at the second of 200
+Hz. The paper's models leave the mass out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+
+from asperity import periodic_response
+from asperity.ledger import FigureNumbers
+from asperity.orbit import over_a_period
+from asperity_papers.bureau2000.curves import FigureCurve, figure_numbers, solve_curves
+from asperity_papers.bureau2000.machine import EXT, EXT_AGE, Float, Machine
+
+#: Instants of the period: pulses of slip are a third of a radian wide and less.
+_SAMPLES = 512
+
+#: Columns of the table, with their units and meaning.
+PERIOD_COLUMNS = {
+    "curve": "name of the curve",
+    "law": "friction law",
+    "inertia": "whether the mass of the slider counts",
+    "phase": "1; time over the period, 0 at the largest load",
+    "load": "1; W/W0",
+    "force": "1; F/W0, the force of the pulling spring",
+    "velocity": "1; velocity of the slider over the pulling velocity",
+    "plastic_velocity": "1; plastic velocity of the joint over the pulling velocity",
+    "age": "1; V Phi/D0",
+}
+#: Curves: name to law, and whether the mass counts.
+PERIODS = {
+    "age on the slider's velocity": (EXT, False),
+    "age on the plastic velocity": (EXT_AGE, False),
+    "with inertia": (EXT, True),
+}
+
+
+def one_period(
+    machine: Machine,
+    law: str,
+    V: float,
+    epsilon: float,
+    *,
+    inertia: bool = False,
+    samples: int = _SAMPLES,
+) -> pd.DataFrame:
+    """Force, velocities and age over one period of the periodic orbit.
+
+    Parameters
+    ----------
+    machine : Machine
+    law : str
+        An elasto-plastic law.
+    V, epsilon : float
+        Pulling velocity (m/s) and amplitude on the contacts.
+    inertia : bool
+    samples : int
+        Instants of the period.
+
+    Returns
+    -------
+    DataFrame
+        With the columns of `PERIOD_COLUMNS` but "curve".
+    """
+    response = periodic_response(
+        machine.slider(law), velocity=V, epsilon=epsilon, frequency=machine.numbers.frequency,
+        inertia=inertia, waveform=samples,
+    )  # fmt: skip
+    return pd.DataFrame({"law": law, "inertia": inertia, **over_a_period(response)._asdict()})
+
+
+def period_figure(machine: Machine) -> FigureNumbers:
+    """One period at 0.5 of modulation and 1 um/s, with both age laws and with inertia."""
+    V, epsilon = machine.velocities[0], machine.stated().epsilon_eff
+    tables = [
+        one_period(machine, law, V, epsilon, inertia=inertia).assign(curve=name)
+        for name, (law, inertia) in PERIODS.items()
+    ]
+    data = pd.concat(tables, ignore_index=True)[list(PERIOD_COLUMNS)]
+    drops = [float(rows["force"].mean()) - machine.mu_ss(V) for rows in tables]
+    scalars = {
+        "velocity_min": float(tables[0]["velocity"].min()),
+        "velocity_max": float(tables[0]["velocity"].max()),
+        "plastic_velocity_max": float(tables[0]["plastic_velocity"].max()),
+        "drop_printed": drops[0],
+        "drop_plastic_age": drops[1],
+        "drop_inertia": drops[2],
+        "plastic_age_smaller_by": 1 - drops[1] / drops[0],
+    }
+    return figure_numbers(machine, "figure-13", data, scalars, columns=PERIOD_COLUMNS)
+
+
+# --- The resonance of the slider on its asperities -----------------------------------------------
+
+#: Quality factor of the damped resonance. The paper gives no damping; ten is our choice.
+QUALITY = 10.0
+#: Ranges of the two cuts: beyond what is published of lambda (um), and around 120 and 200 Hz.
+_LENGTHS, _FREQUENCIES, _POINTS = (0.4, 1.0), (80.0, 800.0), 100
+#: Values of lambda (um) that the caption names: the ends and the middle of its measured range, and
+#: the fitted one.
+_MARKED = (0.47, 0.62, 0.70, 0.77)
+QUASI_STATIC, UNDAMPED, DAMPED = "no inertia", "inertia", "inertia, damped"
+
+
+def contact_damping(machine: Machine, quality: float = QUALITY) -> float:
+    """Damper between slider and track (N s/m) that gives the resonance a quality factor.
+
+    It is parallel to the asperities and the joint: sqrt(M W0/lambda)/quality. What it adds to the
+    mean force, its value times V, is below 0.001 W0 at 10 um/s.
+    """
+    p = machine.numbers
+    return float(np.sqrt(p.M * p.W0 / p.lambda_) / quality)
+
+
+def resonance_curves(machine: Machine, V: float, epsilon: float) -> list[FigureCurve]:
+    """Cuts over lambda and frequency; names are "lambda, inertia" and the like.
+
+    Parameters
+    ----------
+    machine : Machine
+    V, epsilon : float
+        Pulling velocity (m/s) and amplitude on the contacts, the same at all points.
+    """
+    p = machine.numbers
+    lengths: Float = 1e-6 * np.linspace(*_LENGTHS, _POINTS)
+    # The paper's frequencies are among them: the peaks are narrower than two points.
+    experiments = [p.frequency, p.frequency_vacuum]
+    between = np.geomspace(*_FREQUENCIES, _POINTS - len(experiments))
+    cuts = (
+        FigureCurve("lambda", EXT, V, epsilon, overrides={"lambda_": lengths}),
+        FigureCurve("frequency", EXT, V, epsilon, frequency=np.sort([*between, *experiments])),
+    )
+    cases = {
+        QUASI_STATIC: (False, 0.0), UNDAMPED: (True, 0.0), DAMPED: (True, contact_damping(machine))
+    }  # fmt: skip
+    return [
+        replace(cut, name=f"{cut.name}, {name}", inertia=inertia, damping=damping)
+        for name, (inertia, damping) in cases.items()
+        for cut in cuts
+    ]
+
+
+def resonance_figure(machine: Machine) -> FigureNumbers:
+    """Drop, mu1 and mu2 against lambda at 120 Hz and against frequency at 0.7 um."""
+    p, V, epsilon = machine.numbers, machine.velocities[1], machine.stated().epsilon_eff
+    data = solve_curves(machine, resonance_curves(machine, V, epsilon))
+    read, f = figure_numbers(machine, "", data, {}), p.frequency_vacuum
+    still, moved = (f"frequency, {name}" for name in (QUASI_STATIC, UNDAMPED))
+    percent = {
+        name: 100 * -at_frequency(read, name, "delta_mu", f) / machine.mu_ss(V)
+        for name in (still, moved)
+    }
+    changes = {
+        f"change of {column} at lambda {length:g} um": _change(read, column, 1e-6 * length)
+        for column in ("delta_mu", "mu2")
+        for length in _MARKED
+    }
+    scalars = {
+        "contact_resonance": machine.contact_resonance,
+        "contact_damping": contact_damping(machine),
+        "relative_drop_200Hz": percent[still] / 100,
+        "relative_drop_200Hz_inertia": percent[moved] / 100,
+        "mu2_ratio_200Hz": at_frequency(read, moved, "mu2", f)
+        / at_frequency(read, still, "mu2", f),
+        **changes,
+    }
+    low, high = machine.ends_of("lambda_quasi_static")
+    marks = {"lambda low": low, "lambda high": high, "lambda fitted": p.lambda_}
+    return figure_numbers(machine, "figure-15", data, scalars, quoted={"Q": QUALITY, **marks})
+
+
+def at_frequency(numbers: FigureNumbers, curve: str, column: str, frequency: float) -> float:
+    """A quantity on a cut over the frequency, linear in ln f between the points."""
+    rows = numbers.curve(curve)
+    return float(np.interp(np.log(frequency), np.log(rows["frequency"]), rows[column]))
+
+
+def _change(numbers: FigureNumbers, column: str, length: float) -> float:
+    """Relative change of a quantity by inertia at one lambda (m)."""
+    still, moved = (
+        numbers.at(f"lambda, {name}", column, length, "lambda") for name in (QUASI_STATIC, UNDAMPED)
+    )
+    return moved / still - 1

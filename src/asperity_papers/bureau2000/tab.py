@@ -1,0 +1,229 @@
+"""The paper's figures on the browser page, where its numbers can be moved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cache, partial
+from keyword import iskeyword
+from typing import Any
+
+import numpy as np
+
+from asperity import InputError, response_function
+from asperity.ledger import TabFigure, altered
+from asperity.materials import Material
+from asperity.orbit import Outcome, ResponseFunction
+from asperity.parameters import law_parameters
+from asperity_papers.bureau2000.curves import WORDS, FigureCurve, solve_curves, variations
+from asperity_papers.bureau2000.figures import CURVES
+from asperity_papers.bureau2000.machine import EXT, STRONGEST, Machine, printed
+from asperity_papers.bureau2000.motion import one_period
+
+#: Intervals of a curve that follows a slider, and instants of a period.
+_STEPS, _INSTANTS = 25, 128
+#: The figure without curves: the element of the elasto-plastic law, here with its motion.
+ELEMENT = "figure-10"
+_SOLVED = ("mean_friction", "delta_mu", "mu1", "mu2")
+
+
+def _machine(numbers: Material) -> Machine:
+    return Machine(numbers, _STEPS)
+
+
+# --- Lines that take milliseconds ----------------------------------------------------------------
+
+
+def _lines(figure: str, numbers: Material) -> list[dict[str, Any]]:
+    """Lines of a figure; those with inertia take seconds, and bands are many lines."""
+    machine = _machine(numbers)
+    ends = tuple(f", {end}" for end in variations(machine))
+    curves = [c for c in CURVES[figure](machine) if not (c.inertia or c.name.endswith(ends))]
+    values = [_fast_curve(machine, curve) for curve in curves]
+    for curve, columns in zip(curves, values, strict=True):
+        _fill_in(machine, curve, columns)
+    return [
+        {"name": curve.name.replace("um", "µm"), "values": {c: v[c] for c in _columns(figure)}}
+        for curve, v in zip(curves, values, strict=True)
+    ]
+
+
+def _columns(figure: str) -> tuple[str, ...]:
+    return (FIGURES[figure].x, *FIGURES[figure].rows)
+
+
+def _fast_curve(machine: Machine, curve: FigureCurve) -> dict[str, Any]:
+    """Points of a line; NaN where the method that takes milliseconds finds none."""
+    _check_share(curve)
+    slider = machine.slider(curve.law, **curve.overrides)
+    f = machine.numbers.frequency if curve.frequency is None else curve.frequency
+    V, applied, frequency = np.broadcast_arrays(
+        *(np.atleast_1d(np.asarray(x, float)) for x in (curve.V, curve.applied, f))
+    )
+    function, law = _function(curve.law), slider.law
+    values = {
+        **{n: getattr(law, f"{n}_" if iskeyword(n) else n) for n in law_parameters(type(law))},
+        "K": slider.K, "W0": slider.W0, "M": slider.M, "V": V, "frequency": frequency,
+        "epsilon": curve.share * applied,
+    }  # fmt: skip
+    response = function(
+        {
+            n: np.array(np.broadcast_to(np.asarray(values[n], float), V.shape))
+            for n in function.parameters
+        }
+    )
+    mean = np.asarray(response.mean_friction)
+    first, second = np.abs(np.asarray(response.harmonics)).T
+    solved = np.asarray(response.outcome) == Outcome.CONVERGED
+    columns = (mean, mean - np.asarray(law.mu_ss(V)), first, second)
+    return {
+        "V": V,
+        "epsilon_applied": applied,
+        "epsilon_eff": curve.share * applied,
+        **{n: np.where(solved, x, np.nan) for n, x in zip(_SOLVED, columns, strict=True)},
+    }
+
+
+def _fill_in(machine: Machine, curve: FigureCurve, values: dict[str, Any]) -> None:
+    """Solve for the points that the fast method leaves open."""
+    left = np.isnan(values["mean_friction"])
+    if not left.any():
+        return
+    part = replace(curve, V=values["V"][left], applied=values["epsilon_applied"][left])
+    rows = solve_curves(machine, [part], methods=("fourier",))
+    for column in _SOLVED:
+        values[column][left] = rows[column].to_numpy(float)
+
+
+@cache
+def _function(law: str) -> ResponseFunction:
+    return response_function(law, harmonics=2, multipliers=False, search=False)
+
+
+def _check_share(curve: FigureCurve) -> None:
+    largest = float(curve.share * np.max(curve.applied))
+    if not largest < 1:
+        raise InputError(
+            f"the amplitude on the contacts must be below 1, got {largest:.3g} for '{curve.name}'; "
+            "the slider's mass and the contacts resonate: change M, lambda_z or the frequency"
+        )
+
+
+# --- Lines with the mass of the slider, which take seconds ----------------------------------------
+
+
+def _inertial_curves(figure: str, machine: Machine) -> dict[str, FigureCurve]:
+    return {curve.name: curve for curve in CURVES[figure](machine) if curve.inertia}
+
+
+def _inertial_line(figure: str, numbers: Material, name: str, progress: Any) -> dict[str, Any]:
+    machine = _machine(numbers)
+    curve = _inertial_curves(figure, machine)[name]
+    _check_share(curve)
+    rows = solve_curves(machine, [curve], progress=progress)
+    return {
+        "name": name.replace("um", "µm").replace("inertia", "with its mass"),
+        "values": {c: rows[c].to_numpy(float) for c in _columns(figure)},
+    }
+
+
+# --- What the text states, and the element of figure 10 ------------------------------------------
+
+
+def _marks(figure: str, numbers: Material) -> Mapping[str, Sequence[dict[str, Any]]]:
+    """What the text states at one amplitude, by observable; an interval has two ends."""
+    seen = _machine(numbers).stated()
+    at = seen.epsilon_eff if FIGURES[figure].x == "epsilon_eff" else STRONGEST
+    return {
+        "delta_mu": [
+            {"x": at, "ends": [drop], "text": f"stated: 20 % of the friction coefficient at {V}"}
+            for drop, V in zip(seen.drops, ("1 µm/s", "10 µm/s"), strict=True)
+        ],
+        "mu1": [{"x": at, "ends": list(seen.mu1), "text": "stated: of order 10⁻³"}],
+        "mu2": [{"x": at, "ends": list(seen.mu2), "text": "stated: 0.1 to 0.2 of μ₁"}],
+    }
+
+
+def _element_lines(numbers: Material) -> list[dict[str, Any]]:
+    """What the element does over a period: stretch of the asperities, and rates over V."""
+    machine, lines = _machine(numbers), []
+    for name, V in zip(("1 µm/s", "10 µm/s"), machine.velocities, strict=True):
+        period = one_period(machine, EXT, V, machine.stated().epsilon_eff, samples=_INSTANTS)
+        stretch = 1e9 * machine.numbers["lambda"].si * period["force"] / period["load"]
+        columns = {
+            "phase": period["phase"], "stretch": stretch, "slider_velocity": period["velocity"],
+            "plastic_velocity": period["plastic_velocity"],
+        }  # fmt: skip
+        lines.append({"name": name, "values": {n: x.to_numpy() for n, x in columns.items()}})
+    return lines
+
+
+def _element_numbers(numbers: Material) -> Mapping[str, Any]:
+    """Stiffnesses and frequencies of the element, in SI."""
+    asperities = numbers.W0 / numbers["lambda"].si
+    return {
+        "element": {
+            "asperities": asperities,
+            "spring": numbers.K,
+            "ratio": numbers.K / asperities,
+            "resonance": Machine(numbers).contact_resonance,
+        }
+    }
+
+
+# --- The same in Python --------------------------------------------------------------------------
+
+_PYTHON = """\
+from asperity.ledger import altered
+{imports}
+from asperity_papers.bureau2000.machine import Machine, printed
+
+machine = Machine(altered(printed(), {changes!r}))
+print({call})
+"""
+
+
+def _python(figure: str, changes: Mapping[str, float]) -> str:
+    curves = CURVES[figure]
+    return _PYTHON.format(
+        imports="from asperity_papers.bureau2000.curves import solve_curves\n"
+        f"from {curves.__module__} import {curves.__name__}",
+        changes=dict(changes),
+        call=f"solve_curves(machine, {curves.__name__}(machine))",
+    )
+
+
+def _element_python(changes: Mapping[str, float]) -> str:
+    epsilon = Machine(altered(printed(), changes)).stated().epsilon_eff
+    return _PYTHON.format(
+        imports="from asperity_papers.bureau2000.motion import one_period",
+        changes=dict(changes),
+        call=f'one_period(machine, "{EXT}", V=1e-6, epsilon={epsilon})',
+    )
+
+
+def _figure(name: str) -> TabFigure:
+    observables = WORDS.figures[name].observables
+    x, rows = observables[0].x, [o.column for o in observables]
+    return TabFigure(
+        x=x,
+        rows=rows,
+        lines=partial(_lines, name),
+        python=partial(_python, name),
+        logarithmic=("V", *(rows if name == "figure-08" else ())),
+        # Those of figure 3 are slopes.
+        marks=(lambda _: {}) if x == "V" else partial(_marks, name),
+        slow=tuple(_inertial_curves(name, Machine())),
+        slow_line=partial(_inertial_line, name),
+    )
+
+
+#: The figures that the page can move.
+FIGURES: dict[str, TabFigure] = {name: _figure(name) for name in CURVES}
+FIGURES[ELEMENT] = TabFigure(
+    x="phase",
+    rows=("stretch", "slider_velocity", "plastic_velocity"),
+    lines=_element_lines,
+    python=_element_python,
+    extras=_element_numbers,
+)

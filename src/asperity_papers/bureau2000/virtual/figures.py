@@ -1,0 +1,455 @@
+"""Figures 2 to 5 of the virtual experiment: points, the model's lines, and what the points say."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TypeAlias
+
+import numpy as np
+import pandas as pd
+
+import asperity as asp
+from asperity.ledger import FigureNumbers, fill, rich, table
+from asperity_papers.bureau2000.curves import WORDS, FigureCurve, figure_numbers, solve_curves
+from asperity_papers.bureau2000.harmonics import elastic_slope
+from asperity_papers.bureau2000.machine import EXT, FAST, SLOW, SPEEDS, Float
+from asperity_papers.bureau2000.mean import AIR, VACUUM, velocity_axis
+from asperity_papers.bureau2000.virtual.recordings import (
+    POINT_COLUMNS,
+    PRINTED,
+    QUANTITIES,
+    Series,
+    SimulatedPoints,
+    all_series,
+    description,
+    state_coefficient,
+)
+
+#: Half a 95 % interval, in standard uncertainties.
+NORMAL = 1.96
+#: Value, standard uncertainty, and the model's value.
+Read: TypeAlias = tuple[float, float, float]
+
+#: Quantities whose bars are drawn.
+_DRAWN = {
+    "virtual-02": ("delta_mu",),
+    "virtual-03": ("mean_friction",),
+    "virtual-04": ("mu1", "mu2"),
+    "virtual-05": ("delta_mu",),
+}
+
+
+@dataclass(frozen=True)
+class RecoveredQuantity:
+    """A number read off the simulated recordings, and the one in the simulated machine.
+
+    Attributes
+    ----------
+    what : str
+    value, uncertainty : float
+        Standard uncertainty.
+    true_value : float
+        Of the model, or given to the machine: what the readings know nothing of.
+    stated : str
+        What the text of the paper says about its own experiment.
+    """
+
+    what: str
+    value: float
+    uncertainty: float
+    true_value: float
+    stated: str
+
+    @property
+    def agrees(self) -> bool:
+        """Whether the 95 % interval holds the value in the simulated machine."""
+        return bool(abs(self.value - self.true_value) <= NORMAL * self.uncertainty)
+
+
+@dataclass(frozen=True)
+class VirtualFigure:
+    """A figure of the virtual experiment.
+
+    Attributes
+    ----------
+    numbers : FigureNumbers
+        The model's lines, and points with the columns of `POINT_COLUMNS`.
+    series : tuple of Series
+    recovered : tuple of RecoveredQuantity
+    """
+
+    numbers: FigureNumbers
+    series: tuple[Series, ...]
+    recovered: tuple[RecoveredQuantity, ...]
+
+
+def _of(points: pd.DataFrame, series: str) -> pd.DataFrame:
+    return points[points["series"] == series]
+
+
+def last_point(points: pd.DataFrame, series: str, name: str) -> Read:
+    """Value, uncertainty and model of a quantity at a series' largest amplitude."""
+    row = _of(points, series).iloc[-1]
+    return float(row[name]), float(row[f"{name}_uncertainty"]), float(row[f"{name}_model"])
+
+
+def ratio(a: Read, b: Read) -> Read:
+    """Value, uncertainty and model of a quotient of two independent ones."""
+    value = a[0] / b[0]
+    return value, abs(value) * float(np.hypot(a[1] / a[0], b[1] / b[0])), a[2] / b[2]
+
+
+def with_model(points: pd.DataFrame, lines: pd.DataFrame) -> pd.DataFrame:
+    """Points with the model's values, from the operating points of the lines.
+
+    Raises
+    ------
+    KeyError
+        If a line has no operating point where a point is.
+    """
+    where = (points[name].to_numpy() for name in ("V", "frequency", "epsilon_eff"))
+    at = [_row(lines, V, f, e) for V, f, e in zip(*where, strict=True)]
+    completed = points.copy()
+    steady = lines["mean_friction"] - lines["delta_mu"]
+    for name in QUANTITIES:
+        column = steady if name == "static_friction" else lines[name]
+        completed[f"{name}_model"] = column.loc[at].to_numpy()
+    return completed[list(POINT_COLUMNS)]
+
+
+def _row(lines: pd.DataFrame, V: float, f: float, epsilon: float) -> int:
+    same = (
+        np.isclose(lines["V"], V, rtol=1e-9, atol=0)
+        & (lines["frequency"] == f)
+        & np.isclose(lines["epsilon_eff"], epsilon, rtol=1e-9, atol=1e-12)
+    )
+    if not same.any():
+        raise KeyError(f"no operating point at {V:g} m/s, {f:g} Hz, {epsilon:g}")
+    return int(lines.index[same][0])
+
+
+def _over_amplitude(
+    readings: SimulatedPoints, series: tuple[Series, ...]
+) -> tuple[pd.DataFrame, pd.DataFrame]:
+    """The model's lines of some series, with the machine's parameters, and their points."""
+    eps, overrides = PRINTED.applied_amplitudes(), {"B": state_coefficient()}
+    lines = solve_curves(
+        PRINTED,
+        (
+            FigureCurve(
+                one.name, EXT, one.velocity, eps, abs(one.transfer), one.frequency, overrides
+            )
+            for one in series
+        ),
+    )
+    return lines, with_model(pd.concat([readings[one.name] for one in series]), lines)
+
+
+def _figure(
+    name: str,
+    lines: pd.DataFrame,
+    points: pd.DataFrame,
+    series: tuple[Series, ...],
+    recovered: Sequence[RecoveredQuantity],
+    quoted: Mapping[str, float],
+    **slopes: float,
+) -> VirtualFigure:
+    scalars = {
+        f"{quantity.what}, {part}": getattr(quantity, part)
+        for quantity in recovered
+        for part in ("value", "uncertainty", "true_value")
+    }
+    numbers = figure_numbers(PRINTED, name, lines, scalars | slopes, quoted=quoted, points=points)
+    return VirtualFigure(numbers, series, tuple(recovered))
+
+
+def virtual_2(readings: SimulatedPoints) -> VirtualFigure:
+    """Change of the mean against eps, at two velocities."""
+    pair = all_series()[:2]
+    lines, points = _over_amplitude(readings, pair)
+    drops = [last_point(points, name, "delta_mu") for name in SPEEDS]
+    still = [last_point(points, name, "static_friction") for name in SPEEDS]
+    shares = [ratio(drop, F0) for drop, F0 in zip(drops, still, strict=True)]
+    recovered = [
+        RecoveredQuantity(
+            f"Share of the mean that ε = 0.5 takes, {name}", -value, sigma, -true_value, "20 %"
+        )
+        for name, (value, sigma, true_value) in zip(SPEEDS, shares, strict=True)
+    ]
+    recovered.append(
+        RecoveredQuantity(
+            f"Drop at {FAST} over that at {SLOW}", *ratio(drops[1], drops[0]), "1, within accuracy"
+        )
+    )
+    weak = _of(points, SLOW).iloc[0]
+    quoted = {
+        **{f"drop, {name}": -share[0] for name, share in zip(SPEEDS, shares, strict=True)},
+        **{f"bar, {name}": NORMAL * share[1] for name, share in zip(SPEEDS, shares, strict=True)},
+        "weakest": weak["delta_mu"],
+        "bar of the weakest": NORMAL * weak["delta_mu_uncertainty"],
+        "strongest": drops[0][0],
+    }
+    return _figure("virtual-02", lines, points, pair, recovered, quoted)
+
+
+def virtual_3(readings: SimulatedPoints) -> VirtualFigure:
+    """Mean against V for four amplitudes."""
+    at_120_hz = (one for one in all_series() if one.frequency == PRINTED.numbers.frequency)
+    series = tuple(sorted(at_120_hz, key=lambda one: one.velocity))
+    amplitudes = PRINTED.numbers["epsilon_figure3"].si_values or ()
+    V, share, overrides = (
+        velocity_axis(PRINTED),
+        abs(series[0].transfer),
+        {"B": state_coefficient()},
+    )
+    lines = solve_curves(
+        PRINTED,
+        (FigureCurve(f"eps = {e:g}", EXT, V, e, share, overrides=overrides) for e in amplitudes),
+    )
+    tables = [
+        rows
+        for one in (readings[series_.name] for series_ in series)
+        for rows in (_still(one), one[one["epsilon_set"].isin(amplitudes)])
+    ]
+    points = with_model(pd.concat(tables, ignore_index=True), lines)
+    slopes = {e: _slope(points[points["epsilon_set"] == e]) for e in amplitudes}
+    still, strong = slopes[min(slopes)], slopes[max(slopes)]
+    change = strong[0] - still[0], float(np.hypot(strong[1], still[1])), strong[2] - still[2]
+    recovered = (
+        RecoveredQuantity("Slope of the mean over ln V at ε = 0", *still, "A − B"),
+        RecoveredQuantity("Change of the slope by ε = 0.5", *change, "0, within accuracy"),
+    )
+    quoted = {
+        "change": change[0],
+        "bar of the change": NORMAL * change[1],
+        "change of the model": change[2],
+    }
+    named = {f"slope_{e:g}": slope[0] for e, slope in slopes.items()}
+    return _figure("virtual-03", lines, points, series, recovered, quoted, **named)
+
+
+def _still(rows: pd.DataFrame) -> pd.DataFrame:
+    """One point of eps = 0: the mean of all F(0) of a series, and how they differ."""
+    F0 = rows["static_friction"]
+    stated, scatter = float(np.sqrt(np.mean(rows["static_friction_stated"] ** 2))), F0.std()
+    one = dict.fromkeys(POINT_COLUMNS, np.nan) | {
+        name: rows[name].iloc[0] for name in ("series", "V", "frequency", "seeds")
+    }
+    for name in ("epsilon_set", "epsilon", "epsilon_eff"):
+        one[name] = 0.0
+    for name in ("mean_friction", "static_friction"):
+        one |= {name: F0.mean(), f"{name}_stated": stated, f"{name}_scatter": scatter}
+        one[f"{name}_uncertainty"] = max(stated, scatter)
+    return pd.DataFrame([one])[list(rows.columns)]
+
+
+def _slope(rows: pd.DataFrame) -> Read:
+    """Slope over ln V of the readings, its uncertainty, and the same of the model.
+
+    All velocities count alike, so that what is fitted does not depend on the noise.
+    """
+    x = np.log(rows["V"].to_numpy())
+    share = (x - x.mean()) / np.sum((x - x.mean()) ** 2)
+    value, sigma, model = (
+        rows[f"mean_friction{name}"].to_numpy() for name in ("", "_uncertainty", "_model")
+    )
+    return float(share @ value), float(np.sqrt(share**2 @ sigma**2)), float(share @ model)
+
+
+def virtual_4(readings: SimulatedPoints) -> VirtualFigure:
+    """First and second harmonic against eps, at two velocities."""
+    pair = all_series()[:2]
+    lines, points = _over_amplitude(readings, pair)
+    first, second = (
+        [last_point(points, name, column) for name in SPEEDS] for column in ("mu1", "mu2")
+    )
+    shares = [ratio(b, a) for a, b in zip(first, second, strict=True)]
+    slow = _of(points, SLOW)
+    plateau = float(slow["epsilon_eff"].iloc[-1]) * elastic_slope(PRINTED, pair[0].velocity)
+    over = (first[0][0] / plateau, first[0][1] / plateau, first[0][2] / plateau)
+    grown = f"at {FAST} over %s at {SLOW}, ε = 0.5"
+    recovered = (
+        *(
+            RecoveredQuantity(f"μ₁ at ε = 0.5, {name}", *mu1, "of order 1e-3")
+            for name, mu1 in zip(SPEEDS, first, strict=True)
+        ),
+        RecoveredQuantity(f"μ₁ {grown % 'μ₁'}", *ratio(first[1], first[0]), "1"),
+        RecoveredQuantity(f"μ₂ {grown % 'μ₂'}", *ratio(second[1], second[0]), "above 1"),
+        *(
+            RecoveredQuantity(f"μ₂/μ₁ at ε = 0.5, {name}", *share, "0.1 to 0.2")
+            for name, share in zip(SPEEDS, shares, strict=True)
+        ),
+        RecoveredQuantity(f"μ₁ over the elastic plateau ε_eff μ̄ l/(1 + l), {SLOW}", *over, "–"),
+    )
+    quoted = {
+        f"{what}, {name}": value
+        for name, mu1, share in zip(SPEEDS, first, shares, strict=True)
+        for what, value in (("mu1", mu1[0]), ("bar", NORMAL * mu1[1]), ("ratio", share[0]))
+    }
+    return _figure("virtual-04", lines, points, pair, recovered, quoted)
+
+
+def virtual_5(readings: SimulatedPoints) -> VirtualFigure:
+    """Change of the mean in air and in vacuum, and the factor that makes them one curve."""
+    p = PRINTED.numbers
+    pair = tuple(one for one in all_series() if one.frequency == p.frequency_vacuum)
+    lines, points = _over_amplitude(readings, pair)
+    factor, sigma = collapse(_of(points, VACUUM), _of(points, AIR))
+    vacuum, air = (abs(one.transfer) for one in pair)
+    recovered = RecoveredQuantity(
+        "Factor on ε that makes air and vacuum collapse", factor, sigma, air / vacuum,
+        f"{1 / p.collapse_divisor_200Hz}",
+    )  # fmt: skip
+    quoted = {
+        "factor": factor,
+        "bar of the factor": NORMAL * sigma,
+        "factor of the machine": air / vacuum,
+        **{f"share, {name}": share for name, share in ((VACUUM, vacuum), (AIR, air))},
+        **{f"drop, {n}": last_point(points, n, "delta_mu")[0] for n in (VACUUM, AIR)},
+    }
+    return _figure("virtual-05", lines, points, pair, (recovered,), quoted)
+
+
+def collapse(vacuum: pd.DataFrame, air: pd.DataFrame) -> tuple[float, float]:
+    """The factor on eps that brings the drops in air onto those in vacuum.
+
+    Parameters
+    ----------
+    vacuum, air : DataFrame
+        Points.
+
+    Returns
+    -------
+    (float, float)
+        The factor and its standard uncertainty.
+
+    Notes
+    -----
+    Both series are fitted by one curve, a (sqrt(1 + (b u)^2) - 1) + c u^2 with u = eps in vacuum
+    and u = factor eps in air. On the periodic orbits themselves it gives the factor to 1e-4.
+    """
+    from scipy.optimize import curve_fit
+
+    scaled = np.repeat([False, True], [len(vacuum), len(air)])
+
+    def drop(epsilon: Float, factor: float, a: float, b: float, c: float) -> Float:
+        u = np.where(scaled, factor * epsilon, epsilon)
+        return a * (np.sqrt(1 + (b * u) ** 2) - 1) + c * u**2
+
+    epsilon, value, sigma = (
+        np.concatenate([rows[name].to_numpy() for rows in (vacuum, air)])
+        for name in ("epsilon", "delta_mu", "delta_mu_uncertainty")
+    )
+    start = (0.5, -0.05, 10.0, 0.0)
+    best, covariance = curve_fit(drop, epsilon, value, start, sigma=sigma, absolute_sigma=True)
+    return float(best[0]), float(np.sqrt(covariance[0, 0]))
+
+
+#: What makes each figure out of the experiment, in the order of the paper.
+VIRTUAL: tuple[Callable[[SimulatedPoints], VirtualFigure], ...] = (
+    virtual_2,
+    virtual_3,
+    virtual_4,
+    virtual_5,
+)
+
+
+# --- The experiment on the page, and the heads of its tables --------------------------------------
+
+
+def introduction(figures: Sequence[VirtualFigure]) -> str:
+    """What is simulated and what is not, in front of the figures."""
+    within, bars = np.sum([covered(f.numbers) for f in figures], axis=0)
+    # Figures share series, and the points of eps = 0 have no window.
+    points = pd.concat([_points(f).dropna(subset="window") for f in figures])
+    readings = points.drop_duplicates(["series", "epsilon_set"])
+    windows, verdicts = readings["window"], readings["verdict"]
+    numbers = {
+        "runs": len(figures[0].series[0].seeds),
+        "normal": NORMAL,
+        "within": within,
+        "bars": bars,
+        "shortest": windows.min(),
+        "longest": windows.max(),
+        "clear": int((verdicts == "ok").sum()),
+        "readings": len(verdicts),
+        "machine": "; ".join(description(figures[0].series[0].frequency)),
+        "resonance": PRINTED.contact_resonance,
+    }
+    texts = WORDS.section["experiment"].before
+    return "".join(f"<p>{_marked(fill(text, numbers, 'section.experiment'))}</p>" for text in texts)
+
+
+def _points(figure: VirtualFigure) -> pd.DataFrame:
+    assert figure.numbers.points is not None  # every figure of the experiment has them
+    return figure.numbers.points
+
+
+def covered(numbers: FigureNumbers) -> tuple[int, int]:
+    """Number of drawn 95 % intervals that contain the model, and of all of them."""
+    points = numbers.points
+    assert points is not None  # every figure of the experiment has them
+    within = [
+        abs(points[name] - points[f"{name}_model"]) <= NORMAL * points[f"{name}_uncertainty"]
+        for name in _DRAWN[numbers.name]
+    ]
+    return int(sum(holds.sum() for holds in within)), sum(len(holds) for holds in within)
+
+
+def _marked(text: str) -> str:
+    return rich(text).replace("&lt;b&gt;", "<b>").replace("&lt;/b&gt;", "</b>")
+
+
+def recovered_table(figures: Sequence[VirtualFigure]) -> str:
+    """What the recordings say, the value in the simulated machine, and what the paper states."""
+    heads = {
+        "Read off simulated recordings": "statement", "Reading, ± 95 %": "computed",
+        "The machine has": "stated", "The text has": "stated",
+    }  # fmt: skip
+    rows = [_cells(quantity) for figure in figures for quantity in figure.recovered]
+    return table(heads, rows, "Read off the simulated recordings")
+
+
+def _cells(quantity: RecoveredQuantity) -> tuple[str, ...]:
+    half = NORMAL * quantity.uncertainty
+    digits = max(0, 1 - int(np.floor(np.log10(half))))
+    reading = f"{quantity.value:.{digits}f} ± {half:.{digits}f}"
+    if not quantity.agrees:
+        reading += " (does not hold what the machine has)"
+    texts = (quantity.what, reading, f"{quantity.true_value:.{digits}f}", quantity.stated)
+    return tuple(map(rich, texts))
+
+
+def provenance(
+    figure: VirtualFigure, place: str, what: str, parameters: Sequence[str]
+) -> list[str]:
+    """What the first lines of a CSV say.
+
+    Parameters
+    ----------
+    figure : VirtualFigure
+    place : str
+        Of the figure in the report.
+    what : str
+        The table: of the points or of the lines.
+    parameters : sequence of str
+        Lines on the numbers that the models were given.
+    """
+    runs = [
+        f"  {s.name}, {s.frequency:g} Hz: seeds {', '.join(map(str, s.seeds))}; eps_eff/eps "
+        f"{abs(s.transfer):.6g}; sliding {s.sliding:.4g} s, modulated {s.modulated:.4g} s"
+        for s in figure.series
+    ]
+    return [
+        f"SIMULATED, {what} of {place}: a virtual experiment; no measured points",
+        "after the protocol of Bureau, Baumberger and Caroli, Phys. Rev. E 62, 6810 (2000)",
+        f"computed by asperity {asp.__version__}",
+        *description(figure.series[0].frequency),
+        "runs (seed: noise of the sensors, drift of the gauge; the motion is the same):",
+        *runs,
+        "parameters, where nothing above says otherwise (kind in brackets):",
+        *parameters,
+        "read off the points:",
+        *(f"  {name} = {value:.12g}" for name, value in figure.numbers.scalars.items()),
+    ]

@@ -1,0 +1,142 @@
+"""The report's page in a browser: widths, headings, filters and links, on screens and on paper."""
+
+from pathlib import Path
+
+import pytest
+
+from asperity.figures.files import save_picture
+from asperity.figures.style import style
+from asperity.ledger import Claim, find_paper
+from asperity.ledger.page import Plate, PlateGroup, build_page
+from asperity_papers.bureau2000.figures import SCHEMATICS
+
+WIDTHS = (390, 800, 1400)
+
+
+def claims(paper):
+    """The paper's own words, with verdicts in turn: what is computed takes a minute."""
+    verdicts = ("reproduced", "reproduced", "differs", "misprint")
+    return [
+        Claim(
+            id=entry.id, place=entry.place, statement=entry.statement, stated=entry.stated,
+            kind=entry.kind, computed="1.234e-3 at 1 um/s; 5.678e-3 at 10 um/s", how=entry.how,
+            rule="the value within 5 % of what is stated", verdict=verdicts[n % 4],
+            why=entry.why, numbers={"value": 1.0},
+        )
+        for n, entry in enumerate(paper.contents.claim)
+    ]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def address(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    paper = find_paper("bureau2000")
+    with style():
+        plates = [
+            Plate(name, s.place, s.title, s.caption, s.alt,
+                  save_picture(draw(), folder / name)[0], (f"{name}.png",))
+            for name, draw in SCHEMATICS.items()
+            for s in [paper.words.figures[name]]
+        ]  # fmt: skip
+    group = PlateGroup("figures", "Figures", "", plates, "")
+    found = claims(paper)
+    text = build_page(paper, [group], found, paper.headlines(found))
+    (folder / "index.html").write_text(text, encoding="utf-8")
+    return (folder / "index.html").as_uri()
+
+
+@pytest.fixture
+def visit(chromium, address):
+    """A function that opens the page, and refuses anything that it fetches from elsewhere."""
+    opened, fetched = [], []
+
+    def open_page(width=1400, fragment="", **options):
+        page = chromium.new_page(viewport={"width": width, "height": 844}, **options)
+        page.on("request", lambda request: fetched.append(request.url))
+        page.goto(address + fragment)
+        opened.append(page)
+        return page
+
+    yield open_page
+    for page in opened:
+        page.close()
+    assert all(url.startswith(("file:", "data:")) for url in fetched)
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_is_wider_than_the_screen(visit, width, scheme):
+    page = visit(width, color_scheme=scheme)
+    page.evaluate("document.querySelectorAll('details').forEach(d => { d.open = true })")
+    assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_what_is_linked_to_is_not_hidden_under_the_navigation(visit, width):
+    page = visit(width)
+    targets = page.eval_on_selector_all("nav a", "links => links.map(a => a.hash)")
+    assert len(targets) >= 5
+    last = page.eval_on_selector_all(".claim", "all => '#' + all[all.length - 1].id")
+    for target in [*targets, last]:
+        page.evaluate(f"location.hash = '{target}'")
+        heading = f"{target} h2" if target in targets else f"{target} summary"
+        bottom = page.evaluate("document.querySelector('nav').getBoundingClientRect().bottom")
+        top = page.evaluate(f"document.querySelector('{heading}').getBoundingClientRect().top")
+        assert top >= bottom, target
+
+
+def shown(page):
+    """Classes of the claims that are on the screen."""
+    return page.eval_on_selector_all(
+        ".claim", "all => all.filter(c => c.getClientRects().length).map(c => c.className)"
+    )
+
+
+@pytest.mark.parametrize("width", [390, 1400])
+def test_tiles_show_the_claims_that_they_count(visit, width):
+    page = visit(width)
+    everything = page.eval_on_selector_all(".claim", "all => all.map(c => c.className)")
+    first = shown(page)
+    assert set(first) < set(everything)
+    assert not any("reproduced" in name for name in first)
+    for verdict in ("reproduced", "misprint", "differs"):
+        page.click(f".tiles .{verdict} a")
+        count = int(page.inner_text(f".tiles .{verdict} b"))
+        assert shown(page) == [f"claim {verdict} test"] * count
+    page.click(".filters a[href='#show-apart']")
+    assert shown(page) == [name for name in everything if name.endswith("apart")]
+    page.click(".filters a[href='#show-all']")
+    assert shown(page) == everything
+
+
+def test_claims_are_folded_and_every_link_on_the_page_has_a_target(visit):
+    page = visit(390)
+    assert page.eval_on_selector_all("details", "all => all.some(d => d.open)") is False
+    missing = page.eval_on_selector_all(
+        "a[href^='#']",
+        "links => links.map(a => a.hash.slice(1)).filter(n => !document.getElementById(n))",
+    )
+    assert missing == []
+
+
+def test_a_link_to_a_reproduced_claim_shows_it(visit, address):
+    page = visit(390)
+    name = page.eval_on_selector_all(".claim.reproduced", "all => all[0].id")
+    page.goto(f"{address}#{name}")
+    assert page.is_visible(f"[id='{name}'] summary")
+
+
+def test_all_claims_are_printed_with_what_was_computed(visit, tmp_path):
+    page = visit()
+    page.emulate_media(media="print")
+    assert len(shown(page)) == len(find_paper("bureau2000").contents.claim)
+    assert not page.is_visible("nav")
+    target = tmp_path / "page.pdf"
+    page.pdf(path=target, format="A4")
+    assert Path(target).read_bytes().startswith(b"%PDF")
+
+
+def test_folded_claims_do_not_make_a_phone_scroll_for_ever(visit):
+    """The head, two figures, 25 claims and the parameters; the ledger used to be 60 screens."""
+    page = visit(390)
+    assert page.evaluate("document.documentElement.scrollHeight") < 30 * 844
