@@ -8,7 +8,7 @@ column ``run``.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,6 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
-
-#: Gauss-Newton steps of a fit without a run, and the change at which it is done.
-_STEPS, _DONE = 30, 1e-8
-#: Reductions of a step that does not lower chi-squared, each by 4.
-_HALVINGS = 6
 
 
 @dataclass(frozen=True)
@@ -56,11 +51,10 @@ def leave_one_run_out(found: Fit) -> CrossValidation:
     The density of a run is normal about the prediction of the fit to the others, with their
     uncertainty of the parameters on top of the errors.
     """
-    terms = found.objective.terms
-    if len(terms) != 1 or not isinstance(terms[0], LockInTerm):
+    tables = found.objective.terms_of(LockInTerm)
+    if not tables or len(found.objective.terms) > 1:
         return CrossValidation(math.nan, {}, "data other than tables have no runs to leave out")
-    term = terms[0]
-    assert isinstance(term, LockInTerm)  # by the question above
+    (term,) = tables
     names = list(dict.fromkeys(term.table.run.tolist()))
     if len(names) < 2:
         return CrossValidation(
@@ -75,41 +69,14 @@ def leave_one_run_out(found: Fit) -> CrossValidation:
 def _predictive(found: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> float:
     """Log density of the rows left out, given the others."""
     objective = found.objective
-    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
-
-    def parts(u: Float) -> tuple[Float, Float, Float, Float] | None:
-        """Residuals and Jacobian of what stays, priors included, and of what is left out."""
-        data = objective.data_residuals(u)
-        if data is None:
-            return None
-        priors, slopes = objective.prior_residuals(u)
-        out = left_out[data[0].row]
-        r, jacobian = data[0].values, data[0].jacobian
-        return (
-            np.concatenate([r[~out], priors]),
-            np.vstack([jacobian[~out], slopes]),
-            r[out],
-            jacobian[out],
-        )
-
-    u = objective.coordinates(found.values)
-    now = parts(u)
-    assert now is not None  # the fit has converged there
-    for _ in range(_STEPS if u.size else 0):
-        step = -np.linalg.lstsq(now[1], now[0], rcond=1e-10)[0]
-        for _ in range(_HALVINGS):
-            trial = np.clip(u + step, low + 1e-12, high - 1e-12)
-            after = parts(trial)
-            if after is not None and after[0] @ after[0] <= now[0] @ now[0]:
-                break
-            step /= 4
-        else:
-            break
-        gain = float(now[0] @ now[0] - after[0] @ after[0])
-        u, now = trial, after
-        if gain < _DONE:
-            break
-    _, J, r_out, J_out = now
+    rest = replace(objective, terms=(term.weighted(np.where(left_out, 0.0, 1.0)),))
+    u = rest.minimise(objective.coordinates(found.values))[0]
+    data = objective.data_residuals(u)
+    if data is None:
+        return math.nan
+    out = left_out[data[0].row]
+    r_out, J_out = data[0].values[out], data[0].jacobian[out]
+    J = np.vstack([data[0].jacobian[~out], objective.prior_residuals(u)[1]])
     information = J.T @ J
     if u.size and np.linalg.cond(information) > 1e14:
         return math.nan

@@ -18,14 +18,11 @@ from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import Objective
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.sampling import whitened_posterior
-from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm, any_searched
 
 Float = NDArray[np.float64]
 
-#: Samples, those where motions through recordings or searched orbits take ten or a hundred times
-#: as long, and the degrees of freedom of the distribution that they come from.
-_SAMPLES, _RECORDED, _SEARCHED, _TAILS = 1024, 256, 128, 5.0
+#: Degrees of freedom of the distribution that samples come from.
+_TAILS = 5.0
 #: Effective samples below which the number is no more than a guess.
 _ENOUGH = 50.0
 
@@ -71,8 +68,8 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     found : Fit
         Converged.
     samples : int, optional
-        By default 1024, 256 with a recording, and 128 where the orbits of a table are searched for;
-        0 for the normal approximation alone.
+        By default what the data afford, 1024 for a table, 256 with a recording, and 128 where
+        orbits are searched for; 0 for the normal approximation alone.
     seed : int
 
     Notes
@@ -81,9 +78,7 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     lowers the logarithm by ln k.
     """
     if samples is None:
-        terms = found.objective.terms
-        recorded = any(isinstance(term, RunTerm) for term in terms)
-        samples = _SEARCHED if any_searched(terms) else _RECORDED if recorded else _SAMPLES
+        samples = min(term.affordable for term in found.objective.terms)
     if not found.objective.unknowns:
         # Nothing to average over.
         density = found.log_likelihood
@@ -123,12 +118,8 @@ def _log_target(whitened: Whitened, z: Float) -> Float:
 
 def log_likelihoods(objective: Objective, u: Float) -> Float:
     """Logarithms of the likelihood at many coordinates, shapes (samples, n) to (samples,)."""
+    values = [objective.named(x) for x in u]
     total = np.zeros(len(u))
     for term in objective.terms:
-        if isinstance(term, LockInTerm):
-            constant = 2 * term.weights.log_scale
-            constant += int(term.weights.reported.sum()) * math.log(2 * math.pi)
-            total -= 0.5 * (term.chi2_of_many(objective.unknowns, u, near=True) + constant)
-        else:
-            return np.array([objective.log_likelihood(x) for x in u])
+        total += term.log_norm - 0.5 * term.chi2_of_many(values, near=True)
     return total

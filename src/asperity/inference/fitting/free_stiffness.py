@@ -54,13 +54,12 @@ def _freed(found: Fit, progress: Callable[[int, int], None] | None) -> Fit | Non
     """The fit with K free; None where that is not asked for."""
     objective = found.objective
     given = np.unique(objective.fixed.get("K", ()))
-    single = len(objective.terms) == 1 and isinstance(objective.terms[0], LockInTerm)
-    if not (single and given.size == 1 and found.converged):
+    tables = objective.terms_of(LockInTerm)
+    if not (tables and len(objective.terms) == 1 and given.size == 1 and found.converged):
         return None
     if found.dof <= 0 or found.p_value >= _FAILS:
         return None
-    term = objective.terms[0]
-    assert isinstance(term, LockInTerm)
+    (term,) = tables
     before = term.forward
     fixed = {n: v for n, v in objective.fixed.items() if n != "K"}
     forward = Forward(

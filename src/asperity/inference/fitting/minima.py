@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -13,8 +12,6 @@ from scipy.stats import chi2 as chi_squared
 from scipy.stats.qmc import Sobol
 
 from asperity.inference.objective import Objective
-from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm
 from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
@@ -104,11 +101,12 @@ def minima_of(
     found.sort(key=lambda pair: pair[1])
     if found and not begun.searched and _blocked(objective, *found[0]):
         best = found[0][1]
-        objective.search_from_now_on()
+        objective.use_search(True)
         stopped = distinct(found)
         beyond = [_onwards(objective, end) for end in stopped[:_SEARCHED]]
         if min(value for _, value in beyond) > best - _GAIN:
-            _search_no_more(objective)
+            # The fast method again, where the slower one has found nothing better.
+            objective.use_search(False)
         else:
             # The others are minima, or only where the fast method ends.
             rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
@@ -150,14 +148,14 @@ def _beginnings(
     high = np.array([u.to_coordinate(u.start[1]) for u in unknowns])
     shares = Sobol(len(unknowns), seed=seed).random(drawn)
     candidates = [middle, *(low + (high - low) * shares)]
-    chi2 = _chi2_of_starts(objective, candidates)
+    chi2 = objective.chi2_of_many(np.array(candidates))
     at = np.flatnonzero(np.isfinite(chi2))
-    searched = at.size < (_RARE * chi2.size if _has_table(objective) else 1)
+    searched = at.size < (_RARE * chi2.size if objective.has_table else 1)
     few: Objective | None = None
     if searched:
-        objective.search_from_now_on()
+        objective.use_search(True)
         few = _few_rows(objective)
-        if few is None and _is_table(objective):
+        if few is None and objective.has_table and len(objective.terms) == 1:
             few = objective
         candidates = [
             candidates[i] for i in dict.fromkeys([*range(min(_WITH_SEARCH, chi2.size)), *at])
@@ -218,7 +216,7 @@ def _with_those_beside(
     Under slow modulation, where slip events may come early or late in the period, parameters that
     are wrong by a factor describe most of the data: minima hide each other from drawn starts.
     """
-    if not _has_table(objective):
+    if not objective.has_table:
         return found
     for _ in range(_ROUNDS_BESIDE):
         if not found or _p_value(objective, found[0]) > DOUBTFUL:
@@ -255,7 +253,7 @@ def _with_other_lengths(
     leaves little but a phase in the readings: values of D0 that differ by a factor of ten, with
     other A and B, may describe them equally well. Intervals that do not know of it are too short.
     """
-    if not _has_table(objective) or not found or _far_off(objective, found[0]):
+    if not objective.has_table or not found or _far_off(objective, found[0]):
         return found
     best = found[0][0]
     # Where orbits are searched for, few rows show where minima are.
@@ -292,62 +290,28 @@ def _p_value(objective: Objective, minimum: tuple[Float, float]) -> float:
     return float(chi_squared.sf(value, max(r.size - u.size, 1)))
 
 
-def _is_table(objective: Objective) -> bool:
-    """Whether the data are one table."""
-    (term, *others) = objective.terms
-    return not others and isinstance(term, LockInTerm) and hasattr(term, "table")
-
-
 def _few_rows(objective: Objective) -> Objective | None:
     """The objective of a few rows of its table, spread over it; None for other data, or few rows.
 
     What a law predicts at them places the minimum well enough to begin there with all rows.
     """
-    if not _is_table(objective):
-        return None
-    term = objective.terms[0]
-    assert isinstance(term, LockInTerm)
-    table = term.table
-    reported = np.sum([np.isfinite(v) for v in table.values.values()], axis=0)
-    # Points that lie close together repeat each other.
-    order = np.lexsort([table.points[name] for name in ("epsilon", "frequency", "V")])
-    rows = max(
-        _FEW_ROWS, math.ceil(_DATA_EACH * len(objective.unknowns) / max(reported.mean(), 1e-9))
-    )
-    if table.rows < 4 * rows:
-        return None
-    kept = order[np.linspace(0, table.rows - 1, rows).round().astype(int)]
-    return replace(objective, terms=(term.with_rows(np.isin(np.arange(table.rows), kept)),))
+    return objective.thinned(_FEW_ROWS, _DATA_EACH * len(objective.unknowns))
 
 
-def _chi2_of_starts(objective: Objective, starts: list[Float]) -> Float:
-    """chi-squared of starts, infinite where the law has no solution."""
-    runs = [term for term in objective.terms if isinstance(term, RunTerm)]
-    if len(runs) < len(objective.terms):
-        return np.array([objective.chi2(u) for u in starts])
-    priors = [float(np.sum(objective.prior_residuals(u)[0] ** 2)) for u in starts]
-    named = [objective.named(u) for u in starts]
-    return np.array([sum(r.chi2(v) for r in runs) for v in named]) + priors
-
-
-def _chi2_of_many(objective: Objective, candidates: list[Float]) -> Float:
-    """chi-squared of many starts, infinite where the law has no solution."""
-    if not _is_table(objective):
-        return np.array([objective.chi2(u) for u in candidates])
-    term = objective.terms[0]
-    assert isinstance(term, LockInTerm)
+def _chi2_of_many(objective: Objective, candidates: Sequence[Float]) -> Float:
+    """chi-squared of many starts, of a table on few rows first; infinite without a solution."""
     u = np.array(candidates)
-    first = np.zeros(term.table.rows, bool)
-    first[:: max(1, term.table.rows // _ROWS_FIRST)] = True
-    found = np.full(len(u), math.inf)
+    few = objective.thinned(_ROWS_FIRST)
+    if few is None:
+        return objective.chi2_of_many(u, least=_LEAST)
     # Most starts far from the data have no orbit at some row, which takes longest to find out.
-    few = term.with_rows(first).chi2_of_many(objective.unknowns, u, least=_LEAST)
-    # The first is the given start, which is tried whatever four rows say of it.
-    left = np.array(list(dict.fromkeys([0, *np.argsort(few)[:_TRIED]])))
-    left = left[np.isfinite(few[left])]
+    first = few.chi2_of_many(u, least=_LEAST)
+    # The first is the given start, which is tried whatever few rows say of it.
+    left = np.array(list(dict.fromkeys([0, *np.argsort(first)[:_TRIED]])))
+    left = left[np.isfinite(first[left])]
+    found = np.full(len(u), math.inf)
     if left.size:
-        priors = [float(np.sum(objective.prior_residuals(u[i])[0] ** 2)) for i in left]
-        found[left] = term.chi2_of_many(objective.unknowns, u[left], least=_LEAST) + priors
+        found[left] = objective.chi2_of_many(u[left], least=_LEAST)
     return found
 
 
@@ -424,7 +388,7 @@ def _as_it_stands(objective: Objective) -> list[tuple[Float, float]]:
     nowhere = np.zeros(0)
     chi2 = objective.chi2(nowhere)
     if not math.isfinite(chi2):
-        objective.search_from_now_on()
+        objective.use_search(True)
         chi2 = objective.chi2(nowhere)
     return [(nowhere, chi2)] if math.isfinite(chi2) else []
 
@@ -444,7 +408,7 @@ def _blocked(objective: Objective, u: Float, value: float) -> bool:
     It does where the fast method has no solution farther on. Without this question the fit would
     report a wrong minimum, with a law that describes the data as its victim.
     """
-    if not _has_table(objective) or not math.isfinite(value):
+    if not objective.has_table or not math.isfinite(value):
         return False
     decrease = objective.expected_decrease(u)
     return decrease > (_LARGE_GAIN * value if _far_off(objective, (u, value)) else _GAIN)
@@ -453,18 +417,6 @@ def _blocked(objective: Objective, u: Float, value: float) -> bool:
 def _far_off(objective: Objective, minimum: tuple[Float, float]) -> bool:
     """Whether the law does not describe the data there."""
     return _p_value(objective, minimum) < FAR_OFF
-
-
-def _has_table(objective: Objective) -> bool:
-    return any(isinstance(term, LockInTerm) for term in objective.terms)
-
-
-def _search_no_more(objective: Objective) -> None:
-    """The fast method again, where the slower one has found nothing better."""
-    for term in objective.terms:
-        if isinstance(term, LockInTerm):
-            term.forward.uses_search = False
-    objective.forget()
 
 
 def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float]]) -> list[Float]:

@@ -30,11 +30,10 @@ _ALLOWED = 5.0
 
 def under_drift(objective: Objective) -> Objective:
     """The objective with recordings whose noise is taken for a slow drift."""
-    terms = tuple(copy(term) if isinstance(term, RunTerm) else term for term in objective.terms)
-    for term in terms:
-        if isinstance(term, RunTerm):
-            term.expect_slow_noise()
-    return replace(objective, terms=terms)
+    drifting = replace(objective, terms=tuple(copy(term) for term in objective.terms))
+    for term in drifting.terms_of(RunTerm):
+        term.expect_slow_noise()
+    return drifting
 
 
 def with_noise(
@@ -57,7 +56,7 @@ def with_noise(
         higher as twice the logarithm of their likelihood is lower.
     bool
     """
-    noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
+    noisy = objective.terms_of(RunTerm)
     first = [term.noise_state() for term in noisy]
     ends = []
     for u in _apart(objective, minima):
@@ -106,7 +105,7 @@ def without_bad_samples(objective: Objective, search: Callable[[], Found]) -> Fo
     not left out as those elsewhere are. The stiffness says which are wrong, and must itself be
     fitted without them.
     """
-    noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
+    noisy = objective.terms_of(RunTerm)
     alone = [term.alone_at_changes() for term in noisy]
     if not any(alone):
         return search()

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi_squared
 
 from asperity.inference.objective import Objective, Residuals
-from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 
@@ -125,7 +123,7 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
         freedom=freedom,
         unbounded=u - covariance @ _pressure(objective, u, covariance, J.T @ r),
         undetermined=undetermined,
-        stopped=is_of_tables(objective) and objective.expected_decrease(u) > _STOPPED,
+        stopped=objective.noise_is_known and objective.expected_decrease(u) > _STOPPED,
         fitted=len(objective.unknowns) + sum(term.profiled for term in objective.terms),
         priors=len(with_prior),
     )
@@ -164,10 +162,9 @@ def _with_estimated_noise(
     slopes = np.array([float(k.slope(values[k.name])) for k in objective.unknowns])
     total, variance = covariance.copy(), np.zeros(u.size)
     for term in objective.terms:
-        if isinstance(term, RunTerm):
-            added, spread = term.uncertainty_of_noise(values, slopes, known)
-            total += nowhere_negative(added, known)
-            variance += spread
+        added, spread = term.uncertainty_of_noise(values, slopes, known)
+        total += nowhere_negative(added, known)
+        variance += spread
     freedom = 2 * np.diag(known) ** 2 / np.where(variance > 0, variance, 1.0)
     return total, np.where(variance > 0, np.maximum(freedom, 1.0), np.inf)
 
@@ -181,11 +178,6 @@ def nowhere_negative(added: Float, covariance: Float) -> Float:
     sd = np.sqrt(np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0))
     values, vectors = np.linalg.eigh(added / np.outer(sd, sd))
     return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(sd, sd))
-
-
-def is_of_tables(objective: Objective) -> bool:
-    """Whether there are no recordings among the data."""
-    return all(isinstance(term, LockInTerm) for term in objective.terms)
 
 
 def inverse_information(information: Float) -> tuple[Float, NDArray[np.bool_]]:

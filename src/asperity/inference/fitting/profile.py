@@ -114,7 +114,7 @@ class Profile:
                     # The fast method has no orbit beyond, which says nothing about the data.
                     if not self.search:
                         return sign * math.inf
-                    self.objective.search_from_now_on()
+                    self.objective.use_search(True)
                     return self._end(level, wider, sign, bound)
                 return end
             inner, width = outer, 2 * width

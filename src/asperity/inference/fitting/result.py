@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from asperity.inference.unknowns import Prior
 from asperity.parameters.display import Displayed, SummaryLine
 
 Float = NDArray[np.float64]
+T = TypeVar("T")
 
 
 #: Loads of recordings that differ by less, as a share, are one.
@@ -112,6 +114,11 @@ class Fit(Displayed):
     objective: Objective
     outliers: tuple[int, ...] = ()
 
+    def parts(self, kind: type[T]) -> list[tuple[T, Residuals]]:
+        """The sets of data of one kind, tables or recordings, each with its residuals."""
+        pairs = zip(self.objective.terms, self.residuals, strict=True)
+        return [(term, residuals) for term, residuals in pairs if isinstance(term, kind)]
+
     @property
     def judged_by_chi2(self) -> bool:
         """Whether chi-squared judges the law.
@@ -128,10 +135,9 @@ class Fit(Displayed):
         In 1/um, as rock laboratories give them.
         """
         loads: dict[str, list[float]] = {}
-        for term in self.objective.terms:
-            if isinstance(term, RunTerm):
-                name = next((n for n in (f"K[{term.name}]", "K") if n in self.parameters), "")
-                loads.setdefault(name, []).append(term.run.W0 if term.run.load_unit else math.nan)
+        for term in self.objective.terms_of(RunTerm):
+            name = next((n for n in (f"K[{term.name}]", "K") if n in self.parameters), "")
+            loads.setdefault(name, []).append(term.run.W0 if term.run.load_unit else math.nan)
         if not loads and "K" in self.parameters:
             loads["K"] = list(np.unique(self.objective.fixed.get("W0", math.nan)))
         found = {}

@@ -13,11 +13,11 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
-from scipy.signal import lfilter
 from scipy.stats import chi2
 
 Float = NDArray[np.float64]
@@ -31,6 +31,37 @@ _ORDERS_PER_DECADE = 10
 _SMOOTH = 1e-6
 #: Lags of the test of whiteness, at least.
 _LAGS = 20
+
+
+class Whitening(NamedTuple):
+    """Innovations of noise as a linear function of its samples, of NumPy and of JAX arrays.
+
+    Attributes
+    ----------
+    taps : array, shape (p + 1,)
+        Weights of a sample and those before it.
+    first : array, shape (p, p)
+        Weights of the first samples, before which lower orders predict.
+    """
+
+    taps: Any
+    first: Any
+
+    def of(self, x: Any, module: Any = np) -> Any:
+        """Innovations of unit variance along the first axis, of shape (n,) or (n, columns).
+
+        Parameters
+        ----------
+        x : array
+        module : module
+            numpy, or jax.numpy within compiled programs.
+        """
+        n = x.shape[0]
+        p = min(self.first.shape[0], n)
+        columns = x.reshape(n, -1)
+        later = [module.convolve(column, self.taps)[p:n] for column in columns.T]
+        white = module.concatenate([self.first[:p, :p] @ columns[:p], module.stack(later, axis=-1)])
+        return white.reshape(x.shape)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +112,13 @@ class Autoregression:
 
     def whiten(self, columns: Float) -> Float:
         """Innovations of unit variance of samples along the first axis."""
-        x = np.asarray(columns, float)
+        return np.asarray(self.whitening.of(np.asarray(columns, float)))
+
+    @property
+    def whitening(self) -> Whitening:
+        """The linear function from samples to innovations."""
         taps = np.concatenate([[1.0], -self.coefficients[-1]]) / self.innovation
-        out = np.asarray(lfilter(taps, [1.0], x, axis=0))
-        # In place of the unknown samples before the first, lower orders predict.
-        first = min(self.order, x.shape[0])
-        out[:first] = np.tensordot(self._first_taps[:first, :first], x[:first], axes=1)
-        return out
+        return Whitening(taps, self._first_taps)
 
     @functools.cached_property
     def _first_taps(self) -> Float:
@@ -117,15 +148,6 @@ class Autoregression:
         along = np.correlate(ends, a, mode="valid")
         reached = np.minimum(np.arange(white.size, 0, -1), self.order + 1)
         return np.asarray(along / np.sqrt(np.cumsum(a**2))[reached - 1])
-
-    def taps(self, n: int) -> Float:
-        """Weights c of `whiten` for n samples: w_t = sum_k c[t, k] x_(t-k), shape (n, p + 1)."""
-        found = np.zeros((n, self.order + 1))
-        found[:] = np.concatenate([[1.0], -self.coefficients[-1]]) / self.innovation
-        for t, row in enumerate(self._first_taps[:n]):
-            found[t] = 0.0
-            found[t, : t + 1] = row[t::-1]
-        return found
 
     def log_scale(self, n: int) -> float:
         """Sum of the logarithms of the standard deviations of the innovations of n samples."""

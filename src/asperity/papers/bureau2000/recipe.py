@@ -527,8 +527,7 @@ class _SingleFits:
 
     def _shift(self, found: Fit, moved: Sequence[Mapping[str, float]]) -> float:
         """First-order change of the first estimate with what is fixed, half of up less down."""
-        (term,) = found.objective.terms
-        assert isinstance(term, LockInTerm)  # a table was fitted
+        (term,) = found.objective.terms_of(LockInTerm)
         law = found.objective.law
         sides = []
         for change in moved:
