@@ -16,7 +16,7 @@ from asperity.fit_report.bands import bands_of
 from asperity.fit_report.page import document, figure, table
 from asperity.fit_report.pictures import data_figure, residual_figure, run_figure
 from asperity.inference import Fit, Posterior
-from asperity.inference.fitting.record import fit_record
+from asperity.inference.fitting.result import fit_record
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.materials import cited_works

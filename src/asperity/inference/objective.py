@@ -119,11 +119,6 @@ class DataTerm(Protocol):
         """Evaluations that an integral over the parameters may take."""
         ...
 
-    @property
-    def log_norm(self) -> float:
-        """Logarithm of the density of the data where all residuals are 0."""
-        ...
-
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:

@@ -166,7 +166,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     """
     from asperity import inference
     from asperity.inference.comparison.record import comparison_record
-    from asperity.inference.fitting.record import fit_record
+    from asperity.inference.fitting.result import fit_record
 
     asked = Fitted.model_validate(argument["asked"])
     files = argument["files"]

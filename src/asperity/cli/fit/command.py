@@ -152,7 +152,7 @@ def fit(
     from asperity import inference
     from asperity.cli.progress import bar
     from asperity.cli.report import to_json
-    from asperity.inference.fitting.record import fit_record
+    from asperity.inference.fitting.result import fit_record
 
     sampling.check()
     if report is not None:

@@ -11,11 +11,15 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.inference.comparison.cross_validation import CrossValidation, leave_one_run_out
-from asperity.inference.comparison.evidence import Evidence, evidence_of
+from asperity.inference.comparison.evidence import (
+    CrossValidation,
+    Evidence,
+    evidence_of,
+    leave_one_run_out,
+)
 from asperity.inference.fitting.fit import Data, fit, listed_data
-from asperity.inference.fitting.free_stiffness import stiffness_that_describes
 from asperity.inference.fitting.inputs import free_by_default
+from asperity.inference.fitting.plausibility import stiffness_that_describes
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.tables.residuals import residuals_of, weights_of

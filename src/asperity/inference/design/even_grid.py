@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from asperity.inference.design.criteria import Criterion
+from asperity.inference.design.shares import Criterion
 
 Float = NDArray[np.float64]
 

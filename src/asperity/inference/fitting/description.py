@@ -12,15 +12,18 @@ from scipy.stats import chi2 as chi_squared
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from asperity.inference.fitting.intervals import LEVELS, Interval, bounded_interval
-from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
-from asperity.inference.fitting.parabola import (
+from asperity.inference.fitting.intervals import (
+    LEVELS,
     UNDETERMINED,
+    Interval,
     Parabola,
+    Profile,
+    ProfileAtEdgeError,
+    bounded_interval,
     inverse_information,
     parabola_of,
 )
-from asperity.inference.fitting.profile import Profile, ProfileAtEdgeError
+from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
 from asperity.inference.tables.outliers import outlying_rows

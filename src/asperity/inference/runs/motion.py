@@ -1,13 +1,15 @@
-"""Friction through a whole recording, at its samples or averaged over blocks, with derivatives.
+"""Recorded friction of a motion, with derivatives, and the likelihood of a recording.
 
 The states are carried from one piece of the drive to the next: velocity steps, holds, ramps and
 load changes follow each other as in the experiment. The continuous extension of the integrator
-gives the friction between its steps.
+gives the friction between its steps. A fit takes the friction and its derivatives, differentiated
+forwards; a sampler the logarithm of the likelihood and its gradient.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -18,8 +20,8 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
-from asperity.inference.runs.gain import GAIN
-from asperity.inference.runs.reading import Reading
+from asperity.inference.runs.noise import Whitening, innovations
+from asperity.inference.runs.reading import GAIN, Reading
 from asperity.inference.runs.steps import Curve, integrated, law_fields, numbers, with_values
 from asperity.laws import Law
 from asperity.slider import Slider
@@ -330,3 +332,75 @@ def _friction(
     at = excitation(drive, values, piece, times)
     load = drive.load[piece] + drive.load_slope[piece] * (times - drive.edges[piece])
     return motion.force(jnp.stack(y), at) / load
+
+
+class RunArrays(NamedTuple):
+    """Numbers of a recording.
+
+    Attributes
+    ----------
+    motion : Motion
+        Equation of motion whose law and slider are replaced; arrays only.
+    fixed : dict of str to array, shape ()
+        Parameters of the motion that are not free.
+    drive : Drive
+    reading : Reading
+    recorded : array, shape (n,)
+    noise : tuple of Whitening
+        Of each stretch.
+    basis : array, shape (n, columns)
+        Whitened linear nuisances, orthonormal.
+    """
+
+    motion: Any
+    fixed: dict[str, Any]
+    drive: Drive
+    reading: Reading
+    recorded: Any
+    noise: tuple[Whitening, ...]
+    basis: Any
+
+
+@dataclass(frozen=True)
+class RunLikelihood:
+    """Log likelihood of a recording under the noise of the estimate, but for a constant.
+
+    Attributes
+    ----------
+    equation : Motion
+        What of the equation of motion is no number.
+    inner : tuple of (str, str)
+        Free parameters that this recording depends on, and their names in the motion.
+    stretches : tuple of (int, int)
+        First sample and the one after the last of each stretch of noise.
+    room : int
+        Steps of the integrator at most.
+    """
+
+    equation: Any
+    inner: tuple[tuple[str, str], ...]
+    stretches: tuple[tuple[int, int], ...]
+    room: int
+
+    def __call__(self, values: Mapping[str, Array], data: RunArrays) -> Array:
+        """Log likelihood of parameters by name; NaN where the motion cannot be computed."""
+        motion = eqx.combine(data.motion, self.equation)
+        names = tuple(inner for _, inner in self.inner)
+
+        def density(friction: Array) -> Array:
+            departures = friction - data.recorded
+            white = innovations(departures, data.noise, self.stretches, data.basis, jnp)
+            return -0.5 * jnp.sum(white**2)
+
+        def both(x: Array) -> tuple[Array, Array]:
+            given = {**data.fixed, **dict(zip(names, x, strict=True))}
+            return density_through(
+                density, motion, names, given, data.drive, data.reading, room=self.room
+            )
+
+        @jax.custom_vjp
+        def likelihood(x: Array) -> Array:
+            return both(x)[0]
+
+        likelihood.defvjp(both, lambda gradient, change: (change * gradient,))
+        return likelihood(jnp.stack([values[name] for name, _ in self.inner]))

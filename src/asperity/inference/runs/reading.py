@@ -21,6 +21,8 @@ from asperity.tribometer.filters import between, filtered, low_pass
 
 Float = NDArray[np.float64]
 
+#: Name of the gauge's gain in the motion of a run, and of that of every run in priors.
+GAIN = "gain"
 #: Computed times, and samples, are filled up to a multiple of this.
 _ROUNDED = 1024
 #: Samples ahead that the filter of evenly spaced samples reads.

@@ -13,13 +13,17 @@ from numpy.typing import NDArray
 
 from asperity.inference.objective import Residuals
 from asperity.inference.runs.drive import filled_up
-from asperity.inference.runs.gain import GAIN
-from asperity.inference.runs.likelihood import RunArrays, RunLikelihood, innovations
 from asperity.inference.runs.misfit import departures_of_jumps, misfit_after_changes
-from asperity.inference.runs.motion import RunMotion
-from asperity.inference.runs.noise import Autoregression, fitted, strongest_peak, whiteness
-from asperity.inference.runs.noise_uncertainty import added_by_noise
-from asperity.inference.runs.reading import reading_at
+from asperity.inference.runs.motion import RunArrays, RunLikelihood, RunMotion
+from asperity.inference.runs.noise import (
+    Autoregression,
+    added_by_noise,
+    fitted,
+    innovations,
+    strongest_peak,
+    whiteness,
+)
+from asperity.inference.runs.reading import GAIN, reading_at
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.wrong_samples import (
     AT_CHANGE,
@@ -231,13 +235,6 @@ class RunTerm:
     def thinned(self, rows: int, data: int = 0) -> None:
         """A recording has no rows."""
         return
-
-    @property
-    def log_norm(self) -> float:
-        """Logarithm of the density of samples without departures."""
-        stretches = zip(self.models, self.run.stretches, strict=True)
-        scale = sum(m.log_scale(b - a) for m, (a, b) in stretches)
-        return -0.5 * self.run.time.size * math.log(2 * math.pi) - scale
 
     def observed(self) -> dict[str, Float]:
         """Times and friction."""

@@ -151,11 +151,6 @@ class LockInTerm:
         return _SEARCHED_SAMPLES if self.searches else _SAMPLES
 
     @property
-    def log_norm(self) -> float:
-        """Logarithm of the density of readings that are as predicted."""
-        return -0.5 * self._count * math.log(2 * math.pi) - self.weights.log_scale
-
-    @property
     def _count(self) -> int:
         """Number of readings."""
         return sum(int(np.isfinite(v).sum()) for v in self.table.values.values())
