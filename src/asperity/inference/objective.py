@@ -54,6 +54,21 @@ class Residuals(NamedTuple):
     log_scale: float
 
 
+class Minimum(NamedTuple):
+    """Where a minimisation has ended.
+
+    Attributes
+    ----------
+    u : array, shape (n,)
+        Coordinates.
+    chi2 : float
+        Infinite without a solution.
+    """
+
+    u: Float
+    chi2: float
+
+
 class DataTerm(Protocol):
     """One set of data in the likelihood.
 
@@ -371,8 +386,8 @@ class Objective:
         *,
         tolerance: float | None = None,
         evaluations: int = 100,
-    ) -> tuple[Float, float]:
-        """Coordinates of the minimum that is reached from u, and its chi-squared.
+    ) -> Minimum:
+        """The minimum that is reached from u.
 
         Parameters
         ----------
@@ -395,7 +410,7 @@ class Objective:
         inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
         point[moving] = inside = np.clip(point[moving], low + inset[0], high - inset[1])
         if not moving or not math.isfinite(self.chi2(point)):
-            return point, self.chi2(point)
+            return Minimum(point, self.chi2(point))
 
         def whole(part: Float) -> Float:
             full = point.copy()
@@ -423,7 +438,7 @@ class Objective:
             max_nfev=evaluations,
         )
         found = whole(result.x)
-        return found, self.chi2(found)
+        return Minimum(found, self.chi2(found))
 
     def expected_decrease(self, u: Float) -> float:
         """Decrease of chi-squared that residuals linear in the coordinates would allow.
@@ -462,18 +477,18 @@ class Objective:
         term = self.terms[0].thinned(rows, data) if len(self.terms) == 1 else None
         return None if term is None else replace(self, terms=(term,))
 
-    def chi2_of_many(self, u: Float, *, near: bool = False, least: float = 1.0) -> Float:
+    def chi2_of_many(self, u: Float, *, least: float = 1.0) -> Float:
         """chi-squared of data and priors at many coordinates, shapes (samples, n) to (samples,).
 
         Parameters
         ----------
         u : array, shape (samples, n)
-        near, least
+        least : float
             As of `DataTerm.chi2_of_many`.
         """
         priors = np.array([np.sum(self.prior_residuals(x)[0] ** 2) for x in u])
         values = [self.named(x) for x in u]
-        return sum((t.chi2_of_many(values, near=near, least=least) for t in self.terms), priors)
+        return sum((term.chi2_of_many(values, least=least) for term in self.terms), priors)
 
 
 def compressed(columns: Float) -> Float:

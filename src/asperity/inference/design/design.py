@@ -18,7 +18,6 @@ from asperity.inference.design.candidates import (
     candidates_of,
     without_rows,
 )
-from asperity.inference.design.even_grid import EvenGrid, even_grid, times_fewer, times_fewer_of
 from asperity.inference.design.plan import DesignPlan
 from asperity.inference.design.plan_file import plan_of, read_plan
 from asperity.inference.design.predictions import PointModel, prior_terms, rows_of, stacked
@@ -29,7 +28,16 @@ from asperity.inference.design.rival import (
     probability_of_deciding,
     separation,
 )
-from asperity.inference.design.shares import Determinant, Shares, optimal_shares, whole_readings
+from asperity.inference.design.shares import (
+    Determinant,
+    EvenGrid,
+    Shares,
+    even_grid,
+    optimal_shares,
+    times_fewer,
+    times_fewer_of,
+    whole_readings,
+)
 from asperity.inference.design.simulation import Simulated, simulated
 from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
 from asperity.inference.tables.table import LockInTable
