@@ -361,14 +361,6 @@ class Objective:
         data = self.data_residuals(u)
         return -math.inf if data is None else float(sum(log_density(d) for d in data))
 
-    def log_volume(self, u: Float) -> tuple[float, Float]:
-        """Logarithm of the volume dx/du of the coordinates with a prior, and its gradient.
-
-        Parameters without a prior are flat in their coordinate.
-        """
-        counted = np.array([k.logarithmic and k.prior is not None for k in self.unknowns], float)
-        return float(counted @ u), counted
-
     def forget(self) -> None:
         """Forget the last evaluation: a term has changed."""
         self._last = None

@@ -28,6 +28,7 @@ from asperity.inference.design.predictions import (
 )
 from asperity.inference.design.shares import Misfit, Shares, optimal_shares, whole_readings
 from asperity.inference.tables.table import LockInTable
+from asperity.inference.tables.term import on_contacts
 from asperity.orbit import Outcome, response_function
 
 Float = NDArray[np.float64]
@@ -125,10 +126,8 @@ def _slow(plan: DesignPlan, rival: Hypothesis, candidates: Candidates) -> Bool:
     """Candidates at which the fast method does not solve the rival, with its expected values."""
     if plan.inertia or plan.radiation_damping:
         return np.ones(candidates.size, bool)
-    from asperity.inference.design.candidates import parameters_at
-
     quick = response_function(rival.law, search=False)
-    given = parameters_at(rival, candidates.points, rival.values)
+    given = on_contacts({**rival.fixed, **candidates.points, **rival.values})
     outcome = quick({n: given[n] for n in quick.parameters}).outcome
     return np.asarray(outcome) != Outcome.CONVERGED
 

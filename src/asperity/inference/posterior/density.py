@@ -327,10 +327,11 @@ class Whitened:
         one, nothing = np.ones_like(q), np.zeros_like(q)
         bend = np.choose(self.coordinates.kind, [nothing, one, -one, 1 - 2 * share])
         curvature = np.where(self.coordinates.bounded_twice, 2 * share * (1 - share), 0.0)
-        volume, along = self.objective.log_volume(u)
+        # Priors are densities of the parameter itself: that of its logarithm has a volume.
+        volume = np.where((self.prior.precision > 0) & self.prior.arrays.logarithmic, 1.0, 0.0)
         J = jacobian * slope
-        value = -0.5 * float(r @ r) + volume + float(log_slope.sum())
-        return value, -J.T @ r + along * slope + bend, J.T @ J + np.diag(curvature)
+        value = -0.5 * float(r @ r) + float(volume @ u + log_slope.sum())
+        return value, -J.T @ r + volume * slope + bend, J.T @ J + np.diag(curvature)
 
     def compiled(self) -> tuple[PosteriorDensity, DensityData]:
         """The density as a compiled program evaluates it, and its data."""

@@ -223,8 +223,6 @@ def _warm_up(data: Any, key: Any, z: Any, *, log_density: LogDensity) -> ChainSt
         finite_density(log_density, data),
         is_mass_matrix_diagonal=False,
         initial_step_size=0.8 * z.size**-0.25,
-        # What is returned of every draw.
-        adaptation_info_fn=lambda *_: (),
     )
     later, now = jax.random.split(jax.random.wrap_key_data(key))
     (state, found), _ = adaptation.run(now, z, WARM_UP)

@@ -378,12 +378,17 @@ def parameters_at(
         Those that do not belong to the response are left out.
     function : ResponseFunction
     """
-    given = {**fixed, **free}
-    ratio = given.pop("eps_ratio", 1.0)
+    given = on_contacts({**fixed, **free})
     rows = np.shape(fixed["epsilon"])
     module = jnp if any(isinstance(v, jax.core.Tracer) for v in given.values()) else np
-    given["epsilon"] = given["epsilon"] * ratio
     return {n: module.broadcast_to(v, rows) for n, v in given.items() if n in function.parameters}
+
+
+def on_contacts(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters with the amplitude of the modulation that the contacts carry, eps_ratio of it."""
+    given = dict(parameters)
+    given["epsilon"] = given["epsilon"] * given.pop("eps_ratio", 1.0)
+    return given
 
 
 def _steady(
