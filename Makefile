@@ -2,7 +2,9 @@
 #
 #   make demo    the paper, reproduced: report/index.html
 #   make app     the page in a browser: sliders, maps, recordings
-#   make test    the whole test suite
+#   make quick   a minute of tests, some of every file: before a commit
+#   make test    the test suite: before a change goes in
+#   make test-long   populations, statistics, every law through every method: before a release
 #   make check   style, types, documentation
 #   make bench   speed and accuracy against other integrators
 #   make docs    docs/_build/html/index.html
@@ -18,7 +20,7 @@ LOCKED := $(PIP) --require-hashes
 LOCK := requirements
 UPGRADE ?=
 
-.PHONY: demo app test check style types bench docs lock clean
+.PHONY: demo app quick test test-long check style types bench docs lock clean
 .DELETE_ON_ERROR:
 
 demo: $(VENV)/run.stamp
@@ -28,8 +30,18 @@ demo: $(VENV)/run.stamp
 app: $(VENV)/app.stamp
 	$(BIN)/asperity serve --open
 
+# Tests start many processes, and each would compile the packages again where no bytecode is kept.
+quick test test-long: export PYTHONDONTWRITEBYTECODE =
+quick test test-long: export PYTHONPYCACHEPREFIX = $(abspath $(VENV))/bytecode
+
+quick: $(VENV)/test.stamp
+	$(BIN)/python -m pytest -n 2 -m quick
+
 test: $(VENV)/test.stamp
 	$(BIN)/python -m pytest -n 2
+
+test-long: $(VENV)/test.stamp
+	$(BIN)/python -m pytest -n 2 -m long
 
 check: style types docs
 

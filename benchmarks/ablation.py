@@ -23,12 +23,10 @@ from asperity.orbit import Outcome
 from asperity.orbit import multipliers as multiplier_resolution
 from asperity.orbit.batches import take
 from asperity.orbit.methods import series
-from asperity.orbit.methods.branch_following.from_steady_sliding import MESHES
-from asperity.orbit.methods.branch_following.method import BranchFollowing
+from asperity.orbit.methods.branch_following.from_steady_sliding import MESHES, BranchFollowing
 from asperity.orbit.methods.collocation import method as collocation
 from asperity.orbit.methods.method import Method
-from asperity.orbit.methods.registry import METHODS
-from asperity.orbit.search import find_orbits
+from asperity.orbit.search import METHODS, find_orbits
 from asperity.orbit.solution import Solution
 from asperity.slider.problem import Problem
 from benchmarks.residual import LAWS, draw, problem_of

@@ -16,7 +16,7 @@ from scipy.integrate import solve_ivp
 from asperity import Slider, periodic_response
 from asperity.laws import ElastoPlastic, RiceRuina
 from asperity.orbit import PeriodicResponse
-from asperity.orbit.methods.registry import CHOICES
+from asperity.orbit.search import CHOICES
 from asperity.slider.problem import Problem, checked_problem, flatten
 
 #: Residual of either equation over its largest term. The waveform is good to 3e-5 of its swing,

@@ -2,6 +2,7 @@
 
 import gc
 import os
+from itertools import groupby, islice
 
 import pytest
 
@@ -24,15 +25,19 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 #: Rooms that take longest from an empty compilation cache; they come first.
 LONGEST = (
-    *("orbit", "app", "benchmarks", "inference", "papers", "branches", "docs", "cli", "sweep"),
-    "transients",
+    *("orbit", "inference", "papers", "branches", "docs", "transients", "sweep", "app"),
+    *("measurement", "cli", "laws", "theory", "lock_in"),
 )
+
+#: Rooms that go to the processes file by file: the longest, and those that compile nothing.
+BY_FILE = ("orbit", "measurement", "lock_in", "recording")
 
 #: Rooms and files whose programs take longer to be optimised than they run, in processes that their
 #: tests start too. Others run what users run.
 BRIEF = (
     *("orbit", "docs", "theory", "transients", "laws", "app"),
     *("branches/test_boundaries.py", "branches/test_bifurcations.py"),
+    *(f"cli/test_{name}.py" for name in ("design", "map", "other_commands", "response", "run")),
 )
 _SWITCH = "jax_disable_most_optimizations"
 
@@ -43,11 +48,17 @@ def room(nodeid):
 
 
 def scope(nodeid):
-    """What one process of xdist runs: a room, of the longest one a file."""
-    return nodeid.split("::")[0] if room(nodeid) == LONGEST[0] else room(nodeid)
+    """What one process of xdist runs at a time: a room, or a file."""
+    return nodeid.split("::")[0] if room(nodeid) in BY_FILE else room(nodeid)
 
 
+@pytest.hookimpl(tryfirst=True)  # before `-m` selects
 def pytest_collection_modifyitems(items):
+    """Rooms in order, and the first short test of each file marked for `make quick`."""
+    for _, file in groupby(items, key=lambda item: item.path):
+        short = (i for i in file if not any(map(i.get_closest_marker, ("slow", "long"))))
+        for first in islice(short, 1):
+            first.add_marker("quick")
     order = {name: place for place, name in enumerate(LONGEST)}
     items.sort(key=lambda item: order.get(room(item.nodeid), len(order)))
 
@@ -70,7 +81,8 @@ def pytest_xdist_make_scheduler(config, log):
 
     class ByRoom(LoadScopeScheduling):
         def _split_scope(self, nodeid):
-            return scope(nodeid)
+            # The first tests of the files share hardly a program.
+            return nodeid if config.option.markexpr == "quick" else scope(nodeid)
 
     if config.getvalue("dist") != "load":
         return None

@@ -43,7 +43,7 @@ if TYPE_CHECKING:
         response_function,
         sensitivities,
     )
-    from asperity.protocol.from_file import run_experiment as run
+    from asperity.protocol.run import run_experiment as run
     from asperity.recording.readers import read
     from asperity.slider import Slider
     from asperity.sweep.map import response_map as map
@@ -64,7 +64,7 @@ _HOMES = {
     "perturbation_response": ("theory", "perturbation_response"),
     "read": ("recording.readers", "read"),
     "response_function": ("orbit", "response_function"),
-    "run": ("protocol.from_file", "run_experiment"),
+    "run": ("protocol.run", "run_experiment"),
     "sensitivities": ("orbit", "sensitivities"),
     "stability_boundary": ("branches", "stability_boundary"),
     "transient": ("transients", "transient"),

@@ -27,7 +27,7 @@ WORST = {
 }
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_two_points(tmp_path):
     out = tmp_path / "rows.json"
     options = ["--law", "elasto-plastic", "--points", "2", "--repeats", "1", "--million", "0"]

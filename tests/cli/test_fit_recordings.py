@@ -27,15 +27,17 @@ def run_fit(*arguments):
 
 
 def test_a_recording_is_fitted(recording):
-    found = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", "--json")
+    # At the rate of the other fits of this file, for one program.
+    options = ["--free", "A,B,D0,K", "--fit-rate", "5 Hz", "--json"]
+    found = run_fit(recording, "--law", "rice-ruina", *options)
     assert found.exit_code == 0, found.output
-    record = json.loads(found.output)
+    record = json.loads(found.stdout)
     K = record["parameters"]["K"]
     assert K["unit"] == "1/m"
     # The stiffness over the load that the recording was computed with.
     assert abs(K["value"] - 4e3) < 4 * K["se"]
     assert record["noise"]["model"].startswith("AR(")
-    assert record["noise"]["effective_samples"] < 1400
+    assert record["noise"]["effective_samples"] < 700
 
 
 def test_priors_of_a_material_want_the_free_parameters(recording):
@@ -65,6 +67,7 @@ def test_bad_options_are_refused(recording, more, said):
     assert "Traceback" not in found.output
 
 
+@pytest.mark.long
 def test_the_choice_of_the_window_is_an_uncertainty(recording):
     options = ["--windows", "auto", "--fit-rate", "5 Hz"]
     found = run_fit(recording, "--law", "rice-ruina", "--free", "A,B,D0,K", *options)
@@ -165,10 +168,10 @@ def test_a_stiffness_over_the_stress_is_taken_and_shown(under_stress, tmp_path):
     assert over["interval_95"][0] < 4e-3 < over["interval_95"][1]
     assert "K/W0" in (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     # As rock laboratories write it, and as the same number of pascals.
-    fixed = [record("--fix", f"K={text}") for text in ("4e-3/um", "0.004 1/um", "0.08 MPa/um")]
+    fixed = [record("--fix", f"K={text}") for text in ("4e-3/um", "0.08 MPa/um")]
     for name in ("A", "B", "D0"):
         values = [r["parameters"][name]["value"] for r in fixed]
-        assert values == pytest.approx([values[0]] * 3, rel=1e-9)
+        assert values == pytest.approx([values[0]] * 2, rel=1e-9)
     shown = run_fit(*common)
     (line,) = [t for t in shown.output.splitlines() if t.strip().startswith("K/W0")]
     assert line.split()[1] == f"{over['value']:.6g}"

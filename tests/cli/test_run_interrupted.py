@@ -25,13 +25,13 @@ bandwidth = "1 kHz"
 def test_an_interrupted_recording_leaves_the_motion_and_says_so(
     tmp_path, monkeypatch, capsys
 ) -> None:
-    from asperity.recording.writers import text
+    from asperity.recording.writers import WRITERS
 
     def interrupted(trace, columns, path):
         path.write_text("half a recording")
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(text, "save", interrupted)
+    monkeypatch.setitem(WRITERS, ".csv", interrupted)
     protocol, out, record = (tmp_path / n for n in ("p.toml", "run.nc", "recording.csv"))
     protocol.write_text(PROTOCOL)
     with pytest.raises(SystemExit) as left:

@@ -86,7 +86,7 @@ def run_console(snippet, where, capsys) -> None:
 @pytest.mark.parametrize(
     "page",
     [
-        pytest.param(p, id=named(p), marks=pytest.mark.slow if named(p) in SLOW else ())
+        pytest.param(p, id=named(p), marks=pytest.mark.long if named(p) in SLOW else ())
         for p in RUNNABLE
     ],
 )

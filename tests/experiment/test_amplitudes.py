@@ -1,5 +1,7 @@
 """The paper's protocol on the virtual tribometer, against the periodic response."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ import asperity as asp
 from asperity.air import AirLayer, transfer_function
 from asperity.errors import InputError
 from asperity.experiment import Exciter, amplitude_series
+from asperity.measurement.measure import measure
 from asperity.tribometer.sensors import LoadCell, SpringGauge
 from asperity.tribometer.tribometer import Recorder, Tribometer
 
@@ -44,6 +47,15 @@ def test_the_readings_are_the_response_to_what_the_contacts_bear(series) -> None
         assert np.all(found[f"{name}_uncertainty"] < 0.02 * np.abs(getattr(truth, name)))
 
 
+def test_another_transfer_is_seen(series) -> None:
+    found = series.to_dataset()
+    other = asp.periodic_response(
+        SLIDER, velocity=V, epsilon=1.05 * abs(TRANSFER) * np.array(EPSILONS), frequency=F
+    )
+    error = np.abs(found.mu1.values - other.mu1)
+    assert np.all(error > 5 * found.mu1_uncertainty.values + 1e-4 * other.mu1)
+
+
 def test_phases_are_against_the_applied_load(series) -> None:
     found = series.to_dataset()
     truth = asp.periodic_response(
@@ -72,6 +84,15 @@ def test_the_recording_is_that_of_the_whole_protocol(series) -> None:
     assert trace.provenance["law"] == "elasto-plastic"
     on = trace.slice(2.5, 3.5).channel("W").values
     assert np.ptp(on) == pytest.approx(2 * 0.2 * 7, rel=0.01)
+
+
+def test_the_table_has_the_harmonics_that_were_read(series) -> None:
+    point = series.points[0]
+    part = series.trace.slice(point.begin, point.end)
+    one = measure(part, load="normal force", force="shear force", frequency=F, harmonics=1)
+    table = replace(series, points=(replace(point, measurement=one),)).to_dataset()
+    assert "mu1" in table
+    assert "mu2" not in table
 
 
 def test_the_exciter_through_air_is_that_of_the_layer() -> None:

@@ -29,7 +29,7 @@ from asperity.recording.writers import write
 from asperity.tribometer.sensors import LoadCell, SpringGauge
 from asperity.tribometer.tribometer import Recorder, Tribometer
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.long
 
 PMMA = asp.materials.load("bureau2000")
 LAWS = ("rice-ruina", "linker-dieterich", "elasto-plastic")

@@ -10,7 +10,7 @@ from asperity.errors import InputError
 from asperity.experiment import SlideHoldSlide, VelocitySteps, slide_hold_slide, velocity_steps
 from asperity.laws import RiceRuina
 from asperity.loads import Programme
-from asperity.protocol.grammar import parse_step
+from asperity.protocol.steps import parse_step
 from asperity.tribometer.sensors import DisplacementGauge, LoadCell
 from asperity.tribometer.tribometer import Recorder, Tribometer
 

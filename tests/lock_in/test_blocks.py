@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from asperity.errors import InputError
-from asperity.lock_in.basis import Basis
-from asperity.lock_in.blocks import even_step, join, sums
-from asperity.lock_in.demodulation import lock_in
-from asperity.lock_in.retune import retuned
-from asperity.lock_in.stream import LockInStream
+from asperity.lock_in.demodulation import LockInStream, lock_in
+from asperity.lock_in.normal_equations import Basis, even_step, join, sums
+from asperity.lock_in.reference import retuned
 from asperity.measurement.window import merged
 
 TIME = 3.0 + np.arange(20_011) * 1e-3

@@ -5,7 +5,8 @@ import pytest
 from scipy.stats import binom
 
 from asperity.lock_in.demodulation import lock_in
-from asperity.lock_in.phasor import Phasor
+from asperity.lock_in.reading import Phasor
+from references.populations import draws, population
 
 SEEDS = 200
 NAMES = ("W0", "epsilon", "frequency", "mean_friction", "mu1", "phase1", "mu2", "phase2")
@@ -21,7 +22,9 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", population(["shared by both", *(c for c in CASES if c != "shared by both")])
+)
 def test_intervals_cover_the_truth(truth, red_noise, case) -> None:
     n, dt, frequency, rho, of_load, of_force, shared = CASES[case]
     truth = truth.but(frequency=frequency, drift=1e-3)
@@ -73,6 +76,7 @@ def test_white_noise_has_the_textbook_s_variances(truth) -> None:
     assert mean == pytest.approx(sigma**2 / n, rel=0.3)
 
 
+@pytest.mark.long
 def test_the_frequency_is_as_good_as_theory_allows(truth) -> None:
     n, dt, sigma = 2000, 1e-3, 0.1
     time = np.arange(n) * dt
@@ -108,13 +112,14 @@ def test_coloured_noise_is_taken_where_it_acts(truth, red_noise) -> None:
     assert spectra[4] < sigma**2 / 25
 
 
-def test_noise_of_the_load_reaches_the_phase(truth) -> None:
+@draws(30, 100)
+def test_noise_of_the_load_reaches_the_phase(truth, draws) -> None:
     n = 2000
     time = np.arange(n) * 1e-3
     rng = np.random.default_rng(5)
     load, force = truth.load(time), truth.force(time)
     phases, stated = [], []
-    for _ in range(100):
+    for _ in range(draws):
         reading = lock_in(time, load + 0.3 * rng.standard_normal(n), force, harmonics=2)
         phases.append(reading.phasor(2).phase)
         stated.append(reading.uncertainty("phase2"))

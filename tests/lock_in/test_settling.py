@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.lock_in.demodulation import lock_in
+from references.populations import draws
 
 
 def settling_force(truth, time, decay, amplitudes):
@@ -16,9 +17,10 @@ def settling_force(truth, time, decay, amplitudes):
 
 @pytest.mark.parametrize("detrend", ["linear", "quadratic"])
 @pytest.mark.parametrize("even", [True, False])
-def test_without_noise_the_truth_is_fitted(truth, detrend, even) -> None:
+@draws(1, 4)
+def test_without_noise_the_truth_is_fitted(truth, detrend, even, draws) -> None:
     rng = np.random.default_rng(3)
-    for _ in range(4):
+    for _ in range(draws):
         truth = truth.but(frequency=rng.uniform(50, 70), drift=rng.normal() * 1e-3)
         time = np.arange(12_000) / 4000
         if not even:
@@ -36,13 +38,14 @@ def test_without_noise_the_truth_is_fitted(truth, detrend, even) -> None:
         assert found.mean_friction == pytest.approx(level, abs=0.03 * error)
         for n, c in enumerate(truth.harmonics, 1):
             assert abs(found.harmonics[n - 1] - c) < 1e-3 * error
-        assert found.settling.told
+        assert found.settling.determined
 
 
-def test_harmonics_settle_too(truth) -> None:
+@draws(6, 30)
+def test_harmonics_settle_too(truth, draws) -> None:
     """mu1 and mu2 are those that the response settles to, within their uncertainties."""
     off, without = [], []
-    for seed in range(30):
+    for seed in range(draws):
         rng = np.random.default_rng(seed)
         time = np.arange(int(rng.uniform(1, 3) * 2000)) / 2000
         decay = (time[-1] - time[0]) / rng.uniform(5, 12)
@@ -59,12 +62,13 @@ def test_harmonics_settle_too(truth) -> None:
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.95])
-def test_a_steady_recording_keeps_its_uncertainty(truth, red_noise, rho) -> None:
+@draws(4, 25)
+def test_a_steady_recording_keeps_its_uncertainty(truth, red_noise, rho, draws) -> None:
     rng = np.random.default_rng(5)
     time = np.arange(3000) * 1e-3
     load, force = truth.load(time), truth.force(time)
     ratios = []
-    for noise in red_noise(rng, rho, 25, time.size):
+    for noise in red_noise(rng, rho, draws, time.size):
         pair = [lock_in(time, load, force + 5e-3 * noise, settles=s) for s in (False, True)]
         assert pair[1].settling is None
         names = ("mean_friction", "mu1", "mu2")

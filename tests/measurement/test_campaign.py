@@ -104,8 +104,10 @@ def test_a_table_has_a_row_for_each_part_and_a_reason_for_each_failure(
 
 def test_an_interrupted_campaign_goes_on(amplitudes, tmp_path) -> None:
     files = [tmp_path / f"{name}.csv" for name in "abc"]
+    # The first amplitude alone.
+    part = b"".join(amplitudes.read_bytes().splitlines(keepends=True)[:14_000])
     for file in files:
-        file.write_bytes(amplitudes.read_bytes())
+        file.write_bytes(part)
     out, asked = tmp_path / "campaign.csv", []
 
     def stop(done: int, total: int, label: str) -> None:
@@ -127,7 +129,7 @@ def test_an_interrupted_campaign_goes_on(amplitudes, tmp_path) -> None:
 
     done = run_campaign(files, counted, out, inputs=ROWS.inputs(), resume=True)
     assert asked == files[2:]
-    assert done.rows == 9
+    assert done.rows == 3
     straight = tmp_path / "straight.csv"
     run_campaign(files, ROWS, straight, inputs=ROWS.inputs())
     assert out.read_bytes() == straight.read_bytes()

@@ -10,11 +10,12 @@ from asperity.inference.runs.run import recorded_run
 from asperity.measurement.measure import measure
 from asperity.measurement.sliding.measure import measure_sliding
 from asperity.recording import Channel, Trace, read
+from references.populations import population
 
 UM = 1e-6
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 def test_a_load_is_read_as_compression_whatever_the_recorder_calls_it(
     truth, protocol, trace, seed
 ) -> None:
@@ -87,7 +88,7 @@ def written(tmp_path, columns):
     return path
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 @pytest.mark.parametrize("columns", [None, {"friction": "mu"}])
 def test_a_friction_beside_a_shear_without_its_load_is_read(tmp_path, seed, columns) -> None:
     rng = np.random.default_rng(seed)

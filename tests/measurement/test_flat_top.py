@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 
 from asperity.measurement.measure import measure
 from asperity.recording import Channel, Trace, check
+from references.populations import population
 
 W0, EPSILON, MU1 = 7.0, 0.24, 2e-3
 
@@ -48,7 +49,7 @@ def harmonics(rng):
 
 
 @pytest.mark.parametrize("cut", ["force", "load"])
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", population(6))
 def test_a_cut_below_the_noise_is_named(seed, cut) -> None:
     rng = np.random.default_rng([seed, len(cut)])
     level, noise = rng.uniform(0.1, 0.9), 10 ** rng.uniform(-3, -1)
@@ -63,7 +64,7 @@ def test_a_cut_below_the_noise_is_named(seed, cut) -> None:
     assert found.verdict != "ok"
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", population(6, short=2))
 def test_a_cut_is_named_in_a_cycle_with_harmonics_in_strong_noise_and_at_few_phases(seed) -> None:
     rng = np.random.default_rng(seed)
     # At 2 kHz 120 Hz has 50 phases, and 100 Hz has 20.
@@ -136,14 +137,14 @@ SMOOTH = {
 }
 
 
-@pytest.mark.parametrize("noise", [1e-3, 3e-2, 0.3])
+@pytest.mark.parametrize("noise", population([3e-2, 1e-3, 0.3]))
 @pytest.mark.parametrize("name", SMOOTH)
 def test_a_smooth_cycle_is_not_suspected(name, noise) -> None:
     _, answer = recorded(np.random.default_rng(0), SMOOTH[name], noise)
     assert answer.verdict == "ok", answer
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 def test_coloured_noise_cuts_nothing_off(red_noise, seed) -> None:
     rng = np.random.default_rng(seed)
     noise = red_noise(rng, 0.99, 1, 24_000)[0]

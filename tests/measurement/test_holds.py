@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.measurement.sliding.measure import measure_sliding
+from references.populations import draws
 
 V, HOLDS, STIFFNESS = 10e-6, (3.0, 30.0, 300.0), 4e3
 
@@ -64,10 +65,11 @@ def test_holds_of_the_user_need_no_displacement(held, sliding_trace) -> None:
         assert np.isnan(hold.reload_slope)
 
 
-def test_noise_makes_no_healing(sliding_trace) -> None:
+@draws(4, 20)
+def test_noise_makes_no_healing(sliding_trace, draws) -> None:
     """The largest of many noisy samples is no peak."""
     heals = []
-    for seed in range(20):
+    for seed in range(draws):
         rng = np.random.default_rng(seed)
         time = np.arange(0, 90, 0.01)
         slip = np.interp(time, [0, 40, 50, 90], [0, 400e-6, 400e-6, 800e-6])

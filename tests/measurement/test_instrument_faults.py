@@ -9,6 +9,7 @@ import pytest
 
 from asperity.measurement.measure import measure
 from asperity.recording import Channel, Trace, check
+from references.populations import population
 
 RATE, F = 2000.0, 37.013
 
@@ -88,7 +89,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", population(2))
 def test_the_fault_is_named(whole, trace, fault, seed) -> None:
     plant, names = FAULTS[fault]
     found = measure(trace(*plant(*whole(seed))))
@@ -107,7 +108,7 @@ NEW = {
 }
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 @pytest.mark.parametrize("frequency", [F, 120.0, 50.0])
 def test_a_clean_recording_is_not_suspected(whole, trace, seed, frequency) -> None:
     found = measure(trace(*whole(seed, frequency=frequency)))
@@ -143,7 +144,7 @@ def test_numbers_are_those_planted(whole, trace) -> None:
 
 
 @pytest.mark.parametrize("base", [50.0, 60.0])
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", population(2))
 def test_mains_alone_are_no_modulation(trace, base, seed) -> None:
     rng = np.random.default_rng(seed)
     time = np.arange(20_000) / RATE
@@ -170,7 +171,7 @@ def test_hum_at_twice_the_mains_is_suspected_from_the_mains_themselves(truth, tr
     assert by_name(found, "hum").number == pytest.approx(4e-3 / (7 * 2e-3), rel=0.3)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 def test_a_force_made_from_friction_says_so_and_a_mean_load_is_recognised(whole, seed) -> None:
     time, load, force = whole(seed)
 
@@ -193,7 +194,7 @@ def test_a_force_made_from_friction_says_so_and_a_mean_load_is_recognised(whole,
     assert wrong.reading.phasor(1).amplitude > 0.05
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 def test_a_loading_ramp_is_no_part_of_f0(whole, trace, seed) -> None:
     time, load, force = whole(seed)
     ramp = np.clip(time / 4, 0.02, 1)

@@ -7,6 +7,7 @@ from scipy.signal import lfilter
 from asperity.errors import InputError
 from asperity.measurement.sliding.measure import measure_sliding
 from asperity.measurement.sliding.segments import displacement_noise, partition
+from references.populations import population
 
 UM = 1e-6
 
@@ -178,7 +179,7 @@ def wanders(rng, size, rate):
 
 
 @pytest.mark.parametrize("kind", [white, gauge, hum, wanders])
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", population(8))
 def test_a_stop_is_one_whatever_the_noise_of_the_displacement(sliding_trace, kind, seed) -> None:
     """Random velocities with stops of seconds between; noise of 5 nm to 0.5 um."""
     rng = np.random.default_rng(seed)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from asperity.measurement.measure import measure
+from references.populations import draws
 
 LEVEL, DROP = 0.43, -0.005
 MU1 = 0.02 * np.exp(-0.5j)
@@ -48,9 +49,10 @@ def verdict(found):
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])
 @pytest.mark.parametrize("constants", [(5, 10), (10, 60)])
-def test_the_settled_mean_is_measured(trace, rho, constants) -> None:
+@draws(3, 12)
+def test_the_settled_mean_is_measured(trace, rho, constants, draws) -> None:
     off, told = [], 0
-    for seed in range(12):
+    for seed in range(draws):
         rng = np.random.default_rng(seed)
         length = rng.uniform(0.8, 4)
         amplitude = np.exp(rng.uniform(*np.log([0.005, 0.05]))) * rng.choice([-1, 1])
@@ -59,14 +61,15 @@ def test_the_settled_mean_is_measured(trace, rho, constants) -> None:
         found = measure(trace(*recording(rng, length, decay, amplitude, rho=rho, drift=drift)))
         told += verdict(found) == "ok"
         off.append(errors(found, drift))
-    assert told >= 10
+    assert told >= draws - 2
     # Student's t of some ten degrees of freedom.
     assert np.abs(off).max() < 5, off
     assert np.sqrt(np.mean(np.square(off))) < 1.6
 
 
-def test_a_settling_without_an_end_has_no_mean(trace) -> None:
-    for seed in range(12):
+@draws(3, 12)
+def test_a_settling_without_an_end_has_no_mean(trace, draws) -> None:
+    for seed in range(draws):
         rng = np.random.default_rng(seed)
         length = rng.uniform(0.6, 2)
         amplitude = rng.uniform(0.005, 0.05) * rng.choice([-1, 1])
@@ -77,8 +80,9 @@ def test_a_settling_without_an_end_has_no_mean(trace) -> None:
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])
 @pytest.mark.parametrize("drift", [0.0, 5e-4])
-def test_a_steady_force_raises_no_alarm(trace, rho, drift) -> None:
-    for seed in range(10):
+@draws(2, 10)
+def test_a_steady_force_raises_no_alarm(trace, rho, drift, draws) -> None:
+    for seed in range(draws):
         rng = np.random.default_rng(seed)
         steady = recording(rng, rng.uniform(0.6, 4), 1.0, 0.0, rho=rho, drift=drift)
         found = measure(trace(*steady))
@@ -89,10 +93,11 @@ def test_a_steady_force_raises_no_alarm(trace, rho, drift) -> None:
         assert found.window[0] - part.first < 0.2 * (part.stop - part.first)
 
 
-def test_what_recovers_after_the_modulation_is_no_level(trace) -> None:
+@draws(5, 16)
+def test_what_recovers_after_the_modulation_is_no_level(trace, draws) -> None:
     """F(0) after it is what the pause settles to, and none where that cannot be told."""
     off, used = [], 0
-    for seed in range(16):
+    for seed in range(draws):
         rng = np.random.default_rng(seed)
         recovery = np.exp(rng.uniform(*np.log([0.05, 1.5])))
         made = recording(rng, 2.0, 1.0, 0.0, recovery=recovery, sigma=5e-4)
@@ -101,7 +106,7 @@ def test_what_recovers_after_the_modulation_is_no_level(trace) -> None:
         off.append(errors(found)[1])
         if recovery > 0.8:
             assert found.after is None
-    assert used >= 6
+    assert used >= 3 / 8 * draws
     assert np.abs(off).max() < 5, off
     assert np.sqrt(np.mean(np.square(off))) < 1.6
 
@@ -115,9 +120,10 @@ def test_a_window_of_the_user_is_judged_as_it_is(trace) -> None:
     assert abs(errors(found)[0]) < 4
 
 
-def test_two_time_constants_are_not_taken_for_one(trace) -> None:
+@draws(3, 8)
+def test_two_time_constants_are_not_taken_for_one(trace, draws) -> None:
     off = []
-    for seed in range(8):
+    for seed in range(draws):
         rng = np.random.default_rng(seed)
         time, load, force = recording(rng, 3.0, 0.35, 0.02)
         begin = time[np.argmax(np.abs(load - 7) > 0.5)]
@@ -126,5 +132,5 @@ def test_two_time_constants_are_not_taken_for_one(trace) -> None:
         found = measure(trace(time, load, force))
         if found.verdict == "ok":
             off.append(errors(found)[0])
-    assert len(off) >= 4
+    assert len(off) >= draws / 2
     assert np.abs(off).max() < 5, off

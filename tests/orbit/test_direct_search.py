@@ -10,7 +10,7 @@ from scipy.optimize import fsolve
 
 from asperity.errors import InputError
 from asperity.orbit import KnownOrbits, Outcome, response_function
-from asperity.orbit.gradient.search import direct
+from asperity.orbit.gradient import search as direct
 
 #: Rock-like numbers; the modulation is slow beside sliding over the memory length, so that the fast
 #: method finds none of these orbits.

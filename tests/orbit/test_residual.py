@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from benchmarks.residual import LAWS, answer, draw, faults, faults_marched
 
+pytestmark = pytest.mark.slow
+
 SAMPLES = 4096
 POINTS = 50
 

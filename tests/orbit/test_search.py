@@ -6,14 +6,13 @@ import pytest
 import asperity as asp
 from asperity.laws import RiceRuina
 from asperity.loads import Harmonic
-from asperity.orbit.instability import mark_too_unstable
 from asperity.orbit.methods.branch_following.from_steady_sliding import RUNAWAY, BranchProgress
 from asperity.orbit.methods.collocation import frequency_path
 from asperity.orbit.methods.collocation import method as collocation
 from asperity.orbit.methods.collocation.initial_guess import InitialGuess
 from asperity.orbit.methods.method import Method
 from asperity.orbit.outcome import Outcome
-from asperity.orbit.search import find_orbits
+from asperity.orbit.search import find_orbits, mark_too_unstable
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.slider import equation_of_motion
 from asperity.slider.problem import Problem, flatten

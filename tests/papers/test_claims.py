@@ -27,6 +27,8 @@ from asperity.papers.ledger.headline import headlines
 from asperity.papers.ledger.ledger import altered, judge_claims
 from asperity.papers.paper import Paper
 
+pytestmark = pytest.mark.slow
+
 #: What is not reproduced. A verdict that turns has to be looked at, and its `why` rewritten.
 MISPRINTS = {
     "steady-position",
@@ -242,7 +244,7 @@ def test_inertia_depends_on_lambda(varied):
     assert (low, high) == (pytest.approx(-0.11, abs=0.01), pytest.approx(0.17, abs=0.01))
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("uncertainty", PAPER.contents.uncertainty, ids=lambda u: u.quantity)
 def test_every_number_that_rests_on_an_uncertain_quantity_says_so(claims, uncertainty):
     """Differences of formulas from an integration and identities rest on it in name only."""

@@ -7,8 +7,7 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.loads import Follow, Hold, Modulate, RampLoad, RampVelocity, Slide, StepLoad
-from asperity.protocol.grammar import FORMS, parse_step
-from asperity.protocol.plan import plan
+from asperity.protocol.steps import FORMS, parse_step, plan
 
 HERE = Path()
 

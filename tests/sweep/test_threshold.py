@@ -118,7 +118,7 @@ def test_a_planted_mistake_in_the_scale_is_seen(monkeypatch) -> None:
     assert abs(float(wrong.ratio) - 1) > 5e-3
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_twice_the_resonance_of_the_asperities_doubles_the_period() -> None:
     """An integration of the inertial equations: force, velocity, interface force and age."""
     V, eps, f, K = 1e-6, 0.15, 810.0, 2 * KC

@@ -10,7 +10,8 @@ from asperity.loads import Hold, Modulate, Programme, Slide
 from asperity.operating_point import numbers_for, sourced_numbers
 from asperity.slider.named import slider_from
 from asperity.transients import steps
-from asperity.transients.termination import _SENTENCES
+from asperity.transients.events import _SENTENCES
+from references.populations import population
 
 #: Numbers of laws that the material does not have.
 OTHERS = {
@@ -20,6 +21,8 @@ OTHERS = {
     "prakash-clifton": {"L": "1 um", "V_star": "1 um/s"},
 }
 LAWS = [name for name, law in registered().items() if law.rate_dependent]
+#: In every run: two and three states, elastic asperities, rest and reversal.
+SUITE = ("rice-ruina", "two-state", "elasto-plastic", "regularised")
 HOLD = Programme(Hold("1 s"), load=7.0, velocity="1 um/s")
 
 
@@ -60,7 +63,9 @@ def assert_ended(slider, programme, **options):
     assert found.to_dataset().sizes["time"] == len(found.time)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize(
+    "law", population([*SUITE, *(name for name in LAWS if name not in SUITE)], short=len(SUITE))
+)
 def test_any_start_ends(law):
     slider = slider_of(law)
     steady = asp.transient(slider, HOLD).states[0]

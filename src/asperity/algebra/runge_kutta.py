@@ -7,8 +7,10 @@ Equations II, 2nd ed. (Springer, 1996), section IV.5.
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
 from functools import cache
+from importlib.resources import files
 from typing import NamedTuple
 
 import numpy as np
@@ -49,21 +51,27 @@ class ExplicitTableau(NamedTuple):
 
 @cache
 def dormand_prince_8() -> ExplicitTableau:
-    """Coefficients as SciPy gives them with its integrator DOP853."""
-    # Imported here because SciPy's integrators take a while to load.
-    from scipy.integrate import DOP853 as METHOD
-
-    change, first, last = np.append(METHOD.B, np.zeros(4)), np.eye(16)[0], np.eye(16)[12]
-    F = np.vstack([change, first - change, 2 * change - last - first, METHOD.D])
+    """The coefficients, from a file: SciPy's integrators, which have them too, load slowly."""
+    table = tomllib.loads(files(__package__).joinpath("dormand_prince_8.toml").read_text())
+    change, first, last = _rows([table["B"]], 16)[0], np.eye(16)[0], np.eye(16)[12]
+    F = np.vstack([change, first - change, 2 * change - last - first, _rows(table["D"], 16)])
     return ExplicitTableau(
-        A=np.vstack([METHOD.A[:12, :12], METHOD.B[:12]]),
-        C=np.append(METHOD.C[:12], 1.0),
-        E5=np.asarray(METHOD.E5),
-        E3=np.asarray(METHOD.E3),
-        extra_A=np.asarray(METHOD.A_EXTRA),
-        extra_C=np.asarray(METHOD.C_EXTRA),
+        A=_rows([*table["A"], table["B"]], 12),
+        C=np.append(table["C"], 1.0),
+        E5=_rows([table["E5"]], 13)[0],
+        E3=_rows([table["E3"]], 13)[0],
+        extra_A=_rows(table["A_EXTRA"], 16),
+        extra_C=np.array(table["C_EXTRA"]),
         powers=_power_basis() @ F,
     )
+
+
+def _rows(rows: list[list[float]], columns: int) -> Float:
+    """Rows of a table, filled up with zeros."""
+    table = np.zeros((len(rows), columns))
+    for row, values in zip(table, rows, strict=True):
+        row[: len(values)] = values
+    return table
 
 
 def _power_basis() -> Float:

@@ -189,44 +189,6 @@ def jacobian_columns(function: Callable[[Array], Array], Y: Array) -> tuple[Arra
     return value, [push(e) for e in unit]
 
 
-def expm_points(matrix: Array) -> Array:
-    """Matrix exponential for every operating point.
-
-    Parameters
-    ----------
-    matrix : array, shape (n, n, points)
-    """
-    if matrix.shape[0] == 1:
-        return jnp.exp(matrix)
-    if matrix.shape[0] == 2:
-        (a, b), (c, d) = matrix
-        half = 0.5 * (a + d)
-        square = (0.5 * (a - d)) ** 2 + b * c
-        root = jnp.sqrt(jnp.abs(square))
-        small = root < 1e-4  # series: accurate to 1e-17, and differentiable at zero
-        safe = jnp.where(small, 1.0, root)
-        cosh = jnp.where(square > 0, jnp.cosh(safe), jnp.cos(safe))
-        cosh = jnp.where(small, 1 + square / 2 + square**2 / 24, cosh)
-        sinhc = jnp.where(square > 0, jnp.sinh(safe), jnp.sin(safe)) / safe
-        sinhc = jnp.where(small, 1 + square / 6 + square**2 / 120, sinhc)
-        traceless = jnp.stack([jnp.stack([a - half, b]), jnp.stack([c, d - half])])
-        identity = jnp.eye(2)[:, :, None]
-        return jnp.exp(half) * (cosh * identity + sinhc * traceless)
-    norm = jnp.abs(matrix).sum(1).max(0)
-    halvings = jnp.maximum(jnp.ceil(jnp.log2(norm + 1e-300)) + 4, 0.0)
-    small = matrix / 2.0**halvings
-    total = term = jnp.broadcast_to(jnp.eye(matrix.shape[0])[:, :, None], matrix.shape)
-    for k in range(1, 14):  # Taylor at norm 1/16: 1e-17
-        term = product(small, term) / k
-        total = total + term
-    return jax.lax.fori_loop(
-        0,
-        jnp.max(halvings).astype(int),
-        lambda i, m: jnp.where(i < halvings, product(m, m), m),
-        total,
-    )
-
-
 def product(a: Array, b: Array) -> Array:
     """Matrix product for every operating point, (n, n, ...) each."""
     return (a[:, :, None] * b[None]).sum(1)

@@ -17,6 +17,7 @@ from starlette.requests import Request
 
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError
+from asperity.parameters.mistakes import worded
 
 
 class Question(BaseModel):
@@ -136,28 +137,14 @@ async def asked(request: Request, kind: type[Question]) -> Any:
     try:
         return kind.model_validate(value)
     except ValidationError as error:
-        raise InputError(_sentence(error)) from None
+        first = error.errors(include_url=False)[0]
+        raise InputError(worded(first, "request", shown=_shown)[0]) from None
     except RecursionError:
         raise InputError("request.body must not be nested so deep, got more; send less") from None
 
 
 def _no_constant(name: str) -> float:
     raise ValueError(name)
-
-
-def _sentence(error: ValidationError) -> str:
-    """The first mistake."""
-    mistake = error.errors(include_url=False)[0]
-    own = mistake.get("ctx", {}).get("error")
-    if isinstance(own, InputError):
-        return str(own)
-    field = ".".join(str(part)[:60] for part in mistake["loc"]) or "request"
-    if mistake["type"] == "extra_forbidden":
-        return f"{field} must be a known field, got another one; leave it out"
-    if mistake["type"] == "missing":
-        return f"{field} must be given, got nothing; add the field"
-    rule = " ".join(mistake["msg"].split()).removeprefix("Input should be ")
-    return f"{field} must be {rule}, got {_shown(mistake['input'])}; correct the value"
 
 
 def _shown(value: Any) -> str:

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from asperity.errors import InputError, printable
 from asperity.outputs import free_disk, size_text
-from asperity.outputs.folder import held_folder
+from asperity.outputs.written import held_folder
 
 #: Largest file (bytes), and all files together.
 LARGEST, TOGETHER = 512 * 1024**2, 2 * 1024**3

@@ -3,7 +3,7 @@
 At a fold a branch turns back in the parameter and a multiplier passes +1; at a period doubling one
 passes -1; at a Neimark-Sacker bifurcation a complex pair passes the unit circle, and a slow
 oscillation grows on top of the modulation. Each has a test function along the arclength whose
-zero is found by Brent's method: the direction of the parameter for folds, ln|m| for the others.
+zero is located by Brent's method: the direction of the parameter for folds, ln|m| for the others.
 
 Source: Yu. A. Kuznetsov, Elements of Applied Bifurcation Theory, chapters 4, 5 and 10;
 R. Seydel, Practical Bifurcation and Stability Analysis, chapter 5.
@@ -61,21 +61,21 @@ def bifurcations_between(
     turned = start.direction * end.direction < 0
     if turned:
         index = min(before, after) if before != after else 0
-        found = _root(follower, start, length, _direction)
-        if found is not None:
-            yield LocatedBifurcation("fold", found, index, before, after)
+        critical_orbit = _root(follower, start, length, _direction)
+        if critical_orbit is not None:
+            yield LocatedBifurcation("fold", critical_orbit, index, before, after)
     index, last = min(before, after), max(before, after)
     while index < last:
-        found = _root(follower, start, length, _log_modulus(index))
-        if found is None:
+        critical_orbit = _root(follower, start, length, _log_modulus(index))
+        if critical_orbit is None:
             return
-        kind = kind_of(found.logs[index])
+        kind = kind_of(critical_orbit.logs[index])
         if kind == "branch point" and turned:
             index += 1  # the multiplier of the fold itself
             continue
         width = 2 if kind == "Neimark-Sacker" else 1
         near, far = (index, index + width) if before < after else (index + width, index)
-        yield LocatedBifurcation(kind, found, index, near, far)
+        yield LocatedBifurcation(kind, critical_orbit, index, near, far)
         index += width
 
 
@@ -127,13 +127,13 @@ def _root(
 
 
 def polished(
-    follower: BranchFollower, found: LocatedBifurcation, intervals: int
+    follower: BranchFollower, located: LocatedBifurcation, intervals: int
 ) -> BranchOrbit | None:
     """The bifurcation solved again on a mesh of `intervals`, by the secant method."""
     return root_near(
         follower,
-        follower.finer(found.branch_orbit.point, intervals),
-        criterion(found.kind, found.critical),
+        follower.finer(located.branch_orbit.point, intervals),
+        criterion(located.kind, located.critical),
     )
 
 

@@ -209,20 +209,20 @@ class Branch(Displayed):
         def at(values: list, units: str, name: str) -> tuple:
             return "bifurcation", np.asarray(values), {"units": units, "long_name": name}
 
-        unit, found = self.unit or "1", self.bifurcations
+        unit, bifurcations = self.unit or "1", self.bifurcations
         data = {
             "parameter": along(self.parameter, unit, self.name),
             "mean_friction": along(self.mean_friction, "1", "mean of F/W0"),
             "mu1": along(self.mu1, "1", "first harmonic of F/W0, peak"),
             "mu2": along(self.mu2, "1", "second harmonic of F/W0, peak"),
             "stable": along(self.stable, "1", "all multipliers inside the unit circle"),
-            "bifurcation_kind": at([b.kind for b in found], "1", "kind of the bifurcation"),
-            "bifurcation_value": at([b.value for b in found], unit, self.name),
+            "bifurcation_kind": at([b.kind for b in bifurcations], "1", "kind of the bifurcation"),
+            "bifurcation_value": at([b.value for b in bifurcations], unit, self.name),
             "bifurcation_frequency": at(
-                [b.frequency for b in found], "Hz", "frequency of the critical mode"
+                [b.frequency for b in bifurcations], "Hz", "frequency of the critical mode"
             ),
             "bifurcation_stability_change": at(
-                [b.stability_change for b in found], "1", "+1 gained, -1 lost, 0 neither"
+                [b.stability_change for b in bifurcations], "1", "+1 gained, -1 lost, 0 neither"
             ),
         }
         for name, values, axis in (

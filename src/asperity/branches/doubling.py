@@ -18,20 +18,19 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity.branches.branch import Bifurcation, Branch
-from asperity.branches.recorder import INTERVALS, BranchRecorder
+from asperity.branches.continuation import INTERVALS, BranchRecorder
 from asperity.branches.steps import BranchFollower, BranchOrbit
 from asperity.errors import InputError
 from asperity.loads import Excitation, Modulation
-from asperity.orbit.mesh.condensation import transfer_maps
-from asperity.orbit.mesh.equations import condensed
+from asperity.orbit.mesh.equations import condensed, transfer_maps
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import Change
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
+    ParameterLine,
     slip_units,
     weighted_row,
 )
-from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
 from asperity.parameters.arguments import counted, function, instance, whole_number
 from asperity.slider.problem import Problem
 
@@ -92,14 +91,14 @@ def doubled_branch(
     -------
     Branch
         With `periods` 2: its harmonics c_n belong to n f / 2, its multipliers to two periods. It
-        starts beside the period doubling and is followed within the same span. The two halves of a
+        starts next to the period doubling and is followed within the same span. The two halves of a
         doubled branch are one orbit, begun a period later: one of them is followed.
 
     Raises
     ------
     InputError
         If the bifurcation is no period doubling, the branch is itself one of doubled period,
-        or no doubled orbit is found beside it.
+        or there is no doubled orbit next to it.
     """
     branch = instance(branch, Branch, "branch", "follow one with continuation")
     advice = "take one of the branch's bifurcations"
@@ -121,7 +120,7 @@ def doubled_branch(
     start = None if simple is None else _beside(follower, twice, simple)
     if start is None:
         raise InputError(
-            "bifurcation must have a doubled orbit beside it, got none that Newton's method finds; "
+            "bifurcation must have a doubled orbit next to it, got none by Newton's method; "
             "continue in another parameter"
         )
     recorder = BranchRecorder(twice, moving, start, counted(progress, most_steps), periods=2)

@@ -1,4 +1,7 @@
-"""Control parameters by name, and the lines on which one or two of them move."""
+"""Control parameters by name, and the lines on which one or two of them move.
+
+An operating point of continuation is checked here, and its first orbit computed.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import jax
 import numpy as np
 
 from asperity.errors import InputError, closest
 from asperity.laws import Law
-from asperity.orbit.methods.branch_following.parameter_line import ParameterLine, still
+from asperity.loads import Modulation
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.methods.branch_following.arclength import ParameterLine, still
+from asperity.orbit.search import find_orbits
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
 from asperity.parameters.arguments import number, pair, shown
-from asperity.slider.named import equation_parameters, with_value
-from asperity.slider.problem import Problem
+from asperity.slider import Slider
+from asperity.slider.named import equation_parameters, value_of, with_value
+from asperity.slider.problem import Problem, checked_problem, flatten
 
 #: Spans of a larger ratio than this are continued by equal factors.
 _LOGARITHMIC = 2.0
@@ -156,11 +164,92 @@ def fixed_as_text(law: type[Law], fixed: Mapping[str, float]) -> str:
 
 def _end(parameter: Parameter, value: Any, field: str) -> float:
     """An end of a span, which the parameter must be able to have."""
-    found = number(value, field, parameter.kind, parameter.rule)
+    checked = number(value, field, parameter.kind, parameter.rule)
     # What can be 0 in a table, for not being there, has to be there to be continued in.
-    if parameter.name in ("M", "eta") and not found > 0:
+    if parameter.name in ("M", "eta") and not checked > 0:
         raise InputError(
-            f"{field} must be positive for {parameter.name}, got {found:g} {parameter.unit}; "
+            f"{field} must be positive for {parameter.name}, got {checked:g} {parameter.unit}; "
             "give a span above zero"
         )
-    return found
+    return checked
+
+
+def start_of(slider: Slider, parameter: str, span: Any, field: str = "span") -> dict[str, Any]:
+    """The start of a span under the name of its parameter.
+
+    Raises
+    ------
+    InputError
+        If there is no such parameter or a span is not a pair.
+    """
+    return {continued_name(type(slider.law), parameter): pair_of(span, parameter, field)[0]}
+
+
+def one_problem(
+    slider: Slider,
+    moving: dict[str, Any],
+    *,
+    velocity: Any,
+    epsilon: Any,
+    frequency: Any,
+    modulation: Modulation | None,
+    inertia: bool,
+    radiation_damping: Any,
+) -> Problem:
+    """Equations and load of one operating point, parameters of shape (1,).
+
+    `moving` has values for those of velocity, epsilon, frequency and damping that are continued.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, one is missing, or there are arrays.
+    """
+    given = {
+        "velocity": moving.get("V", velocity),
+        "frequency": moving.get("frequency", frequency),
+    }
+    for name, value in given.items():
+        if value is None:
+            raise InputError(f"{name} must be given, got None; or continue in it")
+    if not slider.law.rate_dependent:
+        raise InputError(
+            f"law must depend on the velocity to have a branch with bifurcations, got "
+            f"{slider.law.name}; its force is mu W, whatever the parameters"
+        )
+    amplitude = moving.get("epsilon", epsilon)
+    problem = checked_problem(
+        slider,
+        **given,
+        epsilon=amplitude if modulation is None else epsilon,
+        modulation=modulation,
+        inertia=inertia,
+        radiation_damping=moving.get("eta", radiation_damping),
+    )
+    flat, shape = flatten(problem)
+    if shape not in ((), (1,)):
+        raise InputError(
+            f"parameters must be numbers for a continuation, got arrays of shape {shape}; "
+            "follow one operating point at a time"
+        )
+    return flat
+
+
+def starting_orbit(problem: Problem, intervals: int) -> Orbit | None:
+    """An orbit of the one point of `problem` on a mesh of `intervals`; None where there is none."""
+    solution = find_orbits(
+        jax.tree.map(np.asarray, problem),
+        1,
+        harmonics=2,
+        phases=0,
+        progress=lambda _: None,
+        intervals=intervals,
+    )
+    return solution.orbit if solution.converged[0] else None
+
+
+def held_parameters(problem: Problem, *moving: str) -> dict[str, float]:
+    """Parameters of the operating point, SI, but for those that move."""
+    named = equation_parameters(*problem)
+    values = {name: value_of(problem, p) for name, p in named.items() if name not in moving}
+    return {name: float(np.ravel(value)[0]) for name, value in values.items()}

@@ -17,11 +17,11 @@ from asperity.orbit.mesh.remeshing import remeshed
 from asperity.orbit.methods.branch_following.arclength import (
     ArclengthStep,
     ContinuationPoint,
+    ParameterLine,
     arclength_step,
     first_point,
     interpolated,
 )
-from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
 
 Float = NDArray[np.float64]
 

@@ -1,10 +1,13 @@
 """Experiments on a simulated slider, recorded by the virtual tribometer and read as any other."""
 
-from asperity.experiment.amplitudes.protocol import AmplitudeMotion, amplitude_motion
-from asperity.experiment.amplitudes.readings import AmplitudePoint, AmplitudeSeries
-from asperity.experiment.amplitudes.series import amplitude_series
+from asperity.experiment.amplitudes import (
+    AmplitudeMotion,
+    AmplitudePoint,
+    AmplitudeSeries,
+    amplitude_motion,
+    amplitude_series,
+)
 from asperity.experiment.exciter import Exciter
-from asperity.experiment.gain import channel_gain
 from asperity.experiment.loading import ElasticLength, elastic_length, loading_recording
 from asperity.experiment.recipes import (
     SlideHoldSlide,
@@ -12,6 +15,7 @@ from asperity.experiment.recipes import (
     slide_hold_slide,
     velocity_steps,
 )
+from asperity.tribometer.tribometer import channel_gain
 
 __all__ = [
     "AmplitudeMotion",

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import ScalarFormatter
 
 from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, STATED_FILL, new_figure
-from asperity.measurement.cycle import mean_cycle, residual_spectrum
+from asperity.measurement.record import mean_cycle, residual_spectrum
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray

@@ -23,7 +23,7 @@ from asperity.inference.comparison.compare import Comparison
 from asperity.inference.comparison.record import comparison_record, laws_table
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
-from asperity.outputs.folder import written_folder
+from asperity.outputs.written import written_folder
 
 #: Columns of panels that are legible in half the width of the page.
 _MOST_NARROW = 2

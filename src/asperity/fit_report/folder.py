@@ -20,7 +20,7 @@ from asperity.inference.fitting.result import fit_record
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.materials import cited_works
-from asperity.outputs.folder import written_folder
+from asperity.outputs.written import written_folder
 from asperity.parameters import law_parameters, point_parameters
 
 RUN_CAPTION = (

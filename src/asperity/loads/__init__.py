@@ -1,9 +1,7 @@
 """Modulation programmes: load, shear force and pulling velocity, knowing nothing of friction."""
 
-from asperity.loads.excitation import Excitation
-from asperity.loads.harmonic import Harmonic
 from asperity.loads.modulated import modulated, sampled
-from asperity.loads.modulation import Modulation
+from asperity.loads.modulation import Excitation, Harmonic, Modulation
 from asperity.loads.periodic import Periodic
 from asperity.loads.programme.programme import Programme
 from asperity.loads.programme.steps import (

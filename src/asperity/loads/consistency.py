@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, printable
-from asperity.loads.excitation import Excitation
-from asperity.loads.harmonic import Harmonic
-from asperity.loads.modulation import Modulation
+from asperity.loads.modulation import Excitation, Harmonic, Modulation
 from asperity.loads.periodic import Periodic
 from asperity.parameters.arguments import instance, shown
 
@@ -107,8 +105,8 @@ def _fault(modulation: Modulation, samples: int, name: str) -> str:
         field: np.asarray(value, float) * np.ones((samples, amplitude.size))
         for field, value in zip(Excitation._fields, at, strict=True)
     }
-    for field, found in values.items():
-        if not np.isfinite(found).all():
+    for field, part in values.items():
+        if not np.isfinite(part).all():
             return f"{name}.at must be finite over the period, got {field} that is not; correct it"
     w, pull = values["w"], values["pull"]
     if (low := w.min()) <= 0:
@@ -116,8 +114,8 @@ def _fault(modulation: Modulation, samples: int, name: str) -> str:
             f"{name} must keep W/W0 positive over the period, so that contact is never lost, got "
             f"{low:.4g}; lower its strength"
         )
-    for field, found in (("w", w), ("pull", pull)):
-        mean = _furthest(found.mean(0), 1.0)
+    for field, part in (("w", w), ("pull", pull)):
+        mean = _furthest(part.mean(0), 1.0)
         if abs(mean - 1) > _MEAN:
             return (
                 f"{name}.at must give a {field} of mean 1 over the period, got {mean:.6g}; divide "

@@ -14,8 +14,7 @@ import numpy as np
 from jax import Array
 from jax.typing import ArrayLike
 
-from asperity.loads.excitation import Excitation
-from asperity.loads.modulation import Modulation
+from asperity.loads.modulation import Excitation, Modulation
 
 #: Pairs (a_k, b_k) for k = 1, 2, ...; arrays over the operating points.
 Series: TypeAlias = tuple[tuple[ArrayLike, ArrayLike], ...]

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.lock_in.basis import Basis
-from asperity.lock_in.blocks import BlockSums
+from asperity.lock_in.normal_equations import Basis, BlockSums
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -99,8 +98,8 @@ def local_noise(
         Whether a settling of the mean was fitted too.
     """
     orders = range(blocks.basis.harmonics + 1)
-    found = [noise_around(k, blocks, residual[:, k], white, settles=settles) for k in orders]
-    spectra, dof = zip(*found, strict=True)
+    noises = [noise_around(k, blocks, residual[:, k], white, settles=settles) for k in orders]
+    spectra, dof = zip(*noises, strict=True)
     return LocalNoise(np.array(spectra), np.array(dof))
 
 

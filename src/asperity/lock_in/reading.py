@@ -1,4 +1,4 @@
-"""Result of a lock-in: harmonics, their covariance, and the residual."""
+"""Result of a lock-in: harmonics with their uncertainties, their covariance, and the residual."""
 
 from __future__ import annotations
 
@@ -9,15 +9,81 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
-from asperity.lock_in.blocks import BlockSums
 from asperity.lock_in.noise import LocalNoise
-from asperity.lock_in.phasor import Phasor
+from asperity.lock_in.normal_equations import BlockSums
 from asperity.lock_in.settling import Settling
 
 Array = NDArray[np.float64]
+
+#: Standard deviation (rad) of an angle that is uniform over the circle, pi/sqrt(3).
+_UNKNOWN_PHASE = math.pi / math.sqrt(3)
+
 Complex = NDArray[np.complex128]
 
 _SCALARS = ("W0", "epsilon", "frequency", "mean_force", "mean_friction")
+
+
+@dataclass(frozen=True)
+class Phasor:
+    """Complex amplitude c of Re(c e^(i n phi)), phi the phase of the load.
+
+    Attributes
+    ----------
+    value : complex
+        Its modulus is the peak amplitude, its argument the phase against the load.
+    covariance : array, (2, 2)
+        Of the real and the imaginary part.
+    dof : float
+        Degrees of freedom of the covariance.
+    """
+
+    value: complex
+    covariance: Array
+    dof: float
+
+    @property
+    def amplitude(self) -> float:
+        """Peak amplitude."""
+        return abs(self.value)
+
+    @property
+    def phase(self) -> float:
+        """Phase (rad) in (-pi, pi]."""
+        angle = math.atan2(self.value.imag, self.value.real)
+        return math.pi if angle == -math.pi else angle
+
+    @property
+    def amplitude_uncertainty(self) -> float:
+        """Standard uncertainty of the amplitude, to first order (valid below a third of it)."""
+        return self._along(self._direction)
+
+    @property
+    def phase_uncertainty(self) -> float:
+        """Standard uncertainty (rad) of the phase; at most pi/sqrt(3), an unknown phase."""
+        along = self._direction
+        across = self._along(np.array([-along[1], along[0]]))
+        return min(across / self.amplitude if self.amplitude else math.inf, _UNKNOWN_PHASE)
+
+    def excludes(self, value: complex, level: float = 0.95) -> bool:
+        """Whether `value` lies outside the confidence ellipse of probability `level`."""
+        from scipy.special import fdtri
+
+        away = np.array([value.real - self.value.real, value.imag - self.value.imag])
+        # Without noise the ellipse is a point.
+        spread = np.linalg.eigvalsh(self.covariance)
+        if not spread[0] > 1e-14 * spread[1]:
+            return bool(away.any())
+        distance = float(away @ np.linalg.solve(self.covariance, away)) / 2
+        return bool(distance > fdtri(2, self.dof, level))
+
+    @property
+    def _direction(self) -> Array:
+        if not self.amplitude:
+            return np.array([1.0, 0.0])
+        return np.array([self.value.real, self.value.imag]) / self.amplitude
+
+    def _along(self, direction: Array) -> float:
+        return math.sqrt(max(float(direction @ self.covariance @ direction), 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +162,14 @@ class LockInReading:
     def periods(self) -> float:
         """Number of modulation periods in the window."""
         return (self.end - self.start) * self.frequency
+
+    def observables(self) -> dict[str, float]:
+        """W0, epsilon, frequency, mean_force, mean_friction, then mu1, phase1, ... by name."""
+        numbers = {name: float(getattr(self, name)) for name in _SCALARS}
+        for n in range(1, self.harmonics.size + 1):
+            phasor = self.phasor(n)
+            numbers |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
+        return numbers
 
     def uncertainty(self, name: str) -> float:
         """Standard uncertainty of a number; one of `names`, mu1, phase1, mu2, ...
@@ -267,10 +341,10 @@ def _jacobian(
     level[:first] = average / mean_load
     mean[linear + fitted :][:first] = average
     # Relative change of the load's fundamental: real part amplitude, imaginary part phase.
-    own = load[0] / phasors[0, 0]
+    fundamental = load[0] / phasors[0, 0]
     order = np.arange(1, n + 1)[:, None]
     turn = np.exp(-1j * np.angle(phasors[0, 0] / mean_load) * order) / mean_load
-    lost = 1j * order * own.imag + level
+    lost = 1j * order * fundamental.imag + level
     force_rows = turn * force - relative[:, 1:] * lost
     load_rows = turn * load - relative[:, :1] * lost
     frequency = np.zeros(size)
@@ -280,7 +354,7 @@ def _jacobian(
     return np.vstack(
         [
             level * mean_load,
-            abs(relative[0, 0]) * (own.real - level),
+            abs(relative[0, 0]) * (fundamental.real - level),
             frequency,
             mean,
             mean / mean_load - friction * level,

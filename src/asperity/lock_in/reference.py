@@ -4,20 +4,24 @@ An error of 1e-4 of the frequency is 0.38 rad after 10 s at 60 Hz, so the freque
 of the least-squares fit and not a setting. The fit starts from the strongest line of a spectrum,
 in a window short enough for that start, and is repeated in windows four times as long up to the
 whole one.
+
+The frequency of existing sums can be changed, so that a long recording is read once: over a block
+the phase of a slightly different frequency differs by a constant and a small linear part. The
+constant rotates the sums exactly; the linear part follows from the columns that are multiplied with
+time. The square of the linear part is neglected.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import ConstantLoadError, InputError
-from asperity.lock_in.basis import Basis
-from asperity.lock_in.blocks import even_step, sums
-from asperity.lock_in.normal_equations import solved
+from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, solved, sums
 
 Array = NDArray[np.float64]
 
@@ -29,6 +33,10 @@ _FEW_PERIODS = 8.0
 #: and the square of that after the step that `asperity.lock_in.demodulation.read` makes.
 CONVERGED = 1e-3
 _MOST_STEPS = 12
+
+#: Largest phase (rad) of the highest harmonic over half a block: its square is neglected.
+_WITHIN = 3e-5
+_MOST_RETUNINGS = 4
 
 
 class SpectralLine(NamedTuple):
@@ -72,15 +80,15 @@ def strongest_line(
         piece = slice(at, at + _SPECTRUM)
         spectra.append(_spectrum(*_evenly(time[piece], values[piece], _SPECTRUM)))
     lines = [_top(*spectrum, between) for spectrum in spectra]
-    found = [line for line in lines if line is not None]
-    if not found:
+    present = [line for line in lines if line is not None]
+    if not present:
         where = "" if between is None else f" about {sum(between) / 2:.6g} Hz"
         raise InputError(
             f"reference.frequency must lie within what the recording resolves, got {time.size} "
             f"samples in {time[-1] - time[0]:.6g} s{where}; give another frequency or a longer "
             "window"
         )
-    return max(found, key=lambda line: line.amplitude)
+    return max(present, key=lambda line: line.amplitude)
 
 
 def require_modulated(line: SpectralLine, load: Array) -> None:
@@ -283,3 +291,82 @@ def _smooth(size: int) -> int:
                 break
             best = max(best, odd << int(math.log2(size // odd)))
     return best
+
+
+def retuned_to_load(blocks: BlockSums) -> BlockSums | None:
+    """Sums at the frequency of the load, their first channel.
+
+    Parameters
+    ----------
+    blocks : BlockSums
+        At a frequency that is accurate to a fraction of a radian over all blocks.
+
+    Returns
+    -------
+    BlockSums or None
+        None if the error of the frequency is too large for the length of the blocks.
+    """
+    moved = 0.0
+    for _ in range(_MOST_RETUNINGS):
+        gram, moments = blocks.totals()
+        change = frequency_step(blocks.basis, gram, moments[:, 0])
+        if abs(change) * blocks.basis.half_width < CONVERGED:
+            return blocks
+        moved += abs(change)
+        if not moved * blocks.basis.harmonics * _half_block(blocks) < _WITHIN:
+            return None
+        blocks = retuned(blocks, change)
+    return None
+
+
+def retuned(blocks: BlockSums, change: float) -> BlockSums:
+    """The sums at another angular frequency, to first order within each block.
+
+    Parameters
+    ----------
+    blocks : BlockSums
+    change : float
+        Change of omega (rad/s).
+    """
+    basis = blocks.basis
+    turn = _turn(blocks, change)
+    return replace(
+        blocks,
+        basis=replace(basis, omega=basis.omega + change),
+        gram=turn @ blocks.gram @ turn.transpose(0, 2, 1),
+        moments=turn @ blocks.moments,
+    )
+
+
+def _turn(blocks: BlockSums, change: float) -> Array:
+    """Matrices from the old columns to the new ones, (blocks, size, size)."""
+    basis = blocks.basis
+    n, first, second = basis.harmonics, basis.drift, basis.linear
+    k = np.arange(1, n + 1)
+    away = blocks.middle - basis.centre
+    angle = change * away[:, None] * k
+    cosine, sine = np.cos(angle), np.sin(angle)
+    rotation = np.zeros((away.size, 2 * n, 2 * n))
+    i = np.arange(n)
+    rotation[:, i, i] = rotation[:, n + i, n + i] = cosine
+    rotation[:, i, n + i], rotation[:, n + i, i] = -sine, sine
+    # Derivative of the rotation by the angle, times k change: the linear part of the phase.
+    linear = np.zeros_like(rotation)
+    linear[:, i, i] = linear[:, n + i, n + i] = -sine * k
+    linear[:, i, n + i], linear[:, n + i, i] = -cosine * k, cosine * k
+    linear *= change * basis.half_width
+    u = (away / basis.half_width)[:, None, None]
+    turn = np.zeros((away.size, basis.size, basis.size))
+    turn[:, np.arange(first), np.arange(first)] = 1.0
+    turn[:, first:second, first:second] = rotation - u * linear
+    turn[:, first:second, second:] = linear
+    turn[:, second:, first:second] = -(u**2) * linear
+    turn[:, second:, second:] = rotation + u * linear
+    return turn
+
+
+def _half_block(blocks: BlockSums) -> float:
+    """Half the length (s) of the longest block."""
+    if blocks.middle.size < 2:
+        return blocks.basis.half_width
+    return float(np.diff(blocks.middle).max()) / 2

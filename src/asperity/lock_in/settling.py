@@ -21,9 +21,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.lock_in.blocks import BlockSums
 from asperity.lock_in.noise import harmonic_sums, noise_around
-from asperity.lock_in.normal_equations import inverted
+from asperity.lock_in.normal_equations import BlockSums, inverted
 
 Array = NDArray[np.float64]
 
@@ -106,7 +105,7 @@ class Settling:
         return self.odds > 1
 
     @property
-    def told(self) -> bool:
+    def determined(self) -> bool:
         """Whether its end lies in the window."""
         return self.unfinished < 0.05
 
@@ -141,23 +140,23 @@ def find_settlings(
         Variance of the residual.
     """
     linear = blocks.basis.linear
-    found: dict[int, Settling] = {}
+    settlings: dict[int, Settling] = {}
     # The onset of one order is broad enough to look like a short settling of the next.
     sweep = list(range(blocks.basis.harmonics + 1))
     for _ in range(2):
         for order in sweep:
-            found.pop(order, None)
-            cleaned = without(blocks, channel, tuple(found.values()))
+            settlings.pop(order, None)
+            cleaned = without(blocks, channel, tuple(settlings.values()))
             left = (cleaned.moments - blocks.moments)[:, :linear, channel].sum(0)
             coefficients = fitted.copy()
             coefficients[:linear] += inner @ left
             settling = _Profile(cleaned, channel, coefficients, inner, white, order).settling()
             if settling is not None and settling.possible:
-                found[order] = settling
-        sweep = [order for order, settling in sorted(found.items()) if settling.present]
+                settlings[order] = settling
+        sweep = [order for order, settling in sorted(settlings.items()) if settling.present]
         if len(sweep) < 2:
             break
-    return tuple(found[order] for order in sorted(found))
+    return tuple(settlings[order] for order in sorted(settlings))
 
 
 def without(blocks: BlockSums, channel: int, settlings: tuple[Settling, ...]) -> BlockSums:
@@ -210,8 +209,10 @@ class _Profile:
             gain, amplitude, schur, moved = self._solved(np.exp(logs))
             best = int(np.argmax(gain))
             removed = self._removed(np.exp(logs[best : best + 1]), amplitude[best])
-            beside = self._blocks.gram[:, :, : self._inner.shape[0]] @ moved[best] @ amplitude[best]
-            noise, dof = self._noise(self._left - removed + beside, settles=True)
+            explained = (
+                self._blocks.gram[:, :, : self._inner.shape[0]] @ moved[best] @ amplitude[best]
+            )
+            noise, dof = self._noise(self._left - removed + explained, settles=True)
             fits = _log_likelihood(gain[best] - gain, noise, dof, self._columns[0].size)
             counts = np.flatnonzero(fits > -_NEGLIGIBLE)
             # What a coarse step leaves unexplained is taken for noise: it falls with the step.

@@ -16,6 +16,7 @@ from asperity.errors import InputError, closest
 from asperity.materials.number import Number
 from asperity.materials.record import Material
 from asperity.parameters.arguments import file_path
+from asperity.parameters.mistakes import worded
 from asperity.parameters.toml_file import parsed_toml, toml_content
 
 
@@ -52,47 +53,8 @@ def _material(content: dict[str, Any], name: str, shown: str) -> Material:
     try:
         return Material.model_validate({"name": name} | content)
     except ValidationError as error:
-        raise InputError(_sentence(error, shown)) from None
-
-
-def _sentence(error: ValidationError, shown: str) -> str:
-    """The first mistake, how many more there are, and the way out of the first."""
-    mistakes = error.errors(include_url=False)
-    count = f", the first of {len(mistakes)} mistakes" if len(mistakes) > 1 else ""
-    return f"{_told(mistakes[0])} (in '{shown}'{count})"
-
-
-def _told(mistake: Any) -> str:
-    """One mistake as ``<field> must <rule>, got <value>; <what to do>``."""
-    own = mistake.get("ctx", {}).get("error")
-    if isinstance(own, InputError):
-        return str(own)
-    field = ".".join(str(part) for part in mistake["loc"]) or "material"
-    if mistake["type"] == "value_error":
-        # Raised by the models' own validators, which leave only the field to be named.
-        return f"{field} must {own}"
-    rule, advice = _rule(mistake)
-    return f"{field} must {rule}, got {_value(mistake)}; {advice}"
-
-
-def _rule(mistake: Any) -> tuple[str, str]:
-    """What the field must do, and what to do about it, where pydantic found the mistake."""
-    if mistake["type"] == "extra_forbidden":
-        model = Number if "numbers" in mistake["loc"] else Material
-        wrong = str(mistake["loc"][-1])
-        return "be a known field", closest(wrong, model.model_fields)
-    if mistake["type"] == "missing":
-        return "be given", "add the field"
-    rule = _one_line(mistake["msg"]).removeprefix("Input should be ")
-    return f"be {rule}", "correct the value"
-
-
-def _value(mistake: Any) -> str:
-    if mistake["type"] == "missing":
-        return "nothing"
-    value = mistake["input"]
-    return f"a table of {len(value)} fields" if isinstance(value, Mapping) else repr(value)
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
+        # The first mistake, and how many more there are.
+        mistakes = error.errors(include_url=False)
+        sentence = worded(mistakes[0], "material", {"": Material, "numbers": Number})[0]
+        count = f", the first of {len(mistakes)} mistakes" if len(mistakes) > 1 else ""
+        raise InputError(f"{sentence} (in '{shown}'{count})") from None

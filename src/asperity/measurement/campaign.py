@@ -182,17 +182,17 @@ def failed_row(path: Path, part: int, reason: str) -> Row:
     return {"file": str(path), "part": part, "kind": "", "verdict": "", "reason": reason}
 
 
-def modulated_rows(path: Path, found: Iterable[Measurement | InputError]) -> list[Row]:
+def modulated_rows(path: Path, measurements: Iterable[Measurement | InputError]) -> list[Row]:
     """Rows of the amplitudes of one recording, in their order.
 
     Parameters
     ----------
     path : Path
-    found : iterable of Measurement or InputError
+    measurements : iterable of Measurement or InputError
         From `asperity.measurement.measure.measure_amplitudes`.
     """
     rows = []
-    for part, measurement in enumerate(found, 1):
+    for part, measurement in enumerate(measurements, 1):
         if isinstance(measurement, InputError):
             rows.append(failed_row(path, part, str(measurement)))
             continue
@@ -206,13 +206,9 @@ def modulated_rows(path: Path, found: Iterable[Measurement | InputError]) -> lis
             "verdict": measurement.verdict,
             "reason": "",
         }
-        names = ["W0", "epsilon", "frequency", "mean_force", "mean_friction"]
-        row |= {name: float(getattr(reading, name)) for name in names}
-        for n in range(1, reading.harmonics.size + 1):
-            phasor = reading.phasor(n)
-            row |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
-            names += [f"mu{n}", f"phase{n}"]
-        row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in names}
+        observables = reading.observables()
+        row |= observables
+        row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in observables}
         row |= {
             "static_friction": measurement.static_friction,
             "delta_mu": measurement.delta_mu,
@@ -231,27 +227,29 @@ def modulated_rows(path: Path, found: Iterable[Measurement | InputError]) -> lis
     return rows
 
 
-def sliding_rows(path: Path, found: SlidingMeasurement) -> list[Row]:
+def sliding_rows(path: Path, measurement: SlidingMeasurement) -> list[Row]:
     """Rows of the velocity steps and holds of one recording; of its mean friction without any."""
-    common = {"file": str(path), "verdict": found.verdict, "reason": ""}
+    common = {"file": str(path), "verdict": measurement.verdict, "reason": ""}
     rows: list[Row] = []
-    for step in found.steps:
+    for step in measurement.steps:
         row = {"kind": "step", "start": step.time, "end": step.time}
         row |= {name: getattr(step, name) for name in _STEP}
         rows.append(row | {"change_uncertainty": step.uncertainty})
-    for hold in found.holds:
+    for hold in measurement.holds:
         row = {"kind": "hold", "start": hold.start, "end": hold.end}
         rows.append(row | {name: getattr(hold, name) for name in _HOLD})
     rows.sort(key=lambda row: row["start"])
-    friction = found.friction
+    friction = measurement.friction
     if not rows:
         rows = [{"kind": "level", "start": friction.start, "end": friction.end}]
     more = {
         "mean_friction": friction.value,
         "mean_friction_uncertainty": friction.uncertainty,
-        "healing_per_decade": found.healing.per_decade if found.healing else math.nan,
-        "healing_per_decade_uncertainty": found.healing.uncertainty if found.healing else math.nan,
-        "checks": _named(found.checks),
+        "healing_per_decade": measurement.healing.per_decade if measurement.healing else math.nan,
+        "healing_per_decade_uncertainty": measurement.healing.uncertainty
+        if measurement.healing
+        else math.nan,
+        "checks": _named(measurement.checks),
     }
     return [common | {"part": k} | row | more for k, row in enumerate(rows, 1)]
 

@@ -141,12 +141,12 @@ def modulated_or_sliding(
             raise
         reason = error
     try:
-        found = sliding()
+        measurement = sliding()
     except InputError as error:
         raise (error if constant and plain else reason) from None
-    if not (plain or found.steps or found.holds):
+    if not (plain or measurement.steps or measurement.holds):
         raise reason
-    return found, str(reason)
+    return measurement, str(reason)
 
 
 def _recorded(trace: Trace, name: str) -> bool:

@@ -14,20 +14,19 @@ from asperity.errors import ConstantLoadError, InputError
 from asperity.lock_in.demodulation import DRIFTS, lock_in
 from asperity.lock_in.reading import LockInReading
 from asperity.lock_in.reference import SpectralLine, around, require_modulated, strongest_line
-from asperity.measurement.pauses import under_the_same_load
 from asperity.measurement.samples import Samples, about_window, usable
-from asperity.measurement.series import MeanLevel, Rate, effective_dof, mean_level, rate_between
-from asperity.measurement.sliding.trend import bin_means, columns, fit_trend
-from asperity.measurement.verdicts import (
-    checks,
-    instrument,
-    interference,
-    plausibility,
-    steadiness,
+from asperity.measurement.series import (
+    MeanLevel,
+    Rate,
+    bin_means,
+    columns,
+    effective_dof,
+    fit_trend,
+    mean_level,
+    rate_between,
 )
+from asperity.measurement.verdicts import checks, instrument, steadiness
 from asperity.measurement.verdicts.checks import drift_rate
-from asperity.measurement.verdicts.flat_top import flat_top
-from asperity.measurement.verdicts.shift import shifting_response
 from asperity.measurement.verdicts.verdict import Check, Verdict, worst
 from asperity.measurement.window import (
     LoadInterval,
@@ -35,6 +34,7 @@ from asperity.measurement.window import (
     settled,
     settling_from,
     stretches,
+    under_the_same_load,
     whole_periods,
 )
 from asperity.parameters.display import Displayed, SummaryLine
@@ -201,19 +201,19 @@ def measure_amplitudes(
         As `measure` where the recording as a whole cannot be read.
     """
     recording = _prepared(trace, load, force, frequency, detrend, refine)
-    found: list[Measurement | InputError] = []
+    measurements: list[Measurement | InputError] = []
     for part in recording.parts:
         if not part.modulated:
             continue
         try:
-            found.append(
+            measurements.append(
                 _measured(
                     recording, part, harmonics, None, detrend, only_whole_periods=only_whole_periods
                 )
             )
         except InputError as error:
-            found.append(error)
-    return found
+            measurements.append(error)
+    return measurements
 
 
 @dataclass(frozen=True, eq=False)
@@ -336,10 +336,10 @@ def _asked(
         checks.modulation(reading),
         checks.periods(reading),
         checks.signal(reading),
-        plausibility.contact(reading),
-        plausibility.friction(reading),
-        plausibility.response(reading),
-        plausibility.aliasing(reading, rate),
+        checks.contact(reading),
+        checks.friction(reading),
+        checks.response(reading),
+        checks.aliasing(reading, rate),
         steadiness.leakage(reading),
         steadiness.steady_load(reading, time, load),
         steadiness.steady_force(reading, time, force),
@@ -359,11 +359,11 @@ def _about_the_instrument(
         *instrument.made_force(reading, samples, time, load, force),
         instrument.held_samples(reading, load, force),
         instrument.dropouts(load, force),
-        flat_top(reading, time, load, force),
-        interference.mains(reading, samples, parts),
-        *interference.lines_in_the_pauses(reading, samples, parts),
-        interference.hum(reading, time, force),
-        shifting_response(reading, time, force),
+        instrument.flat_top(reading, time, load, force),
+        instrument.mains(reading, samples, parts),
+        *instrument.lines_in_the_pauses(reading, samples, parts),
+        instrument.hum(reading, time, force),
+        steadiness.shifting_response(reading, time, force),
     )
 
 
@@ -393,8 +393,8 @@ def _parts(samples: Samples, line: SpectralLine, frequency: float) -> list[LoadI
     whole = LoadInterval(0, samples.time.size, line.amplitude)
     if line.amplitude < _LINE * line.background:
         return [whole]
-    found = stretches(samples.time, samples.load, frequency)
-    return found if any(part.modulated for part in found) else [whole]
+    parts = stretches(samples.time, samples.load, frequency)
+    return parts if any(part.modulated for part in parts) else [whole]
 
 
 def _chosen(samples: Samples, part: LoadInterval, frequency: float, degree: int) -> tuple[int, int]:
@@ -422,11 +422,11 @@ def _around(
     at, most = parts.index(chosen), chosen.stop - chosen.first
     sides: list[tuple[MeanLevel, MeanLevel] | None] = []
     for step in (-1, 1):
-        beside = parts[at + step] if 0 <= at + step < len(parts) else None
-        if beside is None or beside.modulated or beside.stop - beside.first < 16:
+        pause = parts[at + step] if 0 <= at + step < len(parts) else None
+        if pause is None or pause.modulated or pause.stop - pause.first < 16:
             sides.append(None)
             continue
-        first, stop = beside.first, beside.stop
+        first, stop = pause.first, pause.stop
         # What is much later, or much earlier, says little.
         if step > 0:
             stop = min(stop, first + 2 * most)
@@ -461,7 +461,7 @@ def _settled_level(time: Array, force: Array) -> MeanLevel | None:
     if settling.present:
         force = force - settling.at(time - time[0])
     level = mean_level(time, force)
-    if settling.present and not settling.told:
+    if settling.present and not settling.determined:
         limit = checks.LIMITS["transient"][0]
         if abs(settling.amplitude) > limit * abs(level.value):
             return None
@@ -473,9 +473,9 @@ def _rates(
     samples: Samples, sides: tuple[tuple[MeanLevel, MeanLevel] | None, ...]
 ) -> list[Rate | None]:
     """Rates at which the force changes in the pauses."""
-    found: list[Rate | None] = []
+    rates: list[Rate | None] = []
     for side in sides:
-        found.append(None)
+        rates.append(None)
         if side is None:
             continue
         first, stop = np.searchsorted(samples.time, [side[0].start, side[0].end])
@@ -483,8 +483,8 @@ def _rates(
             at, means = bin_means(samples.time[first:stop], samples.force[first:stop])
             fit = fit_trend(columns(at - at[0], 1), means)
             doubt = float(np.sqrt(fit.variance * fit.inverse[1, 1]))
-            found[-1] = Rate(float(fit.beta[1]), doubt, float(fit.dof))
-    return found
+            rates[-1] = Rate(float(fit.beta[1]), doubt, float(fit.dof))
+    return rates
 
 
 def _static_friction(

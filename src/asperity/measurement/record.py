@@ -1,11 +1,11 @@
-"""A measurement as plain numbers and texts, for JSON and tables."""
+"""A measurement as plain numbers and texts for JSON and tables, and as curves for pictures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import asdict
 from math import isfinite
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,39 +25,40 @@ SLIDING_CONVENTIONS = (
     "change = level after less level before, both extrapolated to the step; "
     "healing = peak after a hold less level before it; uncertainties are standard uncertainties"
 )
-_SCALARS = ("W0", "epsilon", "frequency", "mean_force", "mean_friction")
+
+Array = NDArray[np.float64]
+
+_BINS = 90
+#: Samples of the spectrum.
+_MOST = 1 << 18
 
 
-def modulated_record(found: Measurement) -> dict[str, Any]:
+def modulated_record(measurement: Measurement) -> dict[str, Any]:
     """Everything that a reading says.
 
     Parameters
     ----------
-    found : Measurement
+    measurement : Measurement
 
     Returns
     -------
     dict
         Of numbers, texts, lists and dicts, in SI.
     """
-    reading = found.reading
-    orders = range(1, reading.harmonics.size + 1)
-    values = {name: float(getattr(reading, name)) for name in _SCALARS}
-    for n in orders:
-        phasor = reading.phasor(n)
-        values |= {f"mu{n}": phasor.amplitude, f"phase{n}": phasor.phase}
+    reading = measurement.reading
+    values = reading.observables()
     doubts = {name: reading.uncertainty(name) for name in values}
     intervals = {name: reading.half_width(name) for name in values}
-    joint = observable_covariance(found)
-    if isfinite(found.delta_mu_interval_95):
-        intervals["delta_mu"] = found.delta_mu_interval_95
+    joint = observable_covariance(measurement)
+    if isfinite(measurement.delta_mu_interval_95):
+        intervals["delta_mu"] = measurement.delta_mu_interval_95
     return {
         "mode": "modulated",
-        "verdict": found.verdict,
+        "verdict": measurement.verdict,
         **values,
-        "static_friction": found.static_friction,
-        "delta_mu": found.delta_mu,
-        "uncertainties": {**doubts, "delta_mu": found.delta_mu_uncertainty},
+        "static_friction": measurement.static_friction,
+        "delta_mu": measurement.delta_mu,
+        "uncertainties": {**doubts, "delta_mu": measurement.delta_mu_uncertainty},
         "intervals_95": intervals,
         "harmonics": _pairs(reading.harmonics),
         "load_harmonics": _pairs(reading.load_harmonics),
@@ -71,43 +72,43 @@ def modulated_record(found: Measurement) -> dict[str, Any]:
                 "order": settling.order,
                 "decay": settling.decay,
                 "amplitude": abs(settling.amplitude),
-                "ends_in_window": settling.told,
+                "ends_in_window": settling.determined,
             }
             for settling in reading.settlings
             if settling.present
         ],
-        "F0_before": _level(found.before),
-        "F0_after": _level(found.after),
+        "F0_before": _level(measurement.before),
+        "F0_after": _level(measurement.after),
         "window": {
             "start": reading.start,
             "end": reading.end,
             "samples": reading.samples,
             "periods": reading.periods,
-            "chosen_by": found.chosen_by,
+            "chosen_by": measurement.chosen_by,
         },
         "stretches": [
             {
-                "start": float(found.samples.time[part.first]),
-                "end": float(found.samples.time[part.stop - 1]),
+                "start": float(measurement.samples.time[part.first]),
+                "end": float(measurement.samples.time[part.stop - 1]),
                 "amplitude": part.amplitude,
             }
-            for part in found.stretches
+            for part in measurement.stretches
         ],
-        "checks": checks_record(found.checks),
-        "findings": [asdict(finding) for finding in found.samples.findings],
-        "channels": {"W": found.samples.names[0], "F": found.samples.names[1]},
-        "unit": found.samples.unit,
-        "dropped_samples": found.samples.dropped,
+        "checks": checks_record(measurement.checks),
+        "findings": [asdict(finding) for finding in measurement.samples.findings],
+        "channels": {"W": measurement.samples.names[0], "F": measurement.samples.names[1]},
+        "unit": measurement.samples.unit,
+        "dropped_samples": measurement.samples.dropped,
         "conventions": CONVENTIONS,
     }
 
 
-def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[np.float64]]:
+def observable_covariance(measurement: Measurement) -> tuple[tuple[str, ...], NDArray[np.float64]]:
     """Joint covariance of what fits compare: mean_friction, delta_mu, mu1, phase1, mu2, phase2.
 
     Parameters
     ----------
-    found : Measurement
+    measurement : Measurement
 
     Returns
     -------
@@ -118,10 +119,10 @@ def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[
         phasor, and across it over the amplitude. Its diagonal are the squares of the reported
         uncertainties.
     """
-    reading = found.reading
+    reading = measurement.reading
     at = reading.names.index
     names, rows = ["mean_friction"], [np.eye(len(reading.names))[at("mean_friction")]]
-    if isfinite(found.delta_mu_uncertainty):
+    if isfinite(measurement.delta_mu_uncertainty):
         names.append("delta_mu")
         rows.append(rows[0])
     for n in range(1, min(reading.harmonics.size, 2) + 1):
@@ -138,10 +139,11 @@ def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[
     covariance = J @ reading.covariance @ J.T
     if "delta_mu" in names:
         # The level at constant load has errors of its own, which nothing else shares.
-        covariance[1, 1] = found.delta_mu_uncertainty**2
+        covariance[1, 1] = measurement.delta_mu_uncertainty**2
     # Phases that may be any have a bound on what is reported of them.
     doubts = [
-        found.delta_mu_uncertainty if n == "delta_mu" else reading.uncertainty(n) for n in names
+        measurement.delta_mu_uncertainty if n == "delta_mu" else reading.uncertainty(n)
+        for n in names
     ]
     # A variance of zero may come out a round-off below it.
     spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -150,12 +152,12 @@ def observable_covariance(found: Measurement) -> tuple[tuple[str, ...], NDArray[
     return tuple(names), covariance
 
 
-def sliding_record(found: SlidingMeasurement) -> dict[str, Any]:
+def sliding_record(measurement: SlidingMeasurement) -> dict[str, Any]:
     """Everything that a recording without modulation says.
 
     Parameters
     ----------
-    found : SlidingMeasurement
+    measurement : SlidingMeasurement
 
     Returns
     -------
@@ -164,20 +166,20 @@ def sliding_record(found: SlidingMeasurement) -> dict[str, Any]:
     """
     return {
         "mode": "sliding",
-        "verdict": found.verdict,
-        "friction": _level(found.friction),
-        "load": _level(found.load),
-        "unit": found.load_unit,
-        "rates": [{"rate": rate, "share": share} for rate, share in found.rates],
-        "samples": int(found.time.size),
-        "velocity_from": found.velocity_from,
-        "detrend": found.detrend,
-        "chosen_by": found.chosen_by,
-        "segments": [{**asdict(s), "steady": _level(s.steady)} for s in found.segments],
-        "steps": [asdict(step) for step in found.steps],
-        "holds": [asdict(hold) for hold in found.holds],
-        "healing": None if found.healing is None else asdict(found.healing),
-        "checks": checks_record(found.checks),
+        "verdict": measurement.verdict,
+        "friction": _level(measurement.friction),
+        "load": _level(measurement.load),
+        "unit": measurement.load_unit,
+        "rates": [{"rate": rate, "share": share} for rate, share in measurement.rates],
+        "samples": int(measurement.time.size),
+        "velocity_from": measurement.velocity_from,
+        "detrend": measurement.detrend,
+        "chosen_by": measurement.chosen_by,
+        "segments": [{**asdict(s), "steady": _level(s.steady)} for s in measurement.segments],
+        "steps": [asdict(step) for step in measurement.steps],
+        "holds": [asdict(hold) for hold in measurement.holds],
+        "healing": None if measurement.healing is None else asdict(measurement.healing),
+        "checks": checks_record(measurement.checks),
         "conventions": SLIDING_CONVENTIONS,
     }
 
@@ -193,3 +195,81 @@ def _level(level: MeanLevel | None) -> dict[str, float] | None:
 
 def _pairs(values: Any) -> list[list[float]]:
     return [[float(c.real), float(c.imag)] for c in values]
+
+
+class MeanCycle(NamedTuple):
+    """Friction over the phase of the load, less its mean.
+
+    Attributes
+    ----------
+    phase : array, shape (n,)
+        Over 2 pi, in the middles of the bins.
+    measured : array, shape (n,)
+        Mean of F/W0 - mean_friction in each bin, without the fitted drift.
+    fine_phase, fitted : array, shape (m,)
+        Sum of the fitted harmonics.
+    """
+
+    phase: Array
+    measured: Array
+    fine_phase: Array
+    fitted: Array
+
+
+def mean_cycle(measurement: Measurement) -> MeanCycle:
+    """The mean cycle of the force against the phase of the load.
+
+    Parameters
+    ----------
+    measurement : Measurement
+    """
+    reading, cut = measurement.reading, slice(*measurement.window)
+    time, force = measurement.samples.time[cut], measurement.samples.force[cut]
+    middle, length = (reading.start + reading.end) / 2, reading.end - reading.start
+    trend = reading.drift[1, 0] * (time - middle) / length if reading.drift.shape[1] else 0.0
+    phase = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
+    where = ((phase % 1.0) * _BINS).astype(int) % _BINS
+    samples = np.bincount(where, minlength=_BINS)
+    mean = np.bincount(where, force - trend, minlength=_BINS) / np.maximum(samples, 1) / reading.W0
+    middles = (np.arange(_BINS) + 0.5) / _BINS
+    filled = samples > 0
+    fine = np.linspace(0, 1, 400)
+    order = np.arange(1, reading.harmonics.size + 1)[:, None]
+    fitted = (reading.harmonics[:, None] * np.exp(2j * np.pi * order * fine)).real.sum(0)
+    return MeanCycle(middles[filled], (mean - reading.mean_friction)[filled], fine, fitted)
+
+
+def residual_spectrum(measurement: Measurement) -> tuple[Array, Array]:
+    """Amplitudes of F/W0 without the fitted harmonics, up to the order after the last one.
+
+    Parameters
+    ----------
+    measurement : Measurement
+
+    Returns
+    -------
+    frequency : array, shape (n,)
+        In Hz.
+    amplitude : array, shape (n,)
+        Under a Hann window.
+    """
+    reading, cut = measurement.reading, slice(*measurement.window)
+    time, force = (
+        measurement.samples.time[cut][:_MOST],
+        measurement.samples.force[cut][:_MOST] / reading.W0,
+    )
+    middle = (reading.start + reading.end) / 2
+    cycles = reading.frequency * (time - middle) + reading.phase / (2 * np.pi)
+    order = np.arange(1, reading.harmonics.size + 1)
+    for n, c in zip(order, reading.harmonics, strict=True):
+        force = force - (c * np.exp(2j * np.pi * n * cycles)).real
+    grid = np.linspace(time[0], time[-1], time.size)
+    level = np.interp(grid, time, force)
+    u = np.linspace(-1, 1, grid.size)
+    level = level - np.polynomial.legendre.legval(u, np.polynomial.legendre.legfit(u, level, 1))
+    hann = np.cos(np.pi / 2 * u) ** 2
+    amplitude = 2 * np.abs(np.fft.rfft(hann * level)) / hann.sum()
+    frequency = np.fft.rfftfreq(grid.size, grid[1] - grid[0])
+    top = min(frequency[-1], (order.size + 1) * reading.frequency)
+    shown = (frequency > frequency[1]) & (frequency <= top)
+    return frequency[shown], amplitude[shown]

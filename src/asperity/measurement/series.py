@@ -1,7 +1,18 @@
-"""Slow series of a recording: block means, their steady part, and a mean with its uncertainty."""
+"""Slow series of a recording: block means, their steady part, levels and trends with uncertainties.
+
+Friction in a segment is averaged in bins of equal time and fitted by least squares with a level, a
+trend over slip and, where asked, decaying exponentials. The residual of these machines is
+correlated over hundreds of samples and holds lines, so the variance of the coefficients is not that
+of white noise: it is the residual's spectral density next to zero frequency, from its projections
+on the slowest cosines that the fitted columns leave free (equal-weighted cosines: Mueller,
+J. Econometrics 141, 1331, 2007; Lazarus et al., J. Bus. Econ. Stat. 36, 541, 2018), followed
+towards zero along its power law where it grows significantly. As many cosines, so many degrees of
+freedom.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +26,11 @@ _COSINES = 8
 _MOST_BLOCKS = 512
 #: Probability at which noise explains that two rates differ.
 _ACCIDENT = 3e-3
+
+#: Bins of a segment, and cosines that tell its slow noise.
+BINS, _TREND_COSINES = 400, 8
+#: Scatter of the log of a squared projection, a chi-squared number of one degree of freedom.
+_LOG_SCATTER = 2.22
 
 
 class MeanLevel(NamedTuple):
@@ -101,12 +117,12 @@ def steady_from(values: Array, degree: int) -> int:
         return 0
     errors = []
     for cut in range(n // 2 + 1):
-        rest = values[cut:]
-        u = np.linspace(-1, 1, rest.size)
+        late = values[cut:]
+        u = np.linspace(-1, 1, late.size)
         columns = np.polynomial.legendre.legvander(u, degree)
-        beta = np.linalg.lstsq(columns, rest)[0]
-        spread = np.sum((rest - columns @ beta) ** 2) / (rest.size - degree - 1)
-        errors.append(spread / rest.size)
+        beta = np.linalg.lstsq(columns, late)[0]
+        spread = np.sum((late - columns @ beta) ** 2) / (late.size - degree - 1)
+        errors.append(spread / late.size)
     error = np.array(errors)
     return int(np.argmax(error <= error.min() * (1 + 3 * np.sqrt(2 / n)) + 1e-300))
 
@@ -122,3 +138,108 @@ def effective_dof(parts: list[tuple[float, float]]) -> float:
     whole = sum(doubt**2 for doubt, _ in parts)
     each = sum(doubt**4 / max(dof, 1.0) for doubt, dof in parts)
     return whole**2 / each if each > 0 else np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class TrendFit:
+    """Least squares of a segment.
+
+    Attributes
+    ----------
+    beta : array, (p,)
+        Level at zero slip, then the coefficients of slip, of its square, and of exponentials.
+    inverse : array, (p, p)
+        Inverse of the normal matrix: times the variance per bin, the covariance of `beta`.
+    variance : float
+        Variance per bin that white noise would need to have, to be as strong as the noise of
+        `beta`.
+    dof : int
+        Degrees of freedom of `variance`.
+    """
+
+    beta: Array
+    inverse: Array
+    variance: float
+    dof: int
+
+
+def bin_means(at: Array, values: Array, bins: int = BINS) -> tuple[Array, Array]:
+    """Means over bins of equal width, without those that are empty.
+
+    Parameters
+    ----------
+    at, values : array, (n,)
+        Positions, rising, and what is averaged there.
+    bins : int
+        At most; no more than half of the samples.
+    """
+    wanted = min(bins, max(4, at.size // 2))
+    edges = np.linspace(at[0], at[-1], wanted + 1)[1:-1]
+    place = np.searchsorted(edges, at, side="right")
+    count = np.bincount(place, minlength=wanted)
+    filled = count > 0
+    weight = count[filled]
+    return (
+        np.bincount(place, at, minlength=wanted)[filled] / weight,
+        np.bincount(place, values, minlength=wanted)[filled] / weight,
+    )
+
+
+def columns(slip: Array, degree: int, decays: tuple[float, ...] = ()) -> Array:
+    """Columns of a fit: powers of slip and exponentials that decay from zero slip, (n, p)."""
+    made = [slip**power for power in range(degree + 1)]
+    made += [np.exp(-np.abs(slip) / decay) for decay in decays]
+    return np.stack(made, axis=1)
+
+
+def fit_trend(matrix: Array, values: Array) -> TrendFit:
+    """Fit a segment.
+
+    Parameters
+    ----------
+    matrix : array, (n, p)
+        From `columns`.
+    values : array, (n,)
+        Bin means of friction.
+    """
+    scale = np.abs(matrix).max(axis=0)
+    scale[scale == 0] = 1.0
+    scaled = matrix / scale
+    inverse = np.linalg.pinv(scaled.T @ scaled, hermitian=True)
+    beta = inverse @ (scaled.T @ values)
+    variance, dof = slow_variance(values - scaled @ beta, scaled)
+    return TrendFit(beta / scale, inverse / np.outer(scale, scale), variance, dof)
+
+
+def slow_variance(residual: Array, matrix: Array) -> tuple[float, int]:
+    """Variance per bin of white noise as strong as the slow noise, and its degrees of freedom.
+
+    Parameters
+    ----------
+    residual : array, (n,)
+    matrix : array, (n, p)
+        The columns that were fitted; the noise that they took is not seen.
+    """
+    n, taken = matrix.shape
+    count = max(1, min(_TREND_COSINES, (n - taken) // 4))
+    most = min(n - 1, 3 * count + taken)
+    if most <= taken:
+        return float(np.mean(residual**2)), 1
+    order = np.arange(1, most + 1)[:, None]
+    waves = np.cos(np.pi * order * (np.arange(n) + 0.5) / n).T
+    together = np.concatenate([matrix, waves], axis=1)
+    gram = together.T @ together
+    # Cosines nearly span a trend: what is left of the last of them must not be rounding.
+    gram[np.diag_indices_from(gram)] *= 1 + 1e-10
+    projections = np.linalg.solve(np.linalg.cholesky(gram), together.T @ residual)
+    power = projections[taken:] ** 2
+    slow = float(power[:count].mean())
+    # Of noise that grows towards zero the fitted columns took the strongest part.
+    away = np.log(np.arange(1, power.size + 1) + taken / 2)
+    centred = away - away.mean()
+    lever = float(centred @ centred)
+    exponent = -float(centred @ np.log(np.maximum(power, 1e-300))) / max(lever, 1e-300)
+    if exponent > 2.5 * _LOG_SCATTER / np.sqrt(max(lever, 1e-300)):
+        exponent = min(exponent, 1.0)
+        slow /= float(np.mean(np.exp(-exponent * away[:count])))
+    return slow, count

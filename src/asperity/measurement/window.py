@@ -1,4 +1,4 @@
-"""Where a recording is modulated, and which part of that is fit to be read."""
+"""Where a recording is modulated, which part of it can be read, and which pauses give F(0)."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.lock_in.basis import Basis
-from asperity.lock_in.blocks import BlockSums, even_step, sums
+from asperity.lock_in.normal_equations import Basis, BlockSums, even_step, sums
 from asperity.lock_in.reference import window_basis
 from asperity.lock_in.settling import Settling, settling_of_mean
 
@@ -36,6 +35,10 @@ _HARMONICS, _RESOLVED = 2, 0.45
 _FORGOTTEN, _NOISIER, _STEPS = 0.1, 7.0, 16
 #: The longest clean run is read alone if it has this share of the stretch.
 _WORTH = 0.5
+
+#: The load of a pause may differ from that of the reading by this share, and by its scatter.
+_SAME_LOAD, _LOAD_SCATTERS = 0.02, 5.0
+_BLOCKS = 100
 
 
 class LoadInterval(NamedTuple):
@@ -79,7 +82,7 @@ def stretches(time: Array, load: Array, frequency: float) -> list[LoadInterval]:
     )
     cuts = np.flatnonzero((changed & on[1:] & on[:-1]) | (on[1:] != on[:-1])) + 1
     bounds = [0, *cuts.tolist(), amplitude.size]
-    found = []
+    intervals = []
     for a, b in pairwise(bounds):
         first, stop = a + (a > 0), b - (b < amplitude.size)
         if b - a == 1 and not on[a]:
@@ -88,8 +91,8 @@ def stretches(time: Array, load: Array, frequency: float) -> list[LoadInterval]:
         if stop - first < 1:
             continue
         height = float(np.median(amplitude[first:stop])) if on[a] else 0.0
-        found.append(LoadInterval(int(edges[first]), int(edges[stop]), height))
-    return found
+        intervals.append(LoadInterval(int(edges[first]), int(edges[stop]), height))
+    return intervals
 
 
 def envelope(time: Array, load: Array, frequency: float) -> tuple[Array, NDArray[np.intp]]:
@@ -236,3 +239,41 @@ def _solved(blocks: BlockSums) -> Array:
     gram = blocks.gram[:, :linear, :linear]
     # A block whose samples lie in a gap's edge may not tell its columns apart.
     return np.linalg.pinv(gram, rcond=1e-12, hermitian=True) @ blocks.moments[:, :linear]
+
+
+def under_the_same_load(
+    load: Array, first: int, stop: int, mean_load: float, *, before: bool
+) -> tuple[int, int]:
+    """Samples of a pause next to the modulated stretch whose load is that of the reading.
+
+    A loading ramp or an unloading is no part of F(0).
+
+    Parameters
+    ----------
+    load : array, (n,)
+        Of the whole recording.
+    first, stop : int
+        The pause.
+    mean_load : float
+        Of the reading.
+    before : bool
+        Whether the pause ends, or begins, at the modulated stretch.
+
+    Returns
+    -------
+    (int, int)
+        As a slice; empty where even the next samples are under another load.
+    """
+    length = max(1, (stop - first) // _BLOCKS)
+    whole = (stop - first) // length
+    values = load[stop - whole * length : stop] if before else load[first : first + whole * length]
+    blocks = values.reshape(whole, length)
+    if before:
+        blocks = blocks[::-1]
+    means = blocks.mean(1)
+    noise = float(np.median(blocks.std(1))) / np.sqrt(length)
+    same = np.abs(means - mean_load) <= _SAME_LOAD * abs(mean_load) + _LOAD_SCATTERS * noise
+    if same.all():
+        return first, stop
+    kept = int(np.argmin(same)) * length
+    return (stop - kept, stop) if before else (first, first + kept)

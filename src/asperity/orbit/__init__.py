@@ -1,15 +1,14 @@
-"""Periodic orbits: found by several methods, with Floquet multipliers and derivatives."""
+"""Periodic orbits: several methods, Floquet multipliers, derivatives."""
 
-from asperity.orbit.averaged import averaged_response
 from asperity.orbit.differentiable import (
     ResponseFunction,
     response_function,
 )
-from asperity.orbit.gradient.program import ResponseValues
-from asperity.orbit.gradient.search.known import KnownOrbits
+from asperity.orbit.gradient.known import KnownOrbits
+from asperity.orbit.gradient.parametrised import ResponseValues
 from asperity.orbit.outcome import Outcome
 from asperity.orbit.period import Period, over_a_period
-from asperity.orbit.periodic import periodic_response
+from asperity.orbit.periodic import averaged_response, periodic_response
 from asperity.orbit.response import PeriodicResponse
 from asperity.orbit.sensitivity import Sensitivities, sensitivities
 

@@ -2,7 +2,7 @@
 
 One shape means one compilation, and bounded memory whatever the number of points. Chunks run one
 after the other: programs of XLA's CPU backend that are called from several threads at once can
-wait for each other for ever. More cores are used by more processes, see `asperity.orbit.processes`.
+wait for each other for ever. More cores are used by more processes, see `asperity.orbit.search`.
 """
 
 from __future__ import annotations

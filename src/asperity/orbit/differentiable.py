@@ -1,9 +1,9 @@
 """The periodic response as a function that JAX programs call and differentiate.
 
-A call finds the orbits and then evaluates them. Orbits are found without derivatives: by the fast
-method within the compiled program, and by the search of `asperity.orbit.search` where the fast
+A call finds the orbits and then evaluates them. Orbits are computed without derivatives, by the
+fast method within the compiled program, and by the search of `asperity.orbit.search` where the fast
 method does not converge or does not resolve the orbit. Derivatives come from the implicit-function
-rule at the orbit, whichever method found it.
+rule at the orbit, whichever method solved for it.
 """
 
 from __future__ import annotations
@@ -25,21 +25,18 @@ from asperity.laws import Law, get_law
 from asperity.loads import Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.orbit.gradient.fast import FastOrbits, fast_orbits, fast_values, has_fast_method
+from asperity.orbit.gradient.known import KnownOrbits, SearchedOrbits
 from asperity.orbit.gradient.parametrised import (
-    ParametrisedProblem,
-    coefficients_of,
-    load_values,
-)
-from asperity.orbit.gradient.program import (
     Parameters,
+    ParametrisedProblem,
     Program,
     ResponseValues,
     by_point,
     chosen,
+    coefficients_of,
+    load_values,
 )
-from asperity.orbit.gradient.search.known import KnownOrbits
-from asperity.orbit.gradient.search.mesh_orbits import SearchedOrbits
-from asperity.orbit.gradient.search.search import search_orbits
+from asperity.orbit.gradient.search import search_orbits
 from asperity.orbit.gradient.searched import derivatives_of, searched_values, values_of
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
@@ -200,7 +197,7 @@ class ResponseFunction:
             )
 
     def _padded(self, parameters: Mapping[str, ArrayLike]) -> tuple[Parameters, int | None]:
-        """All parameters with as many points as a program is compiled for, and those asked for."""
+        """All parameters with as many points as a program is compiled for, and the points given."""
         equations = self._program.equations
         given = self._defaults | dict(parameters)
         for name in given:
@@ -292,7 +289,7 @@ def response_function(
         `KnownOrbits`, from the averaged limit and, under a harmonic load, from the orbit on which
         a motion from steady sliding settles, in some milliseconds a point; it leaves out what
         follows branches, which may take a minute for one point. Within `jax.jit`, and where
-        multipliers are asked for, it is as True.
+        multipliers are wanted, it is as True.
     least_points : int
         Calls with fewer points are filled up to so many, for callers whose number of points varies:
         they share one compiled program.
@@ -442,7 +439,7 @@ def _values(
     wanted: Array | None,
     program: Program,
 ) -> ResponseValues:
-    """Response of orbits that were found, with its derivatives to the parameters."""
+    """Response of converged orbits, with its derivatives to the parameters."""
     valid = program.equations.valid(parameters)
     count = program.harmonics, program.states if program.multipliers else 0
     points = valid.shape[0]

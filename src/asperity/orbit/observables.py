@@ -24,7 +24,7 @@ class Observables(NamedTuple):
     harmonics : complex array, shape (count, points)
         c_1, c_2, ...
     monodromy : array, shape (size, size, points)
-        The monodromy matrix over exp(`log_scale`).
+        The monodromy matrix over exp(`log_scale`); of no meaning where `exponent` is known.
     log_scale : array, shape (points,)
     log_determinant : array, shape (points,)
         Logarithm of the determinant of the monodromy matrix: the integral of the trace of the
@@ -51,10 +51,12 @@ class Observables(NamedTuple):
     def log_multipliers(self) -> NDArray[np.complex128]:
         """Logarithms of the Floquet multipliers by falling modulus, shape (size, points)."""
         monodromy, log_scale, log_determinant, exponent = map(np.asarray, self[2:6])
-        logs = log_multipliers(monodromy, log_scale, log_determinant)
+        logs = np.empty(monodromy.shape[1:], complex)
         # Of multipliers near 1 a matrix of their logarithms keeps more digits.
-        known = np.flatnonzero(np.isfinite(exponent).all((0, 1)))
+        known = np.isfinite(exponent).all((0, 1))
         logs[:, known] = log_multipliers_of_exponent(exponent[..., known], log_determinant[known])
+        others = monodromy[..., ~known], log_scale[~known], log_determinant[~known]
+        logs[:, ~known] = log_multipliers(*others)
         return logs
 
 

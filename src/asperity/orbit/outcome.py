@@ -32,6 +32,9 @@ class Outcome(IntEnum):
 #: which orbits are searched for. Below, multipliers are 1 to round-off, which then decides on
 #: stability; above, round-off of the slip rate is as large as the rate of change of the force.
 SMALLEST_RATE, LARGEST_RATE = 1e-9, 1e15
+#: Exponent of the growth of a disturbance by which the error of a mesh, 1e-6 or less, becomes as
+#: large as the orbit.
+LARGEST_GROWTH = 15.0
 #: Largest share of W0 that may be taken off the contacts: of a harmonic load, epsilon.
 LARGEST_UNLOADING = 0.999
 

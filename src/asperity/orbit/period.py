@@ -103,12 +103,12 @@ def _state(law: Law, v: Array, friction: Array, w: Array) -> Array:
         return state - value / slope
 
     first = jnp.broadcast_to(law.steady_state(v)[0], friction.shape)
-    found: Array = jax.lax.fori_loop(0, _STEPS, step, first)
-    return found
+    result: Array = jax.lax.fori_loop(0, _STEPS, step, first)
+    return result
 
 
 def _derivative(values: Float) -> Float:
     """Derivative by the phase (rad) of a periodic function on a uniform grid."""
     orders = np.fft.rfftfreq(len(values), 1 / len(values))
-    found: Float = np.fft.irfft(1j * orders * np.fft.rfft(values), len(values))
-    return found
+    slope: Float = np.fft.irfft(1j * orders * np.fft.rfft(values), len(values))
+    return slope

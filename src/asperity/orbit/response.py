@@ -1,4 +1,4 @@
-"""The record of a periodic response."""
+"""The record of a periodic response, with its provenance."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.orbit.floquet import from_logs, kind_of_crossing, without_lost_arguments
 from asperity.orbit.outcome import Outcome, sentences
-from asperity.orbit.provenance import provenance_of
 from asperity.orbit.solution import Solution
 from asperity.parameters import DRIVE, OUTPUTS, Parameter
 from asperity.parameters.arguments import shown
@@ -25,11 +25,27 @@ from asperity.parameters.display import (
     parameter_line,
 )
 from asperity.slider import Motion, Slider
-from asperity.slider.named import equation_parameters, value_of
+from asperity.slider.named import equation_parameters, value_of, values_as_text
 from asperity.slider.problem import Problem
 
 if TYPE_CHECKING:
     import xarray
+
+
+def provenance_of(response: PeriodicResponse) -> dict[str, Any]:
+    """Version, law, conventions, tolerance and source of the numbers."""
+    law = type(response.slider.law)
+    return {
+        "asperity_version": __version__,
+        "law": law.name,
+        "source": law.source,
+        "equation_of_motion": response.motion.name,
+        "parameters": values_as_text(response.motion, response.load),
+        "relative_tolerance": 1e-8,
+        "modulation": response.load.formula,
+        "convention": "F/W0 = mean + sum mu_n cos(n w t + phase_n), load w(t) = W/W0",
+    }
+
 
 Float = NDArray[np.float64]
 
@@ -84,7 +100,7 @@ class PeriodicResponse(Displayed):
     load : Modulation
         What is modulated.
     slider, velocity, epsilon, frequency
-        What was asked, in SI; epsilon is the amplitude of the load's first harmonic.
+        The operating point, in SI; epsilon is the amplitude of the load's first harmonic.
     """
 
     mean_friction: Float
@@ -236,7 +252,7 @@ class PeriodicResponse(Displayed):
         return 2 * np.pi * np.arange(samples) / max(samples, 1)
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
-        """Law, equation of motion, and what was found."""
+        """Law, equation of motion, and the outcome."""
         law, points = self.slider.law.name, self.mean_friction.size
         title = f"PeriodicResponse, {law}, {self.motion.name}, {count_text(points, 'point')}"
         drive = ((n, getattr(self, DRIVE[n].argument)) for n in ("V", "epsilon", "frequency"))
@@ -309,9 +325,9 @@ class PeriodicResponse(Displayed):
         """Parameters of the equations and of the drive with their values, of any shape."""
         problem = Problem(self.motion, self.load)
         known = equation_parameters(self.motion, self.load)
-        found = {name: (p, value_of(problem, p)) for name, p in known.items()}
+        values = {name: (p, value_of(problem, p)) for name, p in known.items()}
         # Of a load that is not harmonic: the amplitude of its first harmonic.
-        return found | {"epsilon": (DRIVE["epsilon"], self.epsilon)}
+        return values | {"epsilon": (DRIVE["epsilon"], self.epsilon)}
 
     @property
     def provenance(self) -> dict[str, Any]:

@@ -1,23 +1,104 @@
 """The search for periodic orbits: a list of methods, each given the points that are left.
 
-Which methods there are and in which order they are tried is in `asperity.orbit.methods.registry`;
-what each does is in its own module.
+`METHODS` is the order in which methods are tried, fast ones first; what each does is in its own
+module.
+
+Orbits are searched for within limits of dimensionless numbers, so that units do not matter, wider
+than the range that is tested (`docs/theory/numerical_method.md`). A point outside gets
+`Outcome.OUT_OF_RANGE` at once: a search there takes up to a minute and fails, or gives a stability
+that is round-off.
+
+On several cores each has a process of its own, since XLA's programs do not share one well. Worker
+processes are started once and kept; each loads the compiled programs from the cache.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from asperity.orbit.batches import take
-from asperity.orbit.instability import mark_too_unstable
-from asperity.orbit.limits import mark_out_of_range
+from asperity.orbit.batches import run_chunks, take
+from asperity.orbit.methods.branch_following.from_steady_sliding import BranchFollowing
+from asperity.orbit.methods.collocation.frequency_path import FrequencyPath
+from asperity.orbit.methods.collocation.method import Collocation
+from asperity.orbit.methods.fourier.method import Fourier
 from asperity.orbit.methods.method import Method
-from asperity.orbit.methods.registry import METHODS
-from asperity.orbit.outcome import Outcome
+from asperity.orbit.methods.series import FourierSeries
+from asperity.orbit.methods.shooting.method import Shooting
+from asperity.orbit.outcome import (
+    LARGEST_GROWTH,
+    LARGEST_RATE,
+    LARGEST_UNLOADING,
+    SMALLEST_RATE,
+    Outcome,
+)
 from asperity.orbit.solution import SearchOptions, Solution
+from asperity.orbit.steady_sliding import steady_sliding
+from asperity.parameters.arguments import some_of
 from asperity.slider.problem import Problem
+from asperity.theory.adiabatic import adiabatic_growth
+
+
+def mark_out_of_range(problem: Problem, solution: Solution) -> None:
+    """Give the points outside the limits the outcome OUT_OF_RANGE."""
+    rate, _, unloading = steady_sliding(problem)
+    _mark_outside(solution, ~((rate >= SMALLEST_RATE) & (rate <= LARGEST_RATE)), rate)
+    _mark_outside(solution, ~(unloading <= LARGEST_UNLOADING), unloading)
+
+
+def _mark_outside(
+    solution: Solution, outside: NDArray[np.bool_], values: NDArray[np.float64]
+) -> None:
+    solution.outcome[outside], solution.detail[outside] = Outcome.OUT_OF_RANGE, values[outside]
+
+
+#: Points in a call that integrates the growth of disturbances.
+_GROWTH_CHUNK = 8
+
+
+def mark_too_unstable(problem: Problem, solution: Solution) -> None:
+    """Give failed points the outcome SENSITIVE where disturbances of slow sliding grow too much."""
+    failed = np.isin(solution.outcome, (Outcome.NO_ORBIT, Outcome.NOT_RESOLVED))
+    amplitude = np.broadcast_to(problem.load.amplitude, failed.shape)
+    rows = np.flatnonzero(failed & solution.informed)
+    for part, growth in run_chunks(adiabatic_growth, (problem,), rows, _GROWTH_CHUNK):
+        part = part[growth > LARGEST_GROWTH]
+        share = np.where(solution.outcome[part] == Outcome.NO_ORBIT, solution.detail[part], 1.0)
+        solution.detail[part] = np.minimum(share, 1.0) * amplitude[part]
+        solution.outcome[part] = Outcome.SENSITIVE
+
+
+METHODS: tuple[Method, ...] = (
+    Fourier(),
+    Shooting(),
+    FourierSeries(),
+    Collocation(),
+    BranchFollowing(),
+    FrequencyPath(),
+)
+
+#: What a user may choose among.
+CHOICES = tuple(dict.fromkeys(method.choice for method in METHODS))
+
+#: Earlier names of choices.
+_SYNONYMS = {"smooth": "series"}
+
+
+def chosen_methods(choices: Sequence[str]) -> tuple[Method, ...]:
+    """The methods that a user chose, in the order of the search.
+
+    Raises
+    ------
+    InputError
+        If there is no method of a name.
+    """
+    given = some_of(choices, (*CHOICES, *_SYNONYMS), "methods")
+    names = {_SYNONYMS.get(name, name) for name in given}
+    return tuple(method for method in METHODS if method.choice in names)
 
 
 def find_orbits(
@@ -43,14 +124,14 @@ def find_orbits(
         Called with the number of points finished since the last call.
     methods : tuple of Method
     intervals : int
-        Of the meshes on which orbits found on a mesh are kept; 0 to keep none.
+        Of the meshes on which orbits are kept, by methods on meshes alone; 0 to keep none.
     """
     options = SearchOptions(harmonics, phases, progress, intervals)
     solution = Solution.unsolved(problem, points, options)
     mark_out_of_range(problem, solution)
     outside = solution.outcome == Outcome.OUT_OF_RANGE
     for method in methods:
-        if not method.suits(problem):
+        if not method.suits(problem) or (intervals and not method.on_mesh):
             continue
         left = method.candidates(solution)
         left = left[~outside[left]]
@@ -61,3 +142,63 @@ def find_orbits(
     failed = np.flatnonzero(~solution.converged)
     progress(len(failed))
     return solution
+
+
+#: Points handed to a process at a time: a fraction of a second of work.
+_SLICE = 20_000
+
+#: Below this many points the start of the processes, a second or two, is not worth it.
+WORTHWHILE = 200_000
+
+
+def available_cores() -> int:
+    """Cores this process may run on."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def find_orbits_on_cores(
+    problem: Problem,
+    points: int,
+    workers: int,
+    *,
+    harmonics: int,
+    phases: int,
+    progress: Callable[[int], None],
+    methods: tuple[Method, ...],
+) -> Solution:
+    """`find_orbits` with the points dealt out to `workers` processes; same results, same order."""
+    from loky import get_reusable_executor
+
+    solution = Solution.unsolved(problem, points, SearchOptions(harmonics, phases, progress))
+    options = {"harmonics": harmonics, "phases": phases, "methods": methods}
+    # One thread of XLA in each process, or they fight for the cores.
+    executor = get_reusable_executor(max_workers=workers, env={"NPROC": "1"})
+    waiting: list[tuple[np.ndarray, Any]] = []
+    try:
+        for start in range(0, points, _SLICE):
+            index = np.arange(start, min(start + _SLICE, points))
+            waiting.append((index, executor.submit(_search, take(problem, index), options)))
+            if len(waiting) > 2 * workers:  # bounds the results that wait in memory
+                _collect(solution, *waiting.pop(0), progress)
+        while waiting:
+            _collect(solution, *waiting.pop(0), progress)
+    except BaseException:  # Ctrl-C included: the processes must be stopped
+        executor.shutdown(wait=False, kill_workers=True)
+        raise
+    return solution
+
+
+def _collect(
+    solution: Solution, index: np.ndarray, job: Any, progress: Callable[[int], None]
+) -> None:
+    # Orbits are not wanted here.
+    for target, values in zip(solution[:-1], job.result()[:-1], strict=True):
+        target[..., index] = values
+    progress(len(index))
+
+
+def _search(problem: Problem, options: dict[str, Any]) -> Solution:
+    points = len(np.asarray(problem.system.V))
+    return find_orbits(problem, points, progress=lambda _: None, **options)

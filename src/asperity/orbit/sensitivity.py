@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from asperity.loads import Modulation
 from asperity.orbit.differentiable import ResponseFunction
-from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.gradient.program import ResponseValues
+from asperity.orbit.gradient.parametrised import ParametrisedProblem, ResponseValues
 from asperity.orbit.outcome import Outcome
 from asperity.slider import Slider
 from asperity.slider.problem import checked_problem, flatten

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
 from asperity.orbit.batches import Indices, put, take
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.scheme import GAUSS, scheme_for
+from asperity.orbit.mesh.mesh import GAUSS, Orbit, scheme_for
 from asperity.orbit.observables import Observables
 from asperity.orbit.outcome import Outcome
 from asperity.slider.problem import Problem
@@ -25,7 +24,7 @@ class Solution(NamedTuple):
     Attributes
     ----------
     mean_friction, harmonics, log_multipliers, start, waveform : array
-        As in `Observables`; NaN where no orbit was found.
+        As in `Observables`; NaN where there is no orbit.
     iterations : int array, shape (points,)
         Steps of Fourier collocation, or steps or intervals of the last division of the period.
     outcome : int array, shape (points,)
@@ -35,8 +34,8 @@ class Solution(NamedTuple):
     method : str array, shape (points,)
         Name of the method that gave the outcome; "" for none.
     orbit : Orbit
-        Orbits of the points that a method found on a mesh, on `SearchOptions.intervals` intervals,
-        without any where that is 0; the mesh of the others is 0 throughout.
+        Orbits of the converged points on `SearchOptions.intervals` intervals, without any where
+        that is 0; the mesh of the others is 0 throughout.
     """
 
     mean_friction: Float
@@ -52,7 +51,7 @@ class Solution(NamedTuple):
 
     @classmethod
     def unsolved(cls, problem: Problem, points: int, options: SearchOptions) -> Solution:
-        """No orbit of a problem found yet."""
+        """No orbit of a problem yet."""
         return cls.empty(problem.system.size, points, options, scheme_for(problem.system))
 
     @classmethod
@@ -63,7 +62,7 @@ class Solution(NamedTuple):
         options: SearchOptions,
         scheme: CollocationScheme = GAUSS,
     ) -> Solution:
-        """No orbit with `size` states found yet."""
+        """No orbit with `size` states yet."""
         return cls(
             np.full(points, np.nan),
             np.full((options.harmonics, points), np.nan + 0j),
@@ -115,7 +114,7 @@ class Solution(NamedTuple):
 
 
 class SearchOptions(NamedTuple):
-    """Observables that are asked for, and progress.
+    """Which observables are wanted, and progress.
 
     Attributes
     ----------
@@ -124,7 +123,7 @@ class SearchOptions(NamedTuple):
     progress : callable
         Called with the number of points solved since the last call.
     intervals : int
-        Of the meshes on which orbits that were found on a mesh are kept; 0 to keep none.
+        Of the meshes on which orbits are kept; 0 to keep none.
     """
 
     harmonics: int

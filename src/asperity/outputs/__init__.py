@@ -12,8 +12,6 @@ from asperity.outputs.capacity import (
     require_memory,
     size_text,
 )
-from asperity.outputs.file import written_file
-from asperity.outputs.folder import require_folder, written_folder
 from asperity.outputs.targets import output_file, output_files, require_short
 from asperity.outputs.unfinished import (
     Interrupted,
@@ -22,6 +20,7 @@ from asperity.outputs.unfinished import (
     differences,
     undisturbed,
 )
+from asperity.outputs.written import require_folder, written_file, written_folder
 
 __all__ = [
     "Interrupted",

@@ -145,11 +145,12 @@ def require_short(target: Path, files: Iterable[Path], name: str = "out") -> Non
         Which calls the target `name`.
     """
     length = max(len(os.fsencode(file.name)) for file in files)
-    own = len(os.fsencode(target.name))
+    name_length = len(os.fsencode(target.name))
     if length > _LONGEST:
         raise InputError(
-            f"{name} must have a name of at most {_LONGEST - length + own} bytes, got {own}, which "
-            "leaves no room for the names of files beside it; choose a shorter one"
+            f"{name} must have a name of at most {_LONGEST - length + name_length} bytes, got "
+            f"{name_length}, which leaves no room for the names of files beside it; choose a "
+            "shorter one"
         )
 
 

@@ -17,9 +17,9 @@ from typing import Any, TypeVar
 
 from asperity._version import __version__
 from asperity.errors import InputError
-from asperity.outputs.file import to_disk, writable
 from asperity.outputs.json import json_content
 from asperity.outputs.targets import fresh_name, record_name, unfinished_name
+from asperity.outputs.written import to_disk, writable
 
 _Result = TypeVar("_Result")
 
@@ -179,11 +179,11 @@ class UnfinishedText(UnfinishedOutput):
 
     def _whole(self) -> bool:
         """Whether the finished blocks are those that were written."""
-        left, found = self.progress.get("length", 0), 0
+        left, checksum = self.progress.get("length", 0), 0
         with writable(self.target), self.data.open("rb") as stream:
             while left > 0 and (part := stream.read(min(left, _PART))):
-                left, found = left - len(part), zlib.crc32(part, found)
-        return left == 0 and found == self.progress.get("crc32")
+                left, checksum = left - len(part), zlib.crc32(part, checksum)
+        return left == 0 and checksum == self.progress.get("crc32")
 
     @property
     def rows(self) -> int:
@@ -241,7 +241,7 @@ def _flat(inputs: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
-def differences(saved: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
+def differences(saved: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
     """Which inputs differ, in words; empty where all are the same.
 
     Parameters
@@ -250,10 +250,10 @@ def differences(saved: Mapping[str, Any], asked: Mapping[str, Any]) -> str:
         Inputs of what is there and of what is asked for, as JSON values; nested mappings are
         allowed.
     """
-    saved, asked = _flat(saved), _flat(asked)
-    changed = [n for n in {**saved, **asked} if saved.get(n, ...) != asked.get(n, ...)]
+    saved, wanted = _flat(saved), _flat(wanted)
+    changed = [n for n in {**saved, **wanted} if saved.get(n, ...) != wanted.get(n, ...)]
     listed = [
-        f"{name} = {_shown(saved, name)} there and {_shown(asked, name)} here"
+        f"{name} = {_shown(saved, name)} there and {_shown(wanted, name)} here"
         for name in changed[:_LISTED]
     ]
     if len(changed) > _LISTED:

@@ -84,10 +84,10 @@ def number(value: Any, label: str, kind: str, rule: str = "finite") -> float:
     InputError
         For an array, another unit, or a value that breaks the rule.
     """
-    found = obeying(value, label, kind, rule)
-    if np.size(found) != 1 or np.ndim(found) > 1:
-        raise InputError(f"{label} must be one number, got {shown(found)}; give a single value")
-    return float(np.ravel(found)[0])
+    checked = obeying(value, label, kind, rule)
+    if np.size(checked) != 1 or np.ndim(checked) > 1:
+        raise InputError(f"{label} must be one number, got {shown(checked)}; give a single value")
+    return float(np.ravel(checked)[0])
 
 
 def instance(value: Any, kinds: type[T] | tuple[type[T], ...], label: str, advice: str) -> T:

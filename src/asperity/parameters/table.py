@@ -246,7 +246,7 @@ def law_parameters(law: Any) -> Mapping[str, Parameter]:
     InputError
         If a field has the name of a parameter of the experiment.
     """
-    found = {}
+    parameters = {}
     for declared in dataclasses.fields(law):
         name = plain_name(declared.name)
         if name in EXPERIMENT:
@@ -254,12 +254,14 @@ def law_parameters(law: Any) -> Mapping[str, Parameter]:
                 f"law.{name} must have a name that is free, got '{name}', which is the "
                 f"{EXPERIMENT[name].meaning}; rename the field of {law.__name__}"
             )
-        own = declared.metadata.get("parameter")
+        parameter = declared.metadata.get("parameter")
         # A field without declaration is a pure number.
-        found[name] = own or Parameter(name, "dimensionless", "finite", label=f"law.{name}")
+        parameters[name] = parameter or Parameter(
+            name, "dimensionless", "finite", label=f"law.{name}"
+        )
         path = f"system.slider.law.{declared.name}"
-        found[name] = dataclasses.replace(found[name], name=name, path=path)
-    return MappingProxyType(found)
+        parameters[name] = dataclasses.replace(parameters[name], name=name, path=path)
+    return MappingProxyType(parameters)
 
 
 def point_parameters(law: Any) -> dict[str, Parameter]:
@@ -272,10 +274,10 @@ def all_parameters(laws: Iterable[Any]) -> dict[str, Parameter]:
 
     Where two laws have parameters of the same name, that of the first law stands.
     """
-    found: dict[str, Parameter] = {}
+    parameters: dict[str, Parameter] = {}
     for law in laws:
-        found = {**law_parameters(law), **found}
-    return {**found, **EXPERIMENT}
+        parameters = {**law_parameters(law), **parameters}
+    return {**parameters, **EXPERIMENT}
 
 
 def required(law: Any) -> tuple[str, ...]:
@@ -301,12 +303,12 @@ def known_name(name: str, known: Mapping[str, Parameter], label: str = "paramete
     InputError
         If no parameter has that name; the message suggests the nearest one.
     """
-    found = canonical_name(name, known)
-    if found is None:
+    canonical = canonical_name(name, known)
+    if canonical is None:
         raise InputError(
             f"{label} must be a known name, got {shown(name)}; {suggestion(name, known)}"
         )
-    return found
+    return canonical
 
 
 def suggestion(name: str, known: Mapping[str, Parameter]) -> str:

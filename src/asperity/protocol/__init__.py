@@ -1,11 +1,16 @@
 """Protocols: experiments written as text, and run into a file."""
 
-from asperity.protocol.export import RunOutline, outline, write_csv
 from asperity.protocol.load import load_protocol
-from asperity.protocol.mistakes import ProtocolError
-from asperity.protocol.protocol import Protocol, ProtocolStart, Repeat, SolverSettings
+from asperity.protocol.protocol import (
+    Protocol,
+    ProtocolError,
+    ProtocolStart,
+    Repeat,
+    SolverSettings,
+)
 from asperity.protocol.recording import RecordingSetup, record_run
 from asperity.protocol.run import RunSummary, run_protocol
+from asperity.protocol.run_file import RunOutline, outline, write_csv
 
 __all__ = [
     "Protocol",

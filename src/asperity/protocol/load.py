@@ -10,8 +10,7 @@ from asperity.laws import registered
 from asperity.operating_point import known_parameters
 from asperity.parameters.arguments import shown
 from asperity.parameters.toml_file import toml_content
-from asperity.protocol.mistakes import ProtocolError
-from asperity.protocol.protocol import Protocol
+from asperity.protocol.protocol import Protocol, ProtocolError
 from asperity.units import KINDS
 
 #: Kinds of the quantities in the tables of a file, where each carries its unit.
@@ -75,15 +74,15 @@ def _without_unit(content: Mapping[str, Any]) -> list[str]:
         **_KINDS,
         "parameters": {n: q.kind for n, q in known_parameters(_law(content)).items()},
     }
-    found = []
+    mistakes = []
     for table, names in kinds.items():
         values = content.get(table)
         for name, value in values.items() if isinstance(values, Mapping) else ():
             unit = KINDS[names[name]].si if name in names else ""
             if unit and isinstance(value, int | float) and not isinstance(value, bool):
                 example = KINDS[names[name]].example
-                found.append(
+                mistakes.append(
                     f"{table}.{name} must carry a unit, got {shown(value)}; "
                     f"write it like '{example}'"
                 )
-    return found
+    return mistakes

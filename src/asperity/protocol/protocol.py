@@ -18,20 +18,21 @@ from pydantic import (
     model_validator,
 )
 
-from asperity.errors import InputError
+from asperity import materials
+from asperity.errors import InputError, MistakesError, closest
+from asperity.laws import get_law, registered
 from asperity.loads import Programme, ProgrammeStep
 from asperity.loads.programme.steps import LoadAndVelocity
-from asperity.operating_point import SourcedNumber
-from asperity.protocol.mistakes import ProtocolError, sentences
-from asperity.protocol.numbers import numbers_of, slider_of
-from asperity.protocol.plan import PlannedStep, check_levels, plan
+from asperity.operating_point import SourcedNumber, sourced_numbers
+from asperity.parameters import MACHINE, canonical_name, law_parameters
+from asperity.parameters.mistakes import shown, worded
 from asperity.protocol.recording import RecordingSetup, setup_of
+from asperity.protocol.steps import PlannedStep, check_levels, plan
 from asperity.slider import Slider
+from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, transient
-from asperity.transients.initial_state import require_contact
-from asperity.transients.inputs import MOST_STEPS
-from asperity.transients.sampling import planned_rows
-from asperity.transients.trajectory import row_bytes
+from asperity.transients.inputs import MOST_STEPS, require_contact
+from asperity.transients.trajectory import planned_rows, row_bytes
 from asperity.units import to_si
 
 #: A number in SI, or a text with its unit.
@@ -41,6 +42,69 @@ Given = float | str
 _COMPARED = 100
 
 _STRICT = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
+
+
+def numbers_of(
+    law_name: str,
+    stated: Mapping[str, float | str],
+    material: str,
+    folder: Path,
+    inertia: bool,
+) -> dict[str, SourcedNumber]:
+    """Every number that the motion depends on, in SI.
+
+    Parameters
+    ----------
+    law_name : str
+    stated : mapping of str to float or str
+    material : str
+        Name, or file relative to `folder`; empty for none.
+    folder : Path
+    inertia : bool
+        Whether a mass is needed.
+
+    Raises
+    ------
+    InputError
+        If law or material are unknown, a name belongs to neither law nor machine, or a
+        number is missing or breaks its rule.
+    """
+    law = get_law(law_name)
+    known = {**law_parameters(law), **MACHINE}
+    names = tuple(known)
+    for name in stated:
+        if canonical_name(name, known) is None:
+            owners = [n for n, other in registered().items() if name in law_parameters(other)]
+            raise InputError(
+                f"parameters must belong to {law_name} or the machine, got '{name}'"
+                + (f", which belongs to {', '.join(owners)}; leave it out" if owners else "; ")
+                + ("" if owners else closest(name, names))
+            )
+    source = None
+    if material:
+        file = material.endswith(".toml")
+        source = materials.load(folder / material if file else material)
+    numbers = sourced_numbers(stated, source, "protocol", law_name)
+    needed = [n for n in names if known[n].default is None or (n == "M" and inertia)]
+    missing = [n for n in needed if n not in numbers]
+    if missing:
+        raise InputError(
+            f"parameters must have all numbers of {law_name}, got none for {', '.join(missing)}; "
+            f"name a material that has them or give each one, like {missing[0]} = "
+            f'"{known[missing[0]].example}"'
+        )
+    return {name: numbers[name] for name in names if name in numbers}
+
+
+def slider_of(law_name: str, values: Mapping[str, float]) -> Slider:
+    """The slider that SI values by name describe."""
+    return slider_from(get_law(law_name), values)
+
+
+class ProtocolError(MistakesError):
+    """A protocol that cannot be run: all mistakes in one message."""
+
+    subject = "protocol"
 
 
 class Repeat(BaseModel):
@@ -152,12 +216,7 @@ class Protocol(BaseModel):
         try:
             super().__init__(**fields)
         except ValidationError as error:
-            models: dict[str, type[BaseModel]] = {
-                "": Protocol,
-                "start": ProtocolStart,
-                "solver": SolverSettings,
-            }
-            raise ProtocolError(sentences(error, models)) from None
+            raise ProtocolError(_sentences(error)) from None
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
         """A protocol with some fields replaced, checked as any other."""
@@ -279,3 +338,31 @@ class Protocol(BaseModel):
             **segments,
             "programme": digest.hexdigest(),
         }
+
+
+def _sentences(error: ValidationError) -> list[str]:
+    """The mistakes that pydantic has found, a wrong step once."""
+    models: dict[str, type[BaseModel]] = {
+        "": Protocol,
+        "start": ProtocolStart,
+        "solver": SolverSettings,
+    }
+    sentences: list[str] = []
+    steps: set[Any] = set()
+    for mistake in error.errors(include_url=False):
+        place = mistake["loc"]
+        of_step = place[:1] == ("steps",) and len(place) > 1
+        # pydantic reports a wrong step once for each kind of step.
+        if of_step and place[1] in steps:
+            continue
+        if of_step:
+            steps.add(place[1])
+        if of_step and "error" not in mistake.get("ctx", {}):
+            sentences.append(
+                f"step {int(place[1]) + 1} must be a text, or a table of repeat and steps, got "
+                f"{shown(mistake['input'])}; write it like 'hold 10 s' or "
+                "{ repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }"
+            )
+        else:
+            sentences += worded(mistake, "protocol", models)
+    return sentences

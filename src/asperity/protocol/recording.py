@@ -85,8 +85,8 @@ def setup_of(
     InputError
         If a field is unknown or breaks its rule, or the motion is sampled too coarsely.
     """
-    rest = dict(table)
-    seed, described = rest.pop("seed", 0), rest.pop("sensors", {})
+    settings = dict(table)
+    seed, described = settings.pop("seed", 0), settings.pop("sensors", {})
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InputError(
             f"tribometer.seed must be a whole number from 0, got {shown(seed)}; correct it"
@@ -96,7 +96,7 @@ def setup_of(
             "tribometer.sensors must have a table for each channel, got none; write it like "
             "[tribometer.sensors.'shear force'] with type = 'spring gauge' below it"
         )
-    recorder = _made(Recorder, rest, "tribometer")
+    recorder = _made(Recorder, settings, "tribometer")
     sensors, exposed = {}, {}
     for channel, fields in described.items():
         sensors[channel], exposed[channel] = _sensor(channel, fields)
@@ -140,27 +140,27 @@ def _last_is_odd(time: np.ndarray) -> bool:
 def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
     """The sensor of a channel, and the variable of the motion that it measures."""
     place = f"tribometer.sensors.{channel}"
-    rest = dict(fields) if isinstance(fields, Mapping) else {}
-    name = rest.pop("type", None)
+    options = dict(fields) if isinstance(fields, Mapping) else {}
+    name = options.pop("type", None)
     if not isinstance(name, str) or name not in SENSORS:
         raise InputError(
             f"{place}.type must be a sensor, got {shown(name)}; {closest(str(name), SENSORS)}"
         )
     made, measurable = SENSORS[name]
-    given = rest.pop("measures", None)
-    measured = measurable[0] if given is None else given
+    chosen = options.pop("measures", None)
+    measured = measurable[0] if chosen is None else chosen
     if measured not in measurable:
         raise InputError(
             f"{place}.measures must be something that a {name} can measure, got {shown(measured)}; "
             f"choose {' or '.join(map(repr, measurable))}"
         )
     claimed = next((_CLAIMS[r] for r in _CLAIMS if candidates(r, {channel: None})), measured)
-    if given is None and claimed != measured:
+    if chosen is None and claimed != measured:
         raise InputError(
             f"{place}.measures must be given for a {name} in a channel of this name, got nothing; "
             f"it measures the {measured} unless it says measures = '{claimed}'"
         )
-    return _made(made, rest, place), _SIGNALS[measured]
+    return _made(made, options, place), _SIGNALS[measured]
 
 
 def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:

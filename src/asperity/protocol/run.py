@@ -1,37 +1,99 @@
-"""A protocol from its first step to its last, into a NetCDF file."""
+"""A protocol from its first step to its last, into a NetCDF file.
+
+The state of an unfinished run is saved with its finished blocks, from which it is resumed.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
+import os
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, fields
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
 from asperity import materials
 from asperity.errors import InputError
-from asperity.outputs import (
-    Interrupted,
-    UnfinishedOutput,
-    output_file,
-    require_disk,
-    undisturbed,
-)
-from asperity.protocol.growing_file import CHUNKS, append, describe
-from asperity.protocol.progress import RunProgress
+from asperity.outputs import Interrupted, UnfinishedOutput, output_file, require_disk, undisturbed
+from asperity.parameters.arguments import file_path, function, switch
+from asperity.protocol.load import load_protocol
 from asperity.protocol.protocol import Protocol
+from asperity.protocol.run_file import CHUNKS, append, describe
 from asperity.protocol.stability import stability_statement
-from asperity.transients import Trajectory, integrate_blocks
+from asperity.transients import Checkpoint, Trajectory, integrate_blocks
 
 if TYPE_CHECKING:
     import xarray
 
 #: Rows integrated and written at a time: at most so many are lost by an interruption.
 _ROWS = 20_000
+
+
+@dataclass
+class RunProgress:
+    """State of a run between two blocks.
+
+    Attributes
+    ----------
+    lengths : dict of str to int
+        Lengths of the growing dimensions in the file.
+    time : float
+        Time of the last row (s); NaN without one.
+    checkpoint : Checkpoint or None
+        Where the integration goes on.
+    steady_segment : int
+        Segment of the last event "steady", -1 without one.
+    steps, rejected : int
+        Steps of the integrator so far.
+    unresolved_ringing : float
+        Velocity (m/s) below which ringing has been left out; see `asperity.transient`.
+    methods : list of str
+        Methods of integration that have been used.
+    stopped : str
+        Why the motion ended before the programme; empty where it did not.
+    finished : bool
+        Whether nothing follows.
+    """
+
+    lengths: dict[str, int] = field(default_factory=dict)
+    time: float = float("nan")
+    checkpoint: Checkpoint | None = None
+    steady_segment: int = -1
+    steps: int = 0
+    rejected: int = 0
+    unresolved_ringing: float = 0.0
+    methods: list[str] = field(default_factory=list)
+    stopped: str = ""
+    finished: bool = False
+
+    def to_json(self) -> dict[str, Any]:
+        """Return JSON values; doubles are read back as they are."""
+        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        if self.checkpoint is not None:
+            state = {f.name: getattr(self.checkpoint, f.name) for f in fields(self.checkpoint)}
+            values["checkpoint"] = {
+                n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in state.items()
+            }
+        return values
+
+    @classmethod
+    def from_json(cls, values: Mapping[str, Any]) -> Self:
+        """Read what `to_json` has written.
+
+        Raises
+        ------
+        TypeError, ValueError
+            If the values are no progress.
+        """
+        progress = cls(**values)
+        if progress.checkpoint is not None:
+            state = dict(values["checkpoint"])
+            progress.checkpoint = Checkpoint(**{**state, "states": np.array(state["states"])})
+        return progress
 
 
 @dataclass(frozen=True)
@@ -257,3 +319,40 @@ def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
         "rejected_steps": done.rejected,
         "stopped": done.stopped or "end of the programme",
     }
+
+
+def run_experiment(
+    protocol: Protocol | str | os.PathLike[str],
+    out: str | os.PathLike[str],
+    *,
+    resume: bool = False,
+    progress: Callable[[float, float], None] | None = None,
+) -> RunSummary:
+    """Run a protocol, as ``asperity run`` does.
+
+    Parameters
+    ----------
+    protocol : Protocol or path
+        Or the path of its TOML file.
+    out : path
+        NetCDF file of the motion.
+    resume : bool
+        Go on after an interruption.
+    progress : callable, optional
+        Called now and then with the time reached and the end of the programme (s).
+
+    Returns
+    -------
+    RunSummary
+
+    Raises
+    ------
+    InputError
+        If the protocol has a mistake, or `out` cannot be written.
+    """
+    chosen = protocol
+    if not isinstance(chosen, Protocol):
+        chosen = load_protocol(file_path(chosen, "protocol"))
+    target = file_path(out, "out")
+    resume, progress = switch(resume, "resume"), function(progress, "progress")
+    return run_protocol(chosen, target, resume=resume, progress=progress)

@@ -32,7 +32,7 @@ def stability_statement(protocol: Protocol) -> str:
     Where no closed form of the critical stiffness exists (other laws, radiation damping, elastic
     asperities with inertia), the rate comes from the equations linearised at steady sliding.
     """
-    numbers: dict[str, Any] = {name: found.value for name, found in protocol.numbers.items()}
+    numbers: dict[str, Any] = {name: number.value for name, number in protocol.numbers.items()}
     level, heavy = protocol.programme.level, protocol.solver.inertia
     if protocol.start.states is not None or not level.velocity > 0:
         return ""

@@ -15,7 +15,7 @@ from asperity.recording.finding import Finding
 from asperity.recording.roles import ROLES, role_of
 from asperity.recording.trace import Channel, Trace
 from asperity.units import KINDS
-from asperity.units.dimension import base_units, kind_of_dimension, unit_text
+from asperity.units.scale import base_units, kind_of_dimension, unit_text
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -61,9 +61,9 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     return replace(trace, provenance={**trace.provenance, "derived channels": made})
 
 
-def _with(trace: Trace, target: str, found: Evaluated, field: str, text: str) -> Trace:
+def _with(trace: Trace, target: str, evaluated: Evaluated, field: str, text: str) -> Trace:
     role = role_of(target)
-    quantity = found.quantity
+    quantity = evaluated.quantity
     kind = kind_of_dimension(quantity.dimension)
     _check_kind(role, kind, quantity, field)
     shape = trace.time.shape
@@ -78,14 +78,16 @@ def _with(trace: Trace, target: str, found: Evaluated, field: str, text: str) ->
         channels = {kept if name == target else name: c for name, c in channels.items()}
         findings = tuple(_moved(f, target, kept) for f in findings)
         roles = {r: kept if name == target else name for r, name in roles.items()}
-        found = replace(found, sources=tuple(kept if s == target else s for s in found.sources))
+        evaluated = replace(
+            evaluated, sources=tuple(kept if s == target else s for s in evaluated.sources)
+        )
     channels[target] = channel
     if role is not None:
         roles[role] = target
     alone = check(Trace(trace.time, {target: channel}))
-    own = [f for f in alone if f.name not in _OF_TIME and not f.where.startswith("time,")]
-    inherited = _inherited(findings, found.sources, target, {f.name for f in own})
-    return replace(trace, channels=channels, findings=(*findings, *own, *inherited), roles=roles)
+    direct = [f for f in alone if f.name not in _OF_TIME and not f.where.startswith("time,")]
+    inherited = _inherited(findings, evaluated.sources, target, {f.name for f in direct})
+    return replace(trace, channels=channels, findings=(*findings, *direct, *inherited), roles=roles)
 
 
 def _with_time(trace: Trace, time: NDArray[np.float64], field: str, text: str) -> Trace:
@@ -167,19 +169,19 @@ def _quantity(channel: Channel, key: str, field: str) -> Quantity:
 
 
 def _inherited(
-    findings: tuple[Finding, ...], sources: tuple[str, ...], target: str, own: set[str]
+    findings: tuple[Finding, ...], sources: tuple[str, ...], target: str, known: set[str]
 ) -> list[Finding]:
     """What is known of the sources that a check of the new channel may not see."""
     made = []
     for source in sources:
         for f in findings:
             about = f.where == source or f.where.startswith(f"{source}, ")
-            if not about or f.name in (*own, "unknown unit", "unit overridden", "constant"):
+            if not about or f.name in (*known, "unknown unit", "unit overridden", "constant"):
                 continue
-            said = f"'{target}' is made from '{source}': {f.sentence}"
+            sentence = f"'{target}' is made from '{source}': {f.sentence}"
             where = f"{target}{f.where.removeprefix(source)}"
             name = f.name if f.name.startswith("source ") else f"source {f.name}"
-            made.append(Finding(name, f.severity, f.number, where, said))
+            made.append(Finding(name, f.severity, f.number, where, sentence))
     return made
 
 

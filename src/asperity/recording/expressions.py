@@ -1,21 +1,17 @@
 """Arithmetic of channels with units: ``Conf.Press - (Up.Pore.Press + Dwn.Pore.Press)/2``.
 
-A text is read by a grammar of its own and evaluated on arrays in SI; nothing of it is ever run as
-Python.
+Names, numbers and units of a text are looked up first; what stands between them is parsed by `ast`,
+and only sums, products, powers and the functions of `FUNCTIONS` are evaluated, on arrays in SI.
+Nothing is ever run as Python.
 
-    sum      = product { ("+" | "-") product }
-    product  = signed { ("*" | "/") signed }
-    signed   = [ "+" | "-" ] power
-    power    = factor [ ("^" | "**") signed ]
-    factor   = number [unit | "[" unit "]"] | "[" unit "]" | name | 'name' | "(" sum ")"
-             | function "(" sum { "," sum } ")"
-
-A unit behind a number may hold a quotient if it is written without blanks (``2.4 N/V``). A name is
-that of a channel, or the role that one plays; if it is neither, it is a unit (``36 * mm``).
+A unit stands behind its number (``36 mm``), or in brackets (``[N/V]``); behind a number it may hold
+a quotient if it is written without blanks (``2.4 N/V``). A name is that of a channel, or the role
+that one plays; if it is neither, it is a unit (``36 * mm``). Names with blanks stand in quotes.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -25,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
-from asperity.units.dimension import Dimension, base_units, dimension_of, unit_text
+from asperity.units.scale import Dimension, base_units, dimension_of, unit_text
 
 Array = NDArray[np.float64]
 
@@ -37,7 +33,8 @@ _HIGHEST_POWER = 16.0
 _UNIT = r"(?:[^\W\d_]|[%°])+(?:\^?-?\d+)?"
 _TOKEN = re.compile(
     rf"""
-    (?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)(?:\s*(?P<unit>{_UNIT}(?:[*/·]{_UNIT})*))?
+    (?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
+        (?:\s*(?P<unit>{_UNIT}(?:[*/·]{_UNIT})*)|\s*\[(?P<behind>[^\[\]]*)\])?
     | \[(?P<bracket>[^\[\]]*)\]
     | (?P<quoted>'[^']*'|"[^"]*"|`[^`]*`)
     | (?P<name>[^\W\d][\w.]*)
@@ -46,7 +43,7 @@ _TOKEN = re.compile(
     """,
     re.X,
 )
-_SAME = {"**": "^", "·": "*", "×": "*", "−": "-"}
+_PYTHON = {"^": "**", "·": "*", "×": "*", "−": "-"}
 
 
 class Quantity(NamedTuple):
@@ -104,154 +101,87 @@ def evaluate(text: str, names: Names, field: str) -> Evaluated:
     InputError
         If it is no expression, a name or unit is unknown, or dimensions do not agree.
     """
-    parser = _Parser(text, names, field)
-    # What overflows becomes infinite, and is found as such by the check of the channel.
+    expression = _Expression(text, names, field)
+    # What overflows becomes infinite, and is reported by the check of the channel.
     with np.errstate(all="ignore"):
-        quantity = parser.whole()
-    return Evaluated(quantity, tuple(dict.fromkeys(parser.sources)))
+        quantity = expression.value()
+    return Evaluated(quantity, tuple(dict.fromkeys(expression.sources)))
 
 
-class _Parser:
-    """One pass over the tokens of a text, evaluating as it goes."""
+class _Expression:
+    """A text, and what its names, numbers and units stand for."""
 
     def __init__(self, text: str, names: Names, field: str) -> None:
         self.text, self.names, self.field = text, names, field
+        self.operands: list[Quantity] = []
         self.sources: list[str] = []
-        self.depth = 0
         if len(text) > _LONGEST:
             self.fail(f"have at most {_LONGEST} characters", f"{len(text)}", "split it")
-        self.tokens = self._tokens()
-        self.at = 0
 
     def fail(self, rule: str, got: str, advice: str) -> NoReturn:
         raise InputError(f"{self.field} must {rule}, got {got}; {advice}")
 
-    def _tokens(self) -> list[re.Match[str]]:
-        found, at = [], 0
-        while at < len(self.text):
-            match = _TOKEN.match(self.text, at)
-            if match is None:
-                self._misplaced(self.text[at])
-            if match.lastgroup != "blank":
-                found.append(match)
-            at = match.end()
-        return found
-
     def _misplaced(self, what: str) -> NoReturn:
         self.fail(
             "be an expression of channels, numbers and units",
-            f"'{what}' in '{self.text}'",
+            what,
             "write it like 'Force * 1 kN / (20 mm * 36 mm)', names with blanks in quotes",
         )
 
-    def sign(self) -> str:
-        """The sign that comes next, empty if it is none."""
-        if self.at < len(self.tokens) and self.tokens[self.at]["sign"]:
-            sign = self.tokens[self.at]["sign"]
-            return _SAME.get(sign, sign)
-        return ""
+    def value(self) -> Quantity:
+        source = self._source()
+        try:
+            return self._evaluated(ast.parse(source, mode="eval").body)
+        except SyntaxError:
+            self._misplaced(f"'{self.text}'")
+        except RecursionError:
+            self.fail("be short", f"{len(self.text)} characters", "split it")
 
-    def take(self, sign: str) -> None:
-        if self.sign() != sign:
-            left = self.tokens[self.at][0] if self.at < len(self.tokens) else "its end"
-            self.fail(f"have a '{sign}'", f"{left!r} in '{self.text}'", "check the brackets")
-        self.at += 1
-
-    def whole(self) -> Quantity:
-        value = self.sum()
-        if self.at < len(self.tokens):
-            self._misplaced(self.tokens[self.at][0])
-        return value
-
-    def sum(self) -> Quantity:
-        value = self.product()
-        while (sign := self.sign()) in ("+", "-"):
-            self.at += 1
-            other = self.product()
-            if value.dimension != other.dimension:
-                self.fail(
-                    "add like to like",
-                    f"{_told(value)} {sign} {_told(other)} in '{self.text}'",
-                    "check the units of the channels",
-                )
-            sum_ = value.values + other.values if sign == "+" else value.values - other.values
-            value = Quantity(sum_, value.dimension)
-        return value
-
-    def product(self) -> Quantity:
-        value = self.signed()
-        while (sign := self.sign()) in ("*", "/"):
-            self.at += 1
-            other = self.signed()
-            if sign == "*":
-                values, power = value.values * other.values, 1.0
+    def _source(self) -> str:
+        """The text as Python, each operand a name: ``_0 - (_1 + _2)/_3``."""
+        parts: list[str] = []
+        at = level = signs = 0
+        while at < len(self.text):
+            token = _TOKEN.match(self.text, at)
+            if token is None:
+                self._misplaced(f"'{self.text[at]}' in '{self.text}'")
+            at = token.end()
+            if token["blank"]:
+                continue
+            if token["sign"]:
+                sign = _PYTHON.get(token["sign"], token["sign"])
+                parts.append(sign)
+                level += {"(": 1, ")": -1}.get(sign, 0)
+                signs = signs + 1 if sign in "+-" else 0
+                if max(level, signs) > _DEEPEST:
+                    self.fail(f"have at most {_DEEPEST} levels of brackets", "more", "simplify it")
+                continue
+            signs = 0
+            if token["name"] in FUNCTIONS and self.text[at:].lstrip().startswith("("):
+                parts.append(token["name"])
+                continue
+            parts.append(f"_{len(self.operands)}")
+            if token["number"]:
+                quantity, at = self._number(token)
+            elif token["bracket"] is not None:
+                quantity = self._unit(token["bracket"])
+            elif token["quoted"]:
+                quantity = self._channel(token["quoted"][1:-1], only_channels=True)
             else:
-                values, power = np.divide(value.values, other.values), -1.0
-            value = Quantity(values, _product(value.dimension, other.dimension, power))
-        return value
-
-    def signed(self) -> Quantity:
-        sign = self.sign()
-        if sign in ("+", "-"):
-            self.at += 1
-            self.depth += 1
-            self._not_too_deep()
-            value = self.signed()
-            self.depth -= 1
-            return Quantity(-value.values, value.dimension) if sign == "-" else value
-        return self.power()
-
-    def power(self) -> Quantity:
-        value = self.factor()
-        if self.sign() != "^":
-            return value
-        self.at += 1
-        exponent = self.signed()
-        if exponent.dimension or np.ndim(exponent.values):
-            self.fail("have plain numbers as exponents", _told(exponent), "write it like x^2")
-        n = float(exponent.values)
-        if not abs(n) <= _HIGHEST_POWER:
-            self.fail(f"have exponents up to {_HIGHEST_POWER:g}", f"{n:g}", "correct it")
-        dimension = dimension_of({name: n * m for name, m in value.dimension})
-        return Quantity(np.power(value.values, n), dimension)
-
-    def factor(self) -> Quantity:
-        if self.at >= len(self.tokens):
+                quantity = self._channel(token["name"], only_channels=False)
+            self.operands.append(quantity)
+        if level > 0:
+            self.fail("have a ')'", f"'{self.text}'", "check the brackets")
+        if not parts or parts[-1] in ("+", "-", "*", "/", "**"):
             self.fail("be complete", f"'{self.text}'", "add what is missing at its end")
-        token = self.tokens[self.at]
-        if token["sign"] == "(":
-            self.at += 1
-            self.depth += 1
-            self._not_too_deep()
-            value = self.sum()
-            self.depth -= 1
-            self.take(")")
-            return value
-        if token["sign"]:
-            self._misplaced(token["sign"])
-        self.at += 1
-        if token["number"]:
-            return self._number(float(token["number"]), token)
-        if token["bracket"] is not None:
-            return self._unit(token["bracket"])
-        if token["quoted"]:
-            return self._channel(token["quoted"][1:-1], only_channels=True)
-        if self.sign() == "(" and token["name"] in FUNCTIONS:
-            return self._function(token["name"])
-        return self._channel(token["name"], only_channels=False)
+        return " ".join(parts)
 
-    def _not_too_deep(self) -> None:
-        if self.depth > _DEEPEST:
-            self.fail(f"have at most {_DEEPEST} levels of brackets", "more", "simplify it")
-
-    def _number(self, number: float, token: re.Match[str]) -> Quantity:
-        text = token["unit"]
+    def _number(self, token: re.Match[str]) -> tuple[Quantity, int]:
+        """A number with its unit, and where the text goes on behind them."""
+        number, text = float(token["number"]), token["unit"]
         if text is None:
-            if self.at < len(self.tokens) and self.tokens[self.at]["bracket"] is not None:
-                self.at += 1
-                unit = self._unit(self.tokens[self.at - 1]["bracket"])
-                return Quantity(np.float64(number * unit.values), unit.dimension)
-            return Quantity(np.float64(number), ())
+            unit = self._unit(token["behind"] or "")
+            return Quantity(np.float64(number * unit.values), unit.dimension), token.end()
         # "2 N/area" is a number with a unit over a channel: as much is a unit as can be one.
         length = len(text)
         while length > 0:
@@ -260,21 +190,8 @@ class _Parser:
             except InputError:
                 length = max(text.rfind(mark, 0, length) for mark in "*/·")
                 continue
-            if length < len(text):
-                self._split(token, length)
-            return Quantity(np.float64(number * factor), dimension)
-        return self._unit(text)
-
-    def _split(self, token: re.Match[str], length: int) -> None:
-        """Put what is no unit behind a number back among the tokens."""
-        rest, at = [], token.start("unit") + length
-        while at < token.end():
-            match = _TOKEN.match(self.text, at, token.end())
-            if match is None:
-                self._misplaced(self.text[at])
-            rest.append(match)
-            at = match.end()
-        self.tokens[self.at : self.at] = rest
+            return Quantity(np.float64(number * factor), dimension), token.start("unit") + length
+        return self._unit(text), token.end()
 
     def _unit(self, text: str) -> Quantity:
         try:
@@ -288,9 +205,9 @@ class _Parser:
         return Quantity(np.float64(factor), dimension)
 
     def _channel(self, name: str, only_channels: bool) -> Quantity:
-        found = self.names.find(name, only_channels)
-        if found is not None:
-            quantity, source = found
+        known = self.names.find(name, only_channels)
+        if known is not None:
+            quantity, source = known
             if source:
                 self.sources.append(source)
             return quantity
@@ -299,24 +216,60 @@ class _Parser:
                 raise InputError
             factor, dimension = base_units(name)
         except InputError:
-            known = [*self.names.known, *([] if only_channels else FUNCTIONS)]
             self.fail(
                 "be made of channels that are there",
                 f"'{name}' in '{self.text}'",
-                closest(name, known),
+                closest(name, [*self.names.known, *([] if only_channels else FUNCTIONS)]),
             )
         return Quantity(np.float64(factor), dimension)
 
-    def _function(self, name: str) -> Quantity:
-        self.take("(")
-        self.depth += 1
-        self._not_too_deep()
-        arguments = [self.sum()]
-        while self.sign() == ",":
-            self.at += 1
-            arguments.append(self.sum())
-        self.depth -= 1
-        self.take(")")
+    def _evaluated(self, node: ast.expr) -> Quantity:
+        match node:
+            case ast.Name(id=name) if name not in FUNCTIONS:
+                value = self.operands[int(name[1:])]
+            case ast.UnaryOp(op=ast.UAdd(), operand=inner):
+                value = self._evaluated(inner)
+            case ast.UnaryOp(op=ast.USub(), operand=inner):
+                value = self._evaluated(inner)
+                value = Quantity(-value.values, value.dimension)
+            case ast.BinOp(left=left, op=op, right=right):
+                value = self._combined(self._evaluated(left), op, self._evaluated(right))
+            case ast.Call(func=ast.Name(id=name), args=arguments) if name in FUNCTIONS:
+                value = self._function(name, [self._evaluated(each) for each in arguments])
+            case _:
+                self._misplaced(f"'{self.text}'")
+        return value
+
+    def _combined(self, one: Quantity, op: ast.operator, other: Quantity) -> Quantity:
+        match op:
+            case ast.Add() | ast.Sub():
+                sign = "+" if isinstance(op, ast.Add) else "-"
+                if one.dimension != other.dimension:
+                    self.fail(
+                        "add like to like",
+                        f"{_described(one)} {sign} {_described(other)} in '{self.text}'",
+                        "check the units of the channels",
+                    )
+                total = one.values + other.values if sign == "+" else one.values - other.values
+                return Quantity(total, one.dimension)
+            case ast.Mult():
+                dimension = _product(one.dimension, other.dimension, 1.0)
+                return Quantity(one.values * other.values, dimension)
+            case ast.Div():
+                dimension = _product(one.dimension, other.dimension, -1.0)
+                return Quantity(np.divide(one.values, other.values), dimension)
+        return self._power(one, other)
+
+    def _power(self, value: Quantity, exponent: Quantity) -> Quantity:
+        if exponent.dimension or np.ndim(exponent.values):
+            self.fail("have plain numbers as exponents", _described(exponent), "write it like x^2")
+        n = float(exponent.values)
+        if not abs(n) <= _HIGHEST_POWER:
+            self.fail(f"have exponents up to {_HIGHEST_POWER:g}", f"{n:g}", "correct it")
+        dimension = dimension_of({name: n * m for name, m in value.dimension})
+        return Quantity(np.power(value.values, n), dimension)
+
+    def _function(self, name: str, arguments: list[Quantity]) -> Quantity:
         rule = FUNCTIONS[name]
         if len(arguments) not in rule.arguments:
             counts = " or ".join(map(str, rule.arguments))
@@ -332,7 +285,9 @@ class _Parser:
         start, end = arguments[1:]
         for limit in (start, end):
             if limit.dimension != base_units("s")[1] or np.ndim(limit.values):
-                self.fail("have stretches in time", _told(limit), "write it like zero(x, 0 s, 5 s)")
+                self.fail(
+                    "have stretches in time", _described(limit), "write it like zero(x, 0 s, 5 s)"
+                )
         time = self.names.time
         inside = (time >= start.values) & (time <= end.values)
         if not inside.any():
@@ -354,46 +309,52 @@ class Function:
 
     arguments: tuple[int, ...]
     example: str
-    apply: Callable[[_Parser, list[Quantity]], Quantity]
+    apply: Callable[[_Expression, list[Quantity]], Quantity]
 
 
-def _mean(parser: _Parser, given: list[Quantity]) -> Quantity:
-    values = parser.column(given[0])[parser.stretch(given)]
-    return Quantity(np.float64(np.nanmean(values)) if _any(values) else _NAN, given[0].dimension)
+def _mean(expression: _Expression, arguments: list[Quantity]) -> Quantity:
+    values = expression.column(arguments[0])[expression.stretch(arguments)]
+    return Quantity(
+        np.float64(np.nanmean(values)) if _any(values) else _NAN, arguments[0].dimension
+    )
 
 
-def _median(parser: _Parser, given: list[Quantity]) -> Quantity:
-    values = parser.column(given[0])[parser.stretch(given)]
-    return Quantity(np.float64(np.nanmedian(values)) if _any(values) else _NAN, given[0].dimension)
+def _median(expression: _Expression, arguments: list[Quantity]) -> Quantity:
+    values = expression.column(arguments[0])[expression.stretch(arguments)]
+    return Quantity(
+        np.float64(np.nanmedian(values)) if _any(values) else _NAN, arguments[0].dimension
+    )
 
 
-def _zero(parser: _Parser, given: list[Quantity]) -> Quantity:
-    return Quantity(given[0].values - _mean(parser, given).values, given[0].dimension)
+def _zero(expression: _Expression, arguments: list[Quantity]) -> Quantity:
+    return Quantity(
+        arguments[0].values - _mean(expression, arguments).values, arguments[0].dimension
+    )
 
 
-def _cumulative(parser: _Parser, given: list[Quantity]) -> Quantity:
-    return Quantity(np.cumsum(parser.column(given[0])), given[0].dimension)
+def _cumulative(expression: _Expression, arguments: list[Quantity]) -> Quantity:
+    return Quantity(np.cumsum(expression.column(arguments[0])), arguments[0].dimension)
 
 
-def _integral(parser: _Parser, given: list[Quantity]) -> Quantity:
-    values, time = parser.column(given[0]), parser.names.time
+def _integral(expression: _Expression, arguments: list[Quantity]) -> Quantity:
+    values, time = expression.column(arguments[0]), expression.names.time
     parts = np.diff(time) * (values[1:] + values[:-1]) / 2
     whole = np.concatenate([[0.0], np.cumsum(parts)])
-    return Quantity(whole, _product(given[0].dimension, base_units("s")[1], 1.0))
+    return Quantity(whole, _product(arguments[0].dimension, base_units("s")[1], 1.0))
 
 
-def _derivative(parser: _Parser, given: list[Quantity]) -> Quantity:
-    values = np.gradient(parser.column(given[0]), parser.names.time)
-    return Quantity(values, _product(given[0].dimension, base_units("s")[1], -1.0))
+def _derivative(expression: _Expression, arguments: list[Quantity]) -> Quantity:
+    values = np.gradient(expression.column(arguments[0]), expression.names.time)
+    return Quantity(values, _product(arguments[0].dimension, base_units("s")[1], -1.0))
 
 
-def _absolute(parser: _Parser, given: list[Quantity]) -> Quantity:
-    return Quantity(np.abs(given[0].values), given[0].dimension)
+def _absolute(expression: _Expression, arguments: list[Quantity]) -> Quantity:
+    return Quantity(np.abs(arguments[0].values), arguments[0].dimension)
 
 
-def _root(parser: _Parser, given: list[Quantity]) -> Quantity:
-    half = dimension_of({name: n / 2 for name, n in given[0].dimension})
-    return Quantity(np.sqrt(given[0].values), half)
+def _root(expression: _Expression, arguments: list[Quantity]) -> Quantity:
+    half = dimension_of({name: n / 2 for name, n in arguments[0].dimension})
+    return Quantity(np.sqrt(arguments[0].values), half)
 
 
 _NAN = np.float64(np.nan)
@@ -422,5 +383,5 @@ def _product(one: Dimension, other: Dimension, power: float) -> Dimension:
     return dimension_of(exponents)
 
 
-def _told(value: Quantity | Any) -> str:
+def _described(value: Quantity | Any) -> str:
     return f"a quantity in {unit_text(value.dimension)}" if value.dimension else "a pure number"

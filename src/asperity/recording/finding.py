@@ -12,7 +12,7 @@ Severity = Literal["note", "warning", "error"]
 
 #: Findings on a file whose columns are not all that was recorded, or not under their names.
 _COLUMNS = frozenset(
-    {"truncated", "damaged", "heading mismatch", "other length", "short column", "text column"}
+    {"truncated", "heading mismatch", "other length", "short column", "text column"}
 )
 
 
@@ -61,5 +61,5 @@ def with_cause(error: InputError, findings: Iterable[Finding]) -> InputError:
     findings : iterable of Finding
         What the reader noticed.
     """
-    said = [f.sentence.rstrip(".") for f in findings if f.name in _COLUMNS]
-    return InputError(f"{error} ({'; '.join(said)})") if said else error
+    causes = [f.sentence.rstrip(".") for f in findings if f.name in _COLUMNS]
+    return InputError(f"{error} ({'; '.join(causes)})") if causes else error

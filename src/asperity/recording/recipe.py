@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from typing import Any
 
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError
+from asperity.parameters.mistakes import worded
 from asperity.parameters.toml_file import toml_content
 
 
@@ -57,13 +57,6 @@ def load_recipe(path: str | os.PathLike[str]) -> ReadingRecipe:
     try:
         return ReadingRecipe.model_validate(content)
     except ValidationError as error:
-        raise InputError(_sentence(error.errors(include_url=False)[0], file.name)) from None
-
-
-def _sentence(mistake: Any, name: str) -> str:
-    place = ".".join(map(str, mistake["loc"][:2]))
-    if mistake["type"] == "extra_forbidden":
-        advice = closest(str(mistake["loc"][-1]), ReadingRecipe.model_fields)
-        return f"recipe.{place} must be a known field, got it in '{name}'; {advice}"
-    rule = " ".join(mistake["msg"].split()).removeprefix("Input should be ")
-    return f"recipe.{place} must be {rule}, got {mistake['input']!r} in '{name}'; correct the value"
+        first = error.errors(include_url=False)[0]
+        sentence = worded(first, "recipe", {"": ReadingRecipe}, prefix="recipe.")[0]
+        raise InputError(f"{sentence} (in '{file.name}')") from None

@@ -156,8 +156,8 @@ def candidates(role: str, kinds: Mapping[str, str | None]) -> list[str]:
 
 
 def _says(name: str, spec: Role) -> bool:
-    said = words(name)
-    return "".join(said) in spec.whole or any(w in spec.words for w in said)
+    spoken = words(name)
+    return "".join(spoken) in spec.whole or any(w in spec.words for w in spoken)
 
 
 def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str, str]) -> str:
@@ -185,14 +185,14 @@ def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str
     if role is not None and role in chosen:
         return chosen[role]
     same = [k for k in kinds if k.lower() == name.lower()]
-    found = same or (candidates(role, kinds) if role else [])
-    if len(found) == 1:
-        return found[0]
-    if found:
+    fitting = same or (candidates(role, kinds) if role else [])
+    if len(fitting) == 1:
+        return fitting[0]
+    if fitting:
         raise InputError(
             f"Trace.channel must name one channel, got '{name}', which can be "
-            f"{' or '.join(map(repr, found))}; choose when reading, like "
-            f"columns={{'{role or name}': '{found[0]}'}}"
+            f"{' or '.join(map(repr, fitting))}; choose when reading, like "
+            f"columns={{'{role or name}': '{fitting[0]}'}}"
         )
     raise InputError(
         f"Trace.channel must name a channel, got '{name}'; "

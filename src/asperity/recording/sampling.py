@@ -66,16 +66,16 @@ def check_sampling(time: Array) -> list[Finding]:
         steps = np.diff(clean)
         if grid.quantum > _EVEN * grid.step:
             rounded = [_rounded(grid)]
-    found = rounded + _backward_and_repeated(steps, clean, rows)
+    findings = rounded + _backward_and_repeated(steps, clean, rows)
     forward = steps > 0
     steps, starts = (steps, rows) if forward.all() else (steps[forward], rows[:-1][forward])
     if not steps.size:
-        return found
+        return findings
     gap, missing = _gaps(steps, clean)
     if gap.size:
         longest = gap[np.argmax(missing)]
         row = int(starts[longest])
-        found.append(
+        findings.append(
             Finding(
                 "gap",
                 "warning",
@@ -87,16 +87,16 @@ def check_sampling(time: Array) -> list[Finding]:
         )
         steps, starts = np.delete(steps, gap), np.delete(starts, gap)
     if steps.size and not _are_even(steps, clean):
-        found.append(_uneven(steps, starts, time))
-    return found
+        findings.append(_uneven(steps, starts, time))
+    return findings
 
 
 def _backward_and_repeated(steps: Array, time: Array, rows: NDArray[np.intp]) -> list[Finding]:
-    found = []
+    findings = []
     backward, repeated = np.flatnonzero(steps < 0), np.flatnonzero(steps == 0)
     if backward.size:
         i = int(backward[np.argmin(steps[backward])])
-        found.append(
+        findings.append(
             Finding(
                 "backward time",
                 "error",
@@ -108,7 +108,7 @@ def _backward_and_repeated(steps: Array, time: Array, rows: NDArray[np.intp]) ->
         )
     if repeated.size:
         i = int(repeated[0])
-        found.append(
+        findings.append(
             Finding(
                 "repeated time",
                 "warning",
@@ -118,7 +118,7 @@ def _backward_and_repeated(steps: Array, time: Array, rows: NDArray[np.intp]) ->
                 f"row {rows[i + 1]}.",
             )
         )
-    return found
+    return findings
 
 
 def _gaps(steps: Array, time: Array) -> tuple[NDArray[np.intp], Array]:

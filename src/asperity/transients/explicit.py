@@ -18,8 +18,7 @@ from jax import Array
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
-from asperity.transients.single_kernel import one_kernel
-from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, run_steps
+from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, one_kernel, run_steps
 
 _SAFETY = 0.9
 _LIMITS = LengthLimits(shrink=0.2, grow=6.0)

@@ -26,8 +26,7 @@ from asperity.algebra.small_systems import jacobian_columns, product, solve_colu
 from asperity.loads import Excitation
 from asperity.transients.dense_output import StepChunk
 from asperity.transients.equations import SegmentEquations
-from asperity.transients.single_kernel import one_kernel
-from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, run_steps
+from asperity.transients.steps import AcceptedSteps, LengthLimits, TrialStep, one_kernel, run_steps
 
 STAGES = 5
 _SAFETY = 0.9

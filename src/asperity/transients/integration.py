@@ -1,7 +1,24 @@
-"""Integration through the segments of a programme, one compiled chunk of steps at a time."""
+"""Integration through the segments of a programme, one compiled chunk of steps at a time.
+
+Where the steps of the explicit method are limited by stability, the implicit one goes on.
+
+A slider on elastic asperities rings at sqrt(W0 / (lambda M)). In a hold the slip that damps the
+ringing becomes slower and slower, so that a trace of it is left for ever, and steps that resolve it
+never become longer. Where such steps are too many, the velocity of the slider is integrated with
+the error that corresponds to the tolerated error of the force on the asperities,
+
+    |dv| = sqrt(lambda W0 / M) |d(F_i/W)|,
+
+the velocity with which the slider rings while F_i/W swings by its tolerated error. The implicit
+method then takes steps longer than a period and damps the ringing that is left. All other states
+keep their tolerances.
+
+Stiffness-based choice of the method.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from types import ModuleType
@@ -13,15 +30,181 @@ import numpy as np
 
 from asperity.loads import Programme
 from asperity.loads.programme.segment import ProgrammeSegment
-from asperity.slider import Motion
-from asperity.transients import implicit
-from asperity.transients.dense_output import UNDERFLOW, DenseOutput, StepChunk
-from asperity.transients.discontinuities import states_across_break
-from asperity.transients.equations import MotionSamples, SegmentEquations, step_samples
-from asperity.transients.events import Event, EventDetector, EventThresholds
-from asperity.transients.method_choice import NAMES, MethodChoice
-from asperity.transients.pace import Pace, ringing_velocity
-from asperity.transients.termination import Termination
+from asperity.slider import Inertial, Motion, RadiatingAsperities, ReversingInertial, StiffInertial
+from asperity.transients import explicit, implicit
+from asperity.transients.dense_output import STEPS, UNDERFLOW, DenseOutput, StepChunk
+from asperity.transients.equations import (
+    MotionSamples,
+    SegmentEquations,
+    states_across_break,
+    step_samples,
+)
+from asperity.transients.events import Event, EventDetector, EventThresholds, Termination
+
+#: Steps still to come above which it is tried to leave the ringing out: some ten seconds of work.
+_MANY_STEPS = 1_000_000
+
+#: How much longer steps have to become for that.
+_GAIN = 50.0
+
+#: StepChunks of steps in a row that must foretell too many steps before the integration gives up.
+_HOPELESS_CHUNKS = 20
+
+
+def ringing_velocity(motion: Motion) -> float:
+    """Velocity (over V) at which the slider rings while F_i/W swings by 1; 0 without ringing."""
+    if not isinstance(motion, Inertial):
+        return 0.0
+    return float(np.sqrt(motion.mobility / motion.strain))
+
+
+@dataclass
+class Pace:
+    """Judges the steps of one segment by their number.
+
+    Parameters
+    ----------
+    rings : bool
+        Whether the equations have a ringing that can be left out.
+    most_steps : float
+        Steps that an integration may take.
+    """
+
+    rings: bool
+    most_steps: float
+    _tried: bool = False
+    _hopeless: int = 0
+
+    def enter(self) -> None:
+        """Begin a segment, whose break point may make the slider ring anew."""
+        self._tried, self._hopeless = False, 0
+
+    def many(self, chunk: StepChunk, t: float, end: float) -> bool:
+        """Whether steps such as those of a chunk that begins at `t` are too many to wait for."""
+        return _steps_left(chunk, t, end) >= _MANY_STEPS
+
+    def worth_trying(self, chunk: StepChunk, t: float, end: float) -> bool:
+        """Whether to try steps without ringing instead of a chunk, once in a segment.
+
+        Parameters
+        ----------
+        chunk : StepChunk
+            Steps that resolve the ringing.
+        t, end : float
+            Where they begin, and the end of the segment (s).
+        """
+        if not self.rings or self._tried or not self.many(chunk, t, end):
+            return False
+        self._tried = True
+        return True
+
+    def gained(self, chunk: StepChunk, trial: StepChunk, t: float) -> bool:
+        """Whether the steps of a trial that begins at `t`, as the chunk does, are longer enough."""
+        return _length(trial, t) > _GAIN * _length(chunk, t)
+
+    def out_of_reach(
+        self, chunk: StepChunk, t: float, end: float, start: float, steps: int
+    ) -> Termination | None:
+        """The termination, if the end of the segment is too many steps away.
+
+        Parameters
+        ----------
+        chunk : StepChunk
+            The last steps, which begin at `t` (s).
+        end, start : float
+            End of the segment, and its beginning in the programme (s).
+        steps : int
+            Steps taken so far.
+        """
+        left = _steps_left(chunk, t, end)
+        self._hopeless = self._hopeless + 1 if steps + left > self.most_steps else 0
+        if left and (steps >= self.most_steps or self._hopeless >= _HOPELESS_CHUNKS):
+            detail = f"its steps of {_length(chunk, t):.3g} s would take {left:.3g} more"
+            return Termination("too many steps", start + float(chunk.t), detail)
+        return None
+
+
+def _length(chunk: StepChunk, t: float) -> float:
+    """Mean length of the steps of a chunk that begins at `t` (s)."""
+    return (float(chunk.t) - t) / max(int(chunk.taken), 1)
+
+
+def _steps_left(chunk: StepChunk, t: float, end: float) -> float:
+    """Steps of that length from the end of the chunk to `end`."""
+    left = end - float(chunk.t)
+    if left <= 0 or not chunk.taken:
+        return 0.0
+    length = _length(chunk, t)
+    # Steps below the spacing of doubles do not move the time.
+    return left / length if length > 0 else math.inf
+
+
+METHODS = ("auto", "explicit", "implicit")
+
+#: Names of the methods in results.
+NAMES = {explicit: "explicit", implicit: "implicit"}
+
+#: Share of the steps of a chunk that must be doubtful before the other method is tried.
+_MOST = 0.6
+
+#: Cost of an implicit step in explicit ones.
+_COST = 2.5
+
+
+class MethodChoice:
+    """The explicit or the implicit method, chosen by the last steps.
+
+    Either method reports steps that the other might have taken more cheaply. When the explicit
+    method is at its limit of stability, the implicit one is tried; unless its steps are longer by
+    more than the ratio of the costs, the next trial waits for twice as long. Measured times play
+    no part, so that the same input gives the same result.
+
+    Parameters
+    ----------
+    motion : Motion
+    method : str
+        One of `METHODS`.
+    """
+
+    def __init__(self, motion: Motion, method: str) -> None:
+        stiff = isinstance(motion, StiffInertial | ReversingInertial | RadiatingAsperities)
+        self._free = method == "auto"
+        self._implicit = stiff if self._free else method == "implicit"
+        self._explicit_length = 0.0  # mean step before a trial; 0 where none is under way
+        self._wait, self._waited = 1, 0
+
+    @property
+    def method(self) -> ModuleType:
+        """The module whose `advance` takes the next steps."""
+        return implicit if self._implicit else explicit
+
+    def learn(self, chunk: StepChunk, many: bool) -> None:
+        """Judge the method by the chunk of steps it has just taken.
+
+        Parameters
+        ----------
+        chunk : StepChunk
+        many : bool
+            Whether the end is so many of these steps away that the explicit method is doubted in
+            any case: near a steady state its limit of stability cannot be seen in the steps.
+        """
+        # A chunk that ends early, at a break point, has too few steps to judge.
+        if not self._free or int(chunk.taken) < STEPS:
+            return
+        doubtful = int(chunk.doubtful) > _MOST * STEPS
+        length = float(chunk.length.mean())
+        if not self._implicit:
+            self._waited += 1
+            if (doubtful or many) and self._waited >= self._wait:
+                self._implicit, self._explicit_length = True, length
+        elif self._explicit_length and length < _COST * self._explicit_length:
+            self._implicit, self._waited = False, 0
+            self._wait *= 2
+        else:
+            self._explicit_length = 0.0
+            if doubtful:
+                self._implicit, self._waited, self._wait = False, 0, 1
+
 
 #: Share of the mean load at which contact counts as lost: friction is F_i/W.
 NO_LOAD = 1e-6

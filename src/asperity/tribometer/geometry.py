@@ -20,8 +20,8 @@ def _to_si(geometry: Any, kinds: dict[str, str]) -> None:
     for field in fields(geometry):
         name = f"{type(geometry).__name__}.{field.name}"
         kind = kinds[field.name]
-        given = getattr(geometry, field.name)
-        value = to_radians(given, name) if field.name == "angle" else given
+        stated = getattr(geometry, field.name)
+        value = to_radians(stated, name) if field.name == "angle" else stated
         value = to_si(value, kind, name)
         if not value > 0:
             raise InputError(

@@ -69,8 +69,8 @@ class Sensor:
         for field in fields(self):
             kind = _KINDS.get(field.name, self.kind)
             name = f"{type(self).__name__}.{field.name}"
-            given = getattr(self, field.name)
-            value = to_si(given, "dimensionless" if field.name == "drift" else kind, name)
+            stated = getattr(self, field.name)
+            value = to_si(stated, "dimensionless" if field.name == "drift" else kind, name)
             low = field.name not in ("offset", "drift")
             if low and (value < 0 or (value == 0 and field.name in _POSITIVE)):
                 rule = "positive" if field.name in _POSITIVE else "not negative"

@@ -18,7 +18,7 @@ from asperity.recording.checks import check
 from asperity.recording.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
 from asperity.tribometer.filters import between, filtered, low_pass
-from asperity.tribometer.sensors import Given, Sensor
+from asperity.tribometer.sensors import Accelerometer, Given, Sensor
 from asperity.units import KINDS, to_si
 
 Array = NDArray[np.float64]
@@ -58,10 +58,10 @@ class Recorder:
 
     def __post_init__(self) -> None:
         for name, kind in (("rate", "frequency"), ("cut_off", "frequency"), ("jitter", "time")):
-            given = getattr(self, name)
-            if given is None:
+            stated = getattr(self, name)
+            if stated is None:
                 continue
-            value = to_si(given, kind, f"Recorder.{name}")
+            value = to_si(stated, kind, f"Recorder.{name}")
             if value < 0 or (value == 0 and name != "jitter"):
                 raise InputError(
                     f"Recorder.{name} must be positive, got {value:g} {KINDS[kind].si}; "
@@ -201,3 +201,37 @@ class Tribometer:
             sampled = low + step * np.rint((np.clip(sampled, low, high) - low) / step)
         unit = KINDS[sensor.reads].si
         return Channel(sampled, sensor.reads, unit, name, unit)
+
+
+def channel_gain(
+    tribometer: Tribometer, channel: str, frequency: ArrayLike
+) -> NDArray[np.complex128]:
+    """Recorded over true amplitude of a harmonic signal, e^{+i w t}.
+
+    A laboratory knows it from calibration: amplitudes are divided by its modulus.
+
+    Parameters
+    ----------
+    tribometer : Tribometer
+    channel : str
+        Name of a sensor.
+    frequency : array_like
+        Hz.
+
+    Returns
+    -------
+    complex array, of the shape of `frequency`
+        Sensor and anti-alias filter; a clock's error is not in it.
+    """
+    sensor, recorder = tribometer.sensors[channel], tribometer.recorder
+    s = 2j * np.pi * np.asarray(frequency, float)
+    gain = _filter(s, *low_pass(1, sensor.bandwidth)) * np.exp(-s * sensor.delay)
+    if isinstance(sensor, Accelerometer) and sensor.high_pass > 0:
+        gain = gain * (1 - _filter(s, *low_pass(1, sensor.high_pass)))
+    if recorder.cut_off is not None:
+        gain = gain * _filter(s, *low_pass(recorder.order, recorder.cut_off))
+    return gain
+
+
+def _filter(s: NDArray, poles: NDArray, residues: NDArray) -> NDArray:
+    return (residues / (s[..., None] - poles)).sum(-1)

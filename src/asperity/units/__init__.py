@@ -3,8 +3,7 @@
 Conversion is decimal, so ``"0.4 um"`` is exactly the double nearest to 4e-7.
 """
 
-from asperity.units.angle import to_radians
-from asperity.units.convert import format_si, from_si, to_si
+from asperity.units.convert import format_si, from_si, to_radians, to_si
 from asperity.units.kinds import KINDS, Kind
 
 __all__ = ["KINDS", "Kind", "format_si", "from_si", "to_radians", "to_si"]

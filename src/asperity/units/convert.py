@@ -20,6 +20,9 @@ _LARGEST_POWER = 5000
 #: Characters of a user's text that a message repeats.
 _SHOWN = 60
 
+#: Radians in each unit; a text without one is in radians.
+_RADIANS = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180, "degrees": math.pi / 180}
+
 
 @overload
 def to_si(value: str, kind: str, name: str, *, require_unit: bool = ...) -> float: ...
@@ -211,3 +214,34 @@ def _beyond_doubles(name: str, text: str, spec: Kind) -> InputError:
 def shortened(text: str) -> str:
     """What a message repeats of a user's text."""
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
+
+
+def to_radians(value: Any, name: str) -> Any:
+    """Convert an angle to radians.
+
+    Parameters
+    ----------
+    value : str, number or array
+        A text has its unit, ``"5 deg"`` or ``"0.09 rad"``; numbers are in radians and returned as
+        they are.
+    name : str
+        What messages call the value.
+
+    Raises
+    ------
+    InputError
+        If a text is no angle.
+    """
+    if not isinstance(value, str):
+        return value
+    number, _, unit = value.strip().replace("°", " deg").partition(" ")
+    try:
+        angle = float(number) * _RADIANS[unit.strip()]
+    except (KeyError, ValueError):
+        angle = math.nan
+    if not math.isfinite(angle):
+        raise InputError(
+            f"{name} must be an angle in rad or deg, got '{shortened(value)}'; write it "
+            "like '5 deg'"
+        )
+    return angle

@@ -67,7 +67,7 @@ def test_starts_are_found_without_a_material(readings):
 TRUTH_FREE = {name: TRUTH[name] for name in FREE}
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_intervals_cover_and_a_factor_of_two_in_the_likelihood_would_not(readings, pmma):
     sets = 60
     inside = {"right": np.zeros(2), "narrow": np.zeros(2)}

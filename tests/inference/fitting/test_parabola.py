@@ -9,6 +9,7 @@ from benchmarks.coverage import CASES, TRUE, runs_of
 from asperity.inference import fit
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.intervals import nowhere_negative, parabola_of
+from references.populations import population
 
 
 def test_what_noise_adds_is_not_negative_by_rounding():
@@ -78,7 +79,7 @@ def _information(objective, u):
     return jacobian.T @ jacobian
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", population(3))
 def test_exchangeable_states_are_one_minimum_in_order(seed):
     random = np.random.default_rng(seed)
     (run,) = runs_of(CASES["steps"], 1, seed=seed)

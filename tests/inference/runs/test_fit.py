@@ -20,6 +20,7 @@ from asperity.orbit import periodic_response
 from asperity.recording import Channel, Trace
 from asperity.slider import Slider
 from benchmarks import coverage
+from references.populations import population
 
 CASE = CASES["steps"]
 FREE = ["A", "B", "D0"]
@@ -75,7 +76,7 @@ def test_minima_that_differ_in_the_times_of_steps_alone_are_one_answer(found):
     assert [round(other.chi2 - found.chi2, 6) for other in described.optima] == [1.0]
 
 
-@pytest.mark.parametrize("number", [2, 3])
+@pytest.mark.parametrize("number", population([2, 3]))
 def test_a_drift_that_outweighs_the_signal_hides_no_minimum(number):
     """Under white noise, as under least squares, it passes for slow evolution of the friction."""
 
@@ -108,6 +109,7 @@ def test_exact_recordings_give_the_truth():
         assert estimates[name] == pytest.approx(truth, rel=2e-3)
 
 
+@pytest.mark.long
 def test_white_noise_bars_are_too_small_and_a_factor_of_two_is_seen():
     sets = 8
     # One start besides the truth: the minimum is not what is in question.

@@ -6,6 +6,8 @@ import pytest
 
 from asperity.inference import RunOptions, fit, recorded_run
 
+pytestmark = pytest.mark.slow
+
 FOLDER = Path(__file__).resolve().parents[4] / "shared" / "data"
 BASALT = FOLDER / "velstep4_BRAVA_expb819_basalt.txt"
 

@@ -8,16 +8,22 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from asperity.algebra import cyclic, small_systems
 from asperity.laws import RiceRuina, get_law
 from asperity.loads import Harmonic
-from asperity.orbit.mesh import condensation
-from asperity.orbit.mesh.mesh import Orbit, equidistributed, evaluate, graded_mesh, split
+from asperity.orbit.mesh import equations
+from asperity.orbit.mesh.mesh import (
+    GAUSS,
+    STAGES,
+    Orbit,
+    equidistributed,
+    evaluate,
+    graded_mesh,
+    split,
+)
 from asperity.orbit.mesh.newton import ACCEPTED, Plane, solve, solve_in_plane
 from asperity.orbit.mesh.reading import read_orbit
-from asperity.orbit.mesh.scheme import GAUSS, STAGES
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.problem import Problem, checked_problem, flatten
 from asperity.theory.adiabatic import adiabatic_growth
@@ -27,7 +33,6 @@ EXACT = 1e-11
 #: Points and right-hand sides of the small systems.
 POINTS, COLUMNS = 50, 4
 
-expm_points = jax.jit(small_systems.expm_points)
 product = jax.jit(small_systems.product)
 solve_columns = jax.jit(small_systems.solve_columns)
 spectral_abscissa = jax.jit(small_systems.spectral_abscissa)
@@ -92,21 +97,6 @@ def test_a_singular_matrix_is_not_solved_silently():
         repeated([[1.0, 2.0], [2.0, 4.0]]), repeated(np.ones((2, COLUMNS)))
     ):
         assert not np.isfinite(found).any()
-
-
-@pytest.mark.parametrize("size", [1e-6, 1.0, 20.0])
-@pytest.mark.parametrize("n", [1, 2, 3])
-def test_matrix_exponential(n, size):
-    matrix = size * matrices(n)
-    found = each(expm_points(matrix))
-    for one, expected in zip(found, map(expm, each(matrix)), strict=True):
-        np.testing.assert_allclose(one, expected, rtol=0, atol=EXACT * np.abs(expected).max())
-
-
-def test_matrix_exponential_of_a_defective_matrix():
-    expected = np.exp(0.3) * np.array([[1.0, 1.0], [0.0, 1.0]])
-    found = each(expm_points(repeated([[0.3, 1.0], [0.0, 0.3]])))
-    np.testing.assert_allclose(found[0], expected, atol=1e-15)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3])
@@ -340,9 +330,9 @@ def test_condensation_is_that_of_each_interval(monkeypatch):
     entries = STAGES * n * ((STAGES + 1) * n + sides)
     blocks = {}
     for name, at_a_time in (("whole", intervals), ("blocks", 20)):
-        monkeypatch.setattr(condensation, "_CACHED", at_a_time * entries)
+        monkeypatch.setattr(equations, "_CACHED", at_a_time * entries)
         # A new function each time: the size of the blocks is a constant of the program.
-        condense = jax.jit(lambda *inputs: condensation.condense(*inputs))
+        condense = jax.jit(lambda *inputs: equations.condense(*inputs))
         blocks[name] = jax.tree.map(np.asarray, condense(jacobian, right, widths, GAUSS.a))
     for m in (0, 27, 59):
         J, h = np.moveaxis(jacobian[..., m], 2, 0), widths[m]

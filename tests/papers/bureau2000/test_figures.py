@@ -7,6 +7,8 @@ from asperity.papers.bureau2000 import numbers as study
 from asperity.papers.bureau2000.numbers.bands import band, variations
 from asperity.papers.bureau2000.numbers.harmonics import late_over_early_slope, pulse_limit
 
+pytestmark = pytest.mark.slow
+
 SLOW, FAST = "1 um/s", "10 um/s"
 
 

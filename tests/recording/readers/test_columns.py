@@ -7,7 +7,7 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.recording import read
-from asperity.recording.readers.labels import split_labels
+from asperity.recording.readers.units import split_labels
 
 
 @pytest.fixture

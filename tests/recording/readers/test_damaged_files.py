@@ -141,30 +141,6 @@ def test_the_whole_files_are_recordings(tmp_path, name):
     assert np.allclose(trace.channel("W").values, LOAD, rtol=1e-6)
 
 
-@pytest.mark.parametrize("version", ["4", "5"])
-@pytest.mark.parametrize("compressed", [False, True])
-def test_of_a_matlab_file_that_is_cut_whole_variables_are_read_and_the_cut_is_said(
-    tmp_path, version, compressed
-):
-    if version == "4" and compressed:
-        pytest.skip("version 4 packs nothing")
-    raw = matlab(version, compressed)
-    path = tmp_path / "cut.mat"
-    said, refused = 0, []
-    for size in np.linspace(1, len(raw) - 1, 40).astype(int):
-        path.write_bytes(raw[:size])
-        try:
-            trace = read(path, rate="100 Hz")
-        except InputError as error:
-            refused.append(str(error))
-        else:
-            # A cut between two variables leaves no trace in the file.
-            said += "truncated" in {f.name for f in trace.findings}
-            assert all(c.values.size == ROWS for c in trace.channels.values())
-    assert said > 10
-    assert all("must be a whole file" in message for message in refused), refused
-
-
 def test_json_and_documents_are_refused_at_once(tmp_path):
     for name, text in (
         ("a.json", '[{"t": 1, "F": 2.5}]'),

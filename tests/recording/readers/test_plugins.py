@@ -15,7 +15,7 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.recording import read
-from asperity.recording.readers.plugins import reader_points
+from asperity.recording.readers.formats import reader_points
 
 ROOT = Path(__file__).parents[3]
 EXAMPLE = ROOT / "examples" / "lab_reader.py"
@@ -109,15 +109,15 @@ TEXT_STEP = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], step='1 ms'")
 @pytest.mark.parametrize(
     ("module", "rule"),
     [
-        (RAISES, "could not read .RuntimeError: no."),
+        (RAISES, "could not read it .RuntimeError: no."),
         (NOTHING, "must be a reader that returns a RawRecording"),
-        (UNEQUAL, "must be a reader of columns of one length"),
-        (LISTS, "hold arrays of one dimension, got another thing in 'F'"),
-        (TEXT_STEP, "whose step is a positive number of seconds, got '1 ms'"),
-        (NUMBER_UNIT, "texts for label and unit, got 'F' and 3"),
-        (BARE, "returns a RawRecording of RawColumns"),
-        (START, "start is a number of seconds, got 'now'"),
-        (FINDING, "with a list of Findings"),
+        (UNEQUAL, "RawRecording.columns must be of one length, got .3, 4. rows"),
+        (LISTS, "must be an array of one dimension, got another thing in 'F'"),
+        (TEXT_STEP, "step must be a positive number of seconds, got '1 ms'"),
+        (NUMBER_UNIT, "could not read it .TypeError: label and unit .* texts, got 'F' and 3"),
+        (BARE, "could not read it .TypeError: columns of a RawRecording are RawColumns"),
+        (START, "start must be a number of seconds, got 'now'"),
+        (FINDING, "could not read it .TypeError: findings of a RawRecording are Findings"),
         ("def read(path): ...\n", "must be a reader with is_format"),
         ("import nothing_of_this_name\n", "must be a reader that can be loaded"),
     ],
@@ -126,6 +126,23 @@ def test_a_reader_with_a_mistake_is_one_sentence(package, recording, module, rul
     package("broken = broken_reader", broken_reader=module)
     with pytest.raises(InputError, match=rule):
         read(recording, format="broken")
+
+
+LAYOUT = START.replace("def read(path)", "def read(path, *, delimiter=None)").replace(
+    "start='now'", "provenance={'delimiter': delimiter}"
+)
+
+
+def test_a_reader_takes_the_layout_that_it_names(package, recording, tmp_path):
+    package("broken = broken_reader", broken_reader=LAYOUT)
+    options = {"columns": {"time": "t"}, "format": "broken"}
+    assert read(recording, **options, delimiter="|").provenance["delimiter"] == "|"
+    with pytest.raises(InputError, match=r"read\.group must be left out for format 'broken'"):
+        read(recording, **options, group="run 1")
+    # A reduction file is for recordings of any format: of its layout a reader takes what it can.
+    recipe = tmp_path / "lab.toml"
+    recipe.write_text('group = "run 1"\ndelimiter = ";"\n')
+    assert read(recording, **options, recipe=recipe).provenance["delimiter"] == ";"
 
 
 def test_a_reader_with_the_name_of_a_format_is_refused(package, recording):

@@ -204,10 +204,9 @@ def _measured(
 
 def _modulated(trace: Any, options: Options, name: str) -> dict[str, Any]:
     from asperity.measurement.campaign import modulated_rows
-    from asperity.measurement.cycle import mean_cycle, residual_spectrum
     from asperity.measurement.measure import measure as measured
     from asperity.measurement.measure import measure_amplitudes
-    from asperity.measurement.record import modulated_record
+    from asperity.measurement.record import mean_cycle, modulated_record, residual_spectrum
     from asperity.units import to_si
 
     frequency = options.frequency

@@ -122,7 +122,7 @@ def run(
 def _estimate(plan: Path, as_json: bool) -> int:
     from asperity.cli.report import aligned, to_json
     from asperity.cli.sweep.progress import time_text
-    from asperity.orbit.processes import available_cores
+    from asperity.orbit.search import available_cores
     from asperity.outputs import size_text
     from asperity.sweep import dry_run
 

@@ -24,7 +24,7 @@ from asperity.errors import InputError
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import PriorDensity, Whitened
 from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
-from asperity.orbit.processes import available_cores
+from asperity.orbit.search import available_cores
 from asperity.outputs import Interrupted
 
 Float = NDArray[np.float64]

@@ -18,7 +18,7 @@ from scipy.stats import norm
 from asperity.errors import InputError
 from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.velocities import constant_velocities
-from asperity.measurement.channels import compressive, load_channel, shear_channel
+from asperity.measurement.samples import compressive, load_channel, shear_channel
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace

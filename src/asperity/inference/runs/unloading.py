@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from asperity.errors import InputError
 from asperity.inference.runs.noise import fitted
 from asperity.inference.unknowns import Prior
-from asperity.measurement.channels import compressive
+from asperity.measurement.samples import compressive
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace

@@ -16,7 +16,7 @@ from jax import Array
 from jax.typing import ArrayLike
 
 from asperity._jax import configure
-from asperity.loads.excitation import Excitation
+from asperity.loads.modulation import Excitation
 
 configure()  # double precision, before any segment makes an array
 

@@ -12,10 +12,8 @@ from numpy.typing import ArrayLike
 from asperity.errors import InputError
 from asperity.loads.consistency import checked_modulation
 from asperity.loads.modulation import Modulation
-from asperity.loads.programme.harmonic import HarmonicSegment
-from asperity.loads.programme.interpolants import interpolated
-from asperity.loads.programme.periodic import PeriodicSegment
-from asperity.loads.programme.recorded import RecordedSegment
+from asperity.loads.programme.formulas import HarmonicSegment, PeriodicSegment
+from asperity.loads.programme.recorded import RecordedSegment, interpolated
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.parameters.arguments import number
 from asperity.units import to_radians, to_si
@@ -261,17 +259,17 @@ class Follow(ProgrammeStep):
         return [segment], LoadAndVelocity(float(W[-1]), float(V[-1]))
 
 
-def _velocity(given: Given | None, level: LoadAndVelocity, name: str) -> float:
-    return level.velocity if given is None else number(given, f"{name}.velocity", "velocity")
+def _velocity(velocity: Given | None, level: LoadAndVelocity, name: str) -> float:
+    return level.velocity if velocity is None else number(velocity, f"{name}.velocity", "velocity")
 
 
-def _duration(given: Given, name: str) -> float:
-    return _positive(given, "time", f"{name}.duration")
+def _duration(duration: Given, name: str) -> float:
+    return _positive(duration, "time", f"{name}.duration")
 
 
-def _positive(given: Given, kind: str, name: str) -> float:
-    return number(given, name, kind, "positive")
+def _positive(value: Given, kind: str, name: str) -> float:
+    return number(value, name, kind, "positive")
 
 
-def _at_least_zero(given: Given, kind: str, name: str) -> float:
-    return number(given, name, kind, "not negative")
+def _at_least_zero(value: Given, kind: str, name: str) -> float:
+    return number(value, name, kind, "not negative")

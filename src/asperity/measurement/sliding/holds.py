@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from asperity.measurement.sliding.trend import bin_means, columns, fit_trend
+from asperity.measurement.series import bin_means, columns, fit_trend
 
 Array = NDArray[np.float64]
 
@@ -125,14 +125,14 @@ def read_hold(
     settling : bool
         Whether the sliding before begins with the transient of something earlier.
     """
-    first, held, again, stop = bounds
-    begin = first + int(_SETTLING * (held - first)) * settling
-    slid, mu = bin_means(time[begin:held] - edges[0], friction[begin:held])
+    first, hold, again, stop = bounds
+    begin = first + int(_SETTLING * (hold - first)) * settling
+    slid, mu = bin_means(time[begin:hold] - edges[0], friction[begin:hold])
     fit = fit_trend(columns(slid, min(degree, 1)), mu)
     level = float(fit.beta[0])
     doubt = float(np.sqrt(fit.variance * fit.inverse[0, 0]))
-    quick = _quick_noise(friction[begin:held])
-    rested = friction[max(held, again - max(3, (again - held) // 50)) : again]
+    quick = _quick_noise(friction[begin:hold])
+    rested = friction[max(hold, again - max(3, (again - hold) // 50)) : again]
     low = float(rested.mean()) if rested.size else np.nan
     low_doubt = quick / np.sqrt(max(rested.size, 1))
     peak, peak_doubt, at = _peak(time, friction, again, stop, level, quick)

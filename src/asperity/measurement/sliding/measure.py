@@ -188,11 +188,11 @@ def measure_sliding(
         )
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
-    given = _given_cuts(time, steps, holds)
-    if given is None:
+    times = _given_cuts(time, steps, holds)
+    if times is None:
         cut = partition(time, signals.displacement, friction)
     else:
-        cut = partition_at(time, signals.displacement, np.array(given))
+        cut = partition_at(time, signals.displacement, np.array(times))
         cut = _with_holds(cut, time, holds)
     bounds = [0, *(c.sample for c in cut.cuts), time.size]
     segments = tuple(
@@ -202,7 +202,7 @@ def measure_sliding(
     read_steps, unread = _steps(signals, cut, bounds, segments, DRIFTS[detrend])
     read_holds = _holds(signals, cut, bounds, DRIFTS[detrend])
     doubts = [*cut.doubts, *unread]
-    if given is None and signals.displacement is None:
+    if times is None and signals.displacement is None:
         doubts.append(f"no segments without motion: {signals.no_motion}")
     checks = _checks(signals, segments, read_steps, doubts)
     about = about_channels(trace, signals.names)
@@ -221,7 +221,7 @@ def measure_sliding(
         values=friction,
         velocity_from=signals.motion,
         detrend=detrend,
-        chosen_by="program" if given is None else "user",
+        chosen_by="program" if times is None else "user",
         unread=len(trace.findings) - len(about),
         checks=tuple(checks),
     )
@@ -271,8 +271,8 @@ def _with_holds(
 
 def _segment(time: Array, friction: Array, velocity: float, hold: bool) -> SlidingSegment:
     means = block_means(friction, 100)
-    settled = steady_from(means, 1) * max(1, friction.size // 100)
-    late, values = time[settled:], friction[settled:]
+    begin = steady_from(means, 1) * max(1, friction.size // 100)
+    late, values = time[begin:], friction[begin:]
     away = late - late.mean()
     power = float(away @ away)
     slope = float(away @ (values - values.mean())) / power if power else 0.0
@@ -298,7 +298,7 @@ def _steps(
     degree: int,
 ) -> tuple[list[VelocityStep], list[str]]:
     """Every change between two sliding segments, and sentences on those that cannot be read."""
-    found: list[VelocityStep] = []
+    steps: list[VelocityStep] = []
     unread: list[str] = []
     # The first segment may begin with the loading.
     first = segments[0]
@@ -325,22 +325,22 @@ def _steps(
             unread.append(f"the step at {change.time:.6g} s does not settle in what was recorded")
             settling = np.inf
             continue
-        found.append(step)
+        steps.append(step)
         settling = step.settling_slip
-    return found, unread
+    return steps, unread
 
 
 def _holds(
     signals: SlidingSignals, cut: Partition, bounds: list[int], degree: int
 ) -> list[HoldReading]:
-    found = []
+    holds = []
     for k, hold in enumerate(cut.holds):
         if not hold or k in (0, len(cut.holds) - 1):
             continue
         a, b, c, d = bounds[k - 1 : k + 3]
         if min(b - a, d - c) < _FEWEST or c - b < 2:
             continue
-        found.append(
+        holds.append(
             read_hold(
                 signals.time,
                 signals.friction,
@@ -352,7 +352,7 @@ def _holds(
                 settling=k > 1,
             )
         )
-    return found
+    return holds
 
 
 def _rates(time: Array) -> tuple[tuple[float, float], ...]:

@@ -198,15 +198,15 @@ def _cells(time: Array, displacement: Array, noise: float) -> NDArray[np.intp]:
         stop = min(max(latest, at + 3), n - 1)
         reach = 64
         # The first sample that is far enough, looked for in growing pieces.
-        found, begin = stop, at + 3
+        edge, begin = stop, at + 3
         while begin < stop:
             end = min(begin + reach, stop)
             far = np.abs(displacement[begin:end] - displacement[at]) >= size
             if far.any():
-                found = begin + int(np.argmax(far))
+                edge = begin + int(np.argmax(far))
                 break
             begin, reach = end, 4 * reach
-        at = found
+        at = edge
         edges.append(at)
     if len(edges) > 2 and edges[-1] - edges[-2] < 3:
         del edges[-2]
@@ -267,9 +267,9 @@ def _without_transitions(
         duration = np.diff(time[at])
         path = np.abs(np.diff(displacement[at]))
         speeds = [_velocity(time, displacement, a, b + 1) for a, b in pairwise(at)]
-        found = _transition(bounds, duration, path, speeds, noise)
-        if found is not None:
-            k, near, share = found
+        transition = _transition(bounds, duration, path, speeds, noise)
+        if transition is not None:
+            k, near, share = transition
             if share > _DISTURBANCE:
                 doubts.append(
                     f"{duration[k]:.3g} s at {1e6 * abs(speeds[k]):.3g} um/s from "
@@ -337,37 +337,42 @@ def _transition(
     """The least of the transitions, the neighbour to join it to, and its share of that."""
     least: tuple[int, int, float] | None = None
     for k in range(len(speeds)):
-        beside = [j for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
+        neighbours = [j for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
         speed = abs(speeds[k])
-        if len(beside) == 2 and speed < 0.2 * min(abs(speeds[j]) for j in beside):
+        if len(neighbours) == 2 and speed < 0.2 * min(abs(speeds[j]) for j in neighbours):
             continue  # a stop is no transition, however short
-        spans, paths = [float(duration[j]) for j in beside], [float(path[j]) for j in beside]
-        same = len(beside) == 2 and _log_ratio(speeds[k - 1], speeds[k + 1]) < np.log(_RATIO)
+        spans, paths = (
+            [float(duration[j]) for j in neighbours],
+            [float(path[j]) for j in neighbours],
+        )
+        same = len(neighbours) == 2 and _log_ratio(speeds[k - 1], speeds[k + 1]) < np.log(_RATIO)
         span, slid = (sum(spans), sum(paths)) if same else (min(spans), min(paths))
         share = max(duration[k] / max(span, 1e-300), path[k] / max(slid, 10 * noise))
-        between = len(beside) == 2 and min(abs(speeds[j]) for j in beside) < speed < max(
-            abs(speeds[j]) for j in beside
+        between = len(neighbours) == 2 and min(abs(speeds[j]) for j in neighbours) < speed < max(
+            abs(speeds[j]) for j in neighbours
         )
         if between:
             share = min(share, _share_of_ramp(k, duration, path, speeds, noise))
         few = between and bounds[k + 1] - bounds[k] <= _FEW_CELLS
-        near = min(beside, key=lambda j: _log_ratio(speeds[k], speeds[j]))
+        near = min(neighbours, key=lambda j: _log_ratio(speeds[k], speeds[j]))
         # Displacement of the contact, not of the machine, overshoots and settles after a step.
-        own = max(duration[k] / max(duration[near], 1e-300), path[k] / max(path[near], 10 * noise))
+        relative = max(
+            duration[k] / max(duration[near], 1e-300), path[k] / max(path[near], 10 * noise)
+        )
         settles = (
-            len(beside) == 2
-            and own < _SETTLING
+            len(neighbours) == 2
+            and relative < _SETTLING
             and _log_ratio(speeds[k], speeds[near]) < np.log(_SETTLING_RATIO)
             and _log_ratio(speeds[k], speeds[near])
-            < 0.7 * max(_log_ratio(speeds[k], speeds[j]) for j in beside)
+            < 0.7 * max(_log_ratio(speeds[k], speeds[j]) for j in neighbours)
         )
         limit = _RAMP if between else _DISTURBANCE if same else _TRANSITION
         if share < limit or few:
-            own = 0.0
+            relative = 0.0
         elif not settles:
             continue
-        if least is None or own < least[2]:
-            least = k, near, float(own)
+        if least is None or relative < least[2]:
+            least = k, near, float(relative)
     return least
 
 
@@ -462,7 +467,7 @@ def _kink_of_friction(
     if t.size < 12:
         return at
     tried = np.linspace(max(at - reach, t[2]), min(at + reach, t[-4]), 61)
-    best, found = np.inf, at
+    best, kink = np.inf, at
     level = float(np.sum((f - np.polyval(np.polyfit(t - at, f, 1), t - at)) ** 2))
     for begin in tried:
         turn = np.clip(t - begin, 0, None)
@@ -471,9 +476,9 @@ def _kink_of_friction(
         beta, *_ = np.linalg.lstsq(columns, f)
         misfit = float(np.sum((f - columns @ beta) ** 2))
         if misfit < best:
-            best, found = misfit, float(begin)
+            best, kink = misfit, float(begin)
     # Correlated noise makes a kink too: half of the scatter has to go.
-    return found if best < 0.5 * level else at
+    return kink if best < 0.5 * level else at
 
 
 def _holds(
@@ -485,11 +490,11 @@ def _holds(
 ) -> tuple[list[bool], list[str]]:
     holds, doubts = [], []
     for k, (first, stop) in enumerate(pieces):
-        beside = [abs(speeds[j]) for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
-        if not beside:
+        neighbours = [abs(speeds[j]) for j in (k - 1, k + 1) if 0 <= j < len(speeds)]
+        if not neighbours:
             holds.append(False)
             continue
-        share = abs(speeds[k]) / max(min(beside), 1e-300)
+        share = abs(speeds[k]) / max(min(neighbours), 1e-300)
         moved = abs(float(displacement[stop - 1] - displacement[first]))
         still = share < _HOLD or (share < 0.2 and moved < _CELL_NOISE * noise)
         holds.append(bool(still))
@@ -505,8 +510,8 @@ def _without_rounding(
     time: Array, pieces: list[tuple[int, int]], speeds: list[float], noise: float
 ) -> list[float]:
     """Velocities, zero where the displacement moves by no more than its noise."""
-    found = []
+    kept = []
     for (first, stop), speed in zip(pieces, speeds, strict=True):
         moved = abs(speed) * float(time[stop - 1] - time[first])
-        found.append(0.0 if moved <= 2 * _STILL * noise else speed)
-    return found
+        kept.append(0.0 if moved <= 2 * _STILL * noise else speed)
+    return kept

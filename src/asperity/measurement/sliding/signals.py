@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.measurement.channels import (
+from asperity.measurement.samples import (
     compressive,
     load_channel,
     refuse_contradiction,
+    require_computable,
     shear_channel,
 )
-from asperity.measurement.samples import require_computable
 from asperity.recording.roles import candidates, words
 from asperity.recording.rounded_time import even_times
 
@@ -127,8 +127,8 @@ def sliding_signals(
         weight = weight[use & np.isfinite(weight)]
         weight = weight if weight.size else None
     optional = {"load": weight, "displacement": slip}
-    given = {name: values for name, values in optional.items() if values is not None}
-    require_computable(time=time - time[0], friction=friction, **given)
+    present = {name: values for name, values in optional.items() if values is not None}
+    require_computable(time=time - time[0], friction=friction, **present)
     turned = bool(np.median(friction) < 0)
     return SlidingSignals(
         time=time,

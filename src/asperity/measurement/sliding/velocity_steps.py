@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
-from asperity.measurement.sliding.trend import TrendFit, bin_means, columns, fit_trend
+from asperity.measurement.series import TrendFit, bin_means, columns, fit_trend
 
 Array = NDArray[np.float64]
 
@@ -150,7 +150,7 @@ def read_step(
     lengths = -float(earlier.slip[0]), float(later.slip[-1])
     shorter = min(lengths)
     settling = 0.0
-    found: list[tuple[StepChoice, StepChoice | None, float, TrendFit, TrendFit]] = []
+    readings: list[tuple[StepChoice, StepChoice | None, float, TrendFit, TrendFit]] = []
     windows = sorted(
         {(min(lengths[0], w * shorter), min(lengths[1], w * shorter)) for w in _WINDOWS}
     )
@@ -170,10 +170,10 @@ def read_step(
             right = fit_trend(
                 columns(second.slip[keep], degree, () if share else decays), second.friction[keep]
             )
-            found.append((*_combined(left, right, degree, start, window[1]), left, right))
-    if not found:
+            readings.append((*_combined(left, right, degree, start, window[1]), left, right))
+    if not readings:
         return None
-    return _result(time, before, after, found, settling, known, degree)
+    return _result(time, before, after, readings, settling, known, degree)
 
 
 def _windowed(side: _Side, low: float, high: float) -> _Side | None:
@@ -201,9 +201,9 @@ def _transient(
     def free(values: Array) -> Array:
         return np.asarray(values - base @ (base.T @ values))
 
-    rest = free(friction)
-    own = np.stack([free(stepped - wave) for wave in waves])
-    gram, moment = own @ own.T, own @ rest
+    free_friction = free(friction)
+    free_waves = np.stack([free(stepped - wave) for wave in waves])
+    gram, moment = free_waves @ free_waves.T, free_waves @ free_friction
     gain, chosen, amplitudes = -1.0, (0, 1), np.zeros(2)
     for slow in range(1, decays.size):
         for fast in range(slow):
@@ -247,18 +247,18 @@ def _result(
     time: float,
     before: tuple[Array, Array, float],
     after: tuple[Array, Array, float],
-    found: list[tuple[StepChoice, StepChoice | None, float, TrendFit, TrendFit]],
+    readings: list[tuple[StepChoice, StepChoice | None, float, TrendFit, TrendFit]],
     settling: float,
     known: bool,
     degree: int,
 ) -> VelocityStep:
-    dof = float(min(min(left.dof, right.dof) for *_, left, right in found))
+    dof = float(min(min(left.dof, right.dof) for *_, left, right in readings))
     # Student's t of the slopes' difference, of the choice that tells them apart best.
-    apart = max(ratio for _, _, ratio, _, _ in found)
+    apart = max(ratio for _, _, ratio, _, _ in readings)
     one_slope = degree > 0 and apart < stdtrit(dof, 1 - _CHANCE / 2) ** 2
-    choices = [two for two, *_ in found]
+    choices = [two for two, *_ in readings]
     if one_slope:
-        choices += [one for _, one, *_ in found if one is not None]
+        choices += [one for _, one, *_ in readings if one is not None]
     change = np.array([c.change for c in choices])
     noise = np.array([c.uncertainty for c in choices])
     # A window that happens to look quiet knows no more than the others of its trend.
@@ -277,9 +277,9 @@ def _result(
     velocities = before[2], after[2]
     turned = known and velocities[0] * velocities[1] < 0
     lever = float(np.log(abs(velocities[1] / velocities[0]))) if known and not turned else np.nan
-    middle = found[len(found) // 2]
+    middle = readings[len(readings) // 2]
     slopes = [float(fit.beta[1]) if degree else 0.0 for fit in middle[3:]]
-    level = float(np.mean([left.beta[0] for *_, left, _ in found]))
+    level = float(np.mean([left.beta[0] for *_, left, _ in readings]))
     with np.errstate(divide="ignore", invalid="ignore"):
         rate = [float(np.divide(v, lever)) for v in (mean, uncertainty, half)]
     return VelocityStep(

@@ -1,4 +1,8 @@
-"""The questions that are put to a lock-in reading, each with its limits."""
+"""The questions that are put to a lock-in reading, each with its limits.
+
+Some ask whether a dry contact can give such numbers at all: if not, columns, signs or units are
+mistaken.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +11,13 @@ from numpy.typing import NDArray
 
 from asperity.lock_in.reading import LockInReading
 from asperity.measurement.series import MeanLevel, Rate
-from asperity.measurement.verdicts.oscillation import slow_line
+from asperity.measurement.verdicts.steadiness import slow_line
 from asperity.measurement.verdicts.verdict import Check, judged
 from asperity.recording.finding import Finding
 
 Array = NDArray[np.float64]
 
-#: Where suspicious and bad begin.
+#: Where suspicious and bad begin; friction has a lower and an upper side.
 LIMITS: dict[str, tuple[float, float]] = {
     "modulation": (20.0, 5.0),
     "periods": (5.0, 2.0),
@@ -30,10 +34,18 @@ LIMITS: dict[str, tuple[float, float]] = {
     "infinite": (0.0, 0.25),
     "gap": (0.0, 0.25),
     "uneven sampling": (20.0, 1000.0),
+    "contact": (0.95, 1.0),
+    "low friction": (0.02, -2.0),
+    "high friction": (2.0, 20.0),
+    "response": (1.5, 5.0),
+    "aliasing": (2.0, -1.0),
 }
 
 #: A line this often above its background is no accident of a spectrum of 1e5 lines.
 _LINE = 6.0
+
+#: Harmonics of a load that is as good as a shaker's are gone from here on.
+_HIGHEST = 8
 
 
 def modulation(reading: LockInReading) -> Check:
@@ -77,18 +89,19 @@ def load_harmonics(reading: LockInReading) -> Check:
     """How much of mu2 can come from a second harmonic of the load."""
     if reading.harmonics.size < 2:
         return judged("load harmonics", 0.0, LIMITS["load harmonics"], "mu2 was not asked for")
-    second, own = reading.load_phasor(2), reading.phasor(2)
+    second, response = reading.load_phasor(2), reading.phasor(2)
     share = second.amplitude
     effect = reading.phasor(1).amplitude / abs(reading.epsilon) * share
-    number = effect / max(own.amplitude, 1e-300)
+    number = effect / max(response.amplitude, 1e-300)
     return judged(
         "load harmonics",
         number,
         LIMITS["load harmonics"],
         f"the load's second harmonic is {share:.3g} W0; answered as the first is, it makes "
-        f"{effect:.2g} of mu2 = {own.amplitude:.3g}, and at most "
+        f"{effect:.2g} of mu2 = {response.amplitude:.3g}, and at most "
         f"{abs(reading.mean_friction) * share:.2g} if the force followed the load at once",
-        significant=share > 4 * second.amplitude_uncertainty and effect > own.amplitude_uncertainty,
+        significant=share > 4 * second.amplitude_uncertainty
+        and effect > response.amplitude_uncertainty,
     )
 
 
@@ -135,10 +148,10 @@ def transient(reading: LockInReading, chosen_by: str, pauses: list[Rate]) -> Che
             f"{lasts:.2g} of its time constants; "
         ) + (
             "what it settles to is read"
-            if settling.told
+            if settling.determined
             else "what it settles to cannot be told, record a longer stretch"
         )
-        seen = chosen_by == "user" or not settling.told
+        seen = chosen_by == "user" or not settling.determined
         return judged("transient", number, LIMITS["transient"], sentence, significant=seen)
     away = [drift_rate(reading).beyond(pause) for pause in pauses if reading.drift.shape[1]]
     # A pause that recovers from a modulation may drift too: none of them may explain the window.
@@ -180,14 +193,14 @@ def resolution(reading: LockInReading, load: Array, force: Array) -> Check:
     Noise of half a step smooths them; without it a harmonic below a step is no harmonic.
     """
     heights = (reading.epsilon, reading.phasor(1).amplitude)
-    found = []
+    answers = []
     for c, (name, values) in enumerate((("load", load), ("force", force))):
         steps = np.diff(np.unique(values[: 1 << 14]))
         step = float(steps.min()) if steps.size else 0.0
         noise = float(np.sqrt(reading.noise.spectra[1:, c, c].real.mean()))
         number = step / max(heights[c] * abs(reading.W0), 1e-300)
-        found.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))
-    seen, number, name, noisy = max(found)
+        answers.append((noise < 0.5 * step, number, name, noise / step if step else np.inf))
+    seen, number, name, noisy = max(answers)
     return judged(
         "resolution",
         number,
@@ -198,34 +211,36 @@ def resolution(reading: LockInReading, load: Array, force: Array) -> Check:
     )
 
 
-def findings(found: list[Finding], samples: int, span: float) -> list[Check]:
+def findings(noticed: list[Finding], samples: int, span: float) -> list[Check]:
     """What the reader and the checks of the recording say about the window.
 
     Parameters
     ----------
-    found : list of Finding
+    noticed : list of Finding
     samples : int
         In the window.
     span : float
         Its length (s).
     """
-    return [_finding(finding, samples, span) for finding in found]
+    return [_finding(finding, samples, span) for finding in noticed]
 
 
-def _finding(found: Finding, samples: int, span: float) -> Check:
-    sentence = found.sentence.rstrip(".") + (f" ({found.where})" if found.where else "")
+def _finding(finding: Finding, samples: int, span: float) -> Check:
+    sentence = finding.sentence.rstrip(".") + (f" ({finding.where})" if finding.where else "")
     # Shares of the window, where the number of the finding can be made one.
     shares = {
         "saturation": 1.0,
         **dict.fromkeys(("spike", "repeated time", "nan", "infinite"), 1 / samples),
         "gap": 1 / span,
     }
-    if found.name in shares:
-        return judged(found.name, found.number * shares[found.name], LIMITS[found.name], sentence)
-    if found.name in LIMITS:
-        return judged(found.name, found.number, LIMITS[found.name], sentence)
-    grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[found.severity]
-    return judged(found.name, 1.0, grave, sentence)
+    if finding.name in shares:
+        return judged(
+            finding.name, finding.number * shares[finding.name], LIMITS[finding.name], sentence
+        )
+    if finding.name in LIMITS:
+        return judged(finding.name, finding.number, LIMITS[finding.name], sentence)
+    grave = {"note": (2.0, 3.0), "warning": (0.5, 2.0), "error": (0.25, 0.5)}[finding.severity]
+    return judged(finding.name, 1.0, grave, sentence)
 
 
 def _nonzero(value: float) -> float:
@@ -238,3 +253,77 @@ def _percent(share: float) -> str:
 
 def _times(number: float) -> str:
     return f"{number:.3g} times" if number < 1e6 else "more than a million times"
+
+
+def contact(reading: LockInReading) -> Check:
+    """Whether the load stays above zero."""
+    return judged(
+        "contact",
+        reading.epsilon,
+        LIMITS["contact"],
+        f"the load falls to {1 - reading.epsilon:.3g} W0 in each period; below zero contact is "
+        "lost, or the load's zero or sign is not that of the recording",
+    )
+
+
+def friction(reading: LockInReading) -> Check:
+    """Whether the mean friction is one."""
+    number = reading.mean_friction
+    limits = LIMITS["high friction" if number > LIMITS["low friction"][0] else "low friction"]
+    sentence = (
+        f"the mean of F/W0 is {number:.4g}, where contacts have {LIMITS['low friction'][0]:g} to 2"
+    )
+    if number < 0:
+        sentence += (
+            "; load and force have opposite signs, which turns every phase by pi: a unit such as "
+            "'-1 N' for one of them turns it back"
+        )
+    elif number < LIMITS["low friction"][0] or number > LIMITS["high friction"][0]:
+        sentence += "; check the units, the zeros and which column is which"
+    return judged("friction", number, limits, sentence)
+
+
+def response(reading: LockInReading) -> Check:
+    """Whether the force follows the load by no more than in proportion to it."""
+    phasor = reading.phasor(1)
+    whole = abs(reading.epsilon * reading.mean_friction)
+    number = phasor.amplitude / max(whole, 1e-300)
+    return judged(
+        "response",
+        min(number, 1e300),
+        LIMITS["response"],
+        f"mu1 is {number:.3g} times the mean friction times epsilon, which is what a force in "
+        "proportion to the load has; if it is more, load and force may be exchanged",
+        significant=phasor.amplitude > 3 * phasor.amplitude_uncertainty,
+    )
+
+
+def aliasing(reading: LockInReading, rate: float) -> Check:
+    """Whether a harmonic that is not read looks like one that is.
+
+    Parameters
+    ----------
+    reading : LockInReading
+    rate : float
+        Samples per second, of most of the recording.
+    """
+    n = reading.harmonics.size
+    above = np.arange(n + 1, max(_HIGHEST, n + 1) + 1)
+    # A harmonic below half the rate is where it belongs.
+    folded = above[above * reading.frequency > rate / 2]
+    span = reading.end - reading.start
+    away = (
+        np.abs(np.remainder(folded * reading.frequency + rate / 2, rate) - rate / 2)[:, None]
+        - np.arange(n + 1) * reading.frequency
+    )
+    away = np.abs(away) * span
+    number, sentence = float(span * rate), "no higher harmonic is folded onto one that is read"
+    if away.size:
+        number = float(away.min())
+        at = np.unravel_index(int(np.argmin(away)), away.shape)
+        sentence = (
+            f"at {rate:.5g} samples per second harmonic {folded[at[0]]} of the load looks like "
+            f"{'the mean' if at[1] == 0 else f'harmonic {at[1]}'}, {number:.3g} lines of the "
+            "window away; closer than two, what is read holds both"
+        )
+    return judged("aliasing", number, LIMITS["aliasing"], sentence)

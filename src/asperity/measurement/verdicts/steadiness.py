@@ -1,16 +1,26 @@
-"""Is it one state that was recorded? Load and force that wander, a response that changes."""
+"""Whether one steady state was recorded.
+
+Load and force that wander, oscillations that are no harmonics, a response that changes within the
+window.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.lock_in.normal_equations import Basis, solved
 from asperity.lock_in.reading import LockInReading
+from asperity.lock_in.reference import SpectralLine, strongest_line
 from asperity.measurement.series import block_means
-from asperity.measurement.verdicts.oscillation import left_of_piece
 from asperity.measurement.verdicts.verdict import Check, judged
 
 Array = NDArray[np.float64]
+
+#: Samples of the piece in the middle that is searched for what is nearly as fast as the modulation.
+_PIECE = 1 << 16
+#: Stick-slip of laboratory sliders is slower than this (Hz).
+_STICK_SLIP = 20.0
 
 #: Where suspicious and bad begin.
 LIMITS: dict[str, tuple[float, float]] = {
@@ -18,12 +28,82 @@ LIMITS: dict[str, tuple[float, float]] = {
     "steady response": (0.05, 0.5),
     "steady load": (0.01, 0.05),
     "steady force": (0.002, 0.02),
+    "shifting response": (0.07, 0.4),
 }
 
 #: Spectral lines on each side of a line of its own that belong to it if it is not steady.
 _SIDEBANDS = 16
 #: Slow motion of so many times the variance that noise gives it is no noise.
 _EXCESS = 3.0
+
+_PIECES, _FEWEST_PERIODS = 8, 3
+#: Chi-squared of the pieces beyond its mean, in standard deviations, that noise does not reach.
+_BEYOND = 6.0
+
+
+def slow_line(reading: LockInReading, time: Array, force: Array) -> SpectralLine | None:
+    """The strongest line of the force's residual below the modulation, or below 20 Hz.
+
+    Parameters
+    ----------
+    reading : LockInReading
+    time, force : array, (n,)
+        Of the window.
+    """
+    f = reading.frequency
+    piece, left = left_of_piece(reading, time, force)
+    # Stick-slip may be faster than a slow modulation.
+    highest = max(0.9 * f, _STICK_SLIP)
+    # Means over a third of a period keep what is slower.
+    span = float(time[piece][-1] - time[piece][0])
+    blocks = int(min(left.size, max(64, 3.3 * highest * span)))
+    candidates = [_below(block_means(time[piece], blocks), block_means(left, blocks), highest)]
+    if time.size > _PIECE:
+        count = reading.blocks.count
+        slow = reading.residual[:-1, 0, 1].real / count[:-1]
+        candidates.append(_below(reading.blocks.middle[:-1], slow, 0.9 * f))
+    # Above the modulation, harmonics beyond those that are fitted are no oscillations of their own.
+    width = 2 / span
+    lines = [
+        line
+        for line in candidates
+        if line is not None
+        and (
+            line.frequency < 0.9 * f
+            or abs(line.frequency / f - round(line.frequency / f)) * f > width
+        )
+    ]
+    # A background of nothing, as of a force that stands still, is divided by all the same.
+    return max(lines, key=lambda line: line.amplitude / max(line.background, 1e-300), default=None)
+
+
+def left_of_piece(reading: LockInReading, time: Array, values: Array) -> tuple[slice, Array]:
+    """What a fit of its own leaves of a channel in the middle of a window, and where that is."""
+    at = max(0, (time.size - _PIECE) // 2)
+    piece = slice(at, at + _PIECE)
+    return piece, _residual(reading.blocks.basis, time[piece], values[piece])
+
+
+def _below(time: Array, values: Array, highest: float) -> SpectralLine | None:
+    """The strongest line between drift and a frequency; None where there is no room for one."""
+    if time.size < 32 or (time[-1] - time[0]) * highest < 3 or not values.any():
+        return None
+    lowest = 2.5 / float(time[-1] - time[0])
+    return strongest_line(time, values, between=(lowest, highest))
+
+
+def _residual(basis: Basis, time: Array, force: Array) -> Array:
+    """What a fit of its own leaves of a piece."""
+    piece = Basis(
+        basis.omega,
+        basis.harmonics,
+        basis.degree,
+        float(time[0] + time[-1]) / 2,
+        float(time[-1] - time[0]) / 2,
+    )
+    columns = piece.columns(time)[: piece.linear]
+    beta = solved(columns @ columns.T, columns @ force)
+    return force - beta @ columns
 
 
 def leakage(reading: LockInReading) -> Check:
@@ -125,3 +205,49 @@ def _wander(reading: LockInReading, time: Array, values: Array, channel: int) ->
 
 def _percent(share: float) -> str:
     return f"{100 * share:.2g} %"
+
+
+def shifting_response(reading: LockInReading, time: Array, force: Array) -> Check:
+    """Whether mu1 and its phase shift within the window: range of the pieces over the mean.
+
+    Parameters
+    ----------
+    reading : LockInReading
+    time, force : array, (n,)
+        Of the window.
+    """
+    pieces = int(min(_PIECES, reading.periods // _FEWEST_PERIODS))
+    if pieces < 3:
+        sentence = "the window is too short to be read in pieces"
+        return judged("shifting response", 0.0, LIMITS["shifting response"], sentence)
+    omega = 2 * np.pi * reading.frequency
+    orders = range(1, reading.harmonics.size + 1)
+    middle = (reading.start + reading.end) / 2
+    responses = []
+    for piece in np.array_split(np.arange(time.size), pieces):
+        t = time[piece]
+        u = (t - t[0]) / (t[-1] - t[0]) - 0.5
+        columns = [np.ones_like(t), u]
+        for n in orders:
+            angle = n * omega * (t - middle)
+            columns += [np.cos(angle), np.sin(angle)]
+        beta = np.linalg.lstsq(np.stack(columns, axis=1), force[piece])[0]
+        responses.append(complex(beta[2], -beta[3]))
+    phasors = np.array(responses)
+    mean = phasors.mean()
+    # Of noise alone: the uncertainty of a harmonic that settles is that of what it settles to.
+    # Amplitude over a piece has half the variance of a complex phasor: two components a piece.
+    sigma = np.sqrt(2 * reading.noise.spectra[1, 1, 1].real * pieces / reading.samples)
+    squares = float(np.sum(np.abs(phasors - mean) ** 2)) / max(sigma**2, 1e-300)
+    freedom = 2 * (pieces - 1)
+    seen = squares > freedom + _BEYOND * np.sqrt(2 * freedom)
+    away = np.abs(phasors[:, None] - phasors[None, :])
+    number = float(away.max() / max(abs(mean), 1e-300))
+    return judged(
+        "shifting response",
+        min(number, 1e300),
+        LIMITS["shifting response"],
+        f"read in {pieces} pieces, the first harmonic of the force shifts by {100 * number:.2g} % "
+        "within the window",
+        significant=bool(seen),
+    )

@@ -1,15 +1,26 @@
-"""The fast methods within a compiled program: orbits without derivatives, then their response."""
+"""The fast methods within a compiled program: orbits without derivatives, then their response.
+
+Derivatives follow from the implicit function theorem. Where R(p, Y) = 0 fixes the unknowns Y as
+functions of the parameters p,
+
+    dY = -R_Y^-1 R_p dp.
+
+No iteration of a solver is differentiated. The rule refers to itself, so that derivatives of any
+order follow from R; the linear solve has a transpose, so that they do in forward and reverse mode.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import jax
 import jax.numpy as jnp
 from jax import Array
 
 from asperity._jax import jit_large
+from asperity.orbit.floquet import differentiable_log_multipliers
 from asperity.orbit.gradient.fourier import (
     FloquetEquations,
     FourierEquations,
@@ -17,20 +28,81 @@ from asperity.orbit.gradient.fourier import (
     floquet_factor,
     means,
 )
-from asperity.orbit.gradient.implicit import implicit_solution
-from asperity.orbit.gradient.multipliers import log_multipliers_of_exponent
-from asperity.orbit.gradient.program import Parameters, Program, ResponseValues, only_where
+from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.methods.fourier.balance import BalanceEquations, balanced_orbit
-from asperity.orbit.methods.fourier.observables import force_spectrum, orbit_error
-from asperity.orbit.methods.fourier.orbit import fourier_orbit, load_cycle
-from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
-from asperity.orbit.stiffness import (
-    deepest_unloading,
-    sharpness_of_slip,
-    stiffness_of_steady_sliding,
+from asperity.orbit.methods.fourier.orbit import (
+    force_spectrum,
+    fourier_orbit,
+    load_cycle,
+    orbit_error,
 )
+from asperity.orbit.outcome import LARGEST_UNLOADING, SMALLEST_RATE, Outcome
+from asperity.orbit.steady_sliding import steady_sliding_of
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
+
+
+class Equations(Protocol):
+    """Equations R(p, Y) = 0 of many operating points; hashable, without arrays."""
+
+    def residual(self, parameters: Any, unknowns: Any, at: Any) -> Any:
+        """R, a pytree like the unknowns, each leaf of which depends on the parameters.
+
+        Parameters
+        ----------
+        parameters, unknowns : pytree
+        at : pytree
+            From `prepare`; of no derivative. It may scale and combine the equations.
+        """
+        ...
+
+    def prepare(self, parameters: Any, unknowns: Any) -> Any:
+        """What `residual` and `solve` need at a solution, computed once."""
+        ...
+
+    def solve(self, product: Callable[[Any], Any], right: Any, at: Any) -> Any:
+        """Solve R_Y y = right, given the product R_Y y as a function of y; NaN where it fails."""
+        ...
+
+    def solve_transposed(self, product: Callable[[Any], Any], right: Any, at: Any) -> Any:
+        """The same with the transpose of R_Y."""
+        ...
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(0,))
+def implicit_solution(equations: Equations, parameters: Any, solution: Any) -> Any:
+    """`solution` as a function of the parameters.
+
+    Parameters
+    ----------
+    equations : Equations
+    parameters : pytree of arrays
+    solution : pytree of arrays
+        Unknowns that solve the equations to round-off; a derivative of theirs does not count.
+
+    Returns
+    -------
+    pytree
+        `solution`, with the derivatives of all orders to `parameters`.
+    """
+    return solution
+
+
+@implicit_solution.defjvp
+def _implicit_rule(equations: Equations, primals: tuple, tangents: tuple) -> tuple[Any, Any]:
+    parameters, solution = primals
+    unknowns = implicit_solution(equations, parameters, solution)
+    at = jax.lax.stop_gradient(equations.prepare(parameters, unknowns))
+    _, right = jax.jvp(lambda p: equations.residual(p, unknowns, at), (parameters,), (tangents[0],))
+    _, product = jax.linearize(lambda Y: equations.residual(parameters, Y, at), unknowns)
+    moved = jax.lax.custom_linear_solve(
+        product,
+        jax.tree.map(lambda a: -a, right),
+        solve=lambda multiply, b: equations.solve(multiply, b, at),
+        transpose_solve=lambda multiply, b: equations.solve_transposed(multiply, b, at),
+    )
+    return unknowns, moved
+
 
 #: Grid of quasi-static orbits, and the sharpest slip pulse that it resolves.
 _NODES, _GRADING, _SHARPEST = 32, 0.3, 18.0
@@ -53,11 +125,11 @@ class FastOrbits(NamedTuple):
     unknowns : pytree
         Of the equations of the method.
     floquet : pytree or None
-        Of those of the Floquet factor, where multipliers are asked for.
+        Of those of the Floquet factor, where multipliers are wanted.
     prepared : tuple
         What the linear systems of their derivatives need.
     valid, converged : bool array, shape (points,)
-        Whether the parameters obey their rules, and whether the orbit is found and resolved.
+        Whether the parameters obey their rules, and whether the orbit converged and is resolved.
     """
 
     unknowns: Any
@@ -85,14 +157,11 @@ def _balance(program: Program) -> BalanceEquations:
 def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
     """Orbits by Fourier collocation, checked for convergence and resolution."""
     problem = program.equations.problem(parameters)
-    system, load = problem
     valid = program.equations.valid(parameters)
-    sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
-    rate = stiffness_of_steady_sliding(sliding)
+    rate, sharpness, unloading = steady_sliding_of(problem)
     # Points out of range are left to the search, which says so.
     good = valid & (rate >= SMALLEST_RATE) & (rate < _STIFFEST)
-    good &= deepest_unloading(sliding) <= LARGEST_UNLOADING
-    good &= sharpness_of_slip(sliding) <= _SHARPEST
+    good &= (unloading <= LARGEST_UNLOADING) & (sharpness <= _SHARPEST)
     solve = _fourier_orbits if _quasi_static(program) else _balanced_orbits
     return solve(problem, program, valid, good)
 
@@ -150,7 +219,7 @@ def _fourier_values(
         floquet = FloquetEquations(_NODES)
         q = implicit_solution(floquet, (J, fast.prepared[1]), fast.floquet)
         exponent = jnp.stack([jnp.stack(row) for row in means(floquet.product(J, q))])
-        logs = log_multipliers_of_exponent(2 * jnp.pi * exponent)
+        logs = differentiable_log_multipliers(2 * jnp.pi * exponent)
     return mean, harmonics, logs
 
 

@@ -98,7 +98,7 @@ class FourierEquations:
     def solve(
         self, product: Callable[[Any], Any], right: FourierUnknowns, at: _InvertedJacobian
     ) -> FourierUnknowns:
-        """By the contraction that found the orbit."""
+        """By the contraction that solves for the orbit."""
         J, share, integral = self._transposed(at)
 
         def contract(y: FourierUnknowns) -> FourierUnknowns:
@@ -181,7 +181,7 @@ class FloquetEquations:
         ]
 
     def solve(self, product: Callable[[Any], Any], right: Any, at: Array) -> Any:
-        """By the contraction that found it."""
+        """By the contraction that solves for it."""
         return contracted(lambda y: _less(y, product(y)), right, at + _MORE_STEPS, points_last=True)
 
     def solve_transposed(self, product: Callable[[Any], Any], right: Any, at: Array) -> Any:

@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 
 from asperity.algebra.small_systems import scaled_product
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.mesh.condensation import transfer_maps
 from asperity.orbit.mesh.equations import (
     CondensedEquations,
     collocated,
     condensed_jacobian,
     parameter_slopes,
+    transfer_maps,
 )
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import Plane, newton_step

@@ -12,12 +12,16 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.orbit.batches import mesh_chunk, take
+from asperity.orbit.floquet import sorted_logs
+from asperity.orbit.gradient.known import MeshOrbits
 from asperity.orbit.gradient.mesh_derivatives import orbit_derivatives
-from asperity.orbit.gradient.multipliers import sorted_logs
-from asperity.orbit.gradient.parametrised import ParametrisedProblem
-from asperity.orbit.gradient.program import Parameters, Program, ResponseValues
-from asperity.orbit.gradient.search.mesh_orbits import MeshOrbits
-from asperity.orbit.gradient.search.search import search_orbits
+from asperity.orbit.gradient.parametrised import (
+    Parameters,
+    ParametrisedProblem,
+    Program,
+    ResponseValues,
+)
+from asperity.orbit.gradient.search import search_orbits
 from asperity.orbit.outcome import Outcome
 
 Float = NDArray[np.float64]

@@ -2,21 +2,128 @@
 
 The law's part comes from `asperity.slider.pointwise`, one compiled program for each law; the
 condensation is one for each number of states, whatever the mesh.
+
+The response of the slopes at the collocation points to a change at the left node of an interval
+is a small dense system. Solved interval by interval it leaves equations for the nodes alone. No
+interval knows its neighbours here, so that intervals of any mesh and any operating point lie along
+one axis.
 """
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any, NamedTuple
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
 from asperity._jax import jit_large
+from asperity.algebra.small_systems import inverse_points, product
 from asperity.loads import Excitation
-from asperity.orbit.mesh.condensation import condense
-from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.mesh import STAGES, Orbit
 from asperity.slider.pointwise import PointValues, excitation_at, slopes_along, values_at
 from asperity.slider.problem import Problem
+
+#: Entries of small matrices that are eliminated at a time: they fit into a core's cache.
+_CACHED = 20_000
+
+
+def condense(jacobian: Array, right: Array, widths: Array, a: Array) -> tuple[Array, Array]:
+    """Slopes at the stages as a linear function of the state at the left node.
+
+    Parameters
+    ----------
+    jacobian : array, shape (n, n, STAGES, intervals)
+        [row, column] at the collocation points.
+    right : array, shape (n, STAGES, sides, intervals)
+        Right-hand sides.
+    widths : array, shape (intervals,)
+    a : array, shape (STAGES, STAGES)
+        Of the collocation scheme.
+
+    Returns
+    -------
+    response : array, shape (n, STAGES, n, intervals)
+        Change of the slopes for a change at the left node.
+    constant : array, shape (n, STAGES, sides, intervals)
+        Change of the slopes for each right-hand side.
+    """
+    n, intervals = jacobian.shape[0], widths.shape[-1]
+    solve = partial(_condense_block, a=a)
+    entries = STAGES * n * ((STAGES + 1) * n + right.shape[2])
+    divisors = (k for k in range(1, intervals) if _fits(intervals, k, entries))
+    blocks = next(divisors, intervals)
+    parts = jacobian, right, widths
+    if blocks > 1:
+        # Block by block, so that the elimination stays within a core's cache.
+        cut = tuple(jnp.moveaxis(p.reshape(*p.shape[:-1], blocks, -1), -2, 0) for p in parts)
+        solved = jax.lax.map(solve, cut)
+        solution = jnp.moveaxis(solved, 0, -2).reshape(*solved.shape[1:-1], intervals)
+    else:
+        solution = solve(parts)
+    return solution[:, :, :n], solution[:, :, n:]
+
+
+def _fits(intervals: int, blocks: int, entries: int) -> bool:
+    """Whether an equal share of the intervals, of so many entries each, fits into the cache."""
+    return intervals % blocks == 0 and intervals // blocks * entries <= _CACHED
+
+
+def _condense_block(part: tuple[Array, Array, Array], *, a: Array) -> Array:
+    """The same of some intervals; (n, STAGES, n + right-hand sides, intervals)."""
+    jacobian, right, widths = part
+    n = jacobian.shape[0]
+    per_stage = jnp.transpose(jacobian, (2, 0, 1, 3))  # (stage, row, column, intervals)
+    right = jnp.transpose(right, (1, 0, 2, 3))
+    # Row blocks (I - h a_jk J_j | J_j, right-hand sides), one per stage j, columns (k, state).
+    coupling = per_stage[:, :, None] * (widths * a[:, None, :, None, None])
+    identity = jnp.eye(STAGES)[:, None, :, None] * jnp.eye(n)[:, None, :]
+    left = (identity[..., None] - coupling).reshape(STAGES, n, -1, *widths.shape)
+    solution = _eliminate_stages(jnp.concatenate([left, per_stage, right], axis=2))
+    return jnp.swapaxes(solution, 0, 1)
+
+
+def _eliminate_stages(rows: Array) -> Array:
+    """Block elimination of (stages, n, stages * n + right sides, ...), one stage after the other.
+
+    Returns (stages, n, right sides, ...). Pivots are the n x n blocks of the stages; one
+    is singular only where the mesh is far too coarse for a growing mode.
+    """
+    stages, n = rows.shape[:2]
+    solved = []
+    for _ in range(stages):
+        pivot, rest = rows[0, :, :n], rows[0, :, n:]
+        inverse = inverse_points([list(row) for row in pivot])
+        own = product(jnp.stack([jnp.stack(row) for row in inverse]), rest)
+        below, rows = rows[1:, :, :n], rows[1:, :, n:]
+        rows = rows - (below[:, :, :, None] * own[None, None]).sum(2)
+        solved.append(own)
+    for j in reversed(range(stages - 1)):
+        for later in range(stages - 1, j, -1):
+            at = (later - j - 1) * n
+            known = product(solved[j][:, at : at + n], solved[later])
+            solved[j] = jnp.concatenate([solved[j][:, :at], solved[j][:, at + n :] - known], axis=1)
+    return jnp.stack(solved)
+
+
+def transfer_maps(response: Array, widths: Array, b: Array) -> Array:
+    """Maps (n, n, ...) from a change at the left node to that at the right.
+
+    Parameters
+    ----------
+    response : array, shape (n, STAGES, n, ...)
+        As `condense` returns it.
+    widths : array, shape (...)
+    b : array, shape (STAGES,)
+        Of the collocation scheme.
+    """
+    n = response.shape[0]
+    identity = np.eye(n).reshape(n, n, *(1 for _ in widths.shape))
+    return identity + widths * sum(b[k] * response[:, k] for k in range(STAGES))
+
 
 Float = NDArray[np.float64]
 

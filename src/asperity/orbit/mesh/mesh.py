@@ -1,6 +1,8 @@
 """Meshes for collocation: graded start, equidistribution of the error, evaluation between nodes.
 
 A mesh is an array (intervals + 1, points) that rises from 0 to 2 pi for each operating point.
+
+The collocation method of an equation of motion is chosen here too: Gauss or Radau points.
 """
 
 from __future__ import annotations
@@ -11,8 +13,20 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.mesh.scheme import STAGES
+from asperity.algebra.runge_kutta import CollocationScheme, gauss_legendre, radau_iia
+from asperity.slider import Motion, RadiatingAsperities, StiffInertial
+
+#: Collocation points in an interval.
+STAGES = 4
+
+GAUSS = gauss_legendre(STAGES)
+RADAU = radau_iia(STAGES)
+
+
+def scheme_for(system: Motion) -> CollocationScheme:
+    """The method for an equation of motion: Radau IIA where modes decay within an interval."""
+    return RADAU if isinstance(system, StiffInertial | RadiatingAsperities) else GAUSS
+
 
 Float = NDArray[np.float64]
 

@@ -27,8 +27,7 @@ from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.algebra.cyclic import Border, solve_bordered
-from asperity.orbit.mesh.condensation import transfer_maps
-from asperity.orbit.mesh.equations import CondensedEquations, condensed
+from asperity.orbit.mesh.equations import CondensedEquations, condensed, transfer_maps
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import excitation_at

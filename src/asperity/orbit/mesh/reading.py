@@ -7,8 +7,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.algebra.small_systems import scaled_product, spectral_abscissa, spectral_radius
-from asperity.orbit.mesh.condensation import transfer_maps
-from asperity.orbit.mesh.equations import CondensedEquations, collocated, condensed
+from asperity.orbit.mesh.equations import CondensedEquations, collocated, condensed, transfer_maps
 from asperity.orbit.mesh.mesh import Orbit, split
 from asperity.orbit.observables import Observables
 from asperity.slider.pointwise import PointValues

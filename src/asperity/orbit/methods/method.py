@@ -17,7 +17,7 @@ class Method(ABC):
 
     A search goes through a list of methods; each is given the points that the ones before it left
     and that it may help. To add one, implement it and put it into
-    `asperity.orbit.methods.registry`.
+    `asperity.orbit.search`.
 
     Class attributes
     ----------------
@@ -27,11 +27,14 @@ class Method(ABC):
         What a user calls it in the `methods` of `periodic_response`; several may share one.
     block : int
         Points that it is given at a time, which bounds its memory.
+    on_mesh : bool
+        Whether its orbits lie on meshes, so that they can be kept.
     """
 
     name: ClassVar[str]
     choice: ClassVar[str]
     block: ClassVar[int] = 2048
+    on_mesh: ClassVar[bool] = True
 
     @abstractmethod
     def suits(self, problem: Problem) -> bool:

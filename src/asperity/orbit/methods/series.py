@@ -22,14 +22,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.algebra.runge_kutta import CollocationScheme
-from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
-from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.scheme import scheme_for
-from asperity.orbit.methods.collocation.refinement import accept
+from asperity.orbit.batches import Indices, mesh_chunk, put, take
+from asperity.orbit.mesh.mesh import Orbit, scheme_for
+from asperity.orbit.methods.collocation.method import accept
 from asperity.orbit.methods.method import Method
 from asperity.orbit.solution import SearchOptions, Solution
-from asperity.orbit.stiffness import STIFFNESS_CHUNK, sharpness_of_slip, stiffness_of_steady_sliding
-from asperity.slider import QuasiStatic
+from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider.pointwise import excitation_at, values_at
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import adiabatic_states, even_phases
@@ -73,19 +71,15 @@ class FourierSeries(Method):
     choice = "series"
 
     def suits(self, problem: Problem) -> bool:
-        """Any equations: points with smooth orbits are found out by the attempt."""
+        """Any equations: an attempt shows which orbits are smooth."""
         return True
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
         """As in `Method`; only points under slow or weak modulation are tried."""
         points = np.arange(problem.system.V.shape[-1])
         solution = Solution.unsolved(problem, len(points), options)
-        system, load = problem
-        # Mass and damping make the equations stiff too, but not their orbits smooth.
-        sliding = Problem(QuasiStatic(system.slider, system.V, system.omega), load)
-        slow, weak = np.zeros((2, len(points)), dtype=bool)
-        for part, smoothness in run_chunks(_smoothness, (sliding,), points, STIFFNESS_CHUNK):
-            slow[part], weak[part] = smoothness
+        rate, sharpness, _ = steady_sliding(problem)
+        slow, weak = rate >= _SLOW, (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
         smooth = np.flatnonzero(slow | weak)
         if not len(smooth):
             return solution
@@ -93,26 +87,19 @@ class FourierSeries(Method):
         orbit, resolved = series_orbits(part, len(smooth))
         kept = np.flatnonzero(resolved)
         if len(kept):
-            found = Solution.unsolved(problem, len(kept), options)
-            accept(take(part, kept), found, take(orbit, kept), options)
+            attempt = Solution.unsolved(problem, len(kept), options)
+            accept(take(part, kept), attempt, take(orbit, kept), options)
             rows = smooth[kept]
-            exact = slow[rows] | (np.abs(found.harmonics[:2]) > _LEAST_HARMONIC).all(0)
-            options.progress(int(found.converged[exact].sum()))
-            solution.merge(rows[exact], take(found, np.flatnonzero(exact)))
+            exact = slow[rows] | (np.abs(attempt.harmonics[:2]) > _LEAST_HARMONIC).all(0)
+            options.progress(int(attempt.converged[exact].sum()))
+            solution.merge(rows[exact], take(attempt, np.flatnonzero(exact)))
         return solution
-
-
-def _smoothness(sliding: Problem) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Which points are modulated slowly, and which weakly."""
-    sharpness = np.asarray(sharpness_of_slip(sliding))
-    weak = (sharpness >= _WEAK[0]) & (sharpness <= _WEAK[1])
-    return np.asarray(stiffness_of_steady_sliding(sliding)) >= _SLOW, weak
 
 
 def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool_]]:
     """Orbits of all points of `problem` (NumPy arrays) on `INTERVALS` even intervals.
 
-    Returned beside them is which of them a series resolves, shape (points,).
+    Returned with them is which of them a series resolves, shape (points,).
     """
     scheme, size = scheme_for(problem.system), problem.system.size
     orbit = Orbit.empty(scheme, size, INTERVALS, points)

@@ -6,24 +6,26 @@ from collections import Counter
 from collections.abc import Mapping
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
-
-import numpy as np
+from typing import TYPE_CHECKING
 
 from asperity.errors import InputError, closest, listed, printable
 from asperity.parameters.arguments import shown
 from asperity.recording.checks import check
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
-from asperity.recording.readers.labels import split_labels
 from asperity.recording.readers.raw import refuse_truncated
-from asperity.recording.readers.units import Unit, is_empty, required, understood
+from asperity.recording.readers.units import (
+    Unit,
+    in_si,
+    is_empty,
+    required,
+    split_labels,
+    understood,
+)
 from asperity.recording.roles import ROLES, candidates, role_of
 from asperity.recording.trace import Channel, Trace
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
     from asperity.recording.readers.raw import RawColumn, RawRecording
 
 
@@ -49,10 +51,10 @@ def assemble(
     labels = {c.label: name for c, name in zip(recorded.columns, names, strict=True)}
     try:
         roles = _chosen_roles(columns or {}, names, labels)
-        given = _by_name(units or {}, names, labels, roles)
+        stated = _by_name(units or {}, names, labels, roles)
     except InputError as error:
         raise with_cause(error, findings) from None
-    known = _known_units(texts, given, findings)
+    known = _known_units(texts, stated, findings)
     _check_kinds(roles, known)
     values = {name: c.values for name, c in zip(names, recorded.columns, strict=True)}
     numbers = {name: v for name, v in values.items() if v.dtype.kind in "iufb"}
@@ -84,19 +86,6 @@ def assemble(
     roles = {role: name for role, name in roles.items() if role != "time"}
     trace = Trace(clock.time, channels, (), provenance, roles)
     return Trace(clock.time, channels, (*findings, *check(trace)), provenance, roles)
-
-
-def in_si(values: NDArray[Any], unit: Unit | None) -> NDArray[np.float64]:
-    """Values times the factor of the unit, rounded once."""
-    values = np.asarray(values, dtype=np.float64)
-    if unit is None or unit.factor == 1:
-        return values
-    # What overflows in a damaged file becomes infinite, and is found as such.
-    with np.errstate(over="ignore"):
-        # 10^-n is inexact in binary, 10^n is not.
-        if abs(unit.factor) < 1:
-            return values / float(Decimal(1) / unit.factor)
-        return values * float(unit.factor)
 
 
 def _unit_text(column: RawColumn, split: tuple[str, str]) -> str:
@@ -181,7 +170,7 @@ def _by_name(
     roles: Mapping[str, str],
 ) -> dict[str, str]:
     """Units by the name of the column, whatever the user has called it."""
-    found = {}
+    by_name = {}
     for key, text in units.items():
         role = role_of(key) if key not in names else None
         if role in roles:
@@ -191,19 +180,19 @@ def _by_name(
             name = fitting[0] if len(fitting) == 1 else _name_of(key, names, labels, "units")
         else:
             name = _name_of(key, names, labels, "units")
-        found[name] = text
-    return found
+        by_name[name] = text
+    return by_name
 
 
 def _known_units(
-    texts: dict[str, str], given: Mapping[str, str], findings: list[Finding]
+    texts: dict[str, str], stated: Mapping[str, str], findings: list[Finding]
 ) -> dict[str, Unit]:
     """Units that are understood; what the user gives goes before what the file says."""
     known = {}
     for name, text in texts.items():
         unit = understood(text)
-        if name in given:
-            wanted = required(given[name], name)
+        if name in stated:
+            wanted = required(stated[name], name)
             if unit is not None and unit != wanted:
                 findings.append(
                     Finding(
@@ -211,7 +200,7 @@ def _known_units(
                         "note",
                         float(wanted.factor),
                         name,
-                        f"The file gives '{name}' in '{text}'; it was read in '{given[name]}', as "
+                        f"The file gives '{name}' in '{text}'; it was read in '{stated[name]}', as "
                         "asked.",
                     )
                 )
@@ -241,9 +230,9 @@ def _folded(findings: list[Finding]) -> list[Finding]:
     folded = [f for f in findings if f.name not in many]
     for name in many:
         same = [f for f in findings if f.name == name]
-        said = f"{len(same)} columns have this finding; the first: {same[0].sentence}"
+        sentence = f"{len(same)} columns have this finding; the first: {same[0].sentence}"
         where = listed([f.where for f in same], most=12)
-        folded.append(Finding(name, same[0].severity, len(same), where, said))
+        folded.append(Finding(name, same[0].severity, len(same), where, sentence))
     return folded
 
 

@@ -4,22 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from decimal import Decimal
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from asperity.errors import InputError, listed
 from asperity.recording.finding import Finding
-from asperity.recording.readers.dates import elapsed
+from asperity.recording.readers.units import Unit, in_si
 from asperity.recording.roles import candidates, words
 from asperity.units import to_si
 
 if TYPE_CHECKING:
+    import pandas as pd
     from numpy.typing import NDArray
 
     from asperity.recording.readers.raw import RawRecording
-    from asperity.recording.readers.units import Unit
+
+#: Orders of day and month, each with both clocks.
+_DATES = ("%d.%m.%Y", "%m/%d/%Y", "%d/%m/%Y", "%d-%m-%Y", "%d.%m.%y", "%m/%d/%y", "%d/%m/%y")
+_CLOCKS = ("%H:%M:%S.%f", "%H:%M:%S", "%I:%M:%S.%f %p", "%I:%M:%S %p")
+_MINUTES = r"\d{1,3}:\d{2}(?:\.\d+)?"
+_HOURS = r"(?:\d{1,4} days? )?[+-]?\d{1,6}:\d{1,2}:\d{1,2}(?:\.\d+)?"
+_DAY = 86400.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +76,14 @@ def settle_time(
         return _from_column(roles["time"], values, units)
     kinds = {name: units[name].kind if name in units else None for name in values}
     exact = [n for n in candidates("time", kinds) if "".join(words(n)) in ("time", "t")]
-    found = exact if len(exact) == 1 else candidates("time", kinds)
-    if len(found) > 1:
+    fitting = exact if len(exact) == 1 else candidates("time", kinds)
+    if len(fitting) > 1:
         raise InputError(
-            f"columns['time'] must be chosen, got {' and '.join(map(repr, found))}, which both "
-            f"can be it; choose one, like columns={{'time': '{found[0]}'}}"
+            f"columns['time'] must be chosen, got {' and '.join(map(repr, fitting))}, which both "
+            f"can be it; choose one, like columns={{'time': '{fitting[0]}'}}"
         )
-    if found:
-        return _from_column(found[0], values, units)
+    if fitting:
+        return _from_column(fitting[0], values, units)
     if recorded.step is not None:
         time = np.asarray(recorded.start + np.arange(rows) * recorded.step)
         return Clock(time, f"interval of {recorded.step:.10g} s in the file")
@@ -99,7 +105,7 @@ def _from_first_column(
             f"'{first}'}}, or give the sampling rate, like rate='10 kHz'"
         )
     clock = _from_column(first, values, units)
-    said = Finding(
+    assumed = Finding(
         "no header",
         "warning",
         len(values),
@@ -107,7 +113,7 @@ def _from_first_column(
         "The file names no columns; the first, which only rises, was taken for time; say "
         "columns={'time': 0} to confirm, and name the units.",
     )
-    return Clock(clock.time, clock.source, first, [said, *clock.findings])
+    return Clock(clock.time, clock.source, first, [assumed, *clock.findings])
 
 
 def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[str, Unit]) -> Clock:
@@ -116,7 +122,7 @@ def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[s
         return _from_dates(name, raw)
     unit = units.get(name)
     if unit is None:
-        said = Finding(
+        assumed = Finding(
             "unknown unit",
             "warning",
             1.0,
@@ -124,21 +130,73 @@ def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[s
             f"The file states no unit of '{name}' that is known; seconds were assumed, until "
             f"units={{'{name}': ...}} says otherwise.",
         )
-        return Clock(np.asarray(raw, dtype=np.float64), f"column '{name}'", name, [said])
-    seconds = np.asarray(raw, dtype=np.float64)
-    if unit.factor < 1:
-        seconds = seconds / float(Decimal(1) / unit.factor)
-    elif unit.factor > 1:
-        seconds = seconds * float(unit.factor)
-    return Clock(seconds, f"column '{name}'", name)
+        return Clock(np.asarray(raw, dtype=np.float64), f"column '{name}'", name, [assumed])
+    return Clock(in_si(raw, unit), f"column '{name}'", name)
 
 
 def _from_dates(name: str, raw: NDArray[Any]) -> Clock:
     """Seconds since the first stamp, of dates or of hours:minutes:seconds."""
-    found = elapsed(raw)
-    if found is None:
+    stamps = _elapsed(raw)
+    if stamps is None:
         raise InputError(
             f"columns['time'] must hold numbers, dates or hours:minutes:seconds, got "
             f"'{raw[0]}' in '{name}'; choose another column, or give rate='10 kHz'"
         )
-    return Clock(found[0], f"column '{name}', since {found[1]}", name)
+    return Clock(stamps[0], f"column '{name}', since {stamps[1]}", name)
+
+
+def _elapsed(raw: NDArray[Any]) -> tuple[NDArray[np.float64], str] | None:
+    """Seconds since the first stamp, and that stamp; None if these are no stamps.
+
+    ISO 8601, days before or behind months, hours:minutes:seconds, which go on beyond midnight, and
+    minutes:seconds. Where day and month can be exchanged, the shorter recording is meant.
+
+    Parameters
+    ----------
+    raw : array of str, (n,)
+    """
+    import pandas as pd
+
+    texts = pd.Series(raw).astype("string").str.strip().str.replace(",", ".", regex=False)
+    # Stamps with and without a time zone agree in nothing but universal time.
+    stamps = pd.to_datetime(texts, errors="coerce", format="ISO8601", utc=True)
+    stamps = stamps.dt.tz_localize(None)
+    if stamps.isna().all():
+        stamps = _by_order(texts)
+    if stamps is not None:
+        origin = stamps[stamps.first_valid_index()]
+        return _seconds(stamps - origin), str(origin)
+    short = texts.str.fullmatch(_MINUTES).fillna(False).astype(bool)
+    clock = texts.where(~short, "0:" + texts)
+    # Words such as "5 S" would be durations of pandas' own.
+    clock = clock.where(clock.str.fullmatch(_HOURS).fillna(False).astype(bool))
+    times = pd.to_timedelta(clock, errors="coerce")
+    if times.isna().all():
+        return None
+    origin = times[times.first_valid_index()]
+    seconds = _seconds(times - origin)
+    # A time of day falls by a day at midnight; a wrong stamp falls by less.
+    steps = np.diff(seconds, prepend=seconds[:1])
+    return seconds + _DAY * np.cumsum(steps < -_DAY / 2), str(origin)
+
+
+def _by_order(texts: pd.Series[str]) -> pd.Series[Any] | None:
+    """Stamps by the order of day and month that makes the recording shortest."""
+    import pandas as pd
+
+    first = texts[texts.first_valid_index()] if texts.notna().any() else ""
+    best = None
+    for date in _DATES:
+        for clock in _CLOCKS:
+            form = f"{date} {clock}"
+            if pd.isna(pd.to_datetime(first, errors="coerce", format=form)):
+                continue
+            stamps = pd.to_datetime(texts, errors="coerce", format=form)
+            length = stamps.max() - stamps.min()
+            if best is None or length < best[0]:
+                best = (length, stamps)
+    return best[1] if best else None
+
+
+def _seconds(times: pd.Series[Any]) -> NDArray[np.float64]:
+    return np.asarray(times.dt.total_seconds().to_numpy(dtype=np.float64))

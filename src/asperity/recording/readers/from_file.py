@@ -1,29 +1,26 @@
-"""One door for all formats."""
+"""A file to a checked `Trace`: one door for all formats."""
 
 from __future__ import annotations
 
-import importlib
 import os
 import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from asperity.errors import InputError, closest, printable
+from asperity.errors import InputError, printable
 from asperity.parameters.arguments import file_path
 from asperity.recording.derived import derive
 from asperity.recording.finding import Finding
 from asperity.recording.readers.assemble import assemble
-from asperity.recording.readers.detect import FORMATS, format_of
-from asperity.recording.readers.plugins import plugin_format_of, read_by_plugin, reader_points
+from asperity.recording.readers.formats import raw_recording
 from asperity.recording.roles import role_of
 
 if TYPE_CHECKING:
-    from asperity.recording.readers.raw import RawRecording
     from asperity.recording.recipe import ReadingRecipe
     from asperity.recording.trace import Trace
 
@@ -52,7 +49,7 @@ def read(
     path : str or path
         A file: CSV, tab or blank separated text, HDF5, MATLAB (v4 to v7.3), TDMS, or the LOOK
         binary of xlook; and what readers of other packages recognise
-        (`asperity.recording.readers.plugins`).
+        (`asperity.recording.readers.formats`).
     columns : mapping of str to str or int, optional
         Which column plays a role, such as ``{"F": "Shear", "time": 0}``. Roles are ``time``, ``W``
         (load), ``F`` (shear force), ``velocity``, ``displacement`` and ``friction``; a column is
@@ -93,8 +90,7 @@ def read(
     if recipe is not None and not isinstance(recipe, ReadingRecipe):
         recipe = load_recipe(recipe)
     rules = ReadingRecipe() if recipe is None else recipe
-    layout = {"group": group, "delimiter": delimiter, "decimal": decimal, "format": format}
-    layout = {k: getattr(rules, k) if v is None else v for k, v in layout.items()}
+    layout = {"group": group, "delimiter": delimiter, "decimal": decimal}
     rate = rules.rate if rate is None else rate
     expressions = {**rules.channels, **(channels or {})}
     file = file_path(path, "recording.path")
@@ -103,7 +99,12 @@ def read(
         if clock and rate is None:
             # The file's own clock is a column as any other until the new one is made of it.
             rate = "1 Hz"
-        recorded = _recorded(file, **layout)
+        recorded = raw_recording(
+            _with_content(file),
+            format or rules.format,
+            layout,
+            {name: getattr(rules, name) for name in layout},
+        )
         trace = assemble(
             recorded,
             file,
@@ -116,17 +117,10 @@ def read(
     if recipe is not None:
         provenance = {**trace.provenance, "recipe": rules.model_dump(exclude_defaults=True)}
         trace = replace(trace, provenance=provenance)
-    return replace(trace, findings=(*trace.findings, *_said_by_libraries(warned)))
+    return replace(trace, findings=(*trace.findings, *_library_warnings(warned)))
 
 
-def _recorded(
-    file: Path,
-    *,
-    format: str | None,
-    delimiter: str | None,
-    decimal: str | None,
-    group: str | None,
-) -> RawRecording:
+def _with_content(file: Path) -> Path:
     if not file.is_file():
         raise InputError(f"recording.path must be a file, got '{file}'; check the name")
     if file.stat().st_size == 0:
@@ -134,24 +128,7 @@ def _recorded(
             f"recording.path must hold a recording, got '{file.name}', which is empty; copy it "
             "again from where it was recorded"
         )
-    plugins = reader_points()
-    name = format or plugin_format_of(file) or format_of(file)
-    if name in plugins:
-        for option, value in (("group", group), ("delimiter", delimiter), ("decimal", decimal)):
-            if value is not None:
-                raise InputError(
-                    f"read.{option} must be left out for format '{name}', got '{value}'; its "
-                    "reader takes none"
-                )
-        return read_by_plugin(name, file)
-    if name not in FORMATS:
-        known = [*FORMATS, *plugins]
-        raise InputError(f"read.format must be a format, got '{name}'; {closest(name, known)}")
-    # Each format loads what it needs only when it is met.
-    module: Any = importlib.import_module(f"asperity.recording.readers.{FORMATS[name]}")
-    layout = {"delimiter": delimiter, "decimal": decimal} if name == "text" else {"group": group}
-    recorded: RawRecording = module.load(file, **layout)
-    return recorded
+    return file
 
 
 @contextmanager
@@ -165,7 +142,7 @@ def _quiet() -> Iterator[list[warnings.WarningMessage]]:
             raise type(error)(printable(str(error), _LONGEST)) from None
 
 
-def _said_by_libraries(caught: list[warnings.WarningMessage]) -> list[Finding]:
+def _library_warnings(caught: list[warnings.WarningMessage]) -> list[Finding]:
     """What a library has warned of while a file was read, once for each text."""
     texts = dict.fromkeys(str(w.message) for w in caught)
     return [

@@ -9,49 +9,54 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.recording.readers.named_arrays import group_columns
 from asperity.recording.readers.raw import (
     RawColumn,
     RawRecording,
+    beginning,
+    group_columns,
     interval_of,
     one_table,
-    refuse_truncated,
 )
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
 #: Where a group lies: the place of the group that it lies in, and its name; None for the root.
 _Place = tuple[Any, str] | None
 
 
-def load(path: Path, group: str | None = None) -> RawRecording:
+def is_format(path: Path) -> bool:
+    """By the signature, which may stand behind a block of the user's."""
+    head = beginning(path)
+    # Of 512 bytes or a power of two times that; MATLAB writes one of 512.
+    return any(head[at : at + 8] == _SIGNATURE for at in (0, 512, 1024, 2048)) or head.startswith(
+        b"MATLAB 7.3 MAT-file"
+    )
+
+
+def read(path: Path, *, group: str | None = None) -> RawRecording:
     """Columns of an HDF5 file.
 
     Parameters
     ----------
     path : Path
-        The file. One that is cut cannot be opened by the library, and is refused; so is one whose
-        data lie in other files, which whoever sent it may not be allowed to read.
+        One that is cut cannot be opened by the library. One whose data lie in other files is
+        refused: whoever sent it may not be allowed to read these.
     group : str or None
         Where to look, in a file of several recordings.
     """
     import h5py
 
-    try:
-        with h5py.File(path, "r") as file:
-            _refuse_links_out(file, path)
-            matlab = any(item and "MATLAB_class" in item.attrs for item in file.values())
-            found = _contents(file, path, matlab)
-            if group is not None:
-                chosen = file.get(group.strip("/") or "/")
-                if isinstance(chosen, h5py.Group):
-                    group = found.names.get(_address(chosen), group)
-    except InputError:
-        raise
-    # The library raises whatever the damage makes of the data.
-    except Exception as refused:
-        raise _unreadable(path, refused) from None
-    columns, findings = one_table(found.columns, path, group)
+    with h5py.File(path, "r") as file:
+        _refuse_links_out(file, path)
+        matlab = any(item and "MATLAB_class" in item.attrs for item in file.values())
+        contents = _contents(file, path, matlab)
+        if group is not None:
+            chosen = file.get(group.strip("/") or "/")
+            if isinstance(chosen, h5py.Group):
+                group = contents.names.get(_address(chosen), group)
+    columns, findings = one_table(contents.columns, path, group)
     provenance = {"format": "matlab 7.3" if matlab else "hdf5", "group": group or ""}
-    return RawRecording(columns, findings, provenance, step=found.step)
+    return RawRecording(columns, findings, provenance, step=contents.step)
 
 
 def _refuse_links_out(file: Any, path: Path) -> None:
@@ -93,16 +98,16 @@ def _groups(file: Any, followed: Callable[[Any, str], bool]) -> list[tuple[_Plac
 
     root = file["/"]
     left: list[tuple[_Place, Any]] = [(None, root)]
-    known, found = {_address(root)}, []
+    known, groups = {_address(root)}, []
     while left:
         place, node = left.pop()
-        found.append((place, node))
+        groups.append((place, node))
         for key in node:
             item = node.get(key) if followed(node, key) else None
             if isinstance(item, h5py.Group) and _address(item) not in known:
                 known.add(_address(item))
                 left.append(((place, key), item))
-    return found[::-1]
+    return groups[::-1]
 
 
 def _path(place: _Place) -> str:
@@ -120,17 +125,6 @@ def _address(item: Any) -> int:
 
     address: int = h5py.h5o.get_info(item.id).addr
     return address
-
-
-def _unreadable(path: Path, refused: Exception) -> InputError:
-    text = str(refused)
-    if isinstance(refused, MemoryError):
-        return InputError(
-            f"recording.path must fit into memory, got '{path.name}', which holds more; cut it"
-        )
-    if "truncated" in text or "addr overflow" in text or "eof" in text.lower():
-        return refuse_truncated(path, "which HDF5 finds cut short")
-    return refuse_truncated(path, "which HDF5 cannot open as it is damaged or not whole")
 
 
 class _Contents(NamedTuple):

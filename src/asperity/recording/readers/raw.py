@@ -1,25 +1,34 @@
-"""What a file holds, before units and roles are looked at: the common ground of all formats."""
+"""What a file holds, before units and roles are looked at: the common ground of all formats.
+
+HDF5, MATLAB and TDMS files hold named arrays in groups; which of them are the columns of one
+recording is decided here.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from numbers import Real
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
 from asperity.recording.finding import Finding, with_cause
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from numpy.typing import NDArray
-
-#: Attributes that formats and laboratories use, lower case without blanks and underscores.
+#: Names as `plain` has them: of a sampling rate (Hz), of an interval (s), of the lists that name
+#: the columns of a matrix, and of units.
 _RATES = frozenset({"samplerate", "samplingrate", "samplefrequency", "samplingfrequency", "fs"})
 _INTERVALS = frozenset({"dt", "sampleinterval", "samplinginterval", "timestep", "wfincrement"})
-_UNITS = ("units", "unit", "Units", "Unit", "UNITS", "UNIT", "unit_string", "NI_UnitDescription")
+_NAMES = frozenset({"columns", "columnnames", "names", "channels", "channelnames", "labels"})
+_NAMES |= {"headers", "header", "varnames", "variablenames"}
+_UNITS = frozenset({"units", "unit", "columnunits", "channelunits", "unitnames"})
+#: Columns of a matrix.
+_MOST_COLUMNS = 256
+#: Bytes that show the format of a file.
+_HEAD = 4096
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,12 +42,31 @@ class RawColumn:
     values : ndarray, shape (n,)
         Numbers, or date and time texts, as recorded.
     unit : str or None
-        Where the format keeps the unit beside the name; None where the label may hold it.
+        Where the format keeps the unit next to the name; None where the label may hold it.
+
+    Raises
+    ------
+    TypeError
+        If label or unit is no text.
+    InputError
+        If the values are no array of one dimension.
     """
 
     label: str
     values: NDArray[Any]
     unit: str | None = None
+
+    def __post_init__(self) -> None:
+        label: Any = self.label
+        unit: Any = self.unit
+        values: Any = self.values
+        if not isinstance(label, str) or not (unit is None or isinstance(unit, str)):
+            raise TypeError(f"label and unit of a RawColumn are texts, got {label!r} and {unit!r}")
+        if not isinstance(values, np.ndarray) or values.ndim != 1:
+            raise InputError(
+                f"RawColumn.values must be an array of one dimension, got another thing in "
+                f"'{label}'; write numpy.asarray around it"
+            )
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,6 +83,13 @@ class RawRecording:
         Format, title and layout.
     start, step : float or None
         Clock of a file that keeps an interval instead of a column of times, in seconds.
+
+    Raises
+    ------
+    TypeError
+        If columns or findings are other things.
+    InputError
+        If columns differ in length, or start and step are no times.
     """
 
     columns: list[RawColumn]
@@ -63,11 +98,39 @@ class RawRecording:
     start: float = 0.0
     step: float | None = None
 
+    def __post_init__(self) -> None:
+        if not all(isinstance(column, RawColumn) for column in self.columns):
+            raise TypeError("columns of a RawRecording are RawColumns")
+        if not all(isinstance(finding, Finding) for finding in self.findings):
+            raise TypeError("findings of a RawRecording are Findings")
+        sizes = sorted({column.values.size for column in self.columns})
+        if len(sizes) != 1:
+            raise InputError(
+                f"RawRecording.columns must be of one length, got {sizes} rows; correct the reader"
+            )
+        step: Any = self.step
+        if step is not None and not (isinstance(step, Real) and 0 < float(step) < np.inf):
+            raise InputError(
+                f"RawRecording.step must be a positive number of seconds, got {step!r}; correct "
+                "the reader"
+            )
+        start: Any = self.start
+        if not (isinstance(start, Real) and np.isfinite(float(start))):
+            raise InputError(
+                f"RawRecording.start must be a number of seconds, got {start!r}; correct the reader"
+            )
+
+
+def beginning(path: Path) -> bytes:
+    """The first bytes of a file, by which its format is recognised."""
+    with path.open("rb") as file:
+        return file.read(_HEAD)
+
 
 def truncated(path: Path, number: float, where: str, sentence: str, sure: bool = True) -> Finding:
     """The finding of a file that ends, or may end, too early, what is whole being read."""
-    said = f"{path.name} {'is' if sure else 'may be'} cut short: {sentence}"
-    return Finding("truncated", "error" if sure else "warning", number, where, said)
+    whole = f"{path.name} {'is' if sure else 'may be'} cut short: {sentence}"
+    return Finding("truncated", "error" if sure else "warning", number, where, whole)
 
 
 def refuse_truncated(path: Path, why: str) -> InputError:
@@ -78,29 +141,114 @@ def refuse_truncated(path: Path, why: str) -> InputError:
     )
 
 
+def plain(name: str) -> str:
+    """A name in lower case without separators, to be looked up."""
+    return name.lower().replace("_", "").replace(" ", "")
+
+
 def interval_of(attributes: Mapping[str, Any]) -> float | None:
     """Seconds between samples by attributes such as ``sample_rate`` or ``dt``; None without."""
     for name, value in attributes.items():
-        plain = name.rpartition("/")[2].lower().replace(" ", "").replace("_", "")
-        if plain not in _RATES and plain not in _INTERVALS:
+        key = plain(name.rpartition("/")[2])
+        if key not in _RATES and key not in _INTERVALS:
             continue
         try:
             number = float(np.squeeze(value))
         except (TypeError, ValueError):
             continue
         if number > 0 and np.isfinite(number):
-            return 1 / number if plain in _RATES else number
+            return 1 / number if key in _RATES else number
     return None
 
 
-def unit_of(attributes: Mapping[str, Any]) -> str | None:
-    """Unit that a format keeps in an attribute of the column; None without."""
-    for name in _UNITS:
-        value = attributes.get(name)
-        if isinstance(value, bytes):
-            return value.decode("utf-8", errors="replace")
-        if isinstance(value, str):
-            return str(value)
+def as_texts(value: Any) -> list[str] | None:
+    """A value as a list of texts: one text, or an array of texts; None for anything else."""
+    if isinstance(value, bytes):
+        return [value.decode("utf-8", errors="replace")]
+    if isinstance(value, str):
+        parts = [p.strip() for p in value.split(",")]
+        return parts if len(parts) > 1 else [value]
+    if not isinstance(value, np.ndarray | Sequence) or np.asarray(value).dtype.kind not in "OSU":
+        return None
+    texts = [
+        v.decode("utf-8", errors="replace") if isinstance(v, bytes) else v
+        for v in np.asarray(value).reshape(-1).tolist()
+    ]
+    return texts if texts and all(isinstance(v, str) for v in texts) else None
+
+
+def group_columns(
+    arrays: Mapping[str, Any], attributes: Mapping[str, Mapping[str, Any]] | None = None
+) -> tuple[list[RawColumn], float | None]:
+    """Columns and sampling interval of the arrays of one group.
+
+    Units may stand in an array's attributes, in a text of the group called like it with ``_unit``
+    or ``_units`` behind, or in a group ``units`` with a text of its name.
+    """
+    texts = {key: v for key, v in arrays.items() if as_texts(v) is not None}
+    units = next(
+        (v for k, v in arrays.items() if plain(k) in _UNITS and isinstance(v, Mapping)), {}
+    )
+    columns = []
+    for name, values in arrays.items():
+        if isinstance(values, Mapping) or name in texts:
+            continue
+        about = {**texts, **(attributes or {}).get(name, {})}
+        for key in (f"{name}_unit", f"{name}_units"):
+            if key in texts:
+                about = {"units": texts[key], **about}
+        if name in units:
+            about = {"units": units[name], **about}
+        columns += _columns_of(name, values, about)
+    return columns, interval_of({k: v for k, v in arrays.items() if np.size(v) == 1})
+
+
+def _columns_of(name: str, values: Any, about: Mapping[str, Any]) -> list[RawColumn]:
+    """Columns of one array: itself if it is a vector, the fields of a table, or those of a matrix.
+
+    Parameters
+    ----------
+    name : str
+    values : array
+        Of one or two dimensions; anything else is no recording.
+    about : mapping
+        Texts by name: lists of names and of units count for a matrix.
+    """
+    array = np.asarray(values)
+    if array.dtype.names:
+        flat = array.reshape(-1)
+        units = _texts_in(about, _UNITS, len(array.dtype.names))
+        return [
+            RawColumn(field, np.ascontiguousarray(flat[field]), unit)
+            for field, unit in zip(array.dtype.names, units or [""] * flat.size, strict=False)
+            if flat[field].dtype.kind in "iuf" and flat[field].ndim == 1
+        ]
+    if array.dtype.kind not in "iuf":
+        return []
+    array = np.squeeze(array)
+    if array.ndim == 1 and array.size > 1:
+        unit = _texts_in(about, _UNITS, 1)
+        return [RawColumn(name, array, unit[0] if unit else None)]
+    if array.ndim != 2 or min(array.shape) > _MOST_COLUMNS:
+        return []
+    # Rows are samples, of which a recording has more than channels.
+    matrix = array if array.shape[0] >= array.shape[1] else array.T
+    width = matrix.shape[1]
+    names = _texts_in(about, _NAMES, width) or [f"{name}[{i}]" for i in range(width)]
+    units = _texts_in(about, _UNITS, width)
+    return [
+        RawColumn(names[i], np.ascontiguousarray(matrix[:, i]), units[i] if units else None)
+        for i in range(width)
+    ]
+
+
+def _texts_in(about: Mapping[str, Any], wanted: frozenset[str], number: int) -> list[str] | None:
+    """The list of so many texts in `about` under one of the wanted names."""
+    for name, value in about.items():
+        if plain(name) in wanted:
+            texts = as_texts(value)
+            if texts is not None and len(texts) == number:
+                return texts
     return None
 
 
@@ -129,8 +277,6 @@ def one_table(
         If there is nothing to read, or more than one recording.
     """
     filled = {name: columns for name, columns in groups.items() if columns}
-    if not filled and any(f.name in ("truncated", "damaged") for f in noticed):
-        raise with_cause(refuse_truncated(path, "of which no column is left"), noticed)
     if chosen is not None:
         wanted = chosen.strip("/")
         if wanted not in filled:

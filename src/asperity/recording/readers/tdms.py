@@ -16,17 +16,24 @@ from asperity.recording.finding import Finding
 from asperity.recording.readers.raw import (
     RawColumn,
     RawRecording,
+    beginning,
     one_table,
     refuse_truncated,
     truncated,
-    unit_of,
 )
 
 _LEAD_IN = struct.Struct("<4siIQQ")
 _UNFINISHED = 0xFFFF_FFFF_FFFF_FFFF
+#: Properties that hold the unit of a channel.
+_UNITS = ("units", "unit", "Units", "Unit", "UNITS", "UNIT", "unit_string", "NI_UnitDescription")
 
 
-def load(path: Path, group: str | None = None) -> RawRecording:
+def is_format(path: Path) -> bool:
+    """By the mark of a segment, or of its index."""
+    return beginning(path).startswith((b"TDSm", b"TDSh"))
+
+
+def read(path: Path, *, group: str | None = None) -> RawRecording:
     """Columns of a TDMS file; of one that is cut, the rows that all channels have.
 
     Parameters
@@ -44,14 +51,10 @@ def load(path: Path, group: str | None = None) -> RawRecording:
             "is TDMS; install npTDMS, as 'pip install asperity[lab]' does"
         ) from None
     missing = _missing(path)
-    try:
-        with _quiet(nptdms):
-            file = nptdms.TdmsFile.read(path)
-            channels = {g.name: g.channels() for g in file.groups()}
-            groups = {name: [_column(c) for c in found] for name, found in channels.items()}
-    # The library raises whatever the damage makes of the data.
-    except Exception:
-        raise refuse_truncated(path, "which is damaged or not whole") from None
+    with _quiet(nptdms):
+        file = nptdms.TdmsFile.read(path)
+        channels = {g.name: g.channels() for g in file.groups()}
+        groups = {name: [_column(c) for c in inside] for name, inside in channels.items()}
     findings: list[Finding] = []
     if missing:
         groups, finding = _whole_rows(path, groups, missing)
@@ -81,7 +84,8 @@ def _quiet(nptdms: Any) -> Iterator[None]:
 
 def _column(channel: Any) -> RawColumn:
     values = channel[:] if len(channel) else np.empty(0)
-    return RawColumn(channel.name, np.asarray(values), unit_of(channel.properties))
+    unit = next((u for n in _UNITS if isinstance(u := channel.properties.get(n), str)), None)
+    return RawColumn(channel.name, np.asarray(values), unit)
 
 
 def _whole_rows(
@@ -99,8 +103,8 @@ def _whole_rows(
         cut[name] = [RawColumn(c.label, c.values[:kept], c.unit) for c in columns if c.values.size]
     if not cut:
         raise refuse_truncated(path, "which is cut before its first value")
-    said = "at least some rows" if missing < 0 else f"{missing} bytes at least"
-    sentence = f"{said} are missing at its end; the rows that all channels have were read."
+    number = "at least some rows" if missing < 0 else f"{missing} bytes at least"
+    sentence = f"{number} are missing at its end; the rows that all channels have were read."
     return cut, truncated(
         path, lost, f"row {min(len(c[0].values) for c in cut.values())}", sentence
     )

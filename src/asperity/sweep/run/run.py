@@ -18,7 +18,7 @@ from asperity._version import __version__
 from asperity.errors import InputError, listed
 from asperity.laws import get_law
 from asperity.materials import cited_works
-from asperity.orbit.processes import available_cores
+from asperity.orbit.search import available_cores
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
 from asperity.parameters.arguments import file_path, whole_number
 from asperity.parameters.file_content import file_content

@@ -14,7 +14,7 @@ from asperity.laws import get_law
 from asperity.loads import Programme
 from asperity.parameters import EXPERIMENT, Output, all_parameters
 from asperity.parameters.arguments import number
-from asperity.protocol.plan import plan as planned_steps
+from asperity.protocol.steps import plan as planned_steps
 from asperity.slider.named import slider_from
 from asperity.sweep.plan.model import SweepPlan, TransientTable
 from asperity.sweep.plan.points import Points

@@ -1,1 +1,1 @@
-"""An orbit followed from steady sliding to the amplitude asked for, through folds."""
+"""An orbit followed from steady sliding to the requested amplitude, through folds."""

@@ -14,12 +14,21 @@ slip rate by one:
 
 Source: H. B. Keller, in Applications of Bifurcation Theory (1977), 359-384; collocation with
 an arclength condition as in E. J. Doedel et al., Int. J. Bifurcation Chaos 1, 745 (1991).
+
+A branch is followed along a straight line through the space of all parameters. Every parameter x of
+the equations and of the load depends on one coordinate t,
+
+    x(t) = (x + a t) e^(g t),
+
+evenly where a is given and by equal factors where g is. Which parameters move is data, not code, so
+that one compiled program serves for all of them.
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
@@ -36,11 +45,47 @@ from asperity.orbit.mesh.newton import (
     solve_in_plane,
 )
 from asperity.orbit.mesh.remeshing import remeshed
-from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
 from asperity.slider.motion import Motion
 from asperity.slider.pointwise import PointValues
+from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
+
+
+class ParameterLine(NamedTuple):
+    """A line in the parameters of many operating points, NumPy arrays (points,).
+
+    Attributes
+    ----------
+    origin : Problem
+        Parameters at t = 0.
+    added, growth : Problem
+        The coefficients a and g of each parameter.
+    """
+
+    origin: Problem
+    added: Problem
+    growth: Problem
+
+    def at(self, t: Float) -> Problem:
+        """Parameters at the coordinate `t`, shape (points,)."""
+        return jax.tree.map(lambda x, a, g: (x + a * t) * np.exp(g * t), *self)
+
+    def slope(self, t: Float) -> Problem:
+        """Their derivatives by t."""
+        return jax.tree.map(lambda x, a, g: (a + g * (x + a * t)) * np.exp(g * t), *self)
+
+
+def still(problem: Problem) -> Problem:
+    """Coefficients of a line that does not move."""
+    return jax.tree.map(np.zeros_like, problem)
+
+
+def amplitude_line(problem: Problem) -> ParameterLine:
+    """From steady sliding at t = 0 to the requested modulation at t = 1."""
+    origin = problem._replace(load=jax.tree.map(np.zeros_like, problem.load))
+    added = still(problem)._replace(load=problem.load)
+    return ParameterLine(origin, added, still(problem))
 
 
 class ContinuationPoint(NamedTuple):

@@ -1,4 +1,8 @@
-"""From steady sliding to the amplitude asked for, through folds and canards, in batches."""
+"""From steady sliding to the requested amplitude, through folds and canards, in batches.
+
+`BranchFollowing` is the method of the search that takes the orbits at the ends of these branches,
+or the reason why a branch ends before.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.orbit.batches import Indices, put, run_chunks, take
-from asperity.orbit.instability import CHUNK, LARGEST_GROWTH
-from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import Change
 from asperity.orbit.mesh.reading import growth_within
-from asperity.orbit.mesh.scheme import scheme_for
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
+    ParameterLine,
+    amplitude_line,
     first_point,
 )
 from asperity.orbit.methods.branch_following.moving_mesh import (
@@ -25,11 +29,18 @@ from asperity.orbit.methods.branch_following.moving_mesh import (
     moving_step,
     straight,
 )
-from asperity.orbit.methods.branch_following.parameter_line import ParameterLine, amplitude_line
+from asperity.orbit.methods.collocation.initial_guess import InitialGuess
+from asperity.orbit.methods.collocation.method import solve_from
+from asperity.orbit.methods.method import Method
+from asperity.orbit.outcome import LARGEST_GROWTH, WITHOUT_ORBIT, Outcome
+from asperity.orbit.solution import SearchOptions, Solution
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import adiabatic_growth
 
 Float = NDArray[np.float64]
+
+#: Branches that are followed in a call.
+CHUNK = 8
 
 
 class BranchMesh(NamedTuple):
@@ -45,7 +56,7 @@ MESHES = (BranchMesh(216, 200), BranchMesh(648, 1000))
 #: round-off in the phase limits it.
 RUNAWAY = 13.0
 
-#: Distance from the amplitude asked for below which steps aim at it, and at which it is reached.
+#: Distance from the requested amplitude below which steps aim at it, and at which it is reached.
 _NEAR, _ARRIVED = 1e-2, 1e-6
 #: Rise of the exponent beyond `RUNAWAY` for which a branch is still followed there.
 _AHEAD = 0.5
@@ -87,7 +98,7 @@ class SteadyBranch(NamedTuple):
         do not grow.
     growth : array, shape (points,)
         Exponent by which a disturbance grows while it does, of the last orbit or of steady
-        sliding at the amplitude asked for, whichever is larger; 0 where the outcome is definite.
+        sliding at the requested amplitude, whichever is larger; 0 where the outcome is definite.
     """
 
     orbit: Orbit
@@ -100,7 +111,7 @@ class SteadyBranch(NamedTuple):
 
     @property
     def arrived(self) -> NDArray[np.bool_]:
-        """Whether the amplitude asked for was reached."""
+        """Whether the requested amplitude was reached."""
         return np.abs(self.share - 1) <= _ARRIVED
 
     @property
@@ -112,7 +123,7 @@ class SteadyBranch(NamedTuple):
 
     @property
     def ran_away(self) -> NDArray[np.bool_]:
-        """Whether slip becomes too fast to be followed before the amplitude asked for."""
+        """Whether slip becomes too fast to be followed before the requested amplitude."""
         return ~self.arrived & ~self.folded & (self.end < 1)
 
     @property
@@ -274,7 +285,7 @@ def _follow(
 
 
 def _towards_the_end(pair: PointPair, ratio: Float, failures: NDArray[np.int_]) -> Float:
-    """Steps that are not predicted to pass the amplitude asked for; back where one passed it."""
+    """Steps that are not predicted to pass the requested amplitude; back where one passed it."""
     last, left = pair.point.t - pair.t_before, 1 - pair.point.t
     near = (last != 0) & (np.abs(left) < _NEAR)
     near |= (last > 0) & ((ratio * last > left) | (left < 0))
@@ -305,3 +316,67 @@ def _extremum(pair: PointPair, step: MovingMeshStep, rows: Indices, chosen: Indi
     scale = np.where(np.abs(whole) > 1e-12, (t_next - t) / np.where(whole == 0, 1.0, whole), 0.0)
     scale = np.where(scale > 0, np.minimum(scale, step.length[chosen]), step.length[chosen])
     return t + scale * rise
+
+
+class BranchFollowing(Method):
+    """Follows the branch from steady sliding by its arclength, on finer and finer meshes."""
+
+    name = "branch following"
+    choice = "collocation"
+
+    def __init__(self, meshes: tuple[BranchMesh, ...] = MESHES) -> None:
+        """`meshes` are tried in turn, each on the points without a definite outcome."""
+        self.meshes = meshes
+
+    def suits(self, problem: Problem) -> bool:
+        """Any equations and load."""
+        return True
+
+    def candidates(self, solution: Solution) -> Indices:
+        """Points without an orbit, or with one that was lost on every finer mesh."""
+        return np.flatnonzero(_without_orbit(solution))
+
+    def solve(self, problem: Problem, options: SearchOptions) -> Solution:
+        """As in `Method`; `detail` is the amplitude at which the branch ends."""
+        points = problem.system.V.shape[-1]
+        solution = Solution.unsolved(problem, points, options)
+        definite = np.zeros(points, dtype=bool)
+        for mesh in self.meshes:
+            rows = np.flatnonzero(_without_orbit(solution) & ~definite)
+            if len(rows):
+                part = take(problem, rows)
+                guess, definite[rows] = orbits_along_branches(part, len(rows), mesh)
+                attempt = Solution.unsolved(problem, len(rows), options)
+                solve_from(part, attempt, guess, options)
+                solution.merge(rows, attempt)
+                options.progress(int(attempt.converged.sum()))
+        return solution
+
+
+def _without_orbit(solution: Solution) -> NDArray[np.bool_]:
+    lost = (solution.outcome == Outcome.NOT_RESOLVED) & np.isinf(solution.detail)
+    return np.isin(solution.outcome, WITHOUT_ORBIT) | lost
+
+
+def orbits_along_branches(
+    problem: Problem, points: int, mesh: BranchMesh
+) -> tuple[InitialGuess, NDArray[np.bool_]]:
+    """Orbits of all points of `problem` (NumPy arrays) at the end of their branch.
+
+    Where a branch does not reach the requested amplitude, `outcome` says why. Returned with the
+    guess is whether a finer mesh would give the same, shape (points,).
+    """
+    branch = follow_from_steady_sliding(problem, np.arange(points), mesh)
+    guess = InitialGuess.none(problem, points, mesh.intervals)._replace(orbit=branch.orbit)
+    guess.detail[:] = branch.farthest
+    amplitude = np.broadcast_to(problem.load.amplitude, (points,))
+    for which, outcome, share in (
+        (branch.folded, Outcome.FOLDED, branch.fold),
+        (branch.ran_away, Outcome.RUNAWAY, branch.end),
+        (branch.sensitive, Outcome.SENSITIVE, branch.farthest),
+    ):
+        rows = np.flatnonzero(which & (amplitude > 0))
+        guess.outcome[rows] = outcome
+        guess.detail[rows] = share[rows] * amplitude[rows]
+    guess.solved[:] = branch.arrived
+    return guess, branch.definite

@@ -14,17 +14,16 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.orbit.mesh.mesh import Orbit, on_mesh, spread
+from asperity.orbit.mesh.mesh import STAGES, Orbit, on_mesh, spread
 from asperity.orbit.mesh.newton import Plane, moved
-from asperity.orbit.mesh.scheme import STAGES
 from asperity.orbit.methods.branch_following.arclength import (
     ContinuationPoint,
+    ParameterLine,
     correct,
     turned,
     usable,
     weighted_row,
 )
-from asperity.orbit.methods.branch_following.parameter_line import ParameterLine
 
 Float = NDArray[np.float64]
 

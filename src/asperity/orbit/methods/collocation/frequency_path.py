@@ -9,6 +9,7 @@ import equinox as eqx
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity._jax import jit_large
 from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import solve
@@ -21,12 +22,12 @@ from asperity.orbit.methods.collocation.method import solve_from
 from asperity.orbit.methods.method import Method
 from asperity.orbit.outcome import WITHOUT_ORBIT, Outcome
 from asperity.orbit.solution import SearchOptions, Solution
-from asperity.orbit.stiffness import STIFFNESS_CHUNK, stiffness_of_steady_sliding
+from asperity.orbit.steady_sliding import perturbation_rate
 from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
 
-#: Stiffness of steady sliding at which the averaged limit is close enough to start from.
+#: Rate per radian of a perturbation at which the averaged limit is close enough to start from.
 _FAST_MODULATION = 0.02
 #: Steps, in parts of the path: the first, the shortest, and how many there may be.
 _FIRST_STEP, _SHORTEST_STEP, _MOST_STEPS = 0.02, 1e-4, 250
@@ -34,6 +35,8 @@ _FIRST_STEP, _SHORTEST_STEP, _MOST_STEPS = 0.02, 1e-4, 250
 _GROWTH, _SHRINKAGE = 1.6, 0.35
 #: A step is accepted when Newton's method has converged to this; the end point is solved again.
 _ACCEPTED, _NEWTON_STEPS = 1e-5, 10
+
+_rate = jit_large(perturbation_rate)
 
 
 class FrequencyPath(Method):
@@ -47,7 +50,7 @@ class FrequencyPath(Method):
         return True
 
     def candidates(self, solution: Solution) -> Indices:
-        """Points whose branch from steady sliding has no orbit at the amplitude asked for."""
+        """Points whose branch from steady sliding has no orbit at the requested amplitude."""
         return np.flatnonzero(np.isin(solution.outcome, WITHOUT_ORBIT))
 
     def solve(self, problem: Problem, options: SearchOptions) -> Solution:
@@ -63,15 +66,14 @@ class FrequencyPath(Method):
 
 def orbits_from_high_frequency(problem: Problem, points: int) -> InitialGuess:
     """Orbits of all points of `problem` (NumPy arrays) at the end of their path in frequency."""
-    stiffness = np.zeros(points)
-    for part, value in run_chunks(
-        stiffness_of_steady_sliding, (problem,), np.arange(points), STIFFNESS_CHUNK
-    ):
-        stiffness[part] = value
+    rate = np.zeros(points)
+    chunk = mesh_chunk(problem.system.size)
+    for part, value in run_chunks(_rate, (problem,), np.arange(points), chunk):
+        rate[part] = value
     omega = np.asarray(problem.system.omega)
-    first = omega * np.maximum(stiffness / _FAST_MODULATION, 1.0)
+    first = omega * np.maximum(rate / _FAST_MODULATION, 1.0)
     guess = orbits_from_averaged_limit(_at_frequency(problem, first), points)
-    _follow(problem, first, guess.orbit, guess.found)
+    _follow(problem, first, guess.orbit, guess.solved)
     return guess
 
 
@@ -79,7 +81,7 @@ def _at_frequency(problem: Problem, omega: Float) -> Problem:
     return problem._replace(system=eqx.tree_at(lambda q: q.omega, problem.system, omega))
 
 
-def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool_]) -> None:
+def _follow(problem: Problem, first: Float, orbit: Orbit, solved: NDArray[np.bool_]) -> None:
     """Follow orbits from omega = `first` to that of the problem, evenly in its logarithm.
 
     Parameters
@@ -90,11 +92,11 @@ def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool
         rad/s.
     orbit : Orbit
         Orbits at `first`; overwritten with those at the end of the path.
-    found : bool array, shape (points,)
+    solved : bool array, shape (points,)
         Which points have an orbit; overwritten with those that reach the end.
     """
-    reached, step = np.zeros(len(found)), np.full(len(found), _FIRST_STEP)
-    active = np.flatnonzero(found)
+    reached, step = np.zeros(len(solved)), np.full(len(solved), _FIRST_STEP)
+    active = np.flatnonzero(solved)
 
     chunk = mesh_chunk(problem.system.size)
     for _ in range(_MOST_STEPS):
@@ -110,7 +112,7 @@ def _follow(problem: Problem, first: Float, orbit: Orbit, found: NDArray[np.bool
             reached[part[good]] = trial[part[good]]
             step[part] *= np.where(good, _GROWTH, _SHRINKAGE)
         active = active[(reached[active] < 1) & (step[active] > _SHORTEST_STEP)]
-    found[:] = reached >= 1
+    solved[:] = reached >= 1
 
 
 def _advance(problem: Problem, guess: Orbit) -> tuple[Orbit, Float]:

@@ -1,4 +1,7 @@
-"""Initial guesses of Newton's method, and the averaged limit as the first of them."""
+"""Initial guesses of Newton's method, and the averaged limit as the first of them.
+
+With inertia or radiation damping the first guess is the quasi-static orbit.
+"""
 
 from __future__ import annotations
 
@@ -12,11 +15,9 @@ from numpy.typing import NDArray
 
 from asperity._jax import jit_large
 from asperity.orbit.batches import Indices, mesh_chunk, points_of, put, run_chunks, take
-from asperity.orbit.mesh.mesh import Orbit, graded_mesh
+from asperity.orbit.mesh.mesh import GAUSS, Orbit, evaluate, graded_mesh, scheme_for
 from asperity.orbit.mesh.newton import ACCEPTED, solve
 from asperity.orbit.mesh.remeshing import FIRST_MESH
-from asperity.orbit.mesh.scheme import GAUSS, scheme_for
-from asperity.orbit.methods.collocation.inertial_guess import inertial_guess
 from asperity.orbit.outcome import Outcome
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
@@ -34,7 +35,7 @@ class InitialGuess(NamedTuple):
     Attributes
     ----------
     orbit : Orbit
-    found : bool array, shape (points,)
+    solved : bool array, shape (points,)
         Which points have an orbit.
     outcome : int array, shape (points,)
         `Outcome` of the others.
@@ -43,13 +44,13 @@ class InitialGuess(NamedTuple):
     """
 
     orbit: Orbit
-    found: NDArray[np.bool_]
+    solved: NDArray[np.bool_]
     outcome: NDArray[np.int_]
     detail: Float
 
     @classmethod
     def none(cls, problem: Problem, points: int, intervals: int = FIRST_MESH) -> InitialGuess:
-        """No orbit found yet."""
+        """No orbit yet."""
         system = problem.system
         return cls(
             Orbit.empty(scheme_for(system), system.size, intervals, points),
@@ -78,7 +79,7 @@ def orbits_from_averaged_limit(
     for part, (first, error) in run_chunks(_first_orbit, (problem,), index, chunk):
         good = error < ACCEPTED
         put(guess.orbit, part[good], take(first, np.flatnonzero(good)))
-        guess.found[part] = good
+        guess.solved[part] = good
     return guess
 
 
@@ -108,3 +109,40 @@ def _averaged_states(sliding: Problem) -> Array:
     at = sliding.load.at(theta.reshape(-1, 1) * jnp.ones(points))
     samples = jax.tree.map(lambda a: a.reshape(-1, points) if jnp.ndim(a) else a, at)
     return jnp.stack(averaged_limit(sliding.system, samples, weights).centre)
+
+
+@jit_large
+def _converted(problem: Problem, states: Array, slopes: Array, theta: Array) -> tuple[Array, Array]:
+    """States of the problem from quasi-static ones, (size, ..., points), and their slopes."""
+    system, load = problem
+    quasi_static = QuasiStatic(system.slider, system.V, system.omega)
+
+    def convert(Y: Array, theta: Array) -> Array:
+        at = load.at(theta)
+        mechanical = system.mechanical_states(
+            quasi_static.friction(Y, at),
+            quasi_static.slider_velocity(Y, at),
+            quasi_static.log_slip(Y, at),
+            at,
+        )
+        return jnp.stack([*mechanical, *quasi_static.law_state(Y)])
+
+    return jax.jvp(convert, (states, theta), (slopes, jnp.ones_like(theta)))
+
+
+def inertial_guess(problem: Problem, orbit: Orbit) -> Orbit:
+    """A quasi-static orbit as a first guess of another equation of motion, NumPy arrays."""
+    theta = np.concatenate([orbit.mesh[None, :-1], orbit.stage_phases])
+    inside, slopes = evaluate(orbit, theta.reshape(-1, theta.shape[-1]))
+    shape = (len(inside), *theta.shape)
+    sliding = orbit.centre[:, None, None] + inside.reshape(shape)
+    converted = _converted(problem, sliding, slopes.reshape(shape), theta)
+    states, slopes = (np.asarray(a) for a in converted)
+    nodes = states[:, 0]
+    return Orbit(
+        orbit.mesh,
+        nodes[:, 0],
+        nodes - nodes[:, :1],
+        slopes[:, 1:],
+        scheme_for(problem.system),
+    )

@@ -26,8 +26,15 @@ from jax import Array
 from asperity.algebra.contraction import contracted
 from asperity.algebra.small_systems import Matrix, inverse_by_elimination, inverse_points
 from asperity.loads import Excitation
-from asperity.orbit.methods.fourier.observables import spectrum, truncation
-from asperity.orbit.methods.fourier.orbit import LoadCycle, States, grid, load_cycle, together
+from asperity.orbit.methods.fourier.orbit import (
+    LoadCycle,
+    States,
+    grid,
+    load_cycle,
+    spectrum,
+    together,
+    truncation,
+)
 from asperity.slider import Inertial, QuasiStatic, StiffInertial
 from asperity.slider.problem import Problem
 from asperity.theory.averaged import averaged_limit
@@ -207,7 +214,7 @@ class BalanceEquations:
     def solve(
         self, product: Callable[[Any], Any], right: BalanceUnknowns, at: tuple[Prepared, Array]
     ) -> BalanceUnknowns:
-        """By the contraction that found the orbit."""
+        """By the contraction that solves for the orbit."""
 
         def contract(y: BalanceUnknowns) -> BalanceUnknowns:
             return jax.tree.map(jnp.subtract, y, product(y))

@@ -4,18 +4,53 @@ from __future__ import annotations
 
 from functools import partial
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
-from asperity.orbit.batches import FAST_BLOCK, run_chunks, take
-from asperity.orbit.methods.fourier.orbit import FourierOrbit
-from asperity.orbit.methods.fourier.programs import fast_solve
+from asperity._jax import jit_large
+from asperity.orbit.batches import FAST_BLOCK, points_of, run_chunks, take
+from asperity.orbit.methods.fourier.orbit import FourierOrbit, fourier_observables, fourier_orbit
 from asperity.orbit.methods.method import Method
-from asperity.orbit.observables import waveform
+from asperity.orbit.observables import Observables, waveform
 from asperity.orbit.solution import SearchOptions, Solution
-from asperity.orbit.stiffness import STIFFNESS_CHUNK, sharpness_of_slip, stiffness_of_steady_sliding
+from asperity.orbit.steady_sliding import steady_sliding
 from asperity.slider import QuasiStatic
 from asperity.slider.problem import Problem
+
+
+@partial(jit_large, static_argnames=("nodes", "grading", "harmonics"))
+def fast_solve(
+    problem: Problem, *, nodes: int, grading: float, harmonics: int
+) -> tuple[Observables, Array, FourierOrbit]:
+    """Fourier collocation: the observables, their estimated error and the orbits.
+
+    Works on blocks of points that fit into a core's cache, each until its slowest point is done.
+    """
+    points = points_of(problem)
+
+    def solve(block: Problem) -> tuple[Observables, Array, FourierOrbit]:
+        return _fast_block(block, nodes, grading, harmonics)
+
+    blocks = jax.tree.map(lambda a: a.reshape(-1, FAST_BLOCK), problem)
+    results = jax.lax.map(solve, blocks)
+    return jax.tree.map(lambda a: jnp.moveaxis(a, 0, -2).reshape(*a.shape[1:-1], points), results)
+
+
+def _fast_block(
+    problem: Problem, nodes: int, grading: float, harmonics: int
+) -> tuple[Observables, Array, FourierOrbit]:
+    system, load = problem
+    points = points_of(problem)
+    orbit = fourier_orbit(
+        system, load, points, nodes=nodes, grading=grading, tolerance=1e-10, max_steps=40
+    )
+    observables, error = fourier_observables(system, load, orbit, harmonics=harmonics, max_steps=40)
+    each = {name: jnp.full(points, getattr(orbit, name)) for name in ("steps", "grading")}
+    return observables, error, orbit._replace(**each)
+
 
 #: Grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for: the
 #: nodes that a pulse needs grow with the root of it.
@@ -25,7 +60,7 @@ _CHUNK = 4 * FAST_BLOCK
 #: Estimated error that is accepted.
 _ERROR = 1e-9
 #: Rate per radian of a disturbance above which the iteration does not contract, from experience.
-LARGEST_STIFFNESS = 1.0
+LARGEST_RATE = 1.0
 
 
 class Fourier(Method):
@@ -33,6 +68,7 @@ class Fourier(Method):
 
     name = "fourier"
     choice = "fourier"
+    on_mesh = False
     block = 2**20
 
     def suits(self, problem: Problem) -> bool:
@@ -43,16 +79,10 @@ class Fourier(Method):
         """As in `Method`; a grid gives its failures to the next, finer one."""
         points = np.arange(problem.system.V.shape[-1])
         solution = Solution.unsolved(problem, len(points), options)
-        stiffness, sharpness = np.empty((2, len(points)))
-        for measure, values in (
-            (stiffness_of_steady_sliding, stiffness),
-            (sharpness_of_slip, sharpness),
-        ):
-            for part, value in run_chunks(measure, (problem,), points, STIFFNESS_CHUNK):
-                values[part] = value
-        left = points[stiffness < LARGEST_STIFFNESS]
+        rate, sharpness, _ = steady_sliding(problem)
+        left = points[rate < LARGEST_RATE]
         # Blocks run until their slowest point is done: points of like difficulty belong together.
-        left = left[np.argsort(stiffness[left], kind="stable")]
+        left = left[np.argsort(rate[left], kind="stable")]
         for sharpest, nodes, grading in _GRIDS:
             solve = partial(
                 fast_solve,

@@ -10,12 +10,11 @@ the steps were short enough is asked by repeating it with twice as many, see
 `asperity.orbit.methods.shooting.newton`.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
-(Springer, 1993), section II.5; the coefficients are those that SciPy gives.
+(Springer, 1993), section II.5.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -83,31 +82,6 @@ def _padded(table: np.ndarray) -> np.ndarray:
     return padded
 
 
-def _apart(once: Array, k: Array, function: Callable[[Array], Any], like: Any) -> Any:
-    """`function` of the number k of a step, computed apart from its surroundings.
-
-    XLA would compute a stage once more for each later result that needs it. It does not look
-    through a loop, even one that runs once, as long as it cannot know that.
-
-    Parameters
-    ----------
-    once : int array
-        1, unknown to the compiler.
-    like : pytree
-        Of the shapes of the result.
-    """
-    return jax.lax.fori_loop(k, k + once, lambda i, _: function(i), like)
-
-
-def _combined(row: np.ndarray, h: Array, start: Any, slopes: list[Any]) -> Any:
-    """InitialGuess + h sum of row times slopes."""
-
-    def combine(a: Array, *k: Array) -> Array:
-        return a + h * sum(float(c) * s for c, s in zip(row, k, strict=False) if c != 0)
-
-    return jax.tree.map(combine, start, *slopes)
-
-
 def _slopes(problem: Problem, theta: Array, flow: tuple[Array, ...]) -> tuple[Array, ...]:
     """Slopes of the states and, where they are there, of their derivatives."""
     at = problem.load.at(theta)
@@ -119,22 +93,23 @@ def _slopes(problem: Problem, theta: Array, flow: tuple[Array, ...]) -> tuple[Ar
 
 
 def _advance(problem: Problem, steps: Steps, k: Array, flow: Any) -> Any:
-    """States, and derivatives if any, one step later."""
-    table = dormand_prince_8().A
-    once = jnp.minimum(steps.number, 1)
-    nothing = jax.tree.map(jnp.zeros_like, flow)
-    slopes: list[Any] = []
+    """States, and derivatives if any, one step later.
 
-    def inner(j: int, i: Array) -> Any:
-        return _combined(table[j], steps.lengths[i], flow, slopes)
+    The stages are a loop, so that the rates are compiled once and not for each of them.
+    """
+    table = jnp.asarray(dormand_prince_8().A)
+    stages, length = table.shape[1], steps.lengths[k]
 
-    def slope(j: int, states: Any, i: Array) -> Any:
-        return _slopes(problem, steps.phases[i, j], states)
+    def combined(j: Any, slopes: Any) -> Any:
+        return jax.tree.map(lambda a, s: a + length * jnp.tensordot(table[j], s, 1), flow, slopes)
 
-    for j in range(len(table) - 1):
-        states = _apart(once, k, partial(inner, j), nothing) if j else flow
-        slopes.append(_apart(once, k, partial(slope, j, states), nothing))
-    return inner(len(table) - 1, k)
+    def stage(j: Array, slopes: Any) -> Any:
+        slope = _slopes(problem, steps.phases[k, j], combined(j, slopes))
+        put = partial(jax.lax.dynamic_update_index_in_dim, index=j, axis=0)
+        return jax.tree.map(put, slopes, slope)
+
+    none = jax.tree.map(lambda a: jnp.zeros((stages, *a.shape)), flow)
+    return combined(stages, jax.lax.fori_loop(0, stages, stage, none))
 
 
 @jax.jit

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from asperity.orbit.processes import available_cores
+from asperity.orbit.search import available_cores
 from asperity.papers.bureau2000.virtual.recordings import SimulatedPoints, experiment
 
 #: One thread each for XLA and for NumPy's linear algebra: the other core is taken.

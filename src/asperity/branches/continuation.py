@@ -1,0 +1,225 @@
+"""Pseudo-arclength continuation of the periodic response in any one parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from jax.typing import ArrayLike
+
+from asperity.branches.bifurcation import LocatedBifurcation, bifurcations_between, polished
+from asperity.branches.branch import Bifurcation, Branch, BranchOrigin
+from asperity.branches.parameters import (
+    ContinuedParameter,
+    held_parameters,
+    line_through,
+    moving_parameter,
+    one_problem,
+    start_of,
+    starting_orbit,
+)
+from asperity.branches.steps import BranchFollower, BranchOrbit, follow_branch
+from asperity.errors import InputError
+from asperity.loads import Modulation
+from asperity.parameters.arguments import counted, function, whole_number
+from asperity.slider import Slider
+from asperity.slider.problem import Problem, checked_slider
+
+#: Mesh for a branch of simple period; bifurcations are solved again on three times as many.
+INTERVALS = 216
+
+_RESULTS = {
+    "end": "the branch reaches the end of the span, {value:.6g}{unit}",
+    "start": "the branch returns to the start of the span, {value:.6g}{unit}",
+    "steps": (
+        "the branch was followed for {steps} steps, to {value:.6g}{unit}; "
+        "allow more steps to follow it further"
+    ),
+    "stuck": (
+        "the branch could not be followed beyond {value:.6g}{unit}, where "
+        "no step along it is short enough for Newton's method"
+    ),
+}
+
+
+class BranchRecorder:
+    """Stations and bifurcations gathered along a branch."""
+
+    def __init__(
+        self,
+        follower: BranchFollower,
+        moving: ContinuedParameter,
+        start: BranchOrbit,
+        report: Callable[[int], None],
+        periods: int = 1,
+    ) -> None:
+        """Begin at `start`."""
+        self.follower, self.moving, self.report, self.periods = follower, moving, report, periods
+        self.branch_orbits = [start]
+        self.located: list[tuple[LocatedBifurcation, int]] = []
+
+    def follow_branch(self, most_steps: int) -> str:
+        """Walk until the branch leaves the span; returns a key of the results."""
+        why = follow_branch(
+            self.follower,
+            self.branch_orbits[0],
+            most_steps=most_steps,
+            first_step=1e-3,
+            ended=lambda branch_orbit: not 0 <= branch_orbit.t <= 1,
+            visit=self.visit,
+        )
+        if why != "ended":
+            return why
+        return "end" if self.branch_orbits[-1].t >= 0.5 else "start"
+
+    def visit(self, here: BranchOrbit, length: float, there: BranchOrbit) -> None:
+        """Record a step of the branch, the last one cut at the end of the span."""
+        if not 0 <= there.t <= 1:
+            edge = 1.0 if there.t > 1 else 0.0
+            there, length = self.follower.reaching(here, length, edge) or (there, length)
+        at = len(self.branch_orbits) - 1
+        self.located += [
+            (located, at) for located in bifurcations_between(self.follower, here, length, there)
+        ]
+        self.branch_orbits.append(there)
+        self.report(1)
+
+    def branch(self, why: str, problem: Problem) -> Branch:
+        """The recorder as the user reads it."""
+        values = self.moving.value(np.array([s.t for s in self.branch_orbits]))
+        unit = f" {self.moving.unit}" if self.moving.unit else ""
+        steps = len(self.branch_orbits) - 1
+        return Branch(
+            name=self.moving.name,
+            unit=self.moving.unit,
+            parameter=values,
+            mean_friction=np.array([s.mean_friction for s in self.branch_orbits]),
+            harmonics=np.stack([s.harmonics for s in self.branch_orbits]),
+            log_multipliers=np.stack([s.logs for s in self.branch_orbits]),
+            periods=self.periods,
+            bifurcations=tuple(self._bifurcation(located, at) for located, at in self.located),
+            result=_RESULTS[why].format(value=values[-1], unit=unit, steps=steps),
+            completed=why in ("end", "start"),
+            motion=problem.system,
+            fixed=held_parameters(problem, self.moving.name),
+            origin=BranchOrigin(self.follower, self.moving, problem),
+            last=self.branch_orbits[-1].point,
+        )
+
+    def _bifurcation(self, located: LocatedBifurcation, at: int) -> Bifurcation:
+        intervals = located.branch_orbit.point.orbit.mesh.shape[0] - 1
+        fine = polished(self.follower, located, 3 * intervals)
+        branch_orbit = fine or located.branch_orbit
+        value = float(self.moving.value(branch_orbit.t))
+        coarse = float(self.moving.value(located.branch_orbit.t))
+        omega = float(np.asarray(self.follower.line.at(np.array([branch_orbit.t])).system.omega)[0])
+        angle = abs(np.angle(np.exp(1j * branch_orbit.logs[located.critical].imag)))
+        fold = located.kind in ("fold", "branch point")
+        return Bifurcation(
+            kind=located.kind,
+            value=value,
+            error=abs(coarse - value) / abs(value) if fine else np.inf,
+            mean_friction=branch_orbit.mean_friction,
+            log_multipliers=branch_orbit.logs,
+            frequency=0.0 if fold else angle / (2 * np.pi) * omega / (2 * np.pi),
+            unstable_before=located.before,
+            unstable_after=located.after,
+            index=at,
+            critical=branch_orbit,
+        )
+
+
+def continuation(
+    slider: Slider,
+    *,
+    parameter: str,
+    span: tuple[Any, Any],
+    velocity: ArrayLike | str | None = None,
+    epsilon: ArrayLike | str | None = None,
+    frequency: ArrayLike | str | None = None,
+    modulation: Modulation | None = None,
+    inertia: bool = False,
+    radiation_damping: ArrayLike | str | None = None,
+    harmonics: int = 8,
+    most_steps: int = 1000,
+    progress: Callable[[int, int], None] | None = None,
+) -> Branch:
+    """Follow the periodic response along one parameter, through folds.
+
+    Parameters
+    ----------
+    slider : Slider
+        Numbers, no arrays.
+    parameter : str
+        "epsilon", "frequency", "V", "K", "W0", "M", "eta", or a parameter of the law, such as
+        "alpha" or "lambda"; as in `asperity.parameters`.
+    span : pair of float or str
+        Where the branch starts, and where it ends if it gets there. Positive parameters whose ends
+        differ by more than a factor of 2 are continued by equal factors.
+    velocity : float or str
+        Pulling velocity V (m/s). This, epsilon and frequency may be left out where they are the
+        parameter; what the slider or these say of the parameter gives way to `span`.
+    epsilon : float or str
+        Relative amplitude of the load.
+    frequency : float or str
+        Modulation frequency (Hz).
+    modulation : Modulation, optional
+        In place of `epsilon`.
+    inertia : bool
+    radiation_damping : float or str, optional
+        eta (N s/m).
+    harmonics : int
+        Number of harmonics of the force, at least 2.
+    most_steps : int
+        Steps after which the branch is left where it is.
+    progress : callable, optional
+        Called after each step with the number of steps and `most_steps`.
+
+    Returns
+    -------
+    Branch
+        With `result` saying why it ends. Bifurcations are located to 1e-8 relative; what was
+        reached on two meshes is in their `error`.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, the parameter does not exist, the slider has arrays, or no
+        periodic orbit is found at the start of the span.
+
+    Notes
+    -----
+    Collocation with the arclength condition of Keller (1977), see
+    `asperity.orbit.methods.branch_following.arclength`.
+    """
+    harmonics = whole_number(harmonics, "harmonics", least=2)
+    most_steps = whole_number(most_steps, "most_steps", least=1)
+    progress = function(progress, "progress")
+    checked_slider(slider)
+    problem = one_problem(
+        slider,
+        start_of(slider, parameter, span),
+        velocity=velocity,
+        epsilon=epsilon,
+        frequency=frequency,
+        modulation=modulation,
+        inertia=inertia,
+        radiation_damping=radiation_damping,
+    )
+    moving = moving_parameter(problem, parameter, span)
+    follower = BranchFollower(line_through(problem, (moving,), (0.0,), (1.0,)), harmonics)
+    orbit = starting_orbit(follower.line.at(np.zeros(1)), INTERVALS)
+    start = None if orbit is None else follower.begin(orbit, 0.0, INTERVALS)
+    if start is None:
+        raise _no_orbit(moving)
+    recorder = BranchRecorder(follower, moving, start, counted(progress, most_steps))
+    return recorder.branch(recorder.follow_branch(most_steps), problem)
+
+
+def _no_orbit(moving: ContinuedParameter) -> InputError:
+    unit = f" {moving.unit}" if moving.unit else ""
+    return InputError(
+        f"span must start where there is a periodic orbit, found none at {moving.name} = "
+        f"{moving.start:g}{unit}; start elsewhere, such as at a small epsilon"
+    )

@@ -1,0 +1,306 @@
+"""The paper's protocol: modulate, read, switch off, measure F(0) again, next amplitude.
+
+Bureau et al. (2000), Sec. II: the slider slides steadily; for each amplitude the modulation is
+switched on, the mean force and its harmonics are read, and after switching off the unmodulated
+force is measured again, so that a slow drift of the interface shows.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.experiment.exciter import Exciter
+from asperity.experiment.motion import FORCE, LOAD, motion_rate, signals
+from asperity.loads import Programme, ProgrammeStep, Slide
+from asperity.measurement.measure import Measurement, measure
+from asperity.recording.trace import Trace
+from asperity.slider import Slider
+from asperity.tribometer.tribometer import Tribometer
+from asperity.units import to_si
+
+if TYPE_CHECKING:
+    import xarray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudePoint:
+    """One amplitude of the protocol.
+
+    Attributes
+    ----------
+    epsilon : float
+        Commanded.
+    begin, end : float
+        Of the part of the recording that is read (s), unmodulated sliding before and after it
+        included.
+    measurement : Measurement
+    """
+
+    epsilon: float
+    begin: float
+    end: float
+    measurement: Measurement
+
+    @property
+    def drift(self) -> float:
+        """F(0) after over F(0) before, less 1; NaN where either was not found."""
+        before, after = self.measurement.before, self.measurement.after
+        if before is None or after is None:
+            return np.nan
+        return after.value / before.value - 1
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudeSeries:
+    """Recording of the amplitude protocol, and its readings.
+
+    Attributes
+    ----------
+    trace : Trace
+        The whole recording, as the tribometer made it.
+    points : tuple of AmplitudePoint
+    velocity, frequency : float
+        SI.
+    transfer : complex
+        Of the exciter.
+    """
+
+    trace: Trace
+    points: tuple[AmplitudePoint, ...]
+    velocity: float
+    frequency: float
+    transfer: complex
+
+    def to_dataset(self) -> xarray.Dataset:
+        """Readings over the commanded amplitude, each with its standard uncertainty.
+
+        Returns
+        -------
+        xarray.Dataset
+            ``measured_epsilon, mean_friction, static_friction, delta_mu, mu1, mu2, phase1,
+            phase2`` with ``..._uncertainty`` where there is one, ``drift`` and ``verdict``; of
+            the harmonics, those that were read.
+        """
+        import xarray
+
+        rows = [_row(point) for point in self.points]
+        data = {
+            name: ("epsilon", np.array([row[name] for row in rows]), {"units": unit})
+            for name, unit in _UNITS.items()
+            if all(name in row for row in rows)
+        }
+        data["verdict"] = ("epsilon", np.array([p.measurement.verdict for p in self.points]), {})
+        about = {"units": "1", "long_name": "commanded relative amplitude of the load"}
+        epsilon = [point.epsilon for point in self.points]
+        attributes = {
+            "velocity": f"{self.velocity!r} m/s",
+            "frequency": f"{self.frequency!r} Hz",
+            "borne_over_applied": abs(self.transfer),
+            "simulated": "yes",
+        }
+        return xarray.Dataset(data, {"epsilon": ("epsilon", epsilon, about)}, attributes)
+
+
+_UNITS = {
+    "measured_epsilon": "1",
+    "mean_friction": "1",
+    "mean_friction_uncertainty": "1",
+    "static_friction": "1",
+    "delta_mu": "1",
+    "delta_mu_uncertainty": "1",
+    "mu1": "1",
+    "mu1_uncertainty": "1",
+    "phase1": "rad",
+    "phase1_uncertainty": "rad",
+    "mu2": "1",
+    "mu2_uncertainty": "1",
+    "phase2": "rad",
+    "phase2_uncertainty": "rad",
+    "drift": "1",
+}
+
+
+def _row(point: AmplitudePoint) -> dict[str, float]:
+    measurement = point.measurement
+    reading = measurement.reading
+    row = reading.observables()
+    row |= {f"{name}_uncertainty": reading.uncertainty(name) for name in row}
+    return row | {
+        "measured_epsilon": reading.epsilon,
+        "static_friction": measurement.static_friction,
+        "delta_mu": measurement.delta_mu,
+        "delta_mu_uncertainty": measurement.delta_mu_uncertainty,
+        "drift": point.drift,
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class AmplitudeMotion:
+    """Motion of a slider through the amplitude protocol.
+
+    Attributes
+    ----------
+    time : array, shape (n,)
+        Evenly spaced (s).
+    force : array, shape (n,)
+        Of the spring (N).
+    load : array, shape (n,)
+        As applied (N), air layer included.
+    epsilons : tuple of float
+        Commanded.
+    velocity, sliding, modulated : float
+        Of the drive (m/s); seconds without and with modulation.
+    exciter : Exciter
+    provenance : mapping
+        Of the integration.
+    """
+
+    time: Array
+    force: Array
+    load: Array
+    epsilons: tuple[float, ...]
+    velocity: float
+    sliding: float
+    modulated: float
+    exciter: Exciter
+    provenance: Mapping[str, Any]
+
+    def recorded(
+        self, tribometer: Tribometer, *, seed: int = 0, harmonics: int = 2
+    ) -> AmplitudeSeries:
+        """Record the motion, and read the recording as one of a laboratory.
+
+        Parameters
+        ----------
+        tribometer : Tribometer
+            With the channels ``"shear force"`` and ``"normal force"``; the latter measures the
+            load as applied, not the part of it that an air layer bears.
+        seed : int
+            Of the tribometer's noise: another seed, another recording.
+        harmonics : int
+            To read.
+        """
+        trace = tribometer.record(
+            self.time, {FORCE: self.force, LOAD: self.load}, seed=seed, provenance=self.provenance
+        )
+        frequency = self.exciter.frequency
+        points = []
+        for i, epsilon in enumerate(self.epsilons):
+            begin = i * (self.sliding + self.modulated)
+            end = begin + 2 * self.sliding + self.modulated
+            part = trace.slice(begin, end)
+            measurement = measure(
+                part, load=LOAD, force=FORCE, frequency=frequency, harmonics=harmonics
+            )
+            points.append(AmplitudePoint(epsilon, begin, end, measurement))
+        return AmplitudeSeries(
+            trace, tuple(points), self.velocity, frequency, self.exciter.transfer
+        )
+
+
+def amplitude_motion(
+    slider: Slider,
+    exciter: Exciter,
+    epsilons: Sequence[float],
+    *,
+    rate: float,
+    velocity: float | str,
+    sliding: float | str = "2 s",
+    modulated: float | str = "4 s",
+    rise: float | str = "0.1 s",
+    **options: Any,
+) -> AmplitudeMotion:
+    """Integrate the protocol; parameters as `amplitude_series` describes them.
+
+    Parameters
+    ----------
+    rate : float
+        Samples of the motion per second (Hz), as `motion_rate` has it for a tribometer.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or the motion ends before the protocol does.
+    """
+    speed = to_si(velocity, "velocity", "amplitude_series.velocity")
+    off, on, slow = (
+        to_si(value, "time", f"amplitude_series.{name}")
+        for name, value in (("sliding", sliding), ("modulated", modulated), ("rise", rise))
+    )
+    applied: list[ProgrammeStep] = [Slide(off)]
+    borne: list[ProgrammeStep] = [Slide(off)]
+    for epsilon in epsilons:
+        outer, inner = exciter.steps(epsilon, on, slow)
+        applied += [outer, Slide(off)]
+        borne += [inner, Slide(off)]
+    W0 = np.asarray(slider.W0).item()
+    borne_load = Programme(*borne, load=W0, velocity=speed)
+    applied_load = Programme(*applied, load=W0, velocity=speed)
+    columns, last = signals(slider, borne_load, rate, ("force",), **options)
+    if last.stopped is not None:
+        raise InputError(
+            f"amplitude_series.slider must slide to the end of the protocol, got a motion that "
+            f"ended: {last.stopped}"
+        )
+    time = columns["time"]
+    return AmplitudeMotion(
+        time, columns["force"], applied_load.load(time), tuple(map(float, epsilons)),
+        speed, off, on, exciter, last.provenance,
+    )  # fmt: skip
+
+
+def amplitude_series(
+    slider: Slider,
+    tribometer: Tribometer,
+    exciter: Exciter,
+    epsilons: Sequence[float],
+    *,
+    velocity: float | str,
+    sliding: float | str = "2 s",
+    modulated: float | str = "4 s",
+    rise: float | str = "0.1 s",
+    harmonics: int = 2,
+    seed: int = 0,
+    **options: Any,
+) -> AmplitudeSeries:
+    """Run the protocol on a simulated slider, and read the recording as one of a laboratory.
+
+    Parameters
+    ----------
+    slider : Slider
+        That slides steadily without modulation: K above its critical value, or with inertia.
+    tribometer : Tribometer
+        With the channels ``"shear force"`` and ``"normal force"``; the latter measures the load
+        as applied, not the part of it that an air layer bears.
+    exciter : Exciter
+    epsilons : sequence of float
+        Commanded amplitudes, in the order of the experiment.
+    velocity : float or str
+        Pulling velocity (m/s).
+    sliding, modulated, rise : float or str
+        Seconds of sliding before, between and after, of modulation, and of its coming and going.
+    harmonics : int
+        To read.
+    seed : int
+        Of the tribometer's noise.
+    **options
+        Of `asperity.transients.transient`, such as ``inertia=True``.
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or the motion ends before the protocol does.
+    """
+    motion = amplitude_motion(
+        slider, exciter, epsilons, rate=motion_rate(tribometer), velocity=velocity,
+        sliding=sliding, modulated=modulated, rise=rise, **options,
+    )  # fmt: skip
+    return motion.recorded(tribometer, seed=seed, harmonics=harmonics)

@@ -1,0 +1,199 @@
+"""Orbits on collocation meshes, and how they serve as guesses at nearby parameters.
+
+A fit calls again and again with the same points and parameters that change little. From the orbits
+of the call before, Newton's method needs a few steps, where a search from nothing takes ten times
+as long.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.orbit.batches import Indices, mesh_chunk, put, run_chunks, take
+from asperity.orbit.mesh.mesh import Orbit
+from asperity.orbit.mesh.newton import ACCEPTED
+from asperity.orbit.mesh.remeshing import FIRST_MESH, refined_orbit, remeshed
+from asperity.orbit.multipliers import AGREEMENT
+from asperity.orbit.observables import Observables
+from asperity.orbit.outcome import Outcome
+from asperity.slider.problem import Problem
+
+
+class MeshOrbits(NamedTuple):
+    """Converged orbits on one mesh, NumPy arrays with the points along the last axis.
+
+    Attributes
+    ----------
+    orbit : Orbit
+    mean_friction : array, shape (points,)
+    harmonics : complex array, shape (count, points)
+    log_multipliers : complex array, shape (states, points)
+    """
+
+    orbit: Orbit
+    mean_friction: NDArray[np.float64]
+    harmonics: NDArray[np.complex128]
+    log_multipliers: NDArray[np.complex128]
+
+
+def converged_orbits(orbit: Orbit, observables: Observables, harmonics: int) -> MeshOrbits:
+    """Converged orbits as `MeshOrbits`."""
+    return MeshOrbits(
+        orbit,
+        np.asarray(observables.mean_friction),
+        np.asarray(observables.harmonics[:harmonics]),
+        observables.log_multipliers,
+    )
+
+
+class SearchedOrbits(NamedTuple):
+    """Orbits of a search.
+
+    Attributes
+    ----------
+    outcome : int array, shape (points,)
+        Of all points; those that were not wanted have `Outcome.NO_ORBIT`.
+    parts : list of (array of int, MeshOrbits)
+        Converged points with their orbits, each point once, each part on a mesh of its own.
+    """
+
+    outcome: NDArray[np.int64]
+    parts: list[tuple[Indices, MeshOrbits]]
+
+    @classmethod
+    def none(cls, points: int) -> SearchedOrbits:
+        """No orbit yet."""
+        return cls(np.full(points, int(Outcome.NO_ORBIT)), [])
+
+    def add(self, index: Indices, orbits: MeshOrbits) -> None:
+        """Note converged orbits of the points `index`."""
+        if len(index):
+            self.outcome[index] = Outcome.CONVERGED
+            self.parts.append((index, orbits))
+
+
+Float = NDArray[np.float64]
+
+#: Intervals of the meshes that known orbits are kept on.
+KEPT = 216
+#: Intervals of the mesh that is compared with the first one on which orbits are differentiated.
+COARSER = FIRST_MESH
+#: Largest relative change of mean and harmonics from a mesh to the next at which the finer serves:
+#: its own error is smaller by 3^8, for a stiff orbit by 3^4. The same of the last mesh, as good as
+#: the whole search.
+_AGREEMENT, _LAST_AGREEMENT = 1e-8, AGREEMENT
+
+
+@dataclass
+class KnownOrbits:
+    """The last orbits known of some points, with which the next call begins.
+
+    Attributes
+    ----------
+    points : int
+        Number of points; calls must have as many, in the same order.
+    orbit : Orbit or None
+        Points along the last axis; None where no orbit is known.
+    there : bool array, shape (points,)
+        Of which points an orbit is known.
+    """
+
+    points: int
+    orbit: Orbit | None = None
+    there: NDArray[np.bool_] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.there = np.zeros(self.points, bool)
+
+    def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
+        """Keep the orbits of the points `index` of a problem, on a mesh of any size."""
+        size = problem.system.size
+        if self.orbit is None:
+            self.orbit = Orbit.empty(orbit.scheme, size, KEPT, self.points)
+        self.there[index] = True
+        if len(orbit.mesh) == KEPT + 1:
+            put(self.orbit, index, orbit)
+            return
+        remesh = partial(remeshed, intervals=KEPT)
+        inputs, everyone = (take(problem, index), orbit), np.arange(len(index))
+        for part, kept in run_chunks(remesh, inputs, everyone, mesh_chunk(size)):
+            put(self.orbit, index[part], kept)
+
+    def picked(self, index: Indices) -> KnownOrbits:
+        """The points `index`, which may name one several times."""
+        orbit = None if self.orbit is None else take(self.orbit, index)
+        others = KnownOrbits(len(index), orbit)
+        others.there[:] = self.there[index]
+        return others
+
+
+def followed_orbits(
+    problem: Problem,
+    guess: Orbit,
+    index: Indices,
+    harmonics: int,
+    meshes: tuple[int, ...],
+) -> list[tuple[Indices, Orbit, Observables]]:
+    """Orbits that Newton's method reaches from a guess, checked by a coarser mesh.
+
+    Parameters
+    ----------
+    problem : Problem
+    guess : Orbit
+        Of the points of the problem, of meaning for those of `index`.
+    index : array of int
+    harmonics : int
+        At least 2.
+    meshes : tuple of int
+        Numbers of intervals, rising; an orbit is on the first that agrees with the one before.
+
+    Returns
+    -------
+    list of (array of int, Orbit, Observables)
+        For each mesh that serves any point: the points, their orbits and observables.
+    """
+    parts = []
+    size, points = guess.centre.shape
+    before = np.full((1 + harmonics, points), np.nan + 0j)
+    for intervals in (COARSER, *meshes):
+        solve = partial(refined_orbit, intervals=intervals, harmonics=harmonics)
+        finer = Orbit.empty(guess.scheme, size, intervals, points)
+        good, left = [], []
+        chunk = mesh_chunk(size)
+        for part, (fine, reading, error) in run_chunks(solve, (problem, guess), index, chunk):
+            put(finer, part, fine)
+            change = largest_change(before[:, part], reading)
+            before[:, part] = np.vstack([reading.mean_friction, reading.harmonics])
+            solved = error < ACCEPTED
+            agreement = _LAST_AGREEMENT if intervals == meshes[-1] else _AGREEMENT
+            served = solved & (change < agreement)
+            if served.any():
+                kept = np.flatnonzero(served)
+                good.append((part[kept], take(fine, kept), take(reading, kept)))
+            left.append(part[solved & ~served])
+        if good:
+            parts += good
+        index, guess = np.concatenate([np.zeros(0, int), *left]), finer
+        if not len(index):
+            break
+    return parts
+
+
+def largest_change(before: NDArray[np.complex128], reading: Observables) -> Float:
+    """Largest relative difference of mean and first two harmonics from those before, (points,).
+
+    Parameters
+    ----------
+    before : complex array, shape (1 + harmonics, points)
+        The mean, then the harmonics.
+    reading : Observables
+    """
+    mean, first = before[0].real, before[1:3]
+    scale = np.abs(first) + 1e-9 * np.abs(mean)
+    change = np.abs(reading.harmonics[:2] - first) / np.maximum(scale, np.abs(first[:1]))
+    return np.asarray(np.maximum(change.max(0), np.abs(reading.mean_friction / mean - 1)))

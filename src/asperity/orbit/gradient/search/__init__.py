@@ -1,1 +1,0 @@
-"""Orbits from the search, each on a collocation mesh on which it can be differentiated."""

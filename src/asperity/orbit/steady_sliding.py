@@ -1,0 +1,80 @@
+"""Steady sliding and the load cycle, before an orbit is known: what chooses the method."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from asperity._jax import jit_large
+from asperity.algebra.small_systems import jacobian_columns, spectral_radius
+from asperity.loads import Excitation, Harmonic
+from asperity.orbit.batches import points_of, run_chunks
+from asperity.slider import QuasiStatic
+from asperity.slider.problem import Problem
+from asperity.theory.adiabatic import even_phases
+from asperity.theory.averaged import slip_pulse
+
+#: Phases at which the extremes of a load that is not harmonic are looked for.
+_PHASES = 64
+#: Points in a call.
+_CHUNK = 4096
+
+
+class SteadySliding(NamedTuple):
+    """Dimensionless numbers of an operating point, each (points,).
+
+    Mass and damping do not count: they add fast rates, which methods can treat.
+
+    Attributes
+    ----------
+    rate : array
+        Largest rate per radian of a perturbation of steady sliding: small for fast modulation.
+    sharpness : array
+        Half the range of the exponent of the slip rate over the load cycle.
+    unloading : array
+        Largest share of W0 that the modulation takes off the contacts: epsilon, or 1 - min w.
+    """
+
+    rate: Array
+    sharpness: Array
+    unloading: Array
+
+
+def perturbation_rate(problem: Problem) -> Array:
+    """Largest rate per radian of a perturbation of steady sliding, mass and damping included."""
+    system, points = problem.system, points_of(problem)
+    steady = jnp.broadcast_to(system.steady(), (system.size, points))
+    at = Excitation(jnp.ones(points))
+    _, columns = jacobian_columns(lambda Y: system.rates(Y, at), steady)
+    return spectral_radius(jnp.stack(columns, axis=1))
+
+
+def steady_sliding_of(problem: Problem) -> SteadySliding:
+    """`steady_sliding` of arrays of any length, within a compiled program too."""
+    system, load = problem
+    sliding = QuasiStatic(system.slider, system.V, system.omega)
+    points = points_of(problem)
+    harmonic = isinstance(load, Harmonic)
+    cycle = load.at(even_phases(2 if harmonic else _PHASES) * jnp.ones(points))
+    unloading = jnp.abs(load.epsilon) if harmonic else 1 - jnp.min(cycle.w, axis=0)
+    return SteadySliding(
+        perturbation_rate(Problem(sliding, load)),
+        slip_pulse(sliding, cycle).sharpness,
+        unloading * jnp.ones(points),
+    )
+
+
+_compiled = jit_large(steady_sliding_of)
+
+
+def steady_sliding(problem: Problem) -> SteadySliding:
+    """The numbers of all points of `problem`, NumPy arrays with the points along the last axis."""
+    points = np.arange(problem.system.V.shape[-1])
+    numbers = SteadySliding(*np.empty((3, len(points))))
+    for part, values in run_chunks(_compiled, (problem,), points, _CHUNK):
+        for target, value in zip(numbers, values, strict=True):
+            target[part] = value
+    return numbers

@@ -1,0 +1,195 @@
+"""Files and folders that are written completely or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from asperity.errors import InputError
+from asperity.outputs.targets import fresh_name
+
+try:
+    import fcntl
+except ImportError:  # pragma: no cover  Windows: temporary folders of killed runs stay
+    fcntl = None  # type: ignore[assignment]
+
+_PREFIX = ".asperity-unfinished-"
+
+
+@contextmanager
+def written_file(target: str | os.PathLike[str], name: str = "out") -> Iterator[Path]:
+    """Hand out a path beside `target` whose file replaces `target` at the end.
+
+    An error or an interruption leaves `target` as it was and removes the new file. What is
+    written has reached the disk before it gets its name.
+
+    Parameters
+    ----------
+    target : str or path
+        Checked by `output_file` beforehand.
+    name : str
+        What messages call it, such as ``"--plot"``.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
+    """
+    target = Path(target)
+    fresh = fresh_name(target)
+    try:
+        with writable(target, name):
+            yield fresh
+            to_disk(fresh)
+            fresh.replace(target)
+    finally:
+        with contextlib.suppress(OSError):
+            fresh.unlink(missing_ok=True)
+
+
+@contextmanager
+def writable(target: Path, name: str = "out") -> Iterator[None]:
+    """Turn an error of the file system into a sentence about `target`."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{name} must be a file that can be written, got '{target}' "
+            f"({(error.strerror or str(error)).lower()}); choose a folder that exists, is "
+            "writable and has room"
+        ) from None
+
+
+def to_disk(path: Path) -> None:
+    """Wait until the contents of a file have reached the disk."""
+    with path.open("rb+") as stream:
+        os.fsync(stream.fileno())
+
+
+def require_folder(folder: Path, name: str = "out") -> None:
+    """Refuse a folder that cannot be written, before anything is computed for it.
+
+    Raises
+    ------
+    InputError
+        Which calls the folder `name`.
+    """
+    staging, lock = _staging(folder, name)
+    shutil.rmtree(staging, ignore_errors=True)
+    if lock is not None:
+        os.close(lock)
+
+
+@contextmanager
+def written_folder(folder: Path, name: str = "out") -> Iterator[Path]:
+    """Hand out a temporary folder whose files are moved to `folder` at the end.
+
+    An error, or an interruption, leaves `folder` as it was. Files of other names that lie there
+    stay. The temporary folder lies inside `folder` if that exists, else beside it, so that moving
+    is renaming, which cannot stop half-way through a file. Temporary folders that killed processes
+    have left at that place are removed; those of running processes stay.
+
+    Raises
+    ------
+    InputError
+        At once, if the folder, which messages call `name`, cannot be written.
+    """
+    staging, lock = _staging(folder, name)
+    try:
+        yield staging
+        _move_files(staging, folder, name)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+        if lock is not None:
+            os.close(lock)
+
+
+def _staging(folder: Path, name: str) -> tuple[Path, int | None]:
+    """A new temporary folder, and the descriptor that holds its lock where there are locks."""
+    try:
+        if folder.exists() and not folder.is_dir():
+            raise NotADirectoryError(20, "it is a file")
+        place = folder
+        while not place.exists():
+            place = place.parent
+        return held_folder(place, _PREFIX)
+    except OSError as error:
+        raise _unwritable(folder, name, error) from None
+
+
+def held_folder(place: Path, prefix: str) -> tuple[Path, int | None]:
+    """A new temporary folder, and the descriptor that holds its lock where there are locks.
+
+    Folders of the same prefix that killed processes have left are removed; those of running
+    processes stay.
+
+    Parameters
+    ----------
+    place : Path
+        Where it is made.
+    prefix : str
+        With which its name begins.
+    """
+    # Nobody else may take a folder for abandoned between its creation and its lock.
+    guard = _locked(place, wait=True)
+    try:
+        if guard is not None:
+            _remove_abandoned(place, prefix)
+        made = Path(tempfile.mkdtemp(prefix=prefix, dir=place))
+        return made, _locked(made)
+    finally:
+        if guard is not None:
+            os.close(guard)
+
+
+def _remove_abandoned(place: Path, prefix: str) -> None:
+    """Remove temporary folders that no running process holds."""
+    for left in place.glob(f"{prefix}*"):
+        if left.is_symlink() or not left.is_dir():
+            continue
+        lock = _locked(left)
+        if lock is not None:
+            shutil.rmtree(left, ignore_errors=True)
+            os.close(lock)
+
+
+def _locked(folder: Path, *, wait: bool = False) -> int | None:
+    """Lock a folder until the descriptor is closed or the process ends, however it ends.
+
+    None where it is locked by someone else, or where the file system has no locks.
+    """
+    if fcntl is None:
+        return None
+    try:
+        descriptor = os.open(folder, os.O_RDONLY)
+    except OSError:
+        return None
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+    except OSError:
+        os.close(descriptor)
+        return None
+    return descriptor
+
+
+def _move_files(staging: Path, folder: Path, name: str) -> None:
+    try:
+        for source in sorted(p for p in staging.rglob("*") if p.is_file()):
+            target = folder / source.relative_to(staging)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(source, target)
+    except OSError as error:
+        raise _unwritable(folder, name, error) from None
+
+
+def _unwritable(folder: Path, name: str, error: OSError) -> InputError:
+    why = (error.strerror or "no reason given").lower()
+    return InputError(
+        f"{name} must be a folder that can be written, got '{folder}' ({why}); "
+        "choose another folder"
+    )

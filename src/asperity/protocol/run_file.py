@@ -1,0 +1,212 @@
+"""The NetCDF file of a run: written block by block, and read in blocks as text or as an outline.
+
+Memory does not grow with the file.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.outputs import output_file, written_file
+
+if TYPE_CHECKING:
+    import xarray
+
+#: Dimensions that grow, with the rows of a chunk on disk: a quarter of a megabyte each.
+CHUNKS: Mapping[str, int] = {"time": 32_768, "event": 1024}
+
+#: Columns of the text, with the heading of each.
+_COLUMNS = {
+    "time": "time (s)",
+    "load": "normal load (N)",
+    "force": "shear force (N)",
+    "friction": "friction",
+    "velocity": "velocity (m/s)",
+    "slip_velocity": "plastic velocity (m/s)",
+    "displacement": "displacement (m)",
+}
+
+#: Rows read at a time.
+_ROWS = 4 * CHUNKS["time"]
+
+
+def append(path: Path, block: xarray.Dataset, done: Mapping[str, int]) -> None:
+    """Add a block after the finished ones; an unfinished block behind them is overwritten.
+
+    The file is closed again, so that it is whole and readable between blocks.
+
+    Parameters
+    ----------
+    path : Path
+        Created where nothing is done yet.
+    block : xarray.Dataset
+        Variables over ``time`` or ``event``, and others, which are written once.
+    done : mapping of str to int
+        Length of each growing dimension so far; empty at the beginning.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written or is damaged.
+    """
+    import h5netcdf
+
+    new = not done
+    try:
+        with h5netcdf.File(path, "w" if new else "r+") as file:
+            if new:
+                _lay_out(file, block)
+            begin = {name: done.get(name, 0) for name in CHUNKS}
+            end = {name: begin[name] + block.sizes[name] for name in CHUNKS}
+            for dimension, length in end.items():
+                file.resize_dimension(dimension, length)
+            for name, variable in block.variables.items():
+                head = str(variable.dims[0])
+                if head in CHUNKS and variable.sizes[head]:
+                    file.variables[name][begin[head] : end[head]] = _writable(variable.values)
+    except OSError as error:
+        why = error.strerror or "it is damaged"
+        raise InputError(
+            f"out must be a file that can be written, got '{path}' ({why}); choose a folder that "
+            "exists, is writable and has room"
+        ) from None
+
+
+def describe(path: Path, attributes: Mapping[str, Any]) -> None:
+    """Set attributes of the whole file."""
+    import h5netcdf
+
+    with h5netcdf.File(path, "r+") as file:
+        file.attrs.update(attributes)
+
+
+def _lay_out(file: Any, block: xarray.Dataset) -> None:
+    import h5py
+
+    file.dimensions = {
+        str(name): None if name in CHUNKS else size for name, size in block.sizes.items()
+    }
+    file.attrs.update(block.attrs)
+    for name, variable in block.variables.items():
+        text = variable.dtype.kind in "UO"
+        shape = tuple(CHUNKS.get(str(d), block.sizes[d]) for d in variable.dims)
+        made = file.create_variable(
+            name,
+            variable.dims,
+            dtype=h5py.string_dtype() if text else variable.dtype,
+            chunks=shape if variable.dims[0] in CHUNKS else None,
+        )
+        for key, value in variable.attrs.items():
+            made.attrs[key] = value
+        if variable.dims[0] not in CHUNKS:
+            made[...] = _writable(variable.values)
+
+
+def _writable(values: np.ndarray) -> np.ndarray:
+    return values.astype(object) if values.dtype.kind == "U" else values
+
+
+@dataclass(frozen=True, eq=False)
+class RunOutline:
+    """Extremes of a run over intervals of time, and its events, for a figure.
+
+    Attributes
+    ----------
+    time : array, shape (n,)
+        Middle of each stretch (s).
+    low, high : dict of str to array, shape (n,)
+        Extremes of ``load``, ``force``, ``velocity`` over each stretch, in SI.
+    events : list of (float, str)
+        Time (s) and kind.
+    title : str
+    law : str
+    """
+
+    time: NDArray[np.float64]
+    low: dict[str, NDArray[np.float64]]
+    high: dict[str, NDArray[np.float64]]
+    events: list[tuple[float, str]]
+    title: str
+    law: str
+
+
+def write_csv(run: str | Path, out: str | Path) -> Path:
+    """Write the rows of a run as comma-separated text with units in the headings.
+
+    Parameters
+    ----------
+    run : str or path
+        NetCDF file of `run_protocol`.
+    out : str or path
+
+    Raises
+    ------
+    InputError
+        If `out` cannot be written.
+    """
+    target = output_file(out, "--csv", example="run.csv", inputs={"run": run})
+    with (
+        written_file(target, "--csv") as file,
+        file.open("w", encoding="utf-8", newline="\n") as stream,
+    ):
+        stream.write(",".join(_COLUMNS.values()) + "\n")
+        for block in _blocks(Path(run)):
+            rows = np.column_stack([block[name] for name in _COLUMNS])
+            np.savetxt(stream, rows, "%.12g", ",")
+    return Path(out)
+
+
+def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
+    """Extremes of load, force and velocity over stretches of equal length.
+
+    Parameters
+    ----------
+    run : str or path
+        NetCDF file of `run_protocol`.
+    stretches : int
+        At most; fewer where there are fewer rows.
+    """
+    import h5netcdf
+
+    with h5netcdf.File(run, "r") as file:
+        time = file.variables["time"]
+        first, last, rows = float(time[0]), float(time[-1]), time.shape[0]
+        kinds = [k.decode() if isinstance(k, bytes) else k for k in file.variables["event_kind"][:]]
+        events = list(zip(map(float, file.variables["event_time"][:]), kinds, strict=True))
+        title, law = str(file.attrs["title"]), str(file.attrs["law"])
+    count = max(1, min(stretches, rows))
+    names = ("load", "force", "velocity")
+    low = {name: np.full(count, np.inf) for name in names}
+    high = {name: np.full(count, -np.inf) for name in names}
+    width = (last - first) / count or 1.0
+    for block in _blocks(Path(run)):
+        index = np.minimum(((block["time"] - first) / width).astype(int), count - 1)
+        for name in names:
+            np.minimum.at(low[name], index, block[name])
+            np.maximum.at(high[name], index, block[name])
+    filled = np.isfinite(low["load"])
+    middle = first + width * (np.arange(count) + 0.5)
+    return RunOutline(
+        middle[filled],
+        {name: values[filled] for name, values in low.items()},
+        {name: values[filled] for name, values in high.items()},
+        events,
+        title,
+        law,
+    )
+
+
+def _blocks(run: Path) -> Iterator[dict[str, NDArray[np.float64]]]:
+    import h5netcdf
+
+    with h5netcdf.File(run, "r") as file:
+        rows = file.variables["time"].shape[0]
+        for begin in range(0, rows, _ROWS):
+            yield {n: np.asarray(file.variables[n][begin : begin + _ROWS]) for n in _COLUMNS}

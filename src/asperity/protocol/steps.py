@@ -1,0 +1,361 @@
+"""Lines such as ``modulate 24 % at 120 Hz for 20 s`` to the steps of a programme.
+
+A line is one of the forms below. Words in braces are quantities with their units; what stands in
+square brackets may be left out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.errors import InputError, closest
+from asperity.experiment.recipes import SlideHoldSlide, VelocitySteps
+from asperity.loads import (
+    Follow,
+    Hold,
+    Modulate,
+    ProgrammeStep,
+    RampLoad,
+    RampVelocity,
+    Slide,
+    StepLoad,
+)
+from asperity.loads.programme.steps import LoadAndVelocity
+from asperity.parameters.arguments import shown
+from asperity.recording import read
+from asperity.recording.rounded_time import even_times
+from asperity.units import to_si
+
+#: What a recording can prescribe: the role of its channel, and the kind that it must be of.
+_CHANNELS = {"load": ("W", "force"), "velocity": ("velocity", "velocity")}
+
+#: Findings that make a recording unusable here: interpolation would hide them.
+_UNUSABLE = frozenset({"gap", "truncated", "malformed row", "repeated time", "backward time"})
+
+#: What each quantity of a form measures.
+_KINDS = {
+    "duration": "time",
+    "rise": "time",
+    "fall": "time",
+    "velocity": "velocity",
+    "load": "force",
+    "epsilon": "dimensionless",
+    "sliding": "time",
+    "slip": "length",
+    "frequency": "frequency",
+}
+
+#: Steps that a protocol may have with all repetitions: a misprint must not fill the memory.
+MOST = 100_000
+
+
+def follow(channels: str, file: str, folder: Path) -> Follow:
+    """The step that follows channels of a recording.
+
+    Parameters
+    ----------
+    channels : str
+        ``load``, ``velocity``, or both joined by ``and``.
+    file : str
+        Any recording that `asperity.recording.read` reads; relative to `folder`.
+    folder : Path
+
+    Raises
+    ------
+    InputError
+        If the recording cannot be read, lacks a channel or its unit, or is not whole.
+    """
+    names = [name.strip().lower() for name in channels.split(" and ")]
+    for name in names:
+        if name not in _CHANNELS:
+            raise InputError(
+                f"follow must name what is followed, got '{name}'; {closest(name, _CHANNELS)}"
+            )
+    path = Path(file.strip("\"'"))
+    trace = read(path if path.is_absolute() else folder / path)
+    for finding in trace.findings:
+        if finding.name in _UNUSABLE:
+            raise InputError(
+                f"follow must take a recording without '{finding.name}', got '{path.name}': "
+                f"{finding.sentence} Cut it to a part that is whole"
+            )
+    values: dict[str, np.ndarray] = {}
+    for name in names:
+        role, kind = _CHANNELS[name]
+        channel = trace.channel(role)
+        if channel.kind != kind:
+            raise InputError(
+                f"follow must take the {name} from a channel of its unit, got "
+                f"'{channel.recorded_name}' in '{channel.recorded_unit}' of '{path.name}'; "
+                "write the unit into its heading, as in 'load (N)' or 'velocity (um/s)'"
+            )
+        values[name] = channel.values
+    finite = np.isfinite(trace.time)
+    for column in values.values():
+        finite &= np.isfinite(column)
+    if not finite.all():
+        row = int(np.argmin(finite))
+        raise InputError(
+            f"follow must have a number in every row, got none in row {row} of '{path.name}'; "
+            "cut or fill the recording first"
+        )
+    return Follow(even_times(trace.time), values.get("load"), values.get("velocity"))
+
+
+@dataclass(frozen=True)
+class StepForm:
+    """One way to write a step.
+
+    Attributes
+    ----------
+    pattern : str
+        Words, ``{quantity}`` and ``[optional parts]``.
+    example : str
+    build : callable
+        The step, from the quantities by name and the folder of the file.
+    """
+
+    pattern: str
+    example: str
+    build: Callable[[Mapping[str, Any], Path], ProgrammeStep]
+
+    @cached_property
+    def verb(self) -> str:
+        """The words before the first quantity that tell the forms apart."""
+        head = re.split(r"[{\[]", self.pattern)[0].split()
+        return " ".join(head[: 2 if head[0] in ("step", "ramp") else 1])
+
+    @cached_property
+    def expression(self) -> re.Pattern[str]:
+        """The pattern as a regular expression over text with single blanks."""
+        optional = re.sub(r"\s*\[(.*?)\]", r"(?:,? \1)?", self.pattern)
+        named = re.sub(r"\{(\w+)\}", r"(?P<\1>\\S.*?)", optional)
+        return re.compile(named, re.IGNORECASE)
+
+
+def _step_load(parts: Mapping[str, Any], folder: Path) -> ProgrammeStep:
+    return StepLoad(parts["load"])
+
+
+def _list(text: str) -> tuple[str, ...]:
+    """Quantities with commas between them, each with its unit."""
+    return tuple(part.strip() for part in text.split(","))
+
+
+def _modulate(parts: Mapping[str, Any], folder: Path) -> ProgrammeStep:
+    return Modulate(**parts)
+
+
+#: Every form that a step can take.
+FORMS = (
+    StepForm("hold[for] {duration}", "hold 10 s", lambda parts, folder: Hold(**parts)),
+    StepForm(
+        "slide[at {velocity}] for {duration}",
+        "slide at 10 um/s for 60 s",
+        lambda parts, folder: Slide(**parts),
+    ),
+    StepForm(
+        "modulate {epsilon} at {frequency} for {duration}[rising in {rise}][falling in {fall}]",
+        "modulate 24 % at 120 Hz for 20 s",
+        _modulate,
+    ),
+    StepForm("step load to {load}", "step load to 9 N", _step_load),
+    StepForm(
+        "ramp load to {load} in {duration}",
+        "ramp load to 9 N in 5 s",
+        lambda parts, folder: RampLoad(parts["load"], parts["duration"]),
+    ),
+    StepForm(
+        "ramp velocity to {velocity} in {duration}",
+        "ramp velocity to 100 um/s in 5 s",
+        lambda parts, folder: RampVelocity(parts["velocity"], parts["duration"]),
+    ),
+    StepForm(
+        "slide-hold-slide for {holds} sliding {sliding}",
+        "slide-hold-slide for 1 s, 10 s, 100 s sliding 20 s",
+        lambda parts, folder: SlideHoldSlide(_list(parts["holds"]), parts["sliding"]),
+    ),
+    StepForm(
+        "velocity steps {velocities} over {slip}",
+        "velocity steps 1 um/s, 10 um/s, 1 um/s over 100 um",
+        lambda parts, folder: VelocitySteps(_list(parts["velocities"]), parts["slip"]),
+    ),
+    StepForm(
+        "follow {channels} from {file}",
+        "follow load from recording.csv",
+        lambda parts, folder: follow(parts["channels"], parts["file"], folder),
+    ),
+)
+
+REPEAT = re.compile(r"repeat (?P<times>\S+)(?: times)?:(?P<steps>.*)", re.IGNORECASE)
+REPEAT_EXAMPLE = "repeat 3 times: hold 10 s; slide for 60 s"
+
+
+def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
+    """One line of a protocol as a step.
+
+    Parameters
+    ----------
+    text : str
+    name : str
+        What messages call it, such as ``"steps[3]"``.
+    folder : Path
+        Where files that the line names lie.
+
+    Raises
+    ------
+    InputError
+        If the line is no step, or one of its quantities is not what it has to be.
+    """
+    line = " ".join(text.split())
+    forms = _meant(line, name)
+    for form in forms:
+        match = form.expression.fullmatch(line)
+        if match is not None:
+            parts = {key: value for key, value in match.groupdict().items() if value is not None}
+            return form.build(_quantities(parts, name, line, form.example), folder)
+    examples = " or ".join(f"'{form.example}'" for form in forms)
+    raise InputError(f"{name} must be a whole step, got '{line}'; write it like {examples}")
+
+
+def _meant(line: str, name: str) -> list[StepForm]:
+    """The forms that begin as the line does."""
+    words = line.lower().split()
+    for length in (1, 2):
+        forms = [form for form in FORMS if form.verb == " ".join(words[:length])]
+        if forms:
+            return forms
+    verbs = sorted({verb for form in FORMS for verb in (form.verb, form.verb.split()[0])})
+    # `ramp` alone names two forms, neither of which is meant more than the other.
+    if words and words[0] in verbs:
+        return [form for form in FORMS if form.verb.split()[0] == words[0]]
+    verbs = [*verbs, "repeat"]
+    tried = (" ".join(words[:2]), words[0] if words else "")
+    near = [
+        m for words_said in tried for m in get_close_matches(words_said, verbs, n=1, cutoff=0.6)
+    ]
+    examples = [form.example for form in FORMS if near and form.verb.startswith(near[0])]
+    if near == ["repeat"]:
+        examples = [REPEAT_EXAMPLE]
+    shown = "' or '".join(examples or [form.example for form in FORMS])
+    raise InputError(
+        f"{name} must be a step, got '{line}'; "
+        + (f"did you mean something like '{shown}'?" if near else f"write it like '{shown}'")
+    )
+
+
+def _quantities(
+    parts: Mapping[str, str], name: str, line: str, example: str
+) -> dict[str, float | str]:
+    """Values in SI; what is no quantity stays a text."""
+    quantities: dict[str, float | str] = {}
+    for key, text in parts.items():
+        if key not in _KINDS:
+            quantities[key] = text
+            continue
+        try:
+            quantities[key] = to_si(text, _KINDS[key], f"{name}.{key}", require_unit=True)
+        except InputError as error:
+            raise InputError(f"{error}, as in '{example}' (in '{line}')") from None
+    return quantities
+
+
+@dataclass(frozen=True)
+class PlannedStep:
+    """A step, its place counted from 1 such as ``"step 3.2"``, and the line it was written as."""
+
+    place: str
+    text: str
+    step: ProgrammeStep
+
+
+def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[str]]:
+    """All steps in their order, repetitions written out, and the mistakes in them.
+
+    Parameters
+    ----------
+    steps : sequence of str, ProgrammeStep, or object with ``repeat`` and ``steps``
+    folder : Path
+        Where files that lines name lie.
+    """
+    mistakes: list[str] = []
+    return _planned(steps, "step ", folder, mistakes), mistakes
+
+
+def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iterator[str]:
+    """Mistakes in the values of the steps, each at the load and velocity before it."""
+    reported: set[str] = set()
+    for one in planned:
+        try:
+            _, level = one.step.lay_out(level, one.place)
+            if isinstance(one.step, StepLoad) and not level.load > 0:
+                raise InputError(
+                    f"{one.place}.load must be positive, got {level.load:g} N; give a load above "
+                    "zero, without which there is no contact"
+                )
+        except InputError as error:
+            if one.place not in reported:
+                reported.add(one.place)
+                yield f"{error} (in '{one.text}')"
+
+
+def _planned(
+    steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[str]
+) -> list[PlannedStep]:
+    planned: list[PlannedStep] = []
+    for number, step in enumerate(steps, start=1):
+        place = f"{prefix}{number}"
+        try:
+            planned += _one(step, place, folder, mistakes)
+        except InputError as error:
+            mistakes.append(str(error))
+    return planned
+
+
+def _one(step: Any, place: str, folder: Path, mistakes: list[str]) -> list[PlannedStep]:
+    if isinstance(step, ProgrammeStep):
+        return [PlannedStep(place, repr(step), step)]
+    if isinstance(step, str):
+        line = " ".join(step.split())
+        if line.lower().split(" ")[0] != "repeat":
+            return [PlannedStep(place, line, parse_step(line, place, folder))]
+        times, inner = _repetition(line, place)
+    else:
+        times, inner = step.repeat, step.steps
+    block = _planned(inner, f"{place}.", folder, mistakes)
+    if times * len(block) > MOST:
+        raise InputError(
+            f"{place} must come to at most {MOST} steps, got {shown(times)} times {len(block)}; "
+            "repeat it less often"
+        )
+    return block * times
+
+
+def _repetition(line: str, place: str) -> tuple[int, list[str]]:
+    match = REPEAT.fullmatch(line)
+    inner = [part.strip() for part in match["steps"].split(";")] if match else []
+    if match is None or not match["times"].isdecimal() or _count(match["times"]) < 1:
+        raise InputError(
+            f"{place} must say how often what is repeated, got '{line}'; write it like "
+            f"'{REPEAT_EXAMPLE}'"
+        )
+    if any(part.lower().startswith("repeat") for part in inner):
+        raise InputError(
+            f"{place} must not repeat within a line that repeats, got '{line}'; write the outer "
+            "one as a table, like { repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }"
+        )
+    # A line may end in a semicolon.
+    return _count(match["times"]), [part for i, part in enumerate(inner) if part or i == 0]
+
+
+def _count(digits: str) -> int:
+    """The number, or one beyond `MOST` of digits that are too many to be read."""
+    return int(digits) if len(digits) < 1000 else 10**1000

@@ -1,0 +1,505 @@
+"""How a text lays out its table: delimiter, decimal mark, headings, and where the numbers begin."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice, pairwise
+from pathlib import Path
+
+from asperity.errors import InputError
+from asperity.recording.readers.units import is_empty, usual
+from asperity.recording.roles import ROLES, candidates
+
+#: Ways to divide a line and to mark the decimals, the first of equally good ones being taken.
+_WAYS: tuple[tuple[str | None, str], ...] = (
+    ("\t", "."),
+    (";", "."),
+    (";", ","),
+    ("\t", ","),
+    (",", "."),
+    ("|", "."),
+    (None, "."),
+    (None, ","),
+    # Decimal commas between commas need quotes.
+    (",", ","),
+)
+#: Delimiters by their names, for command lines.
+_NAMED = {"tab": "\t", "comma": ",", "semicolon": ";", "\\t": "\t"}
+_SAMPLE = 40
+#: What a comment begins with.
+COMMENTS = ("#", "%", "!", "//")
+#: Cells without a value, as recording programs write them.
+MISSING = (
+    "",
+    "-",
+    "--",
+    "NaN",
+    "nan",
+    "NAN",
+    "NA",
+    "N/A",
+    "n/a",
+    "null",
+    "None",
+    "#N/A",
+    "1.#QNAN",
+)
+_NUMBER = {
+    mark: re.compile(
+        rf"[+-]?(?:\d+(?:{re.escape(mark)}\d*)?|{re.escape(mark)}\d+)(?:[eE][+-]?\d+)?"
+    )
+    for mark in (".", ",")
+}
+#: Thousands set apart count only before decimals: without them nothing tells the marks apart.
+_GROUPED = {
+    mark: re.compile(rf"[+-]?\d{{1,3}}(?:{re.escape(other)}\d{{3}})+{re.escape(mark)}\d*")
+    for mark, other in ((".", ","), (",", "."))
+}
+_ENDLESS = re.compile(r"[+-]?inf(?:inity)?", re.I)
+_STAMP = re.compile(r"\d{1,4}[-/:.]\d{1,2}[-/:.]\d{1,4}(?:[T ]\d{1,2}:\d{2}.*|[.,]\d+)?")
+_WORD = re.compile(
+    r"(?<![^\W\d_])(?!nan\b|inf\b|na\b|none\b|null\b|[eEtTzZ]\b)[^\W\d_]+(?!\d)", re.I
+)
+_LINE = re.compile(rb"([^\r\n]*)(\r\n|\n|\r|\Z)")
+_DELIMITERS = ("\t", ";", ",", "|", None)
+_WIDE = re.compile(r"\s{2,}|\t")
+#: Cells that name nothing: numbers, and the counts of records that xlook writes.
+_COUNT = re.compile(r"[-+\d.,eE]*\d[-+\d.,eE]*(\s*recs?)?")
+_LONGEST_UNIT = 14
+#: Lines above the table in which names of another number than the columns are looked for.
+_LAST = 2
+_WITH_UNIT = re.compile(r".*[\[({<]([^\[\](){}<>]*)[\])}>]\s*", re.S)
+_TYPES = frozenset({"float", "float32", "float64", "double", "single", "real", "number", "int"})
+
+
+@dataclass(frozen=True)
+class TextLine:
+    """A line of the head of a file.
+
+    Attributes
+    ----------
+    text : str
+        Without its end, one character a byte.
+    start : int
+        Offset of its first byte in the file.
+    ended : bool
+        Whether a line end follows.
+    """
+
+    text: str
+    start: int
+    ended: bool
+
+    @property
+    def blank(self) -> bool:
+        """Whether nothing stands on it."""
+        return not self.text.strip()
+
+    @property
+    def comment(self) -> str:
+        """The sign that makes it a comment; empty if it is none."""
+        bare = self.text.lstrip(' "')
+        return next((sign for sign in COMMENTS if bare.startswith(sign)), "")
+
+
+def lines_of(head: bytes, start: int) -> list[TextLine]:
+    """Lines of `head`, which begins at byte `start` of its file."""
+    lines = []
+    for match in _LINE.finditer(head):
+        if match[0]:
+            ended = bool(match[2])
+            lines.append(TextLine(match[1].decode("latin-1"), start + match.start(), ended))
+    return lines
+
+
+def _decoded(text: str) -> str:
+    """Text of one character a byte as it was meant: UTF-8, else Windows' Western code page."""
+    raw = text.encode("latin-1")
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError:
+        return raw.decode("cp1252", errors="replace")
+
+
+def cells_of(text: str, delimiter: str | None) -> list[str]:
+    """Cells of a line, without quotes and blanks around them; `delimiter` None is blanks."""
+    if delimiter is None:
+        return [cell.strip('"') for cell in text.split()]
+    if '"' not in text:
+        return [cell.strip() for cell in text.split(delimiter)]
+    row = next(csv.reader([text], delimiter=delimiter, skipinitialspace=True), [])
+    return [cell.strip() for cell in row]
+
+
+def is_number(cell: str, decimal: str) -> bool:
+    """Whether a cell holds a number written with this decimal mark."""
+    number = _NUMBER[decimal].fullmatch(cell) or _ENDLESS.fullmatch(cell)
+    return bool(number) or _is_grouped(cell, decimal)
+
+
+def _is_grouped(cell: str, decimal: str) -> bool:
+    """Whether a number has its thousands set apart by the other mark."""
+    return bool(_GROUPED[decimal].fullmatch(cell))
+
+
+def _is_value(cell: str, decimal: str) -> bool:
+    """Whether a cell can stand in a table of numbers: a number, nothing, or a date."""
+    return is_number(cell, decimal) or cell in MISSING or bool(_STAMP.fullmatch(cell))
+
+
+def _has_words(text: str) -> bool:
+    """Whether a line holds letters that belong to no number, date or missing value."""
+    return bool(_WORD.search(text))
+
+
+def digits(cell: str, decimal: str) -> tuple[int, int]:
+    """Digits behind the decimal mark and in the exponent; (0, 0) for what is no number."""
+    if not is_number(cell, decimal):
+        return 0, 0
+    mantissa, _, exponent = cell.lower().partition("e")
+    return len(mantissa.partition(decimal)[2]), len(exponent.strip("+-"))
+
+
+@dataclass(frozen=True)
+class Headings:
+    """Names and units of the columns of a text.
+
+    Attributes
+    ----------
+    names : list of str
+        One a column, as written, unit included; empty where the file has none.
+    units : list of str or None
+        The row of units, where there is one.
+    step : float or None
+        Interval (s) of LabVIEW's text, which may leave its column of times empty.
+    names_in_file : int or None
+        Names in the file, where they are more or fewer than its columns; the first columns have
+        the first names then.
+    """
+
+    names: list[str]
+    units: list[str] | None
+    step: float | None = None
+    names_in_file: int | None = None
+
+
+def _headings(
+    above: Sequence[TextLine], delimiter: str | None, width: int, counted: bool
+) -> Headings:
+    """Headings among the lines above the first row of numbers.
+
+    The last lines with as many cells as the table are taken; commented ones only where no other
+    fits.
+
+    Parameters
+    ----------
+    above : sequence of TextLine
+    delimiter : str or None
+    width : int
+        Columns of the table.
+    counted : bool
+        Whether the first column counts the rows, and needs no name.
+    """
+    plain = [line.text for line in above if not line.comment and not line.blank]
+    rows = _fitting(plain, (delimiter,), width, counted)
+    if not rows:
+        bare = [line.text.strip().strip('"').lstrip("#%!/ ") for line in above if line.comment]
+        rows = _fitting(bare, (delimiter, *_DELIMITERS), width, counted)
+    step = next((_interval(row) for row in rows if row[0] == "Delta_X"), None)
+    rows = [row for row in rows if not _names_nothing(row)]
+    if not rows:
+        return Headings([""] * width, None)
+    if len(rows) > 1 and _are_units(rows[-1], rows[-2]):
+        return Headings(
+            _bare(rows[-2]), [c if _bracketed(c) is None else str(_bracketed(c)) for c in rows[-1]]
+        )
+    # LabVIEW's text has the units above the names, and time in seconds.
+    labview = next((row[1:] for row in rows[:-1] if row[0] == "Y_Unit_Label"), None)
+    return Headings(_bare(rows[-1]), ["s", *labview] if labview else None, step)
+
+
+def _names_of_another_width(
+    above: Sequence[TextLine], delimiter: str | None, width: int
+) -> Headings:
+    """Names that are fewer or more than the columns, if a line of names is beyond doubt.
+
+    It is the last line of words, or stands over the row of units, and two of its names at least
+    are those of a role or carry a unit.
+    """
+    plain = [line.text for line in above if not line.comment and not line.blank]
+    rows = []
+    for text in plain[-_LAST:]:
+        line = _decoded(text)
+        cells = cells_of(line, delimiter) if delimiter else _WIDE.split(line.strip())
+        while cells and not cells[-1].strip():
+            cells.pop()
+        rows.append([cell.strip('" ') for cell in cells])
+    units: list[str] | None = None
+    if len(rows) > 1 and len(rows[-1]) == len(rows[-2]) and _are_units(rows[-1], rows[-2]):
+        units = [_bracketed(c) or c for c in rows.pop()]
+    if not rows or len(rows[-1]) < 2 or _names_nothing(rows[-1]):
+        return Headings([""] * width, None)
+    names = _bare(rows[-1])
+    known = sum(_names_a_quantity(name) for name in names)
+    if known < 2 or len(names) == width:
+        return Headings([""] * width, None)
+    missing = [""] * max(0, width - len(names))
+    return Headings(
+        [*names, *missing][:width],
+        None if units is None else [*units, *missing][:width],
+        None,
+        len(names),
+    )
+
+
+def _names_a_quantity(cell: str) -> bool:
+    """Whether a heading is the name of a role or holds a usual unit in brackets."""
+    match = _WITH_UNIT.fullmatch(cell)
+    if match and usual(match[1]):
+        return True
+    return any(candidates(role, {cell: None}) for role in ROLES)
+
+
+def _names_nothing(row: Sequence[str]) -> bool:
+    """Whether a row is of numbers, or of the types of the columns."""
+    numbers = sum(bool(_COUNT.fullmatch(cell)) for cell in row)
+    return 2 * numbers > len(row) or all(cell.lower() in _TYPES for cell in row)
+
+
+def _bare(row: Sequence[str]) -> list[str]:
+    return [cell[1:-1] if re.fullmatch("'.*'", cell) else cell for cell in row]
+
+
+def _interval(row: Sequence[str]) -> float | None:
+    try:
+        step = float(row[1].replace(",", "."))
+    except ValueError:
+        return None
+    return step if step > 0 else None
+
+
+def _fitting(
+    texts: Sequence[str], delimiters: Sequence[str | None], width: int, counted: bool
+) -> list[list[str]]:
+    """Rows of `width` cells, the first delimiter that gives them being used for each line."""
+    rows = []
+    for text in texts:
+        for delimiter in delimiters:
+            row = _row(_decoded(text), delimiter, width, counted)
+            if row is not None:
+                rows.append(row)
+                break
+    return rows
+
+
+def _row(text: str, delimiter: str | None, width: int, counted: bool) -> list[str] | None:
+    ways = [cells_of(text, delimiter)]
+    if delimiter is None:
+        # Names with blanks in them over a table that blanks divide.
+        ways += [
+            [cell.strip('" ') for cell in _WIDE.split(text.strip())],
+            _quoted(text),
+            _with_units(text.split()),
+        ]
+    for cells in ways:
+        if len(cells) == width:
+            return cells
+        # LabVIEW has a column of comments, and no delimiter where there is none.
+        if len(cells) == width + 1 and cells[-1].lower() in ("", "comment", "comments"):
+            return cells[:-1]
+    for cells in ways if counted else ():
+        if len(cells) == width - 1 and width > 2 and all(cells):
+            return ["row", *cells]
+    return None
+
+
+def _quoted(text: str) -> list[str]:
+    return [a or b for a, b in re.findall(r'"([^"]*)"|(\S+)', text)]
+
+
+def _with_units(tokens: list[str]) -> list[str]:
+    """Words with a unit in brackets that follows joined to the name before it."""
+    joined: list[str] = []
+    for token in tokens:
+        if joined and token[0] in "([{" and token[-1] in ")]}":
+            joined[-1] += " " + token
+        else:
+            joined.append(token)
+    return joined
+
+
+def _bracketed(cell: str) -> str | None:
+    match = re.fullmatch(r"[\[({<](.*)[\])}>]", cell.strip())
+    return match[1].strip() if match else None
+
+
+def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
+    """Whether a row holds units: a third of it at least does, under names that are none."""
+    known = sum(_is_unit(cell) for cell in row)
+    short = all(len(cell) <= _LONGEST_UNIT for cell in row)
+    return short and 3 * known >= len(row) and sum(map(_is_unit, above)) < known
+
+
+def _is_unit(cell: str) -> bool:
+    return not is_empty(cell) and (usual(cell) is not None or _bracketed(cell) is not None)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Layout of a table of text.
+
+    Attributes
+    ----------
+    delimiter : str or None
+        None where blanks divide the cells.
+    decimal : str
+        ``"."`` or ``","``.
+    width : int
+        Columns; an empty one behind a delimiter at the line's end does not count.
+    closed : bool
+        Whether every row ends with a delimiter.
+    headings : Headings
+        Names and units.
+    start : int
+        Offset in bytes of the first row.
+    comment : str
+        Sign of comments, empty where none was seen.
+    sample : list of list of str
+        Cells of some rows that have their line end; of the last if none has.
+    grouped : bool
+        Whether thousands are set apart.
+    longer : int
+        Rows of numbers with surplus cells right above the first row.
+    """
+
+    delimiter: str | None
+    decimal: str
+    width: int
+    closed: bool
+    headings: Headings
+    start: int
+    comment: str
+    sample: list[list[str]]
+    grouped: bool
+    longer: int = 0
+
+
+def layout_of(
+    lines: Sequence[TextLine], path: Path, delimiter: str | None, decimal: str | None
+) -> Layout:
+    """Layout of a text from the lines of its head.
+
+    Parameters
+    ----------
+    lines : sequence of TextLine
+        Whole lines; the last may lack its end if it is the last of the file.
+    path : Path
+        For messages.
+    delimiter, decimal : str or None
+        What the user knows.
+
+    Raises
+    ------
+    InputError
+        If no table of numbers is found.
+    """
+    written = [line for line in lines if not line.blank and not line.comment]
+    # Headings of a short file would outnumber its rows, and its last line may be cut.
+    numeric = (line for line in reversed(written) if not _has_words(line.text))
+    last = list(islice(numeric, _SAMPLE)) or written[-_SAMPLE:]
+    sample = [line.text for line in last if line.ended] or [line.text for line in last]
+    ways = _ways(delimiter, decimal)
+    scored = [(_score(sample, *way), way) for way in ways]
+    (score, width), way = max(scored, key=lambda s: s[0])
+    if not sample or score < 0.5:
+        raise InputError(
+            f"recording.path must hold a table of numbers, got '{path.name}' without one that is "
+            "understood; say delimiter= and decimal=, or give a recording"
+        )
+    rows = [cells_of(text, way[0]) for text in sample]
+    rows = [row for row in rows if len(row) == width]
+    closed = width > 1 and way[0] is not None and not any(row[-1] for row in rows)
+    first = next(i for i, line in enumerate(lines) if _is_row(line, *way, width, rows))
+    above = lines[:first]
+    counted = _count_rows([row[0] for row in rows])
+    heads = _headings(above, way[0], width - closed, counted)
+    if closed and not any(heads.names):
+        # A named column may be empty; one that the delimiter at the end makes has no name.
+        wide = _headings(above, way[0], width, counted)
+        closed, heads = (False, wide) if any(wide.names) and wide.names[-1] else (closed, heads)
+    if not any(heads.names):
+        heads = _names_of_another_width(above, way[0], width - closed)
+    sign = next((line.comment for line in lines if line.comment), "")
+    grouped = any(_is_grouped(cell, way[1]) for row in rows for cell in row)
+    longer = 0
+    for line in reversed(above):
+        cells = cells_of(line.text, way[0])
+        if len(cells) <= width or not all(is_number(cell, way[1]) for cell in cells):
+            break
+        longer += 1
+    return Layout(
+        *way, width - closed, closed, heads, lines[first].start, sign, rows, grouped, longer
+    )
+
+
+def _count_rows(cells: Sequence[str]) -> bool:
+    """Whether the sampled cells of a column, last row first, count the rows."""
+    if not all(cell.isdecimal() and len(cell) < 16 for cell in cells):
+        return False
+    numbers = [int(cell) for cell in cells]
+    return len(numbers) > 1 and all(abs(a - b) == 1 for a, b in pairwise(numbers))
+
+
+def _ways(delimiter: str | None, decimal: str | None) -> list[tuple[str | None, str]]:
+    if decimal not in (None, ".", ","):
+        raise InputError(f"read.decimal must be '.' or ',', got '{decimal}'; give one of them")
+    wanted = (
+        None if delimiter in (" ", "blank", "whitespace") else _NAMED.get(str(delimiter), delimiter)
+    )
+    ways = [
+        (d, m)
+        for d, m in _WAYS
+        if (delimiter is None or d == wanted) and (decimal is None or m == decimal)
+    ]
+    if not ways and wanted is not None and len(wanted) == 1 and wanted.isprintable():
+        ways = [(wanted, decimal or ".")]
+    if not ways:
+        raise InputError(
+            f"read.delimiter must be one character or 'blank', got {delimiter!r}; leave it out to "
+            "have it found"
+        )
+    return ways
+
+
+def _score(sample: Sequence[str], delimiter: str | None, decimal: str) -> tuple[float, int]:
+    """Share of cells that are values in rows of the usual width, and that width."""
+    rows = [cells_of(text, delimiter) for text in sample]
+    if not rows:
+        return 0.0, 0
+    width = Counter(map(len, rows)).most_common(1)[0][0]
+    good = 0.0
+    for row in rows:
+        if len(row) == width and any(is_number(cell, decimal) for cell in row):
+            good += sum(_is_value(cell, decimal) for cell in row) / width
+    return good / len(rows), width
+
+
+def _is_row(
+    line: TextLine, delimiter: str | None, decimal: str, width: int, rows: Sequence[Sequence[str]]
+) -> bool:
+    """Whether a line is a row of the table: numbers wherever the sampled rows have them."""
+    if line.blank or line.comment:
+        return False
+    cells = cells_of(line.text, delimiter)
+    numbers = any(is_number(cell, decimal) for cell in cells)
+    if len(cells) != width or not (numbers or all(c and c in MISSING for c in cells)):
+        return False
+    columns = zip(*rows, strict=True)
+    usual = [sum(is_number(c, decimal) for c in column) * 2 > len(rows) for column in columns]
+    return all(
+        _is_value(cell, decimal) for cell, is_usual in zip(cells, usual, strict=True) if is_usual
+    )

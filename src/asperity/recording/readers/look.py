@@ -1,0 +1,278 @@
+"""The LOOK binary of xlook, the data program of the Penn State rock mechanics laboratory.
+
+The header is big-endian: title (20 bytes), number of records (int32), number of channels (int32),
+sweep (int32), ``dtime`` (float32); then 16 (older) or 32 headers of 84 bytes, one a channel: name
+(13 bytes), units (13), gain (float32), comment (50), number of elements (int32). Channels that are
+not used are called ``no_val``. Columns follow, one behind the other.
+
+Older files hold big-endian float32, as the header is; newer ones float64 in the byte order of the
+machine that wrote them, mostly little-endian. The header says nothing of it, so the size of the
+file decides between 4 and 8 bytes, and the numbers themselves the byte order.
+"""
+
+from __future__ import annotations
+
+import string
+import struct
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from asperity.recording.finding import Finding
+from asperity.recording.readers.raw import (
+    RawColumn,
+    RawRecording,
+    beginning,
+    refuse_truncated,
+    truncated,
+)
+from asperity.recording.roles import candidates
+
+_START = struct.Struct(">20siiif")
+_CHANNEL = struct.Struct(">13s13sf50si")
+#: Headers that a file may have room for, the newer first.
+_SLOTS = (32, 16)
+_PRINTABLE = frozenset(string.printable.encode()) - frozenset(b"\t\n\r\x0b\x0c")
+_UNUSED = "no_val"
+
+#: Number formats, the likelier first.
+_TYPES = (">f4", "<f8", ">f8", "<f4")
+_SAMPLE = 20_000
+#: What it counts for the number format that the size of the file fits.
+_FITS = 0.4
+#: What a laboratory records lies between these, in any unit.
+_SMALLEST, _LARGEST = 1e-12, 1e12
+
+
+@dataclass(frozen=True)
+class _Channel:
+    """A channel that is in use."""
+
+    name: str
+    units: str
+    comment: str
+    elements: int
+
+
+@dataclass(frozen=True)
+class _Header:
+    """Header of a file, read with one number of slots."""
+
+    title: str
+    records: int
+    dtime: float
+    channels: tuple[_Channel, ...]
+    size: int
+
+
+def is_format(path: Path) -> bool:
+    """Whether the beginning of a file makes sense as a header."""
+    return bool(_headers(beginning(path)))
+
+
+def read(path: Path) -> RawRecording:
+    """Columns of a LOOK file; it has no groups."""
+    raw = np.fromfile(path, dtype=np.uint8)
+    readings = _headers(raw[: 1 << 12].tobytes())
+    if not readings:
+        raise refuse_truncated(path, "whose LOOK header is not whole or not one")
+    header, dtype, sure = _layout(raw, readings)
+    body = raw[header.size :]
+    count = body.size // np.dtype(dtype).itemsize
+    data = body[: count * np.dtype(dtype).itemsize].view(dtype)
+    data = _as_doubles(data)
+    columns, findings = _columns(path, header, data)
+    if not sure:
+        findings.append(
+            Finding(
+                "byte order",
+                "warning",
+                np.dtype(dtype).itemsize,
+                "data",
+                f"The numbers were read as {dtype}, but another format makes as much sense.",
+            )
+        )
+    columns, counted = _in_seconds(columns, header.dtime)
+    findings += counted
+    provenance = {
+        "format": "look",
+        "title": header.title,
+        "dtime": header.dtime,
+        "data": dtype,
+        "comments": {c.name: c.comment for c in header.channels if c.comment not in ("", "none")},
+    }
+    return RawRecording(columns, findings, provenance)
+
+
+def _header_size(slots: int) -> int:
+    """Bytes before the data."""
+    return _START.size + slots * _CHANNEL.size
+
+
+def _headers(head: bytes) -> list[_Header]:
+    """Every reading of `head` that makes sense, with 32 slots and with 16."""
+    read = (_header(head, slots) for slots in _SLOTS if len(head) >= _header_size(slots))
+    return [header for header in read if header is not None]
+
+
+def _header(head: bytes, slots: int) -> _Header | None:
+    title, records, channels, _, dtime = _START.unpack_from(head)
+    if records < 1 or not 1 <= channels <= slots or _text(title) is None:
+        return None
+    behind = head[_header_size(slots) :][: len(_UNUSED)]
+    if behind and _UNUSED.encode().startswith(behind):
+        # The header goes on: a file of 32 slots that is cut within them.
+        return None
+    used = []
+    for i in range(slots):
+        fields = _CHANNEL.unpack_from(head, _START.size + i * _CHANNEL.size)
+        name, units, comment = (_text(fields[k]) for k in (0, 1, 3))
+        elements = fields[4]
+        if name is None or units is None or not 0 <= elements <= records:
+            return None
+        # An empty slot of a program that does not write `no_val` holds nothing.
+        if name and not name.startswith(_UNUSED):
+            # xlook itself takes a channel without a count for a full one.
+            used.append(_Channel(name, units, comment or "", elements or records))
+    if not used:
+        return None
+    return _Header(_text(title) or "", records, dtime, tuple(used), _header_size(slots))
+
+
+def _text(raw: bytes) -> str | None:
+    """Text up to its NUL; None if it holds what no text does."""
+    text = raw.partition(b"\0")[0]
+    return text.decode("ascii").strip() if _PRINTABLE.issuperset(text) else None
+
+
+def _as_doubles(data: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
+    # NaN of a damaged file may be of the signalling sort.
+    with np.errstate(all="ignore"):
+        return data.astype(np.float64)
+
+
+def _layout(raw: np.ndarray[Any, Any], readings: list[_Header]) -> tuple[_Header, str, bool]:
+    """Header and number format that fit, and whether nothing else fits as well."""
+    pairs = [(h, t) for h in readings for t in _TYPES]
+    whole = [p for p in pairs if _needed(*p) == raw.size]
+    # Bytes behind the data are rarer than a cut. A cut can make the size fit by chance.
+    fitting = [p for p in pairs if _needed(*p) >= raw.size] or pairs
+    scores = [_sense(raw, *pair) + (_FITS if pair in whole else 0.0) for pair in fitting]
+    best = int(np.argmax(scores))
+    others = [s for i, s in enumerate(scores) if i != best]
+    return *fitting[best], all(scores[best] - s > 0.05 for s in others)
+
+
+def _needed(header: _Header, dtype: str) -> int:
+    elements = sum(c.elements for c in header.channels)
+    return header.size + elements * np.dtype(dtype).itemsize
+
+
+def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
+    """Share of numbers of a size that occurs, less the roughness of the first columns.
+
+    Half of a float64 is no sensible float32 and makes a rough column; two float32 in one float64
+    make a column run on into the next.
+    """
+    item = np.dtype(dtype).itemsize
+    body = raw[header.size : header.size + raw.size // item * item]
+    with np.errstate(all="ignore"):
+        data = body[: body.size // item * item].view(dtype)[:_SAMPLE].astype(np.float64)
+        if not data.size:
+            return 0.0
+        size = np.abs(data)
+        sensible = np.isfinite(data) & (size > _SMALLEST) & (size < _LARGEST)
+        nothing = float((data == 0).mean())
+        share = float(sensible.mean()) + 0.5 * nothing
+        first = data[: header.channels[0].elements]
+        spread = float(np.var(first))
+        rough = float(np.mean(np.diff(first) ** 2)) / spread if first.size > 2 and spread else 0.0
+    return share - 0.2 * min(rough, 2.0) if np.isfinite(rough) else share - 0.4
+
+
+def _columns(
+    path: Path, header: _Header, data: np.ndarray[Any, Any]
+) -> tuple[list[RawColumn], list[Finding]]:
+    """Channels one behind the other; of a file that is cut, those that can be used."""
+    ends = np.cumsum([c.elements for c in header.channels])
+    lost = max(0, int(ends[-1]) - data.size)
+    arrays = []
+    for channel, end in zip(header.channels, ends.tolist(), strict=True):
+        arrays.append(data[end - channel.elements : end])
+    whole = [v.size == c.elements for c, v in zip(header.channels, arrays, strict=True)]
+    columns = list(zip(header.channels, arrays, strict=True))
+    findings: list[Finding] = []
+    if lost and all(whole[:-1]) and arrays[-1].size:
+        # The cut is in the last column: the rows before it are whole.
+        kept = arrays[-1].size
+        where = f"row {kept}"
+        loss = f"{lost} rows lack their last column, and were left out."
+        columns = [(c, v[:kept]) for c, v in columns]
+    elif lost:
+        where = ", ".join(
+            f"'{c.name}'" for c, ok in zip(header.channels, whole, strict=True) if not ok
+        )
+        loss = f"{where} could not be read, being stored behind the cut."
+        columns = [pair for pair, ok in zip(columns, whole, strict=True) if ok]
+    if lost:
+        findings.append(truncated(path, lost, where, f"{lost} numbers are missing; {loss}"))
+    if not columns:
+        raise refuse_truncated(path, "which ends within its first column")
+    rows = max(values.size for _, values in columns)
+    findings += [_short(c.name, v.size, rows) for c, v in columns if v.size < rows]
+    return [RawColumn(c.name, _padded(v, rows), c.units) for c, v in columns], findings
+
+
+def _in_seconds(columns: list[RawColumn], period: float) -> tuple[list[RawColumn], list[Finding]]:
+    """A time column that counts sampling periods, times the period that the header states.
+
+    Such a column holds whole numbers that rise by whole numbers, mostly by one, while the header
+    states another period than one second.
+    """
+    if not (np.isfinite(period) and period > 0 and period != 1):
+        return columns, []
+    made, findings = [], []
+    for column in columns:
+        is_time = bool(candidates("time", {column.label: None}))
+        if not is_time or not _counts(column.values):
+            made.append(column)
+            continue
+        made.append(RawColumn(column.label, column.values * period, "s"))
+        findings.append(
+            Finding(
+                "sample count",
+                "warning",
+                period,
+                column.label,
+                f"'{column.label}' counts samples, and the header states a period of {period:.9g} "
+                f"s; times are the count times this period. If the column is in seconds after all, "
+                "read with rate='1 Hz'.",
+            )
+        )
+    return made, findings
+
+
+def _counts(values: np.ndarray[Any, Any]) -> bool:
+    steps = np.diff(values[np.isfinite(values)])
+    if steps.size < 2:
+        return False
+    whole = bool(np.all(steps == np.rint(steps))) and bool(np.all(steps >= 1))
+    return whole and float(np.mean(steps == 1)) > 0.5 and values[0] == np.rint(values[0])
+
+
+def _padded(values: np.ndarray[Any, Any], rows: int) -> np.ndarray[Any, Any]:
+    if values.size == rows:
+        return values
+    return np.concatenate([values, np.full(rows - values.size, np.nan)])
+
+
+def _short(name: str, elements: int, rows: int) -> Finding:
+    return Finding(
+        "short column",
+        "warning",
+        rows - elements,
+        f"{name}, row {elements}",
+        f"'{name}' has {elements} values where others have {rows}; the rest was read as missing.",
+    )

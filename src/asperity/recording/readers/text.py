@@ -1,0 +1,464 @@
+"""CSV and other tables of text, parsed by pandas' compiled reader once the layout is known.
+
+A table may be packed by gzip. Archives, spreadsheets and documents are refused with what to do.
+"""
+
+from __future__ import annotations
+
+import codecs
+import gzip
+import io
+import json
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from asperity.errors import InputError
+from asperity.recording.finding import Finding
+from asperity.recording.readers.layout import MISSING, Layout, cells_of, digits, layout_of, lines_of
+from asperity.recording.readers.raw import RawColumn, RawRecording, beginning, truncated
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    import pandas as pd
+
+#: Where the table is looked for; farther only if it is not found: headers of some megabytes exist.
+_HEADS = (1 << 16, 1 << 22)
+_BUFFER = 1 << 20
+#: Whole lines that a head must hold to show the layout.
+_FEWEST_LINES = 8
+_SKIPPED = re.compile(r"line (\d+)")
+_GZIP = b"\x1f\x8b"
+_ARCHIVES = {
+    b"PK\x03\x04": "a zip archive or a spreadsheet",
+    b"BZh": "packed by bzip2",
+    b"\xfd7zXZ": "packed by xz",
+    b"\x28\xb5\x2f\xfd": "packed by zstd",
+    b"7z\xbc\xaf": "a 7z archive",
+    b"\xd0\xcf\x11\xe0": "an old spreadsheet or document",
+}
+#: Bytes that a packed text may hold: at 40 a row, seven hours at 1 kHz. What is not packed may be
+#: of any size.
+LARGEST = 1 << 30
+_TAIL = 1 << 16
+#: Rows that must agree before a last line without its end is trusted.
+_ENOUGH = 5
+#: Characters of a row of words that its finding shows.
+_SHOWN = 60
+
+
+def is_format(path: Path) -> bool:
+    """Whether a file is a text, in any encoding that is read, or may be one that is packed.
+
+    Raises
+    ------
+    InputError
+        If it must be unpacked or exported first, or is a document and no table.
+    """
+    head = beginning(path)
+    for mark, kind in _ARCHIVES.items():
+        if head.startswith(mark):
+            raise InputError(
+                f"recording.path must be the recording itself, got '{path.name}', {kind}; unpack "
+                "it, or save the sheet as CSV"
+            )
+    if kind := _document(head):
+        # A table would be looked for in it at length.
+        raise InputError(
+            f"recording.path must hold a table of numbers, got '{path.name}', which is {kind}; "
+            "save it as CSV, or add a reader for it"
+        )
+    return head.startswith(_GZIP) or _is_text(head)
+
+
+def read(path: Path, *, delimiter: str | None = None, decimal: str | None = None) -> RawRecording:
+    """Columns of a text.
+
+    Parameters
+    ----------
+    path : Path
+        The file; UTF-8, UTF-16, or a Western code page; packed by gzip or not.
+    delimiter, decimal : str or None
+        Where the user knows better than the file shows.
+    """
+    if beginning(path).startswith(_GZIP):
+        return _of_any_encoding(io.BytesIO(_unpacked(path)), path, delimiter, decimal)
+    with path.open("rb") as file:
+        return _of_any_encoding(file, path, delimiter, decimal)
+
+
+def _document(head: bytes) -> str:
+    """What sort of document the beginning of a text is of; empty if it is none."""
+    text = head.decode("utf-8-sig", errors="replace").lstrip()
+    if text.startswith(("<?xml", "<!DOCTYPE", "<!doctype", "<html", "<HTML", "<svg")):
+        return "XML or HTML"
+    return "JSON" if text.startswith(("{", "[")) and _is_json(text) else ""
+
+
+def _is_json(text: str) -> bool:
+    """Whether the beginning of a text is that of JSON, which may be cut."""
+    try:
+        json.JSONDecoder().raw_decode(text)
+    except json.JSONDecodeError as error:
+        # Where only the cut is wrong, the rest is JSON; headings in brackets fail at once.
+        return error.pos > 0.9 * len(text) or "Unterminated" in error.msg
+    except RecursionError:  # brackets in brackets without end
+        return True
+    # Values one after the other, a line each; "[1], [2]" is a heading.
+    return text.startswith("{") or text.rstrip().endswith("]")
+
+
+def _wide_order(head: bytes) -> str:
+    """Byte order of UTF-16 without its mark, ``"le"`` or ``"be"``; empty if it is none.
+
+    Of a table in it, every other byte is zero.
+    """
+    for order, zeros, letters in (("le", head[1::2], head[::2]), ("be", head[::2], head[1::2])):
+        if len(zeros) > 8 and zeros.count(0) > 0.9 * len(zeros) and letters.count(0) == 0:
+            return order
+    return ""
+
+
+def _is_text(head: bytes) -> bool:
+    """Whether the beginning of a file is one of a text, in any encoding that is read."""
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")) or _wide_order(head):
+        return True
+    control = sum(byte < 32 and byte not in b"\t\n\r\f\x1a" for byte in head)
+    return control == 0
+
+
+def _unpacked(path: Path) -> bytes:
+    """Contents of a gzip file, which are to be a text of at most `LARGEST` bytes."""
+    with gzip.open(path) as packed:
+        text = packed.read(LARGEST + 1)
+    if len(text) > LARGEST:
+        raise InputError(
+            f"recording.path must unpack to at most {LARGEST // 1024**2} MB, got '{path.name}', "
+            "which goes on; unpack it, and see what it holds"
+        )
+    if not _is_text(text[: 1 << 12]):
+        raise InputError(
+            f"recording.path must hold a text if it is packed, got '{path.name}' with something "
+            "else; unpack it"
+        )
+    return text
+
+
+def _of_any_encoding(
+    file: BinaryIO, path: Path, delimiter: str | None, decimal: str | None
+) -> RawRecording:
+    file.seek(0)
+    mark = file.read(1 << 10)
+    order = _wide_order(mark)
+    if order or mark.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        file.seek(0)
+        wide = file.read().decode(f"utf-16-{order}" if order else "utf-16", errors="replace")
+        wide = wide.removeprefix("\ufeff")
+        return _load(io.BytesIO(wide.encode("utf-8")), 0, path, delimiter, decimal)
+    start = 3 if mark.startswith(codecs.BOM_UTF8) else 0
+    return _load(file, start, path, delimiter, decimal)
+
+
+def _load(
+    file: BinaryIO, start: int, path: Path, delimiter: str | None, decimal: str | None
+) -> RawRecording:
+    size = file.seek(0, io.SEEK_END)
+    layout = _layout(file, start, size, path, delimiter, decimal)
+    ending = _ending_of(file, size, layout)
+    frame, findings = _parse(file, layout, ending.stop, path)
+    if not len(frame):
+        raise InputError(
+            f"recording.path must hold rows of numbers, got '{path.name}' with a heading only; "
+            "give a recording"
+        )
+    frame, left_out = _without_text_rows(frame, layout.width)
+    findings += left_out
+    columns = []
+    for (i, column), _ in zip(frame.items(), range(layout.width), strict=False):
+        values, texts = _numbers_of(column, layout.headings.names[i] or f"column {i}")
+        unit = layout.headings.units[i] if layout.headings.units else None
+        columns.append(RawColumn(layout.headings.names[i], values, unit))
+        findings += texts
+    if layout.headings.names_in_file is not None:
+        findings.insert(0, _mismatch(layout))
+    step = layout.headings.step
+    if step is not None and len(columns) > 1 and _is_empty(columns[0].values):
+        # LabVIEW may write the interval in the header, and no times.
+        del columns[0]
+    else:
+        step = None
+    if ending.sentence:
+        where = f"row {len(frame)}, the last"
+        findings.insert(0, truncated(path, ending.rows, where, ending.sentence, ending.sure))
+    provenance = {
+        "format": "text",
+        "delimiter": layout.delimiter or "blank",
+        "decimal": layout.decimal,
+    }
+    return RawRecording(columns, findings, provenance, step=step)
+
+
+def _mismatch(layout: Layout) -> Finding:
+    """The finding of names that are more or fewer than the columns."""
+    count, width = int(layout.headings.names_in_file or 0), layout.width
+    first = min(count, width)
+    others = (
+        f"columns {count} to {width - 1} have no name"
+        if count < width
+        else f"the last {count - width} names belong to no column"
+    )
+    return Finding(
+        "heading mismatch",
+        "warning",
+        abs(count - width),
+        "the heading",
+        f"The heading has {count} names for {width} columns; the first {first} columns were given "
+        f"the first {first} names, and {others}. Where the names stopped to fit is not in the "
+        "file: check that each column holds what its name says.",
+    )
+
+
+def _layout(
+    file: BinaryIO, start: int, size: int, path: Path, delimiter: str | None, decimal: str | None
+) -> Layout:
+    for head in _HEADS:
+        file.seek(start)
+        lines = lines_of(file.read(head).rstrip(b"\0\x1a"), start)
+        if start + head < size:
+            # The last line is cut here; rows so long that few fit need a longer head.
+            lines = lines[:-1]
+            if len(lines) < _FEWEST_LINES and head != _HEADS[-1]:
+                continue
+        try:
+            return layout_of(lines, path, delimiter, decimal)
+        except InputError:
+            if start + head >= size or head == _HEADS[-1]:
+                raise
+    raise AssertionError
+
+
+def _is_empty(values: np.ndarray[Any, Any]) -> bool:
+    return values.dtype.kind == "f" and bool(np.isnan(values).all())
+
+
+class _Part(io.RawIOBase):
+    """Bytes of a file from one offset to another, so that headings and a cut row are left out."""
+
+    def __init__(self, file: BinaryIO, start: int, stop: int) -> None:
+        self._file, self._left = file, stop - start
+        file.seek(start)
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        got = self._file.read(min(len(buffer), self._left))
+        buffer[: len(got)] = got
+        self._left -= len(got)
+        return len(got)
+
+
+def _parsed_with_texts(parsed: Callable[..., pd.DataFrame], path: Path) -> pd.DataFrame:
+    import pandas as pd
+
+    try:
+        return parsed(low_memory=False)
+    except (pd.errors.ParserError, pd.errors.EmptyDataError):
+        raise InputError(
+            f"recording.path must hold a table that can be parsed, got '{path.name}', in which a "
+            "quote is opened and never closed, or a row goes on without end; correct the file"
+        ) from None
+
+
+def _parse(
+    file: BinaryIO, layout: Layout, stop: int, path: Path
+) -> tuple[pd.DataFrame, list[Finding]]:
+    """The table, as numbers if all of it is numbers; and the rows that are none."""
+    import pandas as pd
+
+    options: dict[str, Any] = {
+        "header": None,
+        "names": list(range(layout.width + layout.closed)),
+        "decimal": layout.decimal,
+        "na_values": list(MISSING),
+        "skipinitialspace": True,
+        "on_bad_lines": "warn",
+        "encoding_errors": "replace",
+        "engine": "c",
+        "sep": r"\s+" if layout.delimiter is None else layout.delimiter,
+        "comment": layout.comment if len(layout.comment) == 1 else None,
+        "thousands": {".": ",", ",": "."}[layout.decimal] if layout.grouped else None,
+    }
+
+    def parsed(**more: Any) -> pd.DataFrame:
+        part = io.BufferedReader(_Part(file, layout.start, stop), _BUFFER)
+        frame = pd.read_csv(part, **options, **more)
+        if isinstance(frame.index, pd.RangeIndex):
+            return frame
+        # Surplus cells in the first row were taken for row labels, which moves all columns.
+        part = io.BufferedReader(_Part(file, layout.start, stop), _BUFFER)
+        return pd.read_csv(part, index_col=False, **options, **more)
+
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        try:
+            frame = parsed(dtype=np.float64)
+        except ValueError:
+            caught.clear()
+            frame = _parsed_with_texts(parsed, path)
+    rows = [int(n) for w in caught for n in _SKIPPED.findall(str(w.message))]
+    rows = [*range(-layout.longer + 1, 1), *rows]
+    return frame, [_malformed(rows)] if rows else []
+
+
+@dataclass(frozen=True)
+class _Ending:
+    """Where the whole rows of a text end.
+
+    Attributes
+    ----------
+    stop : int
+        Offset in bytes behind the last row that counts.
+    rows : int
+        Rows left out behind it.
+    sentence : str
+        Why; empty where the text ends as it should.
+    sure : bool
+        Whether the file must have been cut, or only may have been.
+    """
+
+    stop: int
+    rows: int = 0
+    sentence: str = ""
+    sure: bool = True
+
+
+def _ending_of(file: BinaryIO, size: int, layout: Layout) -> _Ending:
+    """Judge the last line by its end, its cells and its digits.
+
+    A line without its end is whole if all its cells are there and the last one has as many digits
+    behind its mark as the rows before it, all of which must agree; programs that leave out the last
+    line end are that regular. Otherwise its last number may be short, and the row is left out.
+    """
+    begin = max(layout.start, size - _TAIL)
+    file.seek(begin)
+    tail = file.read(size - begin)
+    padded = len(tail) - len(tail.rstrip(b"\0"))
+    tail = tail.rstrip(b"\0\x1a")
+    stop = begin + len(tail)
+    every = lines_of(tail, begin)
+    lines = [line for line in every if not line.blank]
+    if not lines or (lines[-1].ended and not padded):
+        indented = bool(lines) and lines[-1].text[:1] == " "
+        if indented and every[-1].blank and not every[-1].ended:
+            return _Ending(stop, 0, "it ends with the blanks that its rows begin with.", sure=False)
+        return _Ending(stop)
+    last = lines[-1]
+    if padded and last.ended:
+        return _Ending(stop, 0, f"it ends with {padded} empty bytes where rows should be.")
+    if last.text.count('"') % 2:
+        return _Ending(last.start, 1, "its last row has an open quote, and was left out.")
+    cells = cells_of(last.text, layout.delimiter)
+    width = layout.width + layout.closed
+    if last.comment:
+        return _Ending(stop)
+    if len(cells) < width:
+        why = f"its last row has {len(cells)} of {width} cells, and was left out."
+        return _Ending(last.start, 1, why)
+    whole = _is_whole(cells, layout)
+    if whole:
+        return _Ending(stop)
+    why = "its last row has no line end and its last number may be short; it was left out."
+    return _Ending(last.start, 1, why, sure=whole is not None)
+
+
+def _is_whole(cells: list[str], layout: Layout) -> bool | None:
+    """Whether the last number has all its digits; None where nothing tells."""
+    if layout.closed:
+        # The delimiter behind the last number is there.
+        return True
+    column = layout.width - 1
+    last = digits(cells[column], layout.decimal)
+    usual = {digits(row[column], layout.decimal) for row in layout.sample}
+    # Whole numbers can be cut and look whole; and few rows may agree by chance.
+    if len(usual) > 1 or len(layout.sample) < _ENOUGH or usual == {(0, 0)}:
+        return None
+    return usual == {last}
+
+
+def _malformed(lines: list[int]) -> Finding:
+    """The finding of rows, by their lines, that have too many cells."""
+    return Finding(
+        "malformed row",
+        "error",
+        len(lines),
+        f"line {max(lines[0], 1)} of the table",
+        f"{len(lines)} {'row has' if len(lines) == 1 else 'rows have'} more cells than the table "
+        "has columns, and could not be read.",
+    )
+
+
+def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, list[Finding]]:
+    """A table of numbers without its rows of words: headings between parts, remarks below.
+
+    Parameters
+    ----------
+    frame : DataFrame
+        Columns 0 to `width` - 1; one that holds words only, such as dates, leaves all rows.
+    width : int
+    """
+    import pandas as pd
+
+    texts = [i for i, kind in enumerate(frame.dtypes) if i < width and kind.kind not in "iuf"]
+    if not texts:
+        return frame, []
+    numbers = frame[list(range(width))].copy()
+    for i in texts:
+        numbers[i] = pd.to_numeric(frame[i], errors="coerce")
+    if any(2 * numbers[i].notna().sum() < frame[i].notna().sum() for i in texts):
+        return frame, []
+    words = (frame[texts].notna().any(axis=1) & numbers.isna().all(axis=1)).to_numpy()
+    count = int(words.sum())
+    if not count:
+        return frame, []
+    first = int(np.argmax(words))
+    line = " ".join(cell for cell in frame.iloc[first] if isinstance(cell, str))[:_SHOWN]
+    left_out = Finding(
+        "text row",
+        "note",
+        count,
+        f"row {first}",
+        f"{count} {'row holds' if count == 1 else 'rows hold'} words and no number, the first "
+        f"'{line}' in row {first}, and {'was' if count == 1 else 'were'} left out.",
+    )
+    return frame[~words].reset_index(drop=True), [left_out]
+
+
+def _numbers_of(column: pd.Series[Any], name: str) -> tuple[np.ndarray[Any, Any], list[Finding]]:
+    """Numbers of a column, NaN where a text stands among them; a column of texts as it is."""
+    if column.dtype.kind in "iuf":
+        return column.to_numpy(dtype=np.float64), []
+    import pandas as pd
+
+    numbers = pd.to_numeric(column, errors="coerce").to_numpy(dtype=np.float64)
+    texts = np.flatnonzero(np.isnan(numbers) & column.notna().to_numpy())
+    if 2 * texts.size > numbers.size:
+        return column.to_numpy(dtype=object), []
+    if not texts.size:
+        return numbers, []
+    first = int(texts[0])
+    return numbers, [
+        Finding(
+            "text in numbers",
+            "warning",
+            texts.size,
+            f"{name}, row {first}",
+            f"{texts.size} of {numbers.size} cells of '{name}' hold text, the first '"
+            f"{column.iloc[first]}' in row {first}; they were read as missing.",
+        )
+    ]

@@ -1,0 +1,151 @@
+"""Writers of recordings in the formats of laboratories: text, HDF5 and TDMS."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError, closest
+from asperity.outputs import output_file, written_file
+from asperity.units import KINDS
+
+if TYPE_CHECKING:
+    from asperity.recording.trace import Trace
+
+#: Unit and values of each channel, as they are to be written.
+_Columns = Mapping[str, tuple[str, NDArray[np.float64]]]
+
+#: Rows that are formatted at a time.
+_ROWS = 100_000
+#: Group of a TDMS file.
+_GROUP = "recording"
+
+
+def write(
+    trace: Trace,
+    path: str | os.PathLike[str],
+    *,
+    units: Mapping[str, str] | None = None,
+) -> Path:
+    """Write a recording as a laboratory would; `asperity.recording.read` reads it back.
+
+    Parameters
+    ----------
+    trace : Trace
+    path : str or path
+        ``.csv`` (comma separated), ``.txt`` (tabs), ``.h5`` or ``.hdf5``, ``.tdms``.
+    units : mapping of str to str, optional
+        Unit in which a channel is written, by name, such as ``{"load": "kN"}``; SI by default.
+
+    Returns
+    -------
+    Path
+
+    Raises
+    ------
+    InputError
+        If the format is unknown, a unit does not fit, or the file cannot be written.
+    """
+    file = check_path(path)
+    for name in units or {}:
+        if name not in trace.channels:
+            raise InputError(
+                f"write.units must name channels, got '{name}'; {closest(name, trace.channels)}"
+            )
+    columns = _columns(trace, units or {})
+    target = output_file(file, "write.path", example="recording.csv")
+    with written_file(target, "write.path") as complete:
+        WRITERS[file.suffix.lower()](trace, columns, complete)
+    return file
+
+
+def check_path(path: str | os.PathLike[str]) -> Path:
+    """The path, if its end names a format; raises `InputError` if not."""
+    file = Path(path)
+    if file.suffix.lower() not in WRITERS:
+        raise InputError(
+            f"write.path must end in the name of a format, got '{file.name}'; "
+            f"{closest(file.suffix.lower(), WRITERS)}"
+        )
+    return file
+
+
+def _columns(trace: Trace, units: Mapping[str, str]) -> _Columns:
+    columns = {}
+    for name, channel in trace.channels.items():
+        if channel.kind is None:
+            columns[name] = (channel.recorded_unit, channel.values)
+            continue
+        unit = units.get(name, KINDS[channel.kind].si)
+        values = channel.values if unit == channel.unit else channel.to(unit)
+        columns[name] = (unit, values)
+    return columns
+
+
+def _write_text(trace: Trace, columns: _Columns, path: Path) -> None:
+    """A line of headings with units where there are some, then a row a sample."""
+    delimiter = "\t" if path.suffix.lower() == ".txt" else ","
+    headings = [f"{name} ({unit})" if unit else name for name, (unit, _) in columns.items()]
+    values = [trace.time, *(column for _, column in columns.values())]
+    # Time stamps keep the digits of their interval however long the recording is.
+    formats = ["%.15g", *["%.9g"] * len(columns)]
+    with path.open("w", encoding="utf-8", newline="\n") as stream:
+        stream.write(delimiter.join(["time (s)", *headings]) + "\n")
+        for begin in range(0, len(trace), _ROWS):
+            rows = np.column_stack([column[begin : begin + _ROWS] for column in values])
+            np.savetxt(stream, rows, formats, delimiter)
+
+
+def _write_hdf5(trace: Trace, columns: _Columns, path: Path) -> None:
+    """A dataset for time and each channel with its unit in an attribute, and the provenance."""
+    import h5py
+
+    with h5py.File(path, "w") as file:
+        file.attrs["provenance"] = json.dumps(trace.provenance, default=str)
+        file.create_dataset("time", data=trace.time).attrs["units"] = "s"
+        for name, (unit, values) in columns.items():
+            # A slash would make a group of the channel's name.
+            made = file.create_dataset(name.replace("/", " per "), data=values)
+            made.attrs["units"] = unit or "1"
+
+
+def _write_tdms(trace: Trace, columns: _Columns, path: Path) -> None:
+    """One group of waveforms of one clock; an uneven clock is a further channel."""
+    try:
+        import nptdms
+    except ImportError:
+        raise InputError(
+            f"write.path must be in a format that can be written here, got '{path.name}', which "
+            "is TDMS; install npTDMS, as 'pip install asperity[lab]' does"
+        ) from None
+    rate = trace.sample_rate
+    clock: dict[str, Any] = {}
+    if rate is not None:
+        start = float(trace.time[0])
+        clock = {"wf_increment": 1 / rate, "wf_start_offset": start, "wf_samples": len(trace)}
+    channels = [
+        nptdms.ChannelObject(_GROUP, name, np.asarray(values), {**clock, "unit_string": unit})
+        for name, (unit, values) in columns.items()
+    ]
+    if rate is None:
+        stamps = {"unit_string": "s"}
+        channels.insert(0, nptdms.ChannelObject(_GROUP, "time", np.asarray(trace.time), stamps))
+    title = nptdms.RootObject({"name": str(trace.provenance.get("title", ""))})
+    with nptdms.TdmsWriter(str(path)) as writer:
+        writer.write_segment([title, nptdms.GroupObject(_GROUP), *channels])
+
+
+#: Writers of files by their suffix.
+WRITERS: dict[str, Callable[[Trace, _Columns, Path], None]] = {
+    ".csv": _write_text,
+    ".txt": _write_text,
+    ".h5": _write_hdf5,
+    ".hdf5": _write_hdf5,
+    ".tdms": _write_tdms,
+}

@@ -1,0 +1,171 @@
+"""The robust method knows no law: laws of one to five states, and random orbits of every law.
+
+What is compiled of a law is held against its published equations in `tests/laws`. Here orbits are
+put back into the equations: SciPy integrates them over one period from the states at theta = 0.
+"""
+
+import dataclasses
+from functools import cache
+
+import jax
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import asperity as asp
+from asperity.laws import Law, parameter, registered
+from asperity.loads import modulated
+from asperity.operating_point import numbers_for, sourced_numbers
+from asperity.slider.named import slider_from
+from references.populations import population
+
+MU0, A, B, D0, V0, K, W0, V, FREQUENCY = 0.5, 0.013, 0.026, 4e-7, 1e-6, 4e5, 7.0, 2e-6, 60.0
+#: Of mean, harmonics and multipliers, relative; SciPy's tolerances leave 1e-10.
+PROMISED = 1e-8
+#: Of the states after a period, and of harmonics from dense output.
+CLOSED = 1e-7
+SAMPLES = 1024
+
+
+@cache
+def ageing_over_lengths(count):
+    """A law with as many states as lengths, i D0: friction mu0 + A ln(v/V0) + sum B/i phi_i."""
+
+    class Lengths(Law):
+        name = f"lengths-{count}"
+        source = "none"
+        state_names = tuple(f"phi{i + 1}" for i in range(count))
+
+        mu0: float = parameter("law.mu0", "dimensionless")
+        A: float = parameter("law.A", "dimensionless")
+        B: float = parameter("law.B", "dimensionless")
+        D0: float = parameter("law.D0", "length")
+        V0: float = parameter("law.V0", "velocity")
+
+        def friction(self, v, state, w):
+            ages = sum(self.B / (i + 1) * phi for i, phi in enumerate(state))
+            return self.mu0 + self.A * jax.numpy.log(v / self.V0) + ages
+
+        def state_rate(self, v, v_plastic, state, w):
+            return tuple(
+                (self.V0 * jax.numpy.exp(-phi) - v) / ((i + 1) * self.D0)
+                for i, phi in enumerate(state)
+            )
+
+        def steady_state(self, v):
+            return (-jax.numpy.log(v / self.V0),) * count
+
+    return Lengths
+
+
+@pytest.mark.parametrize("states", [1, 2, 3, 5])
+def test_laws_of_as_many_states_against_scipy(states):
+    """The spring's elongation and the law's states, in the equations written out once more."""
+    lengths, epsilon = np.arange(1, states), 0.2
+    slider = asp.Slider(
+        ageing_over_lengths(states - 1)(mu0=MU0, A=A, B=B, D0=D0, V0=V0), spring=4 * K, load=W0
+    )
+    found = asp.periodic_response(
+        slider, velocity=V, epsilon=epsilon, frequency=FREQUENCY, methods=("collocation",)
+    )
+    assert found.result[()] == "converged"
+
+    def rates(t, y):
+        w = 1 + epsilon * np.cos(2 * np.pi * FREQUENCY * t)
+        v = V0 * np.exp((y[0] / w - MU0 - (B / lengths * y[1:]).sum()) / A)
+        return np.array([4 * K / W0 * (V - v), *(V0 * np.exp(-y[1:]) - v) / (lengths * D0)])
+
+    def period(start, **options):
+        span = (0, 1 / FREQUENCY)
+        return solve_ivp(rates, span, start, "DOP853", rtol=1e-12, atol=1e-14, **options)
+
+    run = period(found.start, dense_output=True)
+    assert run.y[:, -1] == pytest.approx(found.start, abs=1e-9)
+    force = run.sol(np.arange(SAMPLES) / SAMPLES / FREQUENCY)[0]
+    spectrum = np.fft.rfft(force) / SAMPLES
+    assert found.mean_friction == pytest.approx(spectrum[0].real, rel=PROMISED)
+    np.testing.assert_allclose(found.harmonics[:2], 2 * spectrum[1:3], rtol=CLOSED)
+    ends = [period(found.start + 1e-30j * unit).y[:, -1].imag / 1e-30 for unit in np.eye(states)]
+    expected = np.linalg.eigvals(np.stack(ends, axis=1))
+    expected = expected[np.argsort(-np.abs(expected))]
+    largest = np.abs(expected) > 1e-6
+    np.testing.assert_allclose(
+        np.abs(found.multipliers)[largest], np.abs(expected)[largest], rtol=PROMISED
+    )
+
+
+#: Numbers of laws that the material does not have.
+OTHERS = {
+    "cut-off": {"V1": "10 nm/s", "V2": "100 um/s"},
+    "nagata": {"c": 2.0, "A": 0.051, "B": 0.0565},
+    "two-state": {"B2": 0.005, "D2": "1.5 um"},
+    "prakash-clifton": {"L": "0.3 um", "V_star": "0.1 um/s"},
+}
+LAWS = sorted(name for name, law in registered().items() if law.rate_dependent)
+EQUATIONS = (
+    {},
+    {"inertia": True},
+    {"radiation_damping": 500.0},
+    {"inertia": True, "radiation_damping": 500.0},
+)
+LOADS = (
+    lambda epsilon: modulated(epsilon),
+    lambda epsilon: modulated(epsilon, load={2: (epsilon / 3, 0.7)}),
+    lambda epsilon: modulated(epsilon, tilt=0.05, pull=0.2, pull_phase=-1.0),
+)
+
+
+def random_orbit(law, seed):
+    """A response at a point, an equation of motion and a load drawn at random."""
+    draw = np.random.default_rng([seed, LAWS.index(law)])
+
+    def spread(low, high):
+        return float(np.exp(draw.uniform(np.log(low), np.log(high))))
+
+    point = {"V": spread(2e-7, 5e-6), "epsilon": 0.1, "frequency": 60.0}
+    material = asp.materials.load("bureau2000")
+    sourced = sourced_numbers(point | OTHERS.get(law, {}), material, "test", law)
+    values = {name: n.value for name, n in numbers_for(law, sourced).items()}
+    values["K"] = spread(3.0, 30.0) * (values["B"] - values["A"]) * values["W0"] / values["D0"]
+    return asp.periodic_response(
+        slider_from(registered()[law], values),
+        velocity=point["V"],
+        frequency=spread(30.0, 300.0),
+        modulation=LOADS[draw.integers(len(LOADS))](draw.uniform(0.02, 0.3)),
+        methods=("collocation",),
+        **EQUATIONS[draw.integers(len(EQUATIONS))],
+    )
+
+
+def assert_orbit(found, motion):
+    """The states return after a period of these equations, and the force has these harmonics."""
+    load = found.load
+    rates = jax.jit(lambda theta, Y: motion.rates(Y, load.at(theta)))
+    force = jax.jit(jax.vmap(lambda theta, Y: motion.force(Y, load.at(theta))))
+    span = (0, 2 * np.pi)
+    run = solve_ivp(rates, span, found.start, "LSODA", rtol=1e-11, atol=1e-13, dense_output=True)
+    assert run.success
+    # What SciPy errs by grows as disturbances do.
+    accuracy = CLOSED * max(1.0, float(found.floquet_max))
+    gap = np.abs(run.y[:, -1] - found.start) / np.maximum(np.abs(found.start), 1e-3)
+    assert gap.max() < accuracy
+    theta = 2 * np.pi * np.arange(SAMPLES) / SAMPLES
+    spectrum = np.fft.rfft(np.asarray(force(theta, run.sol(theta).T))) / SAMPLES
+    assert found.mean_friction == pytest.approx(spectrum[0].real, rel=accuracy)
+    assert np.abs(found.harmonics[:2] - 2 * spectrum[1:3]).max() < 100 * accuracy * found.mu1
+
+
+@pytest.mark.parametrize("seed", population(10))
+@pytest.mark.parametrize("law", LAWS)
+def test_a_random_orbit_obeys_the_equations(law, seed):
+    found = random_orbit(law, seed)
+    assert found.result[()] == "converged"
+    assert_orbit(found, found.motion)
+
+
+@pytest.mark.parametrize("planted", ["V", "omega"])
+def test_an_orbit_of_other_equations_is_seen(planted):
+    found = random_orbit("rice-ruina", 0)
+    other = {planted: 1.001 * getattr(found.motion, planted)}
+    with pytest.raises(AssertionError):
+        assert_orbit(found, dataclasses.replace(found.motion, **other))
