@@ -13,7 +13,7 @@ from asperity import materials
 from asperity.app.api.protocols import checked
 from asperity.errors import InputError
 from asperity.inference import read_table
-from asperity.inference.design.plan.file import read_plan
+from asperity.inference.design.plan_file import read_plan
 from asperity.ledger.contents import read_contents
 from asperity.parameters import file_content
 from asperity.parameters.toml_file import parsed_toml

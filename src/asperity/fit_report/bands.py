@@ -83,7 +83,7 @@ def bands_of(
             radiation_damping=term.forward.radiation_damping,
         )
         if term.searches:
-            forward.search_from_now_on()
+            forward.uses_search = True
             forward(found.values)
         free = {n: np.repeat(v, _AMPLITUDES) for n, v in values.items()}
         predicted, outcome = forward.predicted(free, count, near=term.searches)

@@ -82,26 +82,24 @@ def page(found: Comparison, fits: Mapping[str, Fit]) -> str:
 def _figures(fits: Mapping[str, Fit]) -> str:
     first = next(iter(fits.values()))
     parts = []
-    for i, term in enumerate(first.objective.terms):
-        if isinstance(term, LockInTerm):
-            predicted = {}
-            for name, own in fits.items():
-                its = own.objective.terms[i]
-                assert isinstance(its, LockInTerm)  # all laws have the same data
-                predicted[name] = bands_of(own, its, None)
-            caption = (
-                "Readings with standard uncertainties; medians and 95 % bands of the prediction of "
-                "each law, by the normal approximation."
-            )
-            many = len(next(iter(predicted.values()))) > _MOST_NARROW
-            parts.append(figure(laws_figure(term.table, predicted), caption, wide=many))
-        elif isinstance(term, RunTerm):
-            curves = {}
-            for name, own in fits.items():
-                run = own.objective.terms[i]
-                assert isinstance(run, RunTerm)  # the same
-                curves[name] = run.fitted_friction(own.values)
-            parts.append(figure(run_figure(term.run, curves), RUN_CAPTION))
+    # All laws have the same data.
+    for i, term in enumerate(first.objective.terms_of(LockInTerm)):
+        predicted = {
+            name: bands_of(own, own.objective.terms_of(LockInTerm)[i], None)
+            for name, own in fits.items()
+        }
+        caption = (
+            "Readings with standard uncertainties; medians and 95 % bands of the prediction of "
+            "each law, by the normal approximation."
+        )
+        many = len(next(iter(predicted.values()))) > _MOST_NARROW
+        parts.append(figure(laws_figure(term.table, predicted), caption, wide=many))
+    for i, run in enumerate(first.objective.terms_of(RunTerm)):
+        curves = {
+            name: own.objective.terms_of(RunTerm)[i].fitted_friction(own.values)
+            for name, own in fits.items()
+        }
+        parts.append(figure(run_figure(run.run, curves), RUN_CAPTION))
     return "\n".join(parts)
 
 

@@ -16,7 +16,7 @@ from asperity.fit_report.bands import bands_of
 from asperity.fit_report.page import document, figure, table
 from asperity.fit_report.pictures import data_figure, residual_figure, run_figure
 from asperity.inference import Fit, Posterior
-from asperity.inference.fitting.record import fit_record
+from asperity.inference.fitting.result import fit_record
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.materials import cited_works
@@ -171,39 +171,36 @@ def _correlations(found: Fit) -> str:
 
 def _figures(found: Fit, posterior: Posterior | None) -> str:
     parts = []
-    for term, residuals in zip(found.objective.terms, found.residuals, strict=True):
-        if isinstance(term, LockInTerm):
-            source = "posterior" if posterior else "normal approximation"
-            parts += [
-                figure(
-                    data_figure(term.table, bands_of(found, term, posterior)),
-                    "Readings with standard uncertainties; medians and 95 % bands of the "
-                    f"prediction by the {source}.",
-                ),
-                figure(residual_figure(residuals, term.table.row_names), "Residuals."),
-            ]
-        elif isinstance(term, RunTerm):
-            drawn = run_figure(term.run, {found.law: term.fitted_friction(found.values)})
-            parts.append(figure(drawn, RUN_CAPTION))
+    source = "posterior" if posterior else "normal approximation"
+    for term, residuals in found.parts(LockInTerm):
+        parts += [
+            figure(
+                data_figure(term.table, bands_of(found, term, posterior)),
+                "Readings with standard uncertainties; medians and 95 % bands of the "
+                f"prediction by the {source}.",
+            ),
+            figure(residual_figure(residuals, term.table.row_names), "Residuals."),
+        ]
+    for run, _ in found.parts(RunTerm):
+        drawn = run_figure(run.run, {found.law: run.fitted_friction(found.values)})
+        parts.append(figure(drawn, RUN_CAPTION))
     return "\n".join(parts)
 
 
 def data_tables(found: Fit) -> str:
     """The data of a fit: readings of a table, drive and noise of a recording."""
     parts = []
-    for term in found.objective.terms:
-        if isinstance(term, LockInTerm):
-            read = term.table
-            columns: dict[str, Any] = {**read.points}
-            for name in read.values:
-                columns |= {name: read.values[name], f"{name}_err": read.errors[name]}
-            rows = [
-                (str(read.row_names[i]), *(f"{c[i]:.6g}" for c in columns.values()))
-                for i in range(read.rows)
-            ]
-            parts.append(table(("", *columns), rows))
-        elif isinstance(term, RunTerm):
-            parts.append(_recording(term))
+    for term in found.objective.terms_of(LockInTerm):
+        read = term.table
+        columns: dict[str, Any] = {**read.points}
+        for name in read.values:
+            columns |= {name: read.values[name], f"{name}_err": read.errors[name]}
+        rows = [
+            (str(read.row_names[i]), *(f"{c[i]:.6g}" for c in columns.values()))
+            for i in range(read.rows)
+        ]
+        parts.append(table(("", *columns), rows))
+    parts += [_recording(term) for term in found.objective.terms_of(RunTerm)]
     return "\n".join(parts)
 
 

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
@@ -21,6 +22,9 @@ from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
 
 Float = NDArray[np.float64]
+T = TypeVar("T")
+#: Log likelihood of parameters by name, and of arrays.
+Likelihood = Callable[[Mapping[str, Array], Any], Array]
 
 #: A coordinate nearer to its bound is there.
 _AT_BOUND = 1e-6
@@ -50,6 +54,21 @@ class Residuals(NamedTuple):
     log_scale: float
 
 
+class Minimum(NamedTuple):
+    """Where a minimisation has ended.
+
+    Attributes
+    ----------
+    u : array, shape (n,)
+        Coordinates.
+    chi2 : float
+        Infinite without a solution.
+    """
+
+    u: Float
+    chi2: float
+
+
 class DataTerm(Protocol):
     """One set of data in the likelihood.
 
@@ -68,6 +87,11 @@ class DataTerm(Protocol):
         Model of the noise and `effective_samples`, plain numbers and texts for JSON.
     failure : str
         Why the residuals may not exist, and what to do: the message of a fit that failed.
+    searches : bool or None
+        Whether orbits that the fast method does not find are searched for at every call, which
+        takes long; None for data that are no periodic responses.
+    affordable : int
+        Evaluations that an integral over the parameters may take.
     """
 
     @property
@@ -100,6 +124,16 @@ class DataTerm(Protocol):
         """Why the residuals may not exist, and what to do."""
         ...
 
+    @property
+    def searches(self) -> bool | None:
+        """Whether orbits are searched for at every call; None without periodic responses."""
+        ...
+
+    @property
+    def affordable(self) -> int:
+        """Evaluations that an integral over the parameters may take."""
+        ...
+
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None
     ) -> Residuals | None:
@@ -115,8 +149,79 @@ class DataTerm(Protocol):
         """
         ...
 
-    def search_from_now_on(self) -> None:
-        """Try the slower method at every call."""
+    def likelihood(self, names: tuple[str, ...]) -> tuple[Likelihood, Any]:
+        """The logarithm of the likelihood but for a constant, as compiled programs evaluate it.
+
+        Parameters
+        ----------
+        names : tuple of str
+            All free parameters and nuisances of the fit.
+
+        Returns
+        -------
+        callable
+            Of parameters by name and of the arrays; equal ones share a program.
+        pytree of arrays
+        """
+        ...
+
+    def chi2_of_many(
+        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
+    ) -> Float:
+        """Sums of the squared residuals at many sets of parameters, without derivatives.
+
+        Parameters
+        ----------
+        values : sequence of mapping of str to float
+        near : bool
+            Whether solutions are like those of the last call of `residuals`, and begun there.
+        least : float
+            Share of a table's rows that must have a periodic orbit; with some, the sum is that of
+            these rows, scaled to all. Infinite with fewer, and where there is no motion.
+        """
+        ...
+
+    def thinned(self, rows: int, data: int = 0) -> DataTerm | None:
+        """The same data without most of their rows, to look for minima with.
+
+        Parameters
+        ----------
+        rows, data : int
+            That are kept at least, spread over all.
+
+        Returns
+        -------
+        DataTerm or None
+            None for data that have no rows, or so few that it saves little.
+        """
+        ...
+
+    def uncertainty_of_noise(
+        self, values: Mapping[str, float], slopes: Float, covariance: Float
+    ) -> tuple[Float, Float]:
+        """What estimating the noise adds to a covariance, and the variance of its diagonal.
+
+        Parameters
+        ----------
+        values : mapping of str to float
+            Free parameters and nuisances of the fit, in SI, at the estimate.
+        slopes : array, shape (parameters,)
+            Derivatives of the values to the coordinates of the covariance.
+        covariance : array, shape (parameters, parameters)
+            Under known noise.
+
+        Returns
+        -------
+        array, shape (parameters, parameters), and array, shape (parameters,)
+        """
+        ...
+
+    def observed(self) -> Mapping[str, Float]:
+        """Columns of the data, for files of draws."""
+        ...
+
+    def use_search(self, always: bool) -> None:
+        """Try the slower method at every call, or no more."""
         ...
 
     def warnings(
@@ -256,35 +361,14 @@ class Objective:
         data = self.data_residuals(u)
         return -math.inf if data is None else float(sum(log_density(d) for d in data))
 
-    def log_posterior(self, u: Float) -> tuple[float, Float]:
-        """Logarithm of likelihood times prior, but for a constant, and its gradient.
-
-        Notes
-        -----
-        Priors are densities of the parameter itself, not of its coordinate: a sampler that walks
-        in u adds `log_volume`.
-        """
-        r, jacobian = self.residuals(u)
-        if not np.isfinite(r).all():
-            return -math.inf, np.full(u.shape, np.nan)
-        return -0.5 * float(r @ r), -jacobian.T @ r
-
-    def log_volume(self, u: Float) -> tuple[float, Float]:
-        """Logarithm of the volume dx/du of the coordinates with a prior, and its gradient.
-
-        Parameters without a prior are flat in their coordinate.
-        """
-        counted = np.array([k.logarithmic and k.prior is not None for k in self.unknowns], float)
-        return float(counted @ u), counted
-
     def forget(self) -> None:
         """Forget the last evaluation: a term has changed."""
         self._last = None
 
-    def search_from_now_on(self) -> None:
-        """Let every term try its slower method."""
+    def use_search(self, always: bool) -> None:
+        """Let every term try its slower method at every call, or no more."""
         for term in self.terms:
-            term.search_from_now_on()
+            term.use_search(always)
         self.forget()
 
     def minimise(
@@ -294,8 +378,8 @@ class Objective:
         *,
         tolerance: float | None = None,
         evaluations: int = 100,
-    ) -> tuple[Float, float]:
-        """Coordinates of the minimum that is reached from u, and its chi-squared.
+    ) -> Minimum:
+        """The minimum that is reached from u.
 
         Parameters
         ----------
@@ -318,7 +402,7 @@ class Objective:
         inset = _INSIDE * np.clip(np.abs([low, high]), 1, 1e9)
         point[moving] = inside = np.clip(point[moving], low + inset[0], high - inset[1])
         if not moving or not math.isfinite(self.chi2(point)):
-            return point, self.chi2(point)
+            return Minimum(point, self.chi2(point))
 
         def whole(part: Float) -> Float:
             full = point.copy()
@@ -346,7 +430,7 @@ class Objective:
             max_nfev=evaluations,
         )
         found = whole(result.x)
-        return found, self.chi2(found)
+        return Minimum(found, self.chi2(found))
 
     def expected_decrease(self, u: Float) -> float:
         """Decrease of chi-squared that residuals linear in the coordinates would allow.
@@ -361,10 +445,42 @@ class Objective:
         J, gradient = J[:, ~outwards], gradient[~outwards]
         return float(gradient @ np.linalg.pinv(J.T @ J, hermitian=True) @ gradient)
 
+    def terms_of(self, kind: type[T]) -> list[T]:
+        """The sets of data of one kind, tables or recordings."""
+        return [term for term in self.terms if isinstance(term, kind)]
+
+    @property
+    def has_table(self) -> bool:
+        """Whether periodic responses are among the data."""
+        return any(term.searches is not None for term in self.terms)
+
     @property
     def searches(self) -> bool:
-        """Whether every lock-in table has its slower method tried at every call."""
-        return all(getattr(term, "searches", True) for term in self.terms)
+        """Whether every table has its slower method tried at every call."""
+        return all(term.searches is not False for term in self.terms)
+
+    @property
+    def noise_is_known(self) -> bool:
+        """Whether no noise is estimated: there are no recordings among the data."""
+        return all(term.profiled == 0 for term in self.terms)
+
+    def thinned(self, rows: int, data: int = 0) -> Objective | None:
+        """The objective of few rows of its table; None for other data, or few rows."""
+        term = self.terms[0].thinned(rows, data) if len(self.terms) == 1 else None
+        return None if term is None else replace(self, terms=(term,))
+
+    def chi2_of_many(self, u: Float, *, least: float = 1.0) -> Float:
+        """chi-squared of data and priors at many coordinates, shapes (samples, n) to (samples,).
+
+        Parameters
+        ----------
+        u : array, shape (samples, n)
+        least : float
+            As of `DataTerm.chi2_of_many`.
+        """
+        priors = np.array([np.sum(self.prior_residuals(x)[0] ** 2) for x in u])
+        values = [self.named(x) for x in u]
+        return sum((term.chi2_of_many(values, least=least) for term in self.terms), priors)
 
 
 def compressed(columns: Float) -> Float:

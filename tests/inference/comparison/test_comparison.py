@@ -16,8 +16,7 @@ from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.inference import compare, fit, table_of
 from asperity.inference.comparison.compare import judge
-from asperity.inference.comparison.cross_validation import leave_one_run_out
-from asperity.inference.comparison.evidence import evidence_of
+from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out
 from asperity.inference.comparison.record import laws_table
 from asperity.inference.tables.outliers import outlying_rows
 from references.populations import draws, population

@@ -4,9 +4,14 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from asperity.inference.design.criteria import Determinant, Misfit
-from asperity.inference.design.even_grid import even_grid, times_fewer
-from asperity.inference.design.weights import optimal_shares, whole_readings
+from asperity.inference.design.shares import (
+    Determinant,
+    Misfit,
+    even_grid,
+    optimal_shares,
+    times_fewer,
+    whole_readings,
+)
 
 X = np.linspace(-1, 1, 41)
 

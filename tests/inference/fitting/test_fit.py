@@ -7,7 +7,7 @@ from scipy.stats import chi2
 from asperity.errors import InputError
 from asperity.inference import Prior, compare, fit, table_of
 from asperity.inference.fitting.inputs import free_by_default
-from asperity.inference.fitting.record import fit_record
+from asperity.inference.fitting.result import fit_record
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.laws import get_law
 

@@ -8,7 +8,7 @@ from benchmarks.coverage import CASES, TRUE, runs_of
 
 from asperity.inference import fit
 from asperity.inference.fitting.description import described_fit
-from asperity.inference.fitting.parabola import nowhere_negative, parabola_of
+from asperity.inference.fitting.intervals import nowhere_negative, parabola_of
 from references.populations import population
 
 

@@ -16,10 +16,8 @@ from scipy.special import ndtri
 from asperity.errors import InputError
 from asperity.inference import Prior, RunOptions, fit
 from asperity.inference.posterior import sample_posterior
-from asperity.inference.posterior.coordinates import Coordinates
-from asperity.inference.posterior.nuts import WARM_UP, first_state, run_block, warmed_up
-from asperity.inference.posterior.recordings import likelihood_of_run
-from asperity.inference.posterior.sampling import whitened_posterior
+from asperity.inference.posterior.density import Coordinates
+from asperity.inference.posterior.sampling import next_block, warmed_up, whitened_posterior
 from asperity.outputs import Interrupted
 
 INFINITE = math.inf
@@ -36,21 +34,17 @@ def gap(z, data):
     return jnp.where(z[0] > 3.0, jnp.nan, -0.5 * z[0] ** 2)
 
 
-def drawn(density, start, gradient, value, blocks, chain=0):
-    state, draws, kept = first_state(5, chain, start, value, gradient), [], []
-    for block in range(1, WARM_UP + blocks + 1):
-        warming = block <= WARM_UP
-        state, moves = run_block(density, 0.0, state, adapting=warming)
-        if warming:
-            draws.append(moves.z)
-            state, draws = warmed_up(state, draws, block)
-        else:
-            kept.append(moves)
+def drawn(density, start, blocks):
+    state, _ = warmed_up(density, 0.0, np.asarray(jax.random.key_data(jax.random.key(5))), start)
+    kept = []
+    for _ in range(blocks):
+        state, transitions = next_block(density, 0.0, state)
+        kept.append(transitions)
     return [np.concatenate(part) for part in zip(*kept, strict=True)]
 
 
 def test_the_sampler_draws_from_the_density():
-    z, *_ = drawn(half_normal, np.zeros(2), np.array([0.0, 0.25]), -0.53125, 80)
+    z, *_ = drawn(half_normal, np.zeros(2), 80)
     x = np.exp(z[:, 0])
     for values, exact in ((x, math.sqrt(2 / math.pi)), (x**2, 1.0), (z[:, 1], 0.25)):
         error = values.std() / math.sqrt(array_stats.ess(values[None], method="mean"))
@@ -61,7 +55,7 @@ def test_the_sampler_draws_from_the_density():
 
 
 def test_where_the_density_cannot_be_computed_there_are_no_draws():
-    z, log_density, *_, failed, _ = drawn(gap, np.zeros(1), np.zeros(1), 0.0, 40)
+    z, log_density, *_, failed, _ = drawn(gap, np.zeros(1), 40)
     assert np.isfinite(log_density).all()
     assert z.max() <= 3
     assert 0 < failed.sum() < 0.2 * failed.size
@@ -91,7 +85,6 @@ def found(readings, pmma):
     return fit(readings(11), "elasto-plastic", ("lambda", "eps_ratio"), material=pmma)
 
 
-#: Of the run that is sampled once, and interrupted and resumed.
 SAMPLED = {"chains": 2, "draws": 250, "seed": 3, "jobs": 1}
 
 
@@ -132,20 +125,18 @@ def test_a_posterior_is_the_normalised_likelihood(found, posterior, tmp_path):
     tree.close()
 
 
-def test_an_interrupted_run_goes_on_to_the_same_draws(found, posterior, tmp_path):
-    def stop(done, total):
-        if done > 0.4 * total:
-            raise KeyboardInterrupt
-
-    path = tmp_path / "draws.nc"
-    with pytest.raises(Interrupted, match="--resume"):
-        sample_posterior(found, **SAMPLED, unfinished=path, progress=stop)
-    with pytest.raises(InputError, match="same inputs"):
-        sample_posterior(found, **{**SAMPLED, "seed": 4}, unfinished=path, resume=True)
-    resumed = sample_posterior(found, **SAMPLED, unfinished=path, resume=True)
+def test_draws_do_not_depend_on_the_number_of_processes(found, posterior):
+    again = sample_posterior(found, **{**SAMPLED, "draws": 100, "jobs": 2})
     for name, draws in posterior.draws.items():
-        np.testing.assert_array_equal(resumed.draws[name], draws)
-    assert list(tmp_path.iterdir()) == []
+        np.testing.assert_array_equal(again.draws[name], draws[:, :100])
+
+
+def test_an_interrupted_run_says_so(found):
+    def stop(done, total):
+        raise KeyboardInterrupt
+
+    with pytest.raises(Interrupted, match="nothing was written"):
+        sample_posterior(found, **SAMPLED, progress=stop)
 
 
 def test_what_cannot_be_sampled_is_refused(found):
@@ -162,20 +153,6 @@ def steps():
 def fit_of_steps(run, options=None, prior=None):
     free = ["A", "B", "D0"]
     return fit(run, "rice-ruina", free, start=TRUE, starts=1, runs=options, prior=prior)
-
-
-def test_blocks_of_a_recording_are_the_same_after_another_fit(steps):
-    # An interrupted run is resumed by a new process, which fits the recording again.
-    density, data = whitened_posterior(fit_of_steps(steps)).compiled()
-    again, same = whitened_posterior(fit_of_steps(steps)).compiled()
-    assert again == density
-    for one, other in zip(jax.tree.leaves(data), jax.tree.leaves(same), strict=True):
-        np.testing.assert_array_equal(one, other)
-    gradient = jax.jit(jax.value_and_grad(density))
-    z = np.zeros(data.mode.size)
-    np.testing.assert_array_equal(
-        gradient(z, data)[1], jax.jit(jax.value_and_grad(again))(z, same)[1]
-    )
 
 
 def test_a_posterior_of_nothing_is_refused(steps):
@@ -197,7 +174,7 @@ def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, o
     found = fit_of_steps(steps, options)
     (term,) = found.objective.terms
     assert found.observables["friction"][1] == samples
-    likelihood, data = likelihood_of_run(term, found.objective.names)
+    likelihood, data = term.likelihood(found.objective.names)
 
     @jax.jit
     @jax.value_and_grad

@@ -13,7 +13,7 @@ from asperity.inference import Prior, RunOptions, fit, recorded_run, table_of
 from asperity.inference.fitting.description import described_fit
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.plausibility import unusual_numbers
-from asperity.inference.runs.copies import require_own_samples
+from asperity.inference.runs.assembly import require_own_samples
 from asperity.inference.runs.term import RunTerm
 from asperity.laws import RiceRuina, get_law
 from asperity.orbit import periodic_response

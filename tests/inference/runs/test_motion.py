@@ -6,6 +6,7 @@ from scipy.integrate import solve_ivp
 
 from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.motion import RunMotion
+from asperity.inference.runs.reading import reading_at
 from asperity.laws import get_law
 
 VALUES = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6, "K": 4e3, "W0": 1.0}
@@ -51,7 +52,7 @@ def by_scipy(values, TIMES=TIMES):
 def computed():
     drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), LOAD_SLOPE)
     motion = RunMotion(get_law("linker-dieterich"), 3e-6)
-    return motion(AT, FREE, drive, TIMES)
+    return motion(AT, FREE, drive, reading_at(TIMES))
 
 
 def test_friction_is_that_of_an_independent_integration(computed):
@@ -77,7 +78,7 @@ def test_means_over_blocks_are_those_of_an_independent_integration(computed):
     # Blocks of 0.6 s, each change of the drive within one, and a gap.
     edges = np.linspace(0.0, 69.0, 116)
     blocks = np.stack([edges[:-1], edges[1:]], axis=1)[np.arange(115) != 60]
-    means = motion(AT, FREE, drive, blocks)
+    means = motion(AT, FREE, drive, reading_at(blocks))
     times = (blocks[:, :1] + 0.6 * (np.arange(50) + 0.5) / 50).ravel()
     expected = by_scipy(AT, times).reshape(-1, 50).mean(axis=1)
     # The midpoint rule over 12 ms, where friction turns by 0.04 a second; steps of it are 0.02.
@@ -85,7 +86,7 @@ def test_means_over_blocks_are_those_of_an_independent_integration(computed):
     # About the step and the beginning of the hold.
     some = slice(31, 51)
     at = times.reshape(-1, 50)[some].ravel()
-    points = motion(AT, FREE, drive, at).derivatives.reshape(20, 50, -1).mean(axis=1)
+    points = motion(AT, FREE, drive, reading_at(at)).derivatives.reshape(20, 50, -1).mean(axis=1)
     for name, mean, point in zip(FREE, means.derivatives[some].T, points.T, strict=True):
         # That to the time of the step jumps within a fiftieth of a block.
         np.testing.assert_allclose(mean, point, atol=1e-2 * np.abs(point).max(), err_msg=name)
@@ -95,7 +96,7 @@ def test_a_motion_that_runs_away_is_no_motion():
     drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), np.zeros(4))
     motion = RunMotion(get_law("rice-ruina"), 3e-6)
     # A twentieth of the critical stiffness (B - A)/D0.
-    assert motion({**VALUES, "K": 12.0}, ("A",), drive, TIMES) is None
+    assert motion({**VALUES, "K": 12.0}, ("A",), drive, reading_at(TIMES)) is None
 
 
 @pytest.mark.parametrize("name", ["regularised", "linker-dieterich", "rice-ruina"])
@@ -114,7 +115,7 @@ def test_derivatives_of_steady_sliding_do_not_grow_from_their_rounding(name):
         edges = length * np.array([0.0, 1.0, 1.2])
         drive = Drive(edges, np.array([1.0, 3.0]), nothing, load, nothing)
         times = np.linspace(0, edges[-1], 300)
-        found = RunMotion(get_law(name), V)(values, ("A", "B", "D0", "K"), drive, times)
+        found = RunMotion(get_law(name), V)(values, ("A", "B", "D0", "K"), drive, reading_at(times))
         steady = times < length
         slope = np.log(V / values["V0"])
         expected = np.broadcast_to([slope, -slope, 0.0, 0.0], found.derivatives[steady].shape)

@@ -76,14 +76,6 @@ def test_whiteness_rejects_as_often_as_it_says():
     assert 0.03 < np.mean(rejected) < 0.1 + 3 * np.sqrt(0.09 / 300)
 
 
-def test_taps_are_the_weights_of_the_whitening():
-    noise = Autoregression(np.array([0.8, -0.5, 0.1]), 2.5)
-    x = np.random.default_rng(3).normal(size=7)
-    taps = noise.taps(7)
-    lagged = np.array([[x[t - k] if t >= k else 0.0 for k in range(4)] for t in range(7)])
-    np.testing.assert_allclose((taps * lagged).sum(1), noise.whiten(x[:, None])[:, 0])
-
-
 def test_a_single_sample_that_is_off_is_measured_as_by_generalised_least_squares():
     noise = Autoregression(np.array([0.8, -0.5, 0.1]), 2.5)
     x = np.random.default_rng(4).normal(size=40)

@@ -6,8 +6,7 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
-from asperity.inference.runs.noise import Autoregression, fitted
-from asperity.inference.runs.noise_uncertainty import added_by_noise
+from asperity.inference.runs.noise import Autoregression, added_by_noise, fitted
 
 
 def autocovariances(a, n):

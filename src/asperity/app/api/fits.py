@@ -166,7 +166,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     """
     from asperity import inference
     from asperity.inference.comparison.record import comparison_record
-    from asperity.inference.fitting.record import fit_record
+    from asperity.inference.fitting.result import fit_record
 
     asked = Fitted.model_validate(argument["asked"])
     files = argument["files"]
@@ -311,9 +311,7 @@ def _bands(found: Any, posterior: Any) -> list[dict[str, Any]]:
     from asperity.inference.tables.term import LockInTerm
 
     pictures = []
-    for term in found.objective.terms:
-        if not isinstance(term, LockInTerm):
-            continue
+    for term in found.objective.terms_of(LockInTerm):
         table = term.table
         predicted = bands_of(found, term, posterior)
         rows = []
@@ -372,13 +370,9 @@ def _row(row: Mapping[str, Cell]) -> dict[str, Any]:
 
 def _residuals(found: Any) -> dict[str, list[Any]]:
     """Whitened residuals of the readings, with the observable of each."""
-    from asperity.inference.runs.term import RunTerm
+    from asperity.inference.tables.term import LockInTerm
 
-    parts = [
-        residuals
-        for term, residuals in zip(found.objective.terms, found.residuals, strict=True)
-        if not isinstance(term, RunTerm)
-    ]
+    parts = [residuals for _, residuals in found.parts(LockInTerm)]
     values = [x for r in parts for x in r.values.tolist()]
     names = [str(n) for r in parts for n in r.observable]
     return {"value": values, "observable": names}
@@ -389,9 +383,7 @@ def _run_pictures(found: Any) -> list[dict[str, Any]]:
     from asperity.inference.runs.term import RunTerm
 
     pictures = []
-    for term in found.objective.terms:
-        if not isinstance(term, RunTerm):
-            continue
+    for term in found.objective.terms_of(RunTerm):
         fitted = term.fitted_friction(found.values)
         time, recorded = term.run.time, term.run.friction
         curves = {"recorded": recorded, "fitted": fitted, "difference": recorded - fitted}

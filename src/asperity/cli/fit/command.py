@@ -152,7 +152,7 @@ def fit(
     from asperity import inference
     from asperity.cli.progress import bar
     from asperity.cli.report import to_json
-    from asperity.inference.fitting.record import fit_record
+    from asperity.inference.fitting.result import fit_record
 
     sampling.check()
     if report is not None:
@@ -268,15 +268,14 @@ def _runs(found: Fit) -> list[str]:
     from asperity.inference.runs.term import RunTerm
 
     lines = []
-    for term in found.objective.terms:
-        if isinstance(term, RunTerm):
-            noise = term.noise
-            lines.append(
-                f"{term.name}: noise {noise['model']}, {noise['effective_samples']:.4g} effective "
-                f"of {noise['samples']} samples, whiteness p = {noise['whiteness_p']:.2g}"
-            )
-            if noise["averaged"]:
-                lines.append(f"{term.name}: {noise['averaged']}")
+    for term in found.objective.terms_of(RunTerm):
+        noise = term.noise
+        lines.append(
+            f"{term.name}: noise {noise['model']}, {noise['effective_samples']:.4g} effective "
+            f"of {noise['samples']} samples, whiteness p = {noise['whiteness_p']:.2g}"
+        )
+        if noise["averaged"]:
+            lines.append(f"{term.name}: {noise['averaged']}")
     return lines
 
 

@@ -257,7 +257,8 @@ def priors_of(texts: Sequence[str], free: Sequence[str] | None) -> dict[str, Pri
         If a text is neither, or a name is given twice.
     """
     from asperity import materials
-    from asperity.inference.runs.gain import GAIN, PARAMETER
+    from asperity.inference.runs.assembly import PARAMETER
+    from asperity.inference.runs.reading import GAIN
     from asperity.inference.unknowns import Prior, material_priors
     from asperity.laws import registered
     from asperity.parameters import all_parameters

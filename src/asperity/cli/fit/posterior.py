@@ -27,7 +27,6 @@ class PosteriorOptions:
     chains, draws, seed : int
     out : Path or None
         NetCDF of the draws.
-    resume : bool
     """
 
     wanted: bool
@@ -35,18 +34,14 @@ class PosteriorOptions:
     draws: int
     seed: int
     out: Path | None
-    resume: bool
 
     def check(self) -> None:
         """Refuse what cannot be done before anything is computed."""
         from asperity.outputs import output_file
 
         if not self.wanted:
-            for option, given in (("--out", self.out), ("--resume", self.resume)):
-                if given:
-                    raise InputError(
-                        f"{option} must come with --posterior, got it alone; add --posterior"
-                    )
+            if self.out is not None:
+                raise InputError("--out must come with --posterior, got it alone; add --posterior")
             return
         from asperity.inference.posterior import require_bayes
         from asperity.inference.posterior.sampling import require_sizes
@@ -60,11 +55,6 @@ class PosteriorOptions:
                     "posterior.nc"
                 )
             output_file(self.out, "--out", example="posterior.nc")
-        elif self.resume:
-            raise InputError(
-                "--resume must come with --out, got it alone; name the file whose draws were "
-                "interrupted"
-            )
 
     def sample(self, found: Fit) -> Posterior | None:
         """Sample, with a progress bar, and write the draws."""
@@ -80,8 +70,6 @@ class PosteriorOptions:
                 chains=self.chains,
                 draws=self.draws,
                 seed=self.seed,
-                unfinished=self.out,
-                resume=self.resume,
                 progress=lambda done, total: update(done, total, ""),
             )
         if self.out is not None:
@@ -101,10 +89,9 @@ def posterior_options(command: Callable[..., Any]) -> Callable[..., Any]:
         draws: int,
         seed: int,
         out: Path | None,
-        resume: bool,
         **others: Any,
     ) -> Any:
-        sampling = PosteriorOptions(posterior, chains, draws, seed, out, resume)
+        sampling = PosteriorOptions(posterior, chains, draws, seed, out)
         return command(sampling=sampling, **others)
 
     found: Callable[..., Any] = gathered
@@ -116,7 +103,6 @@ def posterior_options(command: Callable[..., Any]) -> Callable[..., Any]:
         ),
         click.option("--seed", default=0, show_default=True, metavar="N", help="Of the draws."),
         click.option("--out", type=Path, metavar="NC", help="Where the draws go, for ArviZ."),
-        click.option("--resume", is_flag=True, help="Go on with interrupted draws."),
     ):
         found = option(found)
     return found

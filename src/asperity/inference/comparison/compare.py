@@ -11,21 +11,23 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.inference.comparison.cross_validation import CrossValidation, leave_one_run_out
-from asperity.inference.comparison.evidence import Evidence, evidence_of
+from asperity.inference.comparison.evidence import (
+    CrossValidation,
+    Evidence,
+    evidence_of,
+    leave_one_run_out,
+)
 from asperity.inference.fitting.fit import Data, fit, listed_data
-from asperity.inference.fitting.free_stiffness import stiffness_that_describes
 from asperity.inference.fitting.inputs import free_by_default
+from asperity.inference.fitting.plausibility import stiffness_that_describes
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
-from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.residuals import residuals_of, weights_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import (
     Forward,
     LockInTerm,
     all_converged,
-    any_searched,
 )
 from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law, registered
@@ -304,7 +306,7 @@ def _examined(found: Comparison, report: Report) -> Comparison:
     judged = {}
     for k, (name, j) in enumerate(found.laws.items(), 1):
         terms = j.fit.objective.terms
-        slow = any_searched(terms) or any(isinstance(term, RunTerm) for term in terms)
+        slow = any(term.searches or term.profiled for term in terms)
         if j.fit.converged and j.excluded and slow:
             j = replace(j, evidence=evidence_of(j.fit, samples=0))
         elif j.fit.converged:
@@ -461,10 +463,10 @@ def what_would_tell(first: Fit, second: Fit) -> str:
     Looks at the operating points of the data with velocity, amplitude and frequency changed by
     factors up to 4, and at differences in units of the median uncertainty of each observable.
     """
-    term = next((t for t in first.objective.terms if isinstance(t, LockInTerm)), None)
-    if term is None:
+    tables = [term.table for term in first.objective.terms_of(LockInTerm)]
+    if not tables:
         return ""
-    table = term.table
+    (table,) = tables
     largest = float(table.points["epsilon"].max())
     ratio = max(float(_value(f, "eps_ratio")) for f in (first, second))
     trials = []

@@ -1,13 +1,18 @@
-"""Evidence: the probability of the data under a law, averaged over its prior.
+"""Second opinions on a law: its evidence, and how well other runs predict each run.
 
-The integral of likelihood times prior over the parameters by importance sampling from Student's t
-about the mode in whitened coordinates; without samples, the normal approximation (Laplace).
+Evidence is the probability of the data under a law, averaged over its prior: the integral of
+likelihood times prior over the parameters by importance sampling from Student's t about the mode in
+whitened coordinates; without samples, the normal approximation (Laplace).
+
+Samples of one run share what was the same in it, so that leaving out one reading at a time would
+flatter every law. A run is what was measured together: a file, or the rows of one entry in the
+column ``run``.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,17 +20,15 @@ from numpy.typing import NDArray
 from scipy.stats import multivariate_t
 
 from asperity.inference.fitting.result import Fit
-from asperity.inference.objective import Objective
+from asperity.inference.objective import log_density
 from asperity.inference.posterior.density import Whitened
 from asperity.inference.posterior.sampling import whitened_posterior
-from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm, any_searched
+from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 
-#: Samples, those where motions through recordings or searched orbits take ten or a hundred times
-#: as long, and the degrees of freedom of the distribution that they come from.
-_SAMPLES, _RECORDED, _SEARCHED, _TAILS = 1024, 256, 128, 5.0
+#: Degrees of freedom of the distribution that samples come from.
+_TAILS = 5.0
 #: Effective samples below which the number is no more than a guess.
 _ENOUGH = 50.0
 
@@ -71,8 +74,8 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     found : Fit
         Converged.
     samples : int, optional
-        By default 1024, 256 with a recording, and 128 where the orbits of a table are searched for;
-        0 for the normal approximation alone.
+        By default what the data afford, 1024 for a table, 256 with a recording, and 128 where
+        orbits are searched for; 0 for the normal approximation alone.
     seed : int
 
     Notes
@@ -81,22 +84,20 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     lowers the logarithm by ln k.
     """
     if samples is None:
-        terms = found.objective.terms
-        recorded = any(isinstance(term, RunTerm) for term in terms)
-        samples = _SEARCHED if any_searched(terms) else _RECORDED if recorded else _SAMPLES
+        samples = min(term.affordable for term in found.objective.terms)
     if not found.objective.unknowns:
         # Nothing to average over.
         density = found.log_likelihood
         return Evidence(density, 0.0, float(samples), density, 0, {})
     whitened = whitened_posterior(found)
     n = whitened.mode.size
-    at_mode = float(_log_target(whitened, np.zeros((1, n)))[0])
+    at_mode = float(_log_target(found, whitened, np.zeros((1, n)))[0])
     laplace = at_mode + 0.5 * n * math.log(2 * math.pi)
     if samples == 0:
         return Evidence(laplace, math.nan, 0.0, laplace, 0, whitened.prior.record())
     proposal = multivariate_t(np.zeros(n), np.eye(n), df=_TAILS, seed=seed)
     z = np.asarray(proposal.rvs(samples)).reshape(samples, n)
-    log_weights = _log_target(whitened, z) - proposal.logpdf(z).reshape(samples)
+    log_weights = _log_target(found, whitened, z) - proposal.logpdf(z).reshape(samples)
     failed = int((~np.isfinite(log_weights)).sum())
     log_weights = np.where(np.isfinite(log_weights), log_weights, -np.inf)
     top = log_weights.max()
@@ -112,23 +113,86 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     )
 
 
-def _log_target(whitened: Whitened, z: Float) -> Float:
+def _log_target(found: Fit, whitened: Whitened, z: Float) -> Float:
     """Logarithm of likelihood times prior times the volume dq/dz du/dq, shape (samples,)."""
     q = whitened.mode + z @ whitened.root.T
     u = np.asarray(whitened.coordinates.to_u(q))
     volume = np.asarray(whitened.coordinates.log_slope(q)).sum(-1)
     volume = volume + np.linalg.slogdet(whitened.root)[1]
-    return log_likelihoods(whitened.objective, u) + whitened.prior.log_density(u) + volume
-
-
-def log_likelihoods(objective: Objective, u: Float) -> Float:
-    """Logarithms of the likelihood at many coordinates, shapes (samples, n) to (samples,)."""
-    total = np.zeros(len(u))
-    for term in objective.terms:
-        if isinstance(term, LockInTerm):
-            constant = 2 * term.weights.log_scale
-            constant += int(term.weights.reported.sum()) * math.log(2 * math.pi)
-            total -= 0.5 * (term.chi2_of_many(objective.unknowns, u, near=True) + constant)
-        else:
-            return np.array([objective.log_likelihood(x) for x in u])
+    total = whitened.prior.log_density(u) + volume
+    values = [found.objective.named(x) for x in u]
+    for term, residuals in zip(found.objective.terms, found.residuals, strict=True):
+        # The density where all residuals are 0.
+        total += log_density(residuals) + 0.5 * float(np.sum(residuals.values**2))
+        total -= 0.5 * term.chi2_of_many(values, near=True)
     return total
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """Predictive densities of runs that were left out.
+
+    Attributes
+    ----------
+    log_density : float
+        Sum over the runs: expected log predictive density.
+    runs : mapping of str to float
+        Of each run.
+    message : str
+        Why there are no numbers, if there are none.
+    """
+
+    log_density: float
+    runs: dict[str, float]
+    message: str = ""
+
+    def difference(self, other: CrossValidation) -> tuple[float, float]:
+        """How much better this one predicts than the other, and the standard error."""
+        apart = np.array([self.runs[name] - other.runs[name] for name in self.runs])
+        if apart.size < 2:
+            return float(apart.sum()), math.nan
+        return float(apart.sum()), float(apart.std(ddof=1) * math.sqrt(apart.size))
+
+
+def leave_one_run_out(found: Fit) -> CrossValidation:
+    """Cross-validation of a converged fit to tables of lock-in readings.
+
+    The density of a run is normal about the prediction of the fit to the others, with their
+    uncertainty of the parameters on top of the errors.
+    """
+    tables = found.objective.terms_of(LockInTerm)
+    if not tables or len(found.objective.terms) > 1:
+        return CrossValidation(math.nan, {}, "data other than tables have no runs to leave out")
+    (term,) = tables
+    names = list(dict.fromkeys(term.table.run.tolist()))
+    if len(names) < 2:
+        return CrossValidation(
+            math.nan, {}, "all rows are of one run; name the runs in a column 'run'"
+        )
+    runs = {name: _predictive(found, term, term.table.run == name) for name in names}
+    if not all(math.isfinite(value) for value in runs.values()):
+        return CrossValidation(math.nan, runs, "the other runs do not determine the parameters")
+    return CrossValidation(sum(runs.values()), runs)
+
+
+def _predictive(found: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> float:
+    """Log density of the rows left out, given the others."""
+    objective = found.objective
+    rest = replace(objective, terms=(term.weighted(np.where(left_out, 0.0, 1.0)),))
+    u = rest.minimise(objective.coordinates(found.values))[0]
+    data = objective.data_residuals(u)
+    if data is None:
+        return math.nan
+    out = left_out[data[0].row]
+    r_out, J_out = data[0].values[out], data[0].jacobian[out]
+    J = np.vstack([data[0].jacobian[~out], objective.prior_residuals(u)[1]])
+    information = J.T @ J
+    if u.size and np.linalg.cond(information) > 1e14:
+        return math.nan
+    spread = np.eye(r_out.size) + J_out @ np.linalg.solve(information, J_out.T)
+    log_scale = float(term.weights.log_scales[left_out].sum())
+    distance = float(r_out @ np.linalg.solve(spread, r_out))
+    return float(
+        -0.5 * (distance + np.linalg.slogdet(spread)[1] + r_out.size * math.log(2 * math.pi))
+        - log_scale
+    )

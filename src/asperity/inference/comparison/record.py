@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 from asperity.inference.comparison.compare import Comparison
-from asperity.inference.comparison.cross_validation import CrossValidation
-from asperity.inference.comparison.evidence import Evidence
-from asperity.inference.fitting.record import fit_record
+from asperity.inference.comparison.evidence import CrossValidation, Evidence
+from asperity.inference.fitting.result import fit_record
 from asperity.outputs.json import plain
 
 

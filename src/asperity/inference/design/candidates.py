@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +17,7 @@ from scipy.stats import norm
 from scipy.stats.qmc import Sobol
 
 from asperity.inference.design.plan import DesignPlan, Hypothesis
+from asperity.inference.tables.term import on_contacts
 from asperity.orbit import Outcome, periodic_response, response_function
 from asperity.parameters.rules import RULES
 from asperity.slider.named import slider_from
@@ -145,15 +145,6 @@ def drawn_values(plan: DesignPlan) -> tuple[dict[str, float], ...]:
     return tuple(found[: plan.draws])
 
 
-def parameters_at(
-    hypothesis: Hypothesis, points: Mapping[str, Float], values: Mapping[str, float]
-) -> dict[str, Any]:
-    """All parameters of the operating points by name, with the amplitude on the contacts."""
-    given: dict[str, Any] = {**hypothesis.fixed, **points, **values}
-    given["epsilon"] = np.asarray(given["epsilon"]) * given.pop("eps_ratio", 1.0)
-    return given
-
-
 def _reasons(
     plan: DesignPlan,
     hypothesis: Hypothesis,
@@ -162,7 +153,7 @@ def _reasons(
     progress: Progress,
 ) -> tuple[list[str], Bool]:
     """Why each point has no stable response, empty if it has one; and which need the search."""
-    given = parameters_at(hypothesis, points, values)
+    given = on_contacts({**hypothesis.fixed, **points, **values})
     rows = len(points["V"])
     reasons = [""] * rows
     inertial = plan.inertia or plan.radiation_damping

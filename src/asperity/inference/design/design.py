@@ -18,17 +18,28 @@ from asperity.inference.design.candidates import (
     candidates_of,
     without_rows,
 )
-from asperity.inference.design.criteria import Determinant
-from asperity.inference.design.deciding import probability_of_deciding
-from asperity.inference.design.even_grid import EvenGrid, even_grid, times_fewer, times_fewer_of
-from asperity.inference.design.plan import DesignPlan, plan_of, read_plan
-from asperity.inference.design.predictions import PointModel, rows_of, stacked
-from asperity.inference.design.refit import prior_terms
+from asperity.inference.design.plan import DesignPlan
+from asperity.inference.design.plan_file import plan_of, read_plan
+from asperity.inference.design.predictions import PointModel, prior_terms, rows_of, stacked
 from asperity.inference.design.result import Design, DesignedPoint, ExpectedError
-from asperity.inference.design.rival import RivalFit, Separation, separation
+from asperity.inference.design.rival import (
+    RivalFit,
+    Separation,
+    probability_of_deciding,
+    separation,
+)
+from asperity.inference.design.shares import (
+    Determinant,
+    EvenGrid,
+    Shares,
+    even_grid,
+    optimal_shares,
+    times_fewer,
+    times_fewer_of,
+    whole_readings,
+)
 from asperity.inference.design.simulation import Simulated, simulated
-from asperity.inference.design.weights import Shares, optimal_shares, whole_readings
-from asperity.inference.fitting.parabola import UNDETERMINED, inverse_information
+from asperity.inference.fitting.intervals import UNDETERMINED, inverse_information
 from asperity.inference.tables.table import LockInTable
 
 Float = NDArray[np.float64]

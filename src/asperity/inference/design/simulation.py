@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 from asperity.inference.comparison.compare import LARGEST_AICC_DIFFERENCE
 from asperity.inference.design.plan import Hypothesis
-from asperity.inference.design.predictions import PointModel, repeated
-from asperity.inference.design.refit import refit
+from asperity.inference.design.predictions import PointModel, refit, repeated
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import Prior
 

@@ -12,20 +12,22 @@ from scipy.stats import chi2 as chi_squared
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from asperity.inference.fitting.intervals import LEVELS, Interval, bounded_interval
-from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
-from asperity.inference.fitting.parabola import (
+from asperity.inference.fitting.intervals import (
+    LEVELS,
     UNDETERMINED,
+    Interval,
     Parabola,
+    Profile,
+    ProfileAtEdgeError,
+    bounded_interval,
     inverse_information,
-    is_of_tables,
     parabola_of,
 )
-from asperity.inference.fitting.profile import Profile, ProfileAtEdgeError
+from asperity.inference.fitting.minima import DOUBTFUL, FAR_OFF
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.objective import Objective, Residuals, log_density
 from asperity.inference.tables.outliers import outlying_rows
-from asperity.inference.tables.term import LockInTerm, any_searched
+from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
 
 Float = NDArray[np.float64]
@@ -311,7 +313,7 @@ def _profiled(
     """
     if everything:
         return set(range(len(objective.unknowns)))
-    if not is_of_tables(objective):
+    if not objective.noise_is_known:
         return set()
     sd = np.sqrt(np.diag(covariance))
     correlated = np.abs(covariance / np.outer(sd, sd)) > _TOGETHER
@@ -443,7 +445,11 @@ def _with_warnings(found: Fit, said: list[str]) -> Fit:
             f"{found.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
             f"for {worst}; intervals do not hold then"
         )
-    if found.dof > 0 and FAR_OFF < found.p_value < DOUBTFUL and any_searched(found.objective.terms):
+    if (
+        found.dof > 0
+        and FAR_OFF < found.p_value < DOUBTFUL
+        and any(term.searches for term in found.objective.terms)
+    ):
         said.append(
             f"orbits of this table are searched for, and with p = {found.p_value:.2g} a better "
             "minimum may lie where the search, which is a short one, found none at some row: fit "
@@ -489,14 +495,10 @@ def _outliers(found: Fit) -> tuple[int, ...]:
     Beside recordings, of which a fit takes minutes, predictions count as linear.
     """
     objective = found.objective
-    tables = [
-        (term, residuals)
-        for term, residuals in zip(objective.terms, found.residuals, strict=True)
-        if isinstance(term, LockInTerm)
-    ]
+    tables = found.parts(LockInTerm)
     if not tables:
         return ()
-    term, residuals = tables[0]
+    ((term, residuals),) = tables
     if len(objective.terms) > 1:
         return tuple(outlying_rows(residuals))
     u = _coordinates(found)

@@ -15,7 +15,6 @@ import numpy as np
 
 from asperity.errors import InputError
 from asperity.inference.fitting.description import described_fit, failed_fit
-from asperity.inference.fitting.free_stiffness import stiffness_that_describes
 from asperity.inference.fitting.inputs import (
     fixed_values,
     free_by_default,
@@ -30,6 +29,7 @@ from asperity.inference.fitting.own_noise import Found, under_drift, with_noise,
 from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,
+    stiffness_that_describes,
     unusual_numbers,
 )
 from asperity.inference.fitting.result import Fit
@@ -37,9 +37,11 @@ from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.runs.assembly import (
     USUAL_STIFFNESS,
     RunOptions,
+    require_calibrated,
     require_newtons,
     require_no_layer,
     require_own_priors,
+    require_own_samples,
     require_seen,
     run_terms,
     shared_stiffness,
@@ -47,8 +49,7 @@ from asperity.inference.runs.assembly import (
     usual_ranges,
 )
 from asperity.inference.runs.blocks import coarser, reduced
-from asperity.inference.runs.copies import require_own_samples
-from asperity.inference.runs.gain import GAIN, require_calibrated
+from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import Forward, LockInTerm

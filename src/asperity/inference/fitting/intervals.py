@@ -1,4 +1,4 @@
-"""Confidence intervals of a normal estimate whose parameter cannot pass a bound.
+"""Confidence intervals: by the parabola about a minimum, beside a bound, and by profile likelihood.
 
 Near a bound the interval of the likelihood ratio with the usual thresholds covers too often or too
 rarely. The thresholds of Feldman and Cousins (Phys. Rev. D 57, 3873, 1998) hold the coverage, and
@@ -8,9 +8,15 @@ turn from a two-sided interval to an upper limit by themselves.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import brentq
+from scipy.stats import chi2 as chi_squared
 from scipy.stats import norm
+
+from asperity.inference.objective import Objective, Residuals
 
 Interval = tuple[float, float]
 
@@ -98,3 +104,323 @@ def _above(estimate: float, sd: float, level: float, bound: float) -> Interval:
     high = float(brentq(inside, best, far)) if inside(best) > 0 else best
     low = 0.0 if inside(0.0) >= 0 else float(brentq(inside, 0.0, best))
     return bound + sd * low, bound + sd * high
+
+
+Float = NDArray[np.float64]
+
+#: A standard deviation of a coordinate, in factors of e, beyond which data say nothing.
+UNDETERMINED = 1.0
+#: A delay that is nearer to its bound, as a share of its range, is there.
+_AT_BOUND = 1e-3
+#: Standard deviations from a bound within which a gradient towards it is held by the bound.
+_NEAR_BOUND = 0.1
+#: Decrease of chi-squared that must not be left at a minimum: a third of a standard error.
+_STOPPED = 0.1
+
+
+@dataclass(frozen=True)
+class Parabola:
+    """Chi-squared about a minimum.
+
+    Attributes
+    ----------
+    u : array, shape (n,)
+        Coordinates of the minimum.
+    chi2 : float
+    data : tuple of Residuals
+        Of each term.
+    covariance : array, shape (n, n)
+        Of the coordinates, under noise that is known.
+    missing : bool array, shape (n,)
+        Coordinates that nothing bounds.
+    total : array, shape (n, n)
+        The covariance with what noise adds that is estimated from the same data.
+    freedom : array, shape (n,)
+        Degrees of freedom of its diagonal.
+    unbounded : array, shape (n,)
+        Minimum of the parabola without the bounds that hold coordinates of the minimum.
+    undetermined : tuple of str
+        Parameters of which the data say nothing.
+    stopped : bool
+        Whether chi-squared still falls where the law has no orbit.
+    fitted, priors : int
+        Numbers that were fitted, those of the noise included, and of priors.
+    """
+
+    u: Float
+    chi2: float
+    data: tuple[Residuals, ...]
+    covariance: Float
+    missing: NDArray[np.bool_]
+    total: Float
+    freedom: Float
+    unbounded: Float
+    undetermined: tuple[str, ...]
+    stopped: bool
+    fitted: int
+    priors: int
+
+    @property
+    def sd(self) -> Float:
+        """Standard deviations of the coordinates under known noise."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+    @property
+    def se(self) -> Float:
+        """Their standard errors, with what estimated noise adds."""
+        return np.asarray(np.sqrt(np.diag(self.total)))
+
+    @property
+    def readings(self) -> int:
+        """Number of data."""
+        return sum(d.values.size for d in self.data)
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom."""
+        return self.readings + self.priors - self.fitted
+
+    @property
+    def p_value(self) -> float:
+        """Probability of as large a chi-squared by chance; NaN without degrees of freedom."""
+        return float(chi_squared.sf(self.chi2, self.dof)) if self.dof > 0 else math.nan
+
+
+def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
+    """The parabola at a minimum; None where the law has no solution after all."""
+    r, J = objective.residuals(u)
+    data = objective.data_residuals(u)
+    if data is None:
+        return None
+    # A delay whose range the pieces of the drive leave no room in is as good as known.
+    J = np.where(_held(objective, u), 0.0, J)
+    covariance, missing = inverse_information(J.T @ J)
+    total, freedom = _with_estimated_noise(objective, u, covariance, missing)
+    of_data = np.sum([d.jacobian.T @ d.jacobian for d in data], axis=0)
+    # What is known of the instrument belongs to the data.
+    prior_slopes = objective.prior_residuals(u)[1]
+    with_prior = [v for v in objective.unknowns if v.prior is not None]
+    nuisance = [v.nuisance for v in with_prior]
+    informed = inverse_information(of_data + prior_slopes[nuisance].T @ prior_slopes[nuisance])[0]
+    undetermined = tuple(
+        unknown.name
+        for i, unknown in enumerate(objective.unknowns)
+        if not unknown.nuisance
+        and (missing[i] or math.sqrt(max(informed[i, i], 0.0)) > UNDETERMINED)
+    )
+    return Parabola(
+        u=u,
+        chi2=chi2,
+        data=tuple(data),
+        covariance=covariance,
+        missing=missing,
+        total=total,
+        freedom=freedom,
+        unbounded=u - covariance @ _pressure(objective, u, covariance, J.T @ r),
+        undetermined=undetermined,
+        stopped=objective.noise_is_known and objective.expected_decrease(u) > _STOPPED,
+        fitted=len(objective.unknowns) + sum(term.profiled for term in objective.terms),
+        priors=len(with_prior),
+    )
+
+
+def _held(objective: Objective, u: Float) -> NDArray[np.bool_]:
+    """Delays and offsets at a bound, which others do not follow beyond it.
+
+    A stiffness at its bound is none: the data bound it on the other side.
+    """
+    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
+    linear = np.array([k.nuisance and not k.logarithmic for k in objective.unknowns], bool)
+    room = np.where(np.isfinite(high - low), high - low, 1.0)
+    return np.asarray(linear & (np.minimum(u - low, high - u) < _AT_BOUND * room))
+
+
+def _pressure(objective: Objective, u: Float, covariance: Float, gradient: Float) -> Float:
+    """The gradient in coordinates that a bound holds, 0 in others.
+
+    There it is zero at a minimum. In a valley that is all but flat a minimisation leaves some,
+    which says nothing about where the minimum is.
+    """
+    low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
+    sd = np.sqrt(np.diag(covariance))
+    at_low = (gradient > 0) & (u - low < _NEAR_BOUND * sd)
+    at_high = (gradient < 0) & (high - u < _NEAR_BOUND * sd)
+    return np.where(at_low | at_high, gradient, 0.0)
+
+
+def _with_estimated_noise(
+    objective: Objective, u: Float, covariance: Float, missing: NDArray[np.bool_]
+) -> tuple[Float, Float]:
+    """The covariance with what estimated noise adds, and degrees of freedom of its diagonal."""
+    known = np.where(missing[:, None] | missing, 0.0, covariance)
+    values = objective.named(u)
+    slopes = np.array([float(k.slope(values[k.name])) for k in objective.unknowns])
+    total, variance = covariance.copy(), np.zeros(u.size)
+    for term in objective.terms:
+        added, spread = term.uncertainty_of_noise(values, slopes, known)
+        total += nowhere_negative(added, known)
+        variance += spread
+    freedom = 2 * np.diag(known) ** 2 / np.where(variance > 0, variance, 1.0)
+    return total, np.where(variance > 0, np.maximum(freedom, 1.0), np.inf)
+
+
+def nowhere_negative(added: Float, covariance: Float) -> Float:
+    """What is added to a covariance, without what is negative by rounding.
+
+    Where data hardly tell parameters apart, it is the difference of two numbers of many more digits
+    than there are.
+    """
+    sd = np.sqrt(np.where(np.diag(covariance) > 0, np.diag(covariance), 1.0))
+    values, vectors = np.linalg.eigh(added / np.outer(sd, sd))
+    return np.asarray((vectors * np.maximum(values, 0.0)) @ vectors.T * np.outer(sd, sd))
+
+
+def inverse_information(information: Float) -> tuple[Float, NDArray[np.bool_]]:
+    """Inverse of an information matrix, and which coordinates it leaves without bound."""
+    if not information.size:
+        return information, np.zeros(0, bool)
+    scale = np.sqrt(np.diag(information))
+    blind = ~(scale > 0)
+    scale = np.where(blind, 1.0, scale)
+    values, vectors = np.linalg.eigh(information / np.outer(scale, scale))
+    null = values < 1e-13 * max(values.max(), 1.0)
+    loose = (np.abs(vectors[:, null]) > 1e-3).any(1) | blind
+    inverse = (vectors / np.where(null, np.inf, values)) @ vectors.T
+    covariance = inverse / np.outer(scale, scale)
+    return covariance + np.diag(np.where(loose, 1e12, 0.0)), loose
+
+
+#: Steps outwards, each twice as long as the last, before a side counts as without end.
+_STEPS = 12
+#: Accuracy of an end, in standard deviations.
+_ACCURACY = 1e-2
+#: Relative change of the other coordinates that ends a minimisation: chi-squared is good to 1e-4.
+_TOLERANCE = 1e-5
+#: Standard deviations below the threshold at which a profile that ends has an edge, not an end.
+_JUMP = 0.1
+#: Rise of chi-squared that stands for values without a periodic orbit.
+_NO_ORBIT = 1e3
+
+
+class ProfileAtEdgeError(Exception):
+    """A profile runs along the edge of the region in which the data have a prediction."""
+
+
+class Profile:
+    """chi-squared along one coordinate, minimised over the others; each point is computed once.
+
+    Parameters
+    ----------
+    objective : Objective
+    i : int
+        Which coordinate.
+    u, chi2 : array, float
+        The minimum.
+    covariance : array, shape (n, n)
+        Of the coordinates, by the normal approximation.
+    search : bool
+        Whether orbits are searched for where the fast method ends; without, an interval that gets
+        there is open.
+    most : float
+        Evaluations without a solution, at most, where orbits are searched for.
+    """
+
+    def __init__(
+        self,
+        objective: Objective,
+        i: int,
+        u: Float,
+        chi2: float,
+        covariance: Float,
+        *,
+        search: bool,
+        most: float = math.inf,
+    ) -> None:
+        self.objective, self.i, self.u, self.chi2 = objective, i, u, chi2
+        self.search = search
+        self.most = objective.unsolved + most
+        # No farther at once than a factor of e, where the approximation may be worth nothing.
+        self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
+        self.along = covariance[:, i] / covariance[i, i]
+        self.path = {float(u[i]): (u, chi2)}
+
+    @property
+    def lowest(self) -> tuple[Float, float]:
+        """Lowest point on the way; below the minimum where that was not the lowest one."""
+        return min(self.path.values(), key=lambda point: point[1])
+
+    def interval(self, level: float, wider: float = 1.0) -> Interval:
+        """Ends of the confidence interval of a coverage.
+
+        An end is infinite, or the bound, where the profile stays below the threshold.
+
+        Parameters
+        ----------
+        level : float
+            Coverage.
+        wider : float
+            Factor of the interval, for uncertainties that are estimated themselves.
+
+        Raises
+        ------
+        ProfileAtEdgeError
+            If more evaluations than `most` had no solution.
+        """
+        low, high = self.objective.unknowns[self.i].bounds
+        return self._end(level, wider, -1, low), self._end(level, wider, 1, high)
+
+    def _end(self, level: float, wider: float, sign: int, bound: float) -> float:
+        """Where the profile passes the threshold on one side."""
+
+        def excess(x: float) -> float:
+            return self._excess(x, level, wider)
+
+        inner = float(self.u[self.i])
+        width = 1.05 * wider * self.sd * math.sqrt(bounded_threshold(math.inf, level))
+        for _ in range(_STEPS):
+            outer = inner + sign * width
+            if sign * (outer - bound) >= 0:
+                outer = bound - sign * 1e-9 * self.sd
+                if excess(outer) <= 0:
+                    return bound
+            if excess(outer) > 0:
+                end = float(brentq(excess, inner, outer, xtol=_ACCURACY * self.sd))
+                within = [x for x in self.path if sign * (end - x) >= 0]
+                last = max(within, key=lambda x: sign * x)
+                if excess(last) < -_JUMP and not self.objective.searches:
+                    # The fast method has no orbit beyond, which says nothing about the data.
+                    if not self.search:
+                        return sign * math.inf
+                    self.objective.use_search(True)
+                    return self._end(level, wider, sign, bound)
+                return end
+            inner, width = outer, 2 * width
+        return sign * math.inf
+
+    def _excess(self, x: float, level: float, wider: float) -> float:
+        """Root of the rise of chi-squared less that of its threshold: nearly linear in x."""
+        if x not in self.path:
+            nearest = min(self.path, key=lambda known: abs(known - x))
+            for begin in (self._start(x), self.path[nearest][0]):
+                if self.objective.searches and self.objective.unsolved > self.most:
+                    raise ProfileAtEdgeError
+                found, value = self.objective.minimise(begin, {self.i: x}, tolerance=_TOLERANCE)
+                if math.isfinite(value):
+                    break
+            else:
+                return math.sqrt(_NO_ORBIT)
+            self.path[x] = found, value
+        low, high = self.objective.unknowns[self.i].bounds
+        distance = min(x - low, high - x) / (wider * self.sd)
+        limit = wider**2 * bounded_threshold(distance, level)
+        rise = max(self.path[x][1] - self.chi2, 0.0)
+        return math.sqrt(rise) - math.sqrt(limit)
+
+    def _start(self, x: float) -> Float:
+        """The others on the line through the nearest points known, or by the approximation."""
+        first, *others = sorted(self.path, key=lambda known: abs(known - x))
+        begin = self.path[first][0]
+        second = next((other for other in others if abs(other - first) > _ACCURACY * self.sd), None)
+        if second is None:
+            return begin + self.along * (x - first)
+        return begin + (begin - self.path[second][0]) * ((x - first) / (first - second))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -12,15 +12,15 @@ from numpy.typing import NDArray
 from scipy.stats import chi2 as chi_squared
 from scipy.stats.qmc import Sobol
 
-from asperity.inference.objective import Objective
-from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm
+from asperity.inference.objective import Minimum, Objective
 from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import counted
 
 Float = NDArray[np.float64]
 
+#: What minima are ordered by.
+_CHI2 = attrgetter("chi2")
 #: The best of the drawn starts that are followed to their minimum.
 _FOLLOWED = 3
 #: Minima nearer than this in every coordinate are one.
@@ -77,7 +77,7 @@ def minima_of(
     *,
     drawn: int = 64,
     simpler: Sequence[Mapping[str, float]] = (),
-) -> list[tuple[Float, float]]:
+) -> list[Minimum]:
     """Minima from the given start and from the best of many drawn ones, best first.
 
     Parameters
@@ -98,23 +98,12 @@ def minima_of(
     advance = counted(progress, len(begun.followed))
     advance(0)
     if begun.few is not None:
-        found = _by_way_of_few_rows(objective, begun, begun.few, advance)
+        found = _followed_on_few_rows(objective, begun, begun.few, advance)
     else:
-        found = _by_the_straight_way(objective, begun, advance)
-    found.sort(key=lambda pair: pair[1])
-    if found and not begun.searched and _blocked(objective, *found[0]):
-        best = found[0][1]
-        objective.search_from_now_on()
-        stopped = distinct(found)
-        beyond = [_onwards(objective, end) for end in stopped[:_SEARCHED]]
-        if min(value for _, value in beyond) > best - _GAIN:
-            _search_no_more(objective)
-        else:
-            # The others are minima, or only where the fast method ends.
-            rest = [pair for pair in stopped[_SEARCHED:] if not _blocked(objective, *pair)]
-            found = [*beyond, *rest]
-    found = _with_those_beside(objective, sorted(found, key=lambda pair: pair[1]))
-    return _with_other_lengths(objective, found)
+        found = _followed(objective, begun, advance)
+    if not begun.searched:
+        found = _beyond_the_fast_method(objective, found)
+    return _with_other_lengths(objective, _with_those_beside(objective, found))
 
 
 class _Beginnings(NamedTuple):
@@ -150,14 +139,14 @@ def _beginnings(
     high = np.array([u.to_coordinate(u.start[1]) for u in unknowns])
     shares = Sobol(len(unknowns), seed=seed).random(drawn)
     candidates = [middle, *(low + (high - low) * shares)]
-    chi2 = _chi2_of_starts(objective, candidates)
+    chi2 = objective.chi2_of_many(np.array(candidates))
     at = np.flatnonzero(np.isfinite(chi2))
-    searched = at.size < (_RARE * chi2.size if _has_table(objective) else 1)
+    searched = at.size < (_RARE * chi2.size if objective.has_table else 1)
     few: Objective | None = None
     if searched:
-        objective.search_from_now_on()
+        objective.use_search(True)
         few = _few_rows(objective)
-        if few is None and _is_table(objective):
+        if few is None and objective.has_table and len(objective.terms) == 1:
             few = objective
         candidates = [
             candidates[i] for i in dict.fromkeys([*range(min(_WITH_SEARCH, chi2.size)), *at])
@@ -178,124 +167,151 @@ def _beginnings(
     return _Beginnings(starts, special, followed, searched, few)
 
 
-def _by_the_straight_way(
+def _followed(
     objective: Objective, begun: _Beginnings, advance: Callable[[int], None]
-) -> list[tuple[Float, float]]:
-    """Minima that lie at the ends of the ways from the starts."""
+) -> list[Minimum]:
+    """Minima at the ends of the ways from the starts, best first."""
     found = []
     for start in begun.followed:
         found.append(objective.minimise(start))
         advance(1)
     for start in begun.starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF] if begun.searched else ():
-        if found and not _far_off(objective, min(found, key=lambda pair: pair[1])):
+        if found and not _far_off(objective, min(found, key=_CHI2)):
             break
         found.append(objective.minimise(start))
-    return found
+    return sorted(found, key=_CHI2)
 
 
-def _by_way_of_few_rows(
+def _followed_on_few_rows(
     objective: Objective, begun: _Beginnings, few: Objective, advance: Callable[[int], None]
-) -> list[tuple[Float, float]]:
-    """Minima that are looked for on few rows, and from there on all."""
-    ends = _ends_on_few_rows(few, begun.followed, begun.starts, advance)
-    found = _of_all_rows(objective, ends)
+) -> list[Minimum]:
+    """Minima that are looked for on few rows, and from there on all, best first."""
+    found = _of_all_rows(objective, _ends_on_few_rows(few, begun.followed, begun.starts, advance))
     for u in begun.special:
-        lowest = min((value for _, value in found), default=math.inf)
-        if objective.chi2(u) < lowest:
+        if objective.chi2(u) < min((end.chi2 for end in found), default=math.inf):
             found.append(objective.minimise(u))
     if not found:
         # Another row may have no orbit at any of the ends.
         starts = [u for u in begun.starts if math.isfinite(objective.chi2(u))]
         found = [objective.minimise(u) for u in starts[: _FOLLOWED + 1]]
-    return found
+    return sorted(found, key=_CHI2)
 
 
-def _with_those_beside(
-    objective: Objective, found: list[tuple[Float, float]]
-) -> list[tuple[Float, float]]:
+def _some_way(objective: Objective, u: Float, kept: Mapping[int, float] | None = None) -> Minimum:
+    """Where a minimisation from u is after few evaluations, to be compared with others."""
+    return objective.minimise(u, kept, tolerance=_NEARBY, evaluations=_SOME_WAY)
+
+
+def _near_minimum(objective: Objective, u: Float) -> Minimum:
+    """Near the minimum that is reached from u, if the law describes the data there."""
+    return objective.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY)
+
+
+def _beyond_the_fast_method(objective: Objective, found: list[Minimum]) -> list[Minimum]:
+    """Minima that the fast method has kept from their end, followed on with the slower one."""
+    if not found or not _blocked(objective, found[0]):
+        return found
+    objective.use_search(True)
+    stopped = distinct(found)
+    beyond = [_onwards(objective, end) for end in stopped[:_SEARCHED]]
+    if min(end.chi2 for end in beyond) > found[0].chi2 - _GAIN:
+        objective.use_search(False)
+        return found
+    # The others are minima, or only where the fast method ends.
+    others = [end for end in stopped[_SEARCHED:] if not _blocked(objective, end)]
+    return sorted([*beyond, *others], key=_CHI2)
+
+
+def _onwards(objective: Objective, end: Minimum) -> Minimum:
+    """From where the fast method ended, by way of few rows where the law is far off."""
+    if not _far_off(objective, end):
+        return objective.minimise(end.u)
+    few = _few_rows(objective)
+    if few is not None:
+        u = _near_minimum(few, end.u).u
+        end = min(end, Minimum(u, objective.chi2(u)), key=_CHI2)
+    while _far_off(objective, end):
+        before, end = end, _some_way(objective, end.u)
+        if end.chi2 > _WORTHWHILE * before.chi2:
+            return end
+    return objective.minimise(end.u)
+
+
+def _with_those_beside(objective: Objective, found: list[Minimum]) -> list[Minimum]:
     """Minima with those that lie beside the best one where that is doubtful, of tables.
 
     Under slow modulation, where slip events may come early or late in the period, parameters that
     are wrong by a factor describe most of the data: minima hide each other from drawn starts.
     """
-    if not _has_table(objective):
+    if not objective.has_table:
         return found
     for _ in range(_ROUNDS_BESIDE):
         if not found or _p_value(objective, found[0]) > DOUBTFUL:
             break
-        best, lowest = found[0]
+        best = found[0]
         beside = []
         for i, unknown in enumerate(objective.unknowns):
             low, high = (float(unknown.to_coordinate(v)) for v in unknown.start)
             step = _BESIDE if unknown.logarithmic else _SHARE_BESIDE * (high - low)
             for change in (-step, step):
-                u = best.copy()
+                u = best.u.copy()
                 u[i] = float(np.clip(u[i] + change, *unknown.bounds))
                 beside.append(u)
-        enough = lowest - _GAIN
-        if _far_off(objective, found[0]):
+        enough = best.chi2 - _GAIN
+        if _far_off(objective, best):
             # Most likely the law is wrong, and no minimum will do.
             chi2 = _chi2_of_many(objective, beside)
             beside = [beside[i] for i in np.argsort(chi2)[:_FOLLOWED] if math.isfinite(chi2[i])]
-            enough = _WORTHWHILE * lowest
-        ends = [objective.minimise(u, tolerance=_NEARBY, evaluations=_SOME_WAY) for u in beside]
-        u, value = min(ends, key=lambda end: end[1], default=(best, lowest))
-        if value > enough:
+            enough = _WORTHWHILE * best.chi2
+        end = min((_some_way(objective, u) for u in beside), key=_CHI2, default=best)
+        if end.chi2 > enough:
             break
-        found = [objective.minimise(u), *found]
+        found = [objective.minimise(end.u), *found]
     return found
 
 
-def _with_other_lengths(
-    objective: Objective, found: list[tuple[Float, float]]
-) -> list[tuple[Float, float]]:
+def _with_other_lengths(objective: Objective, found: list[Minimum]) -> list[Minimum]:
     """Minima with those at other memory lengths, of tables that the law does not contradict.
 
     Where sliding over D0 takes far longer than a period, or far less, the evolution of friction
     leaves little but a phase in the readings: values of D0 that differ by a factor of ten, with
     other A and B, may describe them equally well. Intervals that do not know of it are too short.
     """
-    if not _has_table(objective) or not found or _far_off(objective, found[0]):
+    if not objective.has_table or not found or _far_off(objective, found[0]):
         return found
-    best = found[0][0]
+    best = found[0].u
     # Where orbits are searched for, few rows show where minima are.
     rough = (_few_rows(objective) if objective.searches else None) or objective
-    lowest = rough.chi2(best)
-    ends = []
+    highest = rough.chi2(best) + _WORTH
+    others = []
     for i, unknown in enumerate(objective.unknowns):
         if not unknown.logarithmic or unknown.nuisance or unknown.parameter.kind != "length":
             continue
-        shorter: list[tuple[Float, float]] = []
-        longer: list[tuple[Float, float]] = []
+        ends = []
         for factor in _OTHER_LENGTHS:
             x = float(np.clip(best[i] + math.log(factor), *unknown.bounds))
-            u, value = rough.minimise(best, {i: x}, tolerance=_NEARBY, evaluations=_SOME_WAY)
-            if math.isfinite(value):
-                end = rough.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY)
-                apart = end[0][i] - best[i]
-                if end[1] < lowest + _WORTH and abs(apart) > math.log(_SAME_LENGTH):
-                    (shorter if apart < 0 else longer).append(end)
+            held = _some_way(rough, best, {i: x})
+            if math.isfinite(held.chi2):
+                ends.append(_near_minimum(rough, held.u))
         # Their valleys may be flat and long: the end of the best on each side will do.
-        for side in (shorter, longer):
-            if side:
-                u, _ = min(side, key=lambda end: end[1])
-                ends.append(objective.minimise(u, evaluations=_LONG_WAY))
-    return sorted([*found, *ends], key=lambda pair: pair[1])
+        for side in (-1, 1):
+            apart = [
+                end
+                for end in ends
+                if end.chi2 < highest and side * (end.u[i] - best[i]) > math.log(_SAME_LENGTH)
+            ]
+            if apart:
+                u = min(apart, key=_CHI2).u
+                others.append(objective.minimise(u, evaluations=_LONG_WAY))
+    return sorted([*found, *others], key=_CHI2)
 
 
-def _p_value(objective: Objective, minimum: tuple[Float, float]) -> float:
+def _p_value(objective: Objective, minimum: Minimum) -> float:
     """Probability that chi-squared is as large or larger by chance."""
-    u, value = minimum
-    if not math.isfinite(value):
+    if not math.isfinite(minimum.chi2):
         return 0.0
-    r, _ = objective.residuals(u)
-    return float(chi_squared.sf(value, max(r.size - u.size, 1)))
-
-
-def _is_table(objective: Objective) -> bool:
-    """Whether the data are one table."""
-    (term, *others) = objective.terms
-    return not others and isinstance(term, LockInTerm) and hasattr(term, "table")
+    r, _ = objective.residuals(minimum.u)
+    return float(chi_squared.sf(minimum.chi2, max(r.size - minimum.u.size, 1)))
 
 
 def _few_rows(objective: Objective) -> Objective | None:
@@ -303,51 +319,23 @@ def _few_rows(objective: Objective) -> Objective | None:
 
     What a law predicts at them places the minimum well enough to begin there with all rows.
     """
-    if not _is_table(objective):
-        return None
-    term = objective.terms[0]
-    assert isinstance(term, LockInTerm)
-    table = term.table
-    reported = np.sum([np.isfinite(v) for v in table.values.values()], axis=0)
-    # Points that lie close together repeat each other.
-    order = np.lexsort([table.points[name] for name in ("epsilon", "frequency", "V")])
-    rows = max(
-        _FEW_ROWS, math.ceil(_DATA_EACH * len(objective.unknowns) / max(reported.mean(), 1e-9))
-    )
-    if table.rows < 4 * rows:
-        return None
-    kept = order[np.linspace(0, table.rows - 1, rows).round().astype(int)]
-    return replace(objective, terms=(term.with_rows(np.isin(np.arange(table.rows), kept)),))
+    return objective.thinned(_FEW_ROWS, _DATA_EACH * len(objective.unknowns))
 
 
-def _chi2_of_starts(objective: Objective, starts: list[Float]) -> Float:
-    """chi-squared of starts, infinite where the law has no solution."""
-    runs = [term for term in objective.terms if isinstance(term, RunTerm)]
-    if len(runs) < len(objective.terms):
-        return np.array([objective.chi2(u) for u in starts])
-    priors = [float(np.sum(objective.prior_residuals(u)[0] ** 2)) for u in starts]
-    named = [objective.named(u) for u in starts]
-    return np.array([sum(r.chi2(v) for r in runs) for v in named]) + priors
-
-
-def _chi2_of_many(objective: Objective, candidates: list[Float]) -> Float:
-    """chi-squared of many starts, infinite where the law has no solution."""
-    if not _is_table(objective):
-        return np.array([objective.chi2(u) for u in candidates])
-    term = objective.terms[0]
-    assert isinstance(term, LockInTerm)
+def _chi2_of_many(objective: Objective, candidates: Sequence[Float]) -> Float:
+    """chi-squared of many starts, of a table on few rows first; infinite without a solution."""
     u = np.array(candidates)
-    first = np.zeros(term.table.rows, bool)
-    first[:: max(1, term.table.rows // _ROWS_FIRST)] = True
-    found = np.full(len(u), math.inf)
+    few = objective.thinned(_ROWS_FIRST)
+    if few is None:
+        return objective.chi2_of_many(u, least=_LEAST)
     # Most starts far from the data have no orbit at some row, which takes longest to find out.
-    few = term.with_rows(first).chi2_of_many(objective.unknowns, u, least=_LEAST)
-    # The first is the given start, which is tried whatever four rows say of it.
-    left = np.array(list(dict.fromkeys([0, *np.argsort(few)[:_TRIED]])))
-    left = left[np.isfinite(few[left])]
+    first = few.chi2_of_many(u, least=_LEAST)
+    # The first is the given start, which is tried whatever few rows say of it.
+    left = np.array(list(dict.fromkeys([0, *np.argsort(first)[:_TRIED]])))
+    left = left[np.isfinite(first[left])]
+    found = np.full(len(u), math.inf)
     if left.size:
-        priors = [float(np.sum(objective.prior_residuals(u[i])[0] ** 2)) for i in left]
-        found[left] = term.chi2_of_many(objective.unknowns, u[left], least=_LEAST) + priors
+        found[left] = objective.chi2_of_many(u[left], least=_LEAST)
     return found
 
 
@@ -356,7 +344,7 @@ def _ends_on_few_rows(
     followed: list[Float],
     starts: list[Float],
     advance: Callable[[int], None],
-) -> list[tuple[Float, float]]:
+) -> list[Minimum]:
     """Minima on few rows, which are where the whole table is begun with.
 
     Each start is followed some way; those that are hopeless beside a minimum that describes the
@@ -364,107 +352,73 @@ def _ends_on_few_rows(
     """
     ways = []
     for start in followed:
-        ways.append(few.minimise(start, tolerance=_NEARBY, evaluations=_SOME_WAY))
+        ways.append(_some_way(few, start))
         advance(1)
     for start in starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF]:
         if not all(_far_off(few, way) for way in ways):
             break
-        ways.append(few.minimise(start, tolerance=_NEARBY, evaluations=_SOME_WAY))
-    ends: list[tuple[Float, float]] = []
-    for u, value in sorted(ways, key=lambda way: way[1])[: _FOLLOWED + 1]:
-        best = min(ends, key=lambda end: end[1], default=None)
-        hopeless = best is not None and value > _HOPELESS * (best[1] + _FEW_ROWS)
-        if math.isfinite(value) and not (hopeless and best and not _far_off(few, best)):
-            ends.append(few.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY))
+        ways.append(_some_way(few, start))
+    ends: list[Minimum] = []
+    for way in sorted(ways, key=_CHI2)[: _FOLLOWED + 1]:
+        best = min(ends, key=_CHI2, default=None)
+        described = best is not None and not _far_off(few, best)
+        hopeless = best is not None and way.chi2 > _HOPELESS * (best.chi2 + _FEW_ROWS)
+        if math.isfinite(way.chi2) and not (hopeless and described):
+            ends.append(_near_minimum(few, way.u))
     return ends
 
 
-def _of_all_rows(
-    objective: Objective, ends: list[tuple[Float, float]]
-) -> list[tuple[Float, float]]:
+def _of_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
     """Minima on all rows from the ends on few: the best, and those that may be as good."""
-    ends = [end for end in sorted(ends, key=lambda end: end[1]) if math.isfinite(end[1])]
+    ends = distinct(sorted((end for end in ends if math.isfinite(end.chi2)), key=_CHI2), _SAME_FEW)
     if not ends:
         return []
-    largest = _AS_GOOD_FEW * (ends[0][1] + len(objective.unknowns) + _FEW_ROWS)
-    worth = [end for end in distinct(ends, _SAME_FEW) if end[1] <= largest][:_FOLLOWED]
-    found: list[tuple[Float, float]] = []
-    for u, _ in worth:
-        if math.isfinite(objective.chi2(u)):
-            found.append(objective.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY))
-    found.sort(key=lambda pair: pair[1])
-    if not found or _far_off(objective, found[0]):
-        return found
+    largest = _AS_GOOD_FEW * (ends[0].chi2 + len(objective.unknowns) + _FEW_ROWS)
+    good = [end.u for end in ends if end.chi2 <= largest][:_FOLLOWED]
+    near = [_near_minimum(objective, u) for u in good if math.isfinite(objective.chi2(u))]
+    near.sort(key=_CHI2)
+    if not near or _far_off(objective, near[0]):
+        return near
     return [
-        objective.minimise(u) if value < found[0][1] + _WORTH else (u, value)
-        for u, value in distinct(found, _SAME_FEW)
+        objective.minimise(end.u) if end.chi2 < near[0].chi2 + _WORTH else end
+        for end in distinct(near, _SAME_FEW)
     ]
 
 
-def _onwards(objective: Objective, end: tuple[Float, float]) -> tuple[Float, float]:
-    """From where the fast method ended, by way of few rows where the law is far off."""
-    if not _far_off(objective, end):
-        return objective.minimise(end[0])
-    u, value = end
-    few = _few_rows(objective)
-    if few is not None:
-        nearer = few.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY)[0]
-        if objective.chi2(nearer) < value:
-            u, value = nearer, objective.chi2(nearer)
-    while _far_off(objective, (u, value)):
-        before = value
-        u, value = objective.minimise(u, tolerance=_NEARBY, evaluations=_SOME_WAY)
-        if value > _WORTHWHILE * before:
-            return u, value
-    return objective.minimise(u)
-
-
-def _as_it_stands(objective: Objective) -> list[tuple[Float, float]]:
+def _as_it_stands(objective: Objective) -> list[Minimum]:
     """The one point of an objective without free parameters, if the law has a solution there."""
     nowhere = np.zeros(0)
     chi2 = objective.chi2(nowhere)
     if not math.isfinite(chi2):
-        objective.search_from_now_on()
+        objective.use_search(True)
         chi2 = objective.chi2(nowhere)
-    return [(nowhere, chi2)] if math.isfinite(chi2) else []
+    return [Minimum(nowhere, chi2)] if math.isfinite(chi2) else []
 
 
-def distinct(minima: list[tuple[Float, float]], same: float = _SAME) -> list[tuple[Float, float]]:
+def distinct(minima: list[Minimum], same: float = _SAME) -> list[Minimum]:
     """Minima without those that repeat an earlier one."""
-    kept: list[tuple[Float, float]] = []
-    for u, value in minima:
-        if all(np.abs(u - other).max() > same for other, _ in kept):
-            kept.append((u, value))
+    kept: list[Minimum] = []
+    for minimum in minima:
+        if all(np.abs(minimum.u - other.u).max() > same for other in kept):
+            kept.append(minimum)
     return kept
 
 
-def _blocked(objective: Objective, u: Float, value: float) -> bool:
+def _blocked(objective: Objective, end: Minimum) -> bool:
     """Whether chi-squared still falls where a minimisation has stopped.
 
     It does where the fast method has no solution farther on. Without this question the fit would
     report a wrong minimum, with a law that describes the data as its victim.
     """
-    if not _has_table(objective) or not math.isfinite(value):
+    if not objective.has_table or not math.isfinite(end.chi2):
         return False
-    decrease = objective.expected_decrease(u)
-    return decrease > (_LARGE_GAIN * value if _far_off(objective, (u, value)) else _GAIN)
+    least = _LARGE_GAIN * end.chi2 if _far_off(objective, end) else _GAIN
+    return objective.expected_decrease(end.u) > least
 
 
-def _far_off(objective: Objective, minimum: tuple[Float, float]) -> bool:
+def _far_off(objective: Objective, minimum: Minimum) -> bool:
     """Whether the law does not describe the data there."""
     return _p_value(objective, minimum) < FAR_OFF
-
-
-def _has_table(objective: Objective) -> bool:
-    return any(isinstance(term, LockInTerm) for term in objective.terms)
-
-
-def _search_no_more(objective: Objective) -> None:
-    """The fast method again, where the slower one has found nothing better."""
-    for term in objective.terms:
-        if isinstance(term, LockInTerm):
-            term.forward.uses_search = False
-    objective.forget()
 
 
 def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float]]) -> list[Float]:

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference.fitting.minima import distinct
-from asperity.inference.objective import Objective
+from asperity.inference.objective import Minimum, Objective
 from asperity.inference.runs.term import NoiseState, RunTerm
 from asperity.inference.runs.wrong_samples import largest_by_chance
 
 Float = NDArray[np.float64]
 #: Minima, best first, and whether noise and parameters agree at the best.
-Found = tuple[list[tuple[Float, float]], bool]
+Found = tuple[list[Minimum], bool]
 
 #: Rounds of estimating noise and parameters, and the change in standard deviations that ends them.
 _ROUNDS, _STILL = 8, 0.03
@@ -30,18 +30,17 @@ _ALLOWED = 5.0
 
 def under_drift(objective: Objective) -> Objective:
     """The objective with recordings whose noise is taken for a slow drift."""
-    terms = tuple(copy(term) if isinstance(term, RunTerm) else term for term in objective.terms)
-    for term in terms:
-        if isinstance(term, RunTerm):
-            term.expect_slow_noise()
-    return replace(objective, terms=terms)
+    drifting = replace(objective, terms=tuple(copy(term) for term in objective.terms))
+    for term in drifting.terms_of(RunTerm):
+        term.expect_slow_noise()
+    return drifting
 
 
 def with_noise(
     objective: Objective,
-    minima: list[tuple[Float, float]],
+    minima: list[Minimum],
     drifting: Objective | None = None,
-    besides: Sequence[tuple[Float, float]] = (),
+    besides: Sequence[Minimum] = (),
 ) -> Found:
     """Minima once the noise is that of the residual, and whether the two agree at the best.
 
@@ -57,7 +56,7 @@ def with_noise(
         higher as twice the logarithm of their likelihood is lower.
     bool
     """
-    noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
+    noisy = objective.terms_of(RunTerm)
     first = [term.noise_state() for term in noisy]
     ends = []
     for u in _apart(objective, minima):
@@ -92,10 +91,10 @@ def with_noise(
         term.restore_noise(state)
     objective.forget()
     chi2 = objective.chi2(best.u)
-    found = [(best.u, chi2)]
+    found = [Minimum(best.u, chi2)]
     for end in sorted(ends, key=lambda end: end.deviance):
         if end is not best and math.isfinite(end.deviance):
-            found.append((end.u, chi2 + end.deviance - best.deviance))
+            found.append(Minimum(end.u, chi2 + end.deviance - best.deviance))
     return found, best.agreed
 
 
@@ -106,7 +105,7 @@ def without_bad_samples(objective: Objective, search: Callable[[], Found]) -> Fo
     not left out as those elsewhere are. The stiffness says which are wrong, and must itself be
     fitted without them.
     """
-    noisy = [term for term in objective.terms if isinstance(term, RunTerm)]
+    noisy = objective.terms_of(RunTerm)
     alone = [term.alone_at_changes() for term in noisy]
     if not any(alone):
         return search()
@@ -129,7 +128,7 @@ def without_bad_samples(objective: Objective, search: Callable[[], Found]) -> Fo
     return left_out(wrong)
 
 
-def _apart(objective: Objective, minima: list[tuple[Float, float]]) -> list[Float]:
+def _apart(objective: Objective, minima: list[Minimum]) -> list[Float]:
     """Minima without those that the data hardly tell from an earlier one: both lead to one end."""
     kept: list[Float] = []
     for u, _ in minima:

@@ -12,8 +12,7 @@ from scipy.stats import norm
 
 from asperity.errors import InputError
 from asperity.inference.fitting.fit import fit
-from asperity.inference.fitting.intervals import LEVELS, Interval
-from asperity.inference.fitting.parabola import UNDETERMINED
+from asperity.inference.fitting.intervals import LEVELS, UNDETERMINED, Interval
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.laws import Law

@@ -1,37 +1,219 @@
 """The posterior density of a fit, as a compiled program needs it.
 
 The sampler walks in z, where the posterior is near a normal density of unit covariance about zero:
-q = mode + root @ z, with the unbounded coordinates q of `asperity.inference.posterior.coordinates`
-and a root of the covariance that the curvature at the mode stands for (Laplace).
+q = mode + root @ z, with unbounded coordinates q and a root of the covariance that the curvature at
+the mode stands for (Laplace).
+
+The coordinate u of a fit has bounds. With two of them, u = low + (high - low) / (1 + exp(-q));
+with one, u = low + exp(q) or u = high - exp(-q); without, u = q. Densities are multiplied by du/dq.
+
+The prior is a proper density of u. A parameter with a prior has that normal density, cut off where
+its rule says. Without, its coordinate is uniform over a range: a tenth of the lowest to ten times
+the highest usual value of a positive parameter, whose coordinate is the logarithm; zero to three
+times the highest usual value of others. The range is widened where the data want a value beyond it.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import norm
 
-from asperity.inference.objective import DataTerm, Objective
-from asperity.inference.posterior.coordinates import Coordinates
-from asperity.inference.posterior.prior_density import PriorDensity
-from asperity.inference.posterior.recordings import RunLikelihood, likelihood_of_run
-from asperity.inference.posterior.tables import LockInLikelihood, likelihood_of_table
-from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm
+from asperity.inference.objective import Likelihood, Objective
+from asperity.inference.unknowns import Unknown
 
 Float = NDArray[np.float64]
 
-#: Steps to the mode, and the decrease of the log density at which it counts as reached.
-_STEPS, _REACHED = 60, 1e-4
-#: Damping of the first step, and the promised gain below which a step that gains nothing ends the
-#: way: that is round-off, or the accuracy of orbits.
-_FIRST_DAMPING, _NOISE = 1e-3, 1e-3
+#: Kinds of coordinates.
+_FREE, _ABOVE, _BELOW, _BETWEEN = 0, 1, 2, 3
+#: The mode is reached where the gradient of the log density is smaller, by standard deviations: a
+#: step gains half its square, near what the accuracy of orbits and motions leaves. Steps at most.
+_REACHED, _STEPS = 0.05, 20
 #: Standard deviations of q are looked for between these.
 _NARROWEST, _WIDEST = 1e-9, 3.0
+
+
+class Coordinates(NamedTuple):
+    """Bounds of the coordinates u and what they are turned into.
+
+    Attributes
+    ----------
+    low, high : array, shape (n,)
+        Bounds of u; 0 where there is none.
+    kind : int array, shape (n,)
+    """
+
+    low: Any
+    high: Any
+    kind: Any
+
+    @classmethod
+    def of(cls, bounds: Sequence[tuple[float, float]]) -> Coordinates:
+        """Coordinates with bounds (low, high), infinite where there is none."""
+        low, high = np.array(bounds, float).reshape(-1, 2).T
+        kind = np.isfinite(low) * _ABOVE + np.isfinite(high) * _BELOW
+        low, high = (np.where(np.isfinite(end), end, 0.0) for end in (low, high))
+        return cls(low, high, kind)
+
+    @property
+    def bounded_twice(self) -> NDArray[np.bool_]:
+        """Which coordinates have bounds on both sides."""
+        return np.asarray(self.kind == _BETWEEN)
+
+    def to_q(self, u: Float) -> Float:
+        """Unbounded coordinates of u; u must lie between the bounds."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            above, below = np.log(u - self.low), -np.log(self.high - u)
+        return np.choose(self.kind, [u, above, below, above + below])
+
+    def to_u(self, q: Any) -> Any:
+        """Coordinates of the fit, for q of shape (..., n)."""
+        share = 1 / (1 + jnp.exp(-q))
+        return jnp.select(
+            [self.kind == _ABOVE, self.kind == _BELOW, self.kind == _BETWEEN],
+            [
+                self.low + _exp(q),
+                self.high - _exp(-q),
+                self.low + (self.high - self.low) * share,
+            ],
+            q,
+        )
+
+    def log_slope(self, q: Any) -> Array:
+        """ln(du/dq) of each coordinate."""
+        between = jnp.log(jnp.maximum(self.high - self.low, 1e-300))
+        between = between - jnp.logaddexp(0.0, q) - jnp.logaddexp(0.0, -q)
+        return jnp.select(
+            [self.kind == _ABOVE, self.kind == _BELOW, self.kind == _BETWEEN],
+            [q, -q, between],
+            jnp.zeros_like(q),
+        )
+
+    def inside(self, u: Float, sd: Float) -> Float:
+        """The nearest coordinates that are off the bounds by a tenth of a standard deviation."""
+        step = 0.1 * np.minimum(sd, np.where(self.kind == _BETWEEN, self.high - self.low, np.inf))
+        low = np.where(np.isin(self.kind, (_ABOVE, _BETWEEN)), self.low + step, -np.inf)
+        high = np.where(np.isin(self.kind, (_BELOW, _BETWEEN)), self.high - step, np.inf)
+        return np.clip(u, low, high)
+
+
+def _exp(q: Any) -> Array:
+    """Exponential without overflow, for coordinates of which another kind is chosen."""
+    return jnp.exp(jnp.clip(q, -700.0, 700.0))
+
+
+class PriorArrays(NamedTuple):
+    """Numbers of a prior.
+
+    Attributes
+    ----------
+    logarithmic : bool array, shape (n,)
+        Where the coordinate u is the logarithm of the parameter.
+    scale : array, shape (n,)
+        Of the others.
+    mean, precision : array, shape (n,)
+        Of normal priors, in SI; 0 where there is none.
+    """
+
+    logarithmic: Any
+    scale: Any
+    mean: Any
+    precision: Any
+
+    def values(self, u: Any) -> Array:
+        """Parameters in SI at coordinates of shape (..., n)."""
+        return jnp.where(self.logarithmic, jnp.exp(u), u * self.scale)
+
+    def log_density(self, u: Any) -> Array:
+        """Logarithm of the density of u but for a constant, shape (..., n) to (...)."""
+        normal = -0.5 * ((self.values(u) - self.mean) * self.precision) ** 2
+        volume = jnp.where((self.precision > 0) & self.logarithmic, u, 0.0)
+        return jnp.sum(normal + volume, axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class PriorDensity:
+    """Normalised prior density of the coordinates.
+
+    Attributes
+    ----------
+    unknowns : tuple of Unknown
+    low, high : array, shape (n,)
+        Range of the coordinates.
+    mean, precision : array, shape (n,)
+        Of the normal priors, in SI; 0 where there is none.
+    log_norm : float
+        Logarithm of the normalising factor.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    low: Float
+    high: Float
+    mean: Float
+    precision: Float
+    log_norm: float
+
+    @classmethod
+    def about(cls, unknowns: Sequence[Unknown], u: Float, sd: Float) -> PriorDensity:
+        """The prior, with ranges that reach an estimate u with standard deviations sd."""
+        low, high = np.array(
+            [k.range_about(x, s) for k, x, s in zip(unknowns, u, sd, strict=True)]
+        ).T
+        mean = np.array([k.prior.mean if k.prior else 0.0 for k in unknowns])
+        sds = np.array([k.prior.sd if k.prior else math.inf for k in unknowns])
+        log_norm = 0.0
+        for k, a, b in zip(unknowns, low, high, strict=True):
+            if k.prior is None:
+                log_norm -= math.log(b - a)
+            else:
+                z = (np.array(k.to_value(np.array([a, b]))) - k.prior.mean) / k.prior.sd
+                log_norm -= math.log(norm.cdf(z[1]) - norm.cdf(z[0]))
+                log_norm -= math.log(k.prior.sd * math.sqrt(2 * math.pi))
+                log_norm += 0.0 if k.logarithmic else math.log(k.scale)
+        return cls(tuple(unknowns), low, high, mean, 1 / sds, log_norm)
+
+    @property
+    def arrays(self) -> PriorArrays:
+        """What a compiled program needs of it."""
+        return PriorArrays(
+            np.array([k.logarithmic for k in self.unknowns]),
+            np.array([k.scale for k in self.unknowns]),
+            self.mean,
+            self.precision,
+        )
+
+    def log_density(self, u: Float) -> Float:
+        """Logarithm of the density at u, shape (..., n) to (...); minus infinity out of range."""
+        outside = ((u < self.low) | (u > self.high)).any(-1)
+        density = np.asarray(self.arrays.log_density(u)) + self.log_norm
+        return np.where(outside, -np.inf, density)
+
+    def record(self) -> dict[str, dict[str, float | str]]:
+        """Each prior in SI, for JSON."""
+        found: dict[str, dict[str, float | str]] = {}
+        for i, k in enumerate(self.unknowns):
+            if k.prior is not None:
+                found[k.name] = {
+                    "kind": "normal",
+                    "mean": k.prior.mean,
+                    "sd": k.prior.sd,
+                    "source": k.prior.source,
+                }
+            else:
+                found[k.name] = {
+                    "kind": "uniform in the logarithm" if k.logarithmic else "uniform",
+                    "low": float(k.to_value(self.low[i])),
+                    "high": float(k.to_value(self.high[i])),
+                }
+        return found
 
 
 class DensityData(NamedTuple):
@@ -41,9 +223,7 @@ class DensityData(NamedTuple):
     ----------
     mode, root : array, shapes (n,) and (n, n)
     coordinates : Coordinates
-    logarithmic : bool array, shape (n,)
-        Where the coordinate u is the logarithm of the parameter.
-    scale, prior_mean, prior_precision : array, shape (n,)
+    prior : PriorArrays
     terms : tuple
         Of each set of data, as its likelihood reads them.
     """
@@ -51,10 +231,7 @@ class DensityData(NamedTuple):
     mode: Any
     root: Any
     coordinates: Coordinates
-    logarithmic: Any
-    scale: Any
-    prior_mean: Any
-    prior_precision: Any
+    prior: PriorArrays
     terms: tuple[Any, ...]
 
 
@@ -71,19 +248,16 @@ class PosteriorDensity:
     """
 
     names: tuple[str, ...]
-    likelihoods: tuple[LockInLikelihood | RunLikelihood, ...]
+    likelihoods: tuple[Likelihood, ...]
 
     def __call__(self, z: Array, data: DensityData) -> Array:
         """Log density at z, of shape (n,)."""
         q = data.mode + data.root @ z
         u = data.coordinates.to_u(q)
-        x = jnp.where(data.logarithmic, jnp.exp(u), u * data.scale)
-        prior = -0.5 * ((x - data.prior_mean) * data.prior_precision) ** 2
-        volume = jnp.where((data.prior_precision > 0) & data.logarithmic, u, 0.0)
-        total = jnp.sum(prior + volume + data.coordinates.log_slope(q))
-        values = dict(zip(self.names, x, strict=True))
-        for likelihood, own in zip(self.likelihoods, data.terms, strict=True):
-            total = total + likelihood(values, own)
+        total = data.prior.log_density(u) + jnp.sum(data.coordinates.log_slope(q))
+        values = dict(zip(self.names, data.prior.values(u), strict=True))
+        for likelihood, arrays in zip(self.likelihoods, data.terms, strict=True):
+            total = total + likelihood(values, arrays)
         return total
 
 
@@ -111,9 +285,21 @@ class Whitened:
         """The posterior whitened at the mode that is reached from u."""
         coordinates = Coordinates.of(list(zip(prior.low, prior.high, strict=True)))
         start = coordinates.to_q(coordinates.inside(u, sd))
-        plain = cls(objective, prior, coordinates, start, np.eye(len(u)))
-        mode, information = plain._climbed(start)
-        return cls(objective, prior, coordinates, mode, _root(information))
+        near = cls(objective, prior, coordinates, start, np.eye(len(u)))
+        near = near._rooted(start)
+        climbed = minimize(
+            lambda z: -near.log_density(z)[0],
+            np.zeros(len(u)),
+            jac=lambda z: -near.log_density(z)[1],
+            hess=near._curvature,
+            method="trust-exact",
+            options={"gtol": _REACHED, "maxiter": _STEPS},
+        )
+        return near._rooted(start + near.root @ climbed.x)
+
+    def _rooted(self, q: Float) -> Whitened:
+        """The same about another point, with the root of the covariance there."""
+        return replace(self, mode=q, root=_root(self._evaluated(q)[2]))
 
     def u_of(self, z: Float) -> Float:
         """Coordinates of the fit at whitened ones, shapes (..., n)."""
@@ -124,71 +310,40 @@ class Whitened:
         value, gradient, _ = self._evaluated(self.mode + self.root @ z)
         return value, self.root.T @ gradient
 
+    def _curvature(self, z: Float) -> Float:
+        """Of minus the log density, as Gauss and Newton have it."""
+        information = self._evaluated(self.mode + self.root @ z)[2]
+        return np.asarray(self.root.T @ information @ self.root)
+
     def _evaluated(self, q: Float) -> tuple[float, Float, Float]:
         """Log density of q, its gradient, and the information matrix."""
         u = np.asarray(self.coordinates.to_u(q))
         r, jacobian = self.objective.residuals(u)
         if not np.isfinite(r).all():
             return -np.inf, np.zeros_like(q), np.eye(q.size)
-        slope = np.exp(np.asarray(self.coordinates.log_slope(q)))
-        volume, along = self.objective.log_volume(u)
-        step = 1e-6
-        up, down = (np.asarray(self.coordinates.log_slope(q + s)) for s in (step, -step))
-        middle = np.asarray(self.coordinates.log_slope(q))
-        value = -0.5 * float(r @ r) + volume + float(middle.sum())
-        J = jacobian * slope
-        gradient = -J.T @ r + along * slope + (up - down) / (2 * step)
-        share = 1 / (1 + np.exp(-q))
+        log_slope = np.asarray(self.coordinates.log_slope(q))
+        slope, share = np.exp(log_slope), 1 / (1 + np.exp(-q))
+        # Derivatives of the logarithm of the slope, first and second.
+        one, nothing = np.ones_like(q), np.zeros_like(q)
+        bend = np.choose(self.coordinates.kind, [nothing, one, -one, 1 - 2 * share])
         curvature = np.where(self.coordinates.bounded_twice, 2 * share * (1 - share), 0.0)
-        return value, gradient, J.T @ J + np.diag(curvature)
-
-    def _climbed(self, q: Float) -> tuple[Float, Float]:
-        """The mode reached from q by damped Gauss-Newton steps, and the information there."""
-        value, gradient, information = self._evaluated(q)
-        damping = _FIRST_DAMPING
-        for _ in range(_STEPS):
-            lifted = information + damping * np.diag(np.diag(information) + 1e-12)
-            step = np.linalg.solve(lifted, gradient)
-            gain = 0.5 * float(step @ gradient)
-            if damping <= _FIRST_DAMPING and gain < _REACHED:
-                break
-            longest = np.abs(step).max()
-            step *= min(1.0, 2.0 / longest) if longest else 1.0
-            trial = self._evaluated(q + step)
-            if trial[0] > value:
-                gain = trial[0] - value
-                q, (value, gradient, information), damping = q + step, trial, damping / 10
-                if gain < _REACHED:
-                    break
-            else:
-                damping *= 10
-                if damping > 1e8 or gain < _NOISE:
-                    break
-        return q, information
+        # Priors are densities of the parameter itself: that of its logarithm has a volume.
+        volume = np.where((self.prior.precision > 0) & self.prior.arrays.logarithmic, 1.0, 0.0)
+        J = jacobian * slope
+        value = -0.5 * float(r @ r) + float(volume @ u + log_slope.sum())
+        return value, -J.T @ r + volume * slope + bend, J.T @ J + np.diag(curvature)
 
     def compiled(self) -> tuple[PosteriorDensity, DensityData]:
         """The density as a compiled program evaluates it, and its data."""
-        parts = [_compiled(term, self.objective.names) for term in self.objective.terms]
-        unknowns = self.objective.unknowns
+        parts = [term.likelihood(self.objective.names) for term in self.objective.terms]
         data = DensityData(
             self.mode,
             self.root,
             self.coordinates,
-            np.array([k.logarithmic for k in unknowns]),
-            np.array([k.scale for k in unknowns]),
-            self.prior.mean,
-            self.prior.precision,
+            self.prior.arrays,
             tuple(arrays for _, arrays in parts),
         )
         return PosteriorDensity(self.objective.names, tuple(own for own, _ in parts)), data
-
-
-def _compiled(term: DataTerm, names: tuple[str, ...]) -> tuple[Any, Any]:
-    """The likelihood of a set of data for a compiled program, and its arrays."""
-    if isinstance(term, RunTerm):
-        return likelihood_of_run(term, names)
-    assert isinstance(term, LockInTerm)  # there is no third kind
-    return likelihood_of_table(term)
 
 
 def _root(information: Float) -> Float:

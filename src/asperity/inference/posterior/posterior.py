@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +16,6 @@ from asperity._version import __version__
 from asperity.inference.fitting.intervals import Interval
 from asperity.inference.fitting.result import Fit
 from asperity.inference.posterior.density import Whitened
-from asperity.inference.posterior.nuts import Transitions
-from asperity.inference.runs.term import RunTerm
-from asperity.inference.tables.term import LockInTerm
 from asperity.outputs.json import plain
 
 Float = NDArray[np.float64]
@@ -29,6 +26,33 @@ _AGREE = 1.01
 _ENOUGH = 100.0
 #: Share of trajectories without a solution at an end that is worth a warning.
 _FEW_FAILED = 1e-3
+
+
+class Transitions(NamedTuple):
+    """What is kept of each draw of a chain.
+
+    Attributes
+    ----------
+    z : array, shape (draws, n)
+    log_density : array, shape (draws,)
+    acceptance : array, shape (draws,)
+        Mean over the trajectory.
+    steps : int array, shape (draws,)
+        Evaluations of the gradient.
+    diverging : bool array, shape (draws,)
+        Whether the energy rose by more than 1000.
+    failed : bool array, shape (draws,)
+        Whether the trajectory ended where the density could not be computed.
+    energy : array, shape (draws,)
+    """
+
+    z: Any
+    log_density: Any
+    acceptance: Any
+    steps: Any
+    diverging: Any
+    failed: Any
+    energy: Any
 
 
 @dataclass(frozen=True)
@@ -249,17 +273,10 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
 
 
 def _observed(found: Fit) -> dict[str, Float]:
+    """Columns of all data; those of recordings have the name of theirs where there are several."""
     terms = found.objective.terms
-    observed = {
-        name: column
+    return {
+        f"{name}[{term.name}]" if term.profiled and len(terms) > 1 else name: column
         for term in terms
-        if isinstance(term, LockInTerm)
-        for columns in (term.table.points, term.table.values)
-        for name, column in columns.items()
+        for name, column in term.observed().items()
     }
-    for term in terms:
-        if isinstance(term, RunTerm):
-            suffix = f"[{term.name}]" if len(terms) > 1 else ""
-            observed[f"time{suffix}"] = term.run.time
-            observed[f"friction{suffix}"] = term.run.friction
-    return observed

@@ -1,45 +1,38 @@
-"""Draws from the posterior of a fit: chains in processes of their own, block by block.
+"""Draws from the posterior of a fit by the No-U-Turn sampler, a process to each chain.
 
-Every finished block of a chain is kept with the state that the next one goes on from. An
-interrupted run goes on there and gives the same draws as one that was not interrupted, whatever
-the number of processes.
+Sampler and warm-up are blackjax's (Hoffman and Gelman, 2014; the windows of Stan), on the whitened
+density. Every chain has a key of its own: the draws do not depend on the number of processes.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from collections.abc import Callable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
 from contextlib import contextmanager
-from dataclasses import replace
+from functools import partial
 from importlib.util import find_spec
-from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
+from asperity._jax import jit_large
 from asperity.errors import InputError
 from asperity.inference.fitting.result import Fit
-from asperity.inference.posterior.density import DensityData, Whitened
-from asperity.inference.posterior.nuts import (
-    BLOCK,
-    WARM_UP,
-    ChainState,
-    Transitions,
-    first_state,
-    run_block,
-    warmed_up,
-)
-from asperity.inference.posterior.posterior import Posterior, posterior_of
-from asperity.inference.posterior.prior_density import PriorDensity
+from asperity.inference.posterior.density import PriorDensity, Whitened
+from asperity.inference.posterior.posterior import Posterior, Transitions, posterior_of
 from asperity.orbit.search import available_cores
-from asperity.outputs import Interrupted, UnfinishedText
+from asperity.outputs import Interrupted
 
 Float = NDArray[np.float64]
+#: Logarithm of a density, of z and of arrays.
+LogDensity = Callable[[Array, Any], Array]
 
+#: Draws of the warm-up, and of each block between two reports of progress.
+WARM_UP, BLOCK = 300, 50
 #: Spread of the first positions, in standard deviations of the normal approximation.
 _OVERDISPERSED = 2.0
 #: Tries for a first position at which the law has a solution.
@@ -52,6 +45,28 @@ _ASK = 0.5
 _ONE_THREAD = {"NPROC": "1", "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 
+class ChainState(NamedTuple):
+    """Where a chain is, all as arrays.
+
+    Attributes
+    ----------
+    key : uint32 array
+        Data of the key of the next block.
+    z, log_density, gradient : array
+        Whitened position, of shape (n,), log density there and its gradient.
+    step_size : array, shape ()
+    metric : array, shape (n, n)
+        Inverse mass matrix.
+    """
+
+    key: Any
+    z: Any
+    log_density: Any
+    gradient: Any
+    step_size: Any
+    metric: Any
+
+
 def sample_posterior(
     found: Fit,
     *,
@@ -59,8 +74,6 @@ def sample_posterior(
     draws: int = 1000,
     seed: int = 0,
     jobs: int | None = None,
-    unfinished: Path | None = None,
-    resume: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Posterior:
     """Sample the posterior of a fit by the No-U-Turn sampler.
@@ -73,13 +86,9 @@ def sample_posterior(
         At least 2 chains, for R-hat, and 100 draws each after the warm-up; draws are rounded up
         to whole blocks of 50.
     seed : int
-        The same seed gives the same draws, whatever `jobs` and interruptions.
+        The same seed gives the same draws, whatever `jobs`.
     jobs : int, optional
         Processes; by default one a chain, at most the cores of this machine.
-    unfinished : Path, optional
-        Finished blocks are kept beside this file until all are done.
-    resume : bool
-        Go on with what an interrupted run has kept there.
     progress : callable, optional
         Called with finished and all draws, those of the warm-up included, at each block and twice
         a second; an exception of it ends the sampling.
@@ -91,8 +100,8 @@ def sample_posterior(
     Raises
     ------
     InputError
-        If the extra ``bayes`` is not installed, the fit has not converged, a number is too small,
-        or what is to be resumed belongs to another run.
+        If the extra ``bayes`` is not installed, the fit has not converged, or a number is too
+        small.
     Interrupted
         On Ctrl-C.
     """
@@ -106,43 +115,32 @@ def sample_posterior(
         raise InputError("posterior must be of free parameters, got none; free one, such as A")
     require_sizes(chains, draws)
     whitened = whitened_posterior(found)
-    blocks = WARM_UP + -(-draws // BLOCK)
-    report = progress or (lambda done, total: None)
     density, data = whitened.compiled()
-    store = _Store(unfinished, _inputs(found, whitened, data, chains, draws, seed), resume)
-    # The same to the last digit as where an interrupted run began.
-    whitened = store.whitening(whitened)
-    data = data._replace(mode=whitened.mode, root=whitened.root)
-    runs = [_Chain(whitened, seed, chain, store.blocks(chain)) for chain in range(chains)]
-    done = sum(len(run.kept) for run in runs)
-    report(done * BLOCK, chains * blocks * BLOCK)
-    jobs = min(jobs or available_cores(), chains)
+    blocks = -(-draws // BLOCK)
+    kept: list[list[Transitions]] = [[] for _ in range(chains)]
+    done, total = 0, chains * (WARM_UP + blocks * BLOCK)
+    report = progress or (lambda done, total: None)
     try:
-        with _submitting(jobs) as submit:
-
-            def go_on(run: _Chain) -> Future:
-                return submit(run_block, density, data, run.state, adapting=run.warming)
-
-            waiting = {go_on(run): run for run in runs if len(run.kept) < blocks}
+        report(done, total)
+        with _submitting(min(jobs or available_cores(), chains)) as submit:
+            waiting = {
+                submit(warmed_up, density, data, *_beginning(whitened, seed, chain)): chain
+                for chain in range(chains)
+            }
             while waiting:
                 finished = wait(waiting, timeout=_ASK, return_when=FIRST_COMPLETED).done
-                if not finished:
-                    report(done * BLOCK, chains * blocks * BLOCK)
                 for future in finished:
-                    run = waiting.pop(future)
+                    chain = waiting.pop(future)
                     state, transitions = future.result()
-                    run.take(state, transitions)
-                    store.add(run.number, run.state, transitions)
-                    done += 1
-                    report(done * BLOCK, chains * blocks * BLOCK)
-                    if len(run.kept) < blocks:
-                        waiting[go_on(run)] = run
+                    if transitions is not None:
+                        kept[chain].append(transitions)
+                    done += WARM_UP if transitions is None else BLOCK
+                    if len(kept[chain]) < blocks:
+                        waiting[submit(next_block, density, data, state)] = chain
+                report(done, total)
     except KeyboardInterrupt:
-        kept = f"{done * BLOCK} of {chains * blocks * BLOCK} draws" if done and unfinished else ""
-        raise Interrupted(kept) from None
-    posterior = posterior_of(found, whitened, [r.kept[WARM_UP:] for r in runs], seed=seed)
-    store.discard()
-    return posterior
+        raise Interrupted() from None
+    return posterior_of(found, whitened, kept, seed=seed)
 
 
 def require_sizes(chains: int, draws: int) -> None:
@@ -155,11 +153,11 @@ def require_sizes(chains: int, draws: int) -> None:
     for name, value, least in (("chains", chains, 2), ("draws", draws, 100)):
         if value < least:
             raise InputError(f"{name} must be at least {least}, got {value}; ask for more")
-    blocks = WARM_UP + -(-draws // BLOCK)
-    if chains * blocks * BLOCK > _MOST_DRAWS:
+    each = WARM_UP + -(-draws // BLOCK) * BLOCK
+    if chains * each > _MOST_DRAWS:
         raise InputError(
             f"chains times draws must be {_MOST_DRAWS} at most, those of the warm-up included, "
-            f"got {chains} chains of {blocks * BLOCK}; ask for fewer"
+            f"got {chains} chains of {each}; ask for fewer"
         )
 
 
@@ -177,51 +175,15 @@ def whitened_posterior(found: Fit) -> Whitened:
     return Whitened.at(objective, prior, u, sd)
 
 
-class _Chain:
-    """A chain with its finished blocks."""
-
-    def __init__(
-        self,
-        whitened: Whitened,
-        seed: int,
-        number: int,
-        kept: list[tuple[ChainState, Transitions]],
-    ) -> None:
-        self.number = number
-        self.kept: list[Transitions] = []
-        self._draws: list[Float] = []
-        self.state = kept[-1][0] if kept else _overdispersed(whitened, seed, number)
-        for _, transitions in kept:
-            self.kept.append(transitions)
-            if len(self.kept) <= WARM_UP:
-                self._draws.append(transitions.z)
-                # The kept states already have the metric; this brings the list of draws along.
-                self._draws = warmed_up(self.state, self._draws, len(self.kept))[1]
-
-    @property
-    def warming(self) -> bool:
-        """Whether the next block belongs to the warm-up."""
-        return len(self.kept) < WARM_UP
-
-    def take(self, state: ChainState, transitions: Transitions) -> None:
-        """Add a block."""
-        warming = self.warming
-        self.kept.append(transitions)
-        if warming:
-            self._draws.append(transitions.z)
-            state, self._draws = warmed_up(state, self._draws, len(self.kept))
-        self.state = state
-
-
-def _overdispersed(whitened: Whitened, seed: int, chain: int) -> ChainState:
-    """First state of a chain, drawn wider than the posterior."""
+def _beginning(whitened: Whitened, seed: int, chain: int) -> tuple[Any, Float]:
+    """Key of a chain, and its first position, drawn wider than the posterior."""
+    key = jax.random.fold_in(jax.random.key(seed), chain)
     rng = np.random.default_rng([seed, chain])
     spread = _OVERDISPERSED
     for _ in range(_TRIES):
         z = spread * rng.normal(size=whitened.mode.size)
-        value, gradient = whitened.log_density(z)
-        if np.isfinite(value):
-            return first_state(seed, chain, z, value, gradient)
+        if np.isfinite(whitened.log_density(z)[0]):
+            return np.asarray(jax.random.key_data(key)), z
         spread *= 0.9
     raise InputError(
         f"posterior must have a first position for chain {chain + 1}, got none in {_TRIES} draws "
@@ -229,74 +191,98 @@ def _overdispersed(whitened: Whitened, seed: int, chain: int) -> ChainState:
     )
 
 
-class _Store:
-    """Finished blocks of all chains, as lines of JSON; in memory only without a file."""
+def warmed_up(log_density: LogDensity, data: Any, key: Any, z: Float) -> tuple[ChainState, None]:
+    """State of a chain after the warm-up, which no draw is kept of.
 
-    def __init__(self, path: Path | None, inputs: dict[str, Any], resume: bool) -> None:
-        self._file = None if path is None else UnfinishedText(path, inputs)
-        self._blocks: dict[int, list[tuple[ChainState, Transitions]]] = {}
-        self._whitening: dict[str, Float] = {}
-        if self._file is None:
-            return
-        self._file.start(resume)
-        for line in self._file.text().splitlines():
-            record = json.loads(line)
-            if "mode" in record:
-                self._whitening = {n: np.array(v) for n, v in record.items()}
-                continue
-            state = ChainState(**{n: _array(v) for n, v in record["state"].items()})
-            kept = Transitions(**{n: _array(v) for n, v in record["transitions"].items()})
-            self._blocks.setdefault(record["chain"], []).append((state, kept))
-
-    def whitening(self, whitened: Whitened) -> Whitened:
-        """The whitening that finished blocks have, or this one where there are none."""
-        if self._whitening:
-            return replace(whitened, mode=self._whitening["mode"], root=self._whitening["root"])
-        if self._file is not None:
-            record = {"mode": whitened.mode.tolist(), "root": whitened.root.tolist()}
-            self._file.append(json.dumps(record) + "\n", 0)
-        return whitened
-
-    def blocks(self, chain: int) -> list[tuple[ChainState, Transitions]]:
-        return self._blocks.get(chain, [])
-
-    def add(self, chain: int, state: ChainState, transitions: Transitions) -> None:
-        if self._file is not None:
-            record = {"chain": chain, "state": _plain(state), "transitions": _plain(transitions)}
-            self._file.append(json.dumps(record) + "\n", 1)
-
-    def discard(self) -> None:
-        if self._file is not None:
-            self._file.discard()
+    Parameters
+    ----------
+    log_density : callable
+        The same object for the same program.
+    data : pytree of arrays
+    key : uint32 array
+        Data of the key of the chain.
+    z : array, shape (n,)
+        First position.
+    """
+    return jax.tree.map(np.asarray, _warm_up(data, key, z, log_density=log_density)), None
 
 
-def _plain(parts: ChainState | Transitions) -> dict[str, Any]:
-    return {
-        name: {"dtype": str(np.asarray(a).dtype), "values": np.asarray(a).tolist()}
-        for name, a in parts._asdict().items()
-    }
+def next_block(
+    log_density: LogDensity, data: Any, state: ChainState
+) -> tuple[ChainState, Transitions]:
+    """The next `BLOCK` draws of a chain."""
+    return jax.tree.map(np.asarray, _block(data, state, log_density=log_density))
 
 
-def _array(record: dict[str, Any]) -> Any:
-    return np.array(record["values"], dtype=record["dtype"])
+@partial(jit_large, static_argnames=("log_density",))
+def _warm_up(data: Any, key: Any, z: Any, *, log_density: LogDensity) -> ChainState:
+    import blackjax
+
+    adaptation = blackjax.window_adaptation(
+        blackjax.nuts,
+        finite_density(log_density, data),
+        is_mass_matrix_diagonal=False,
+        initial_step_size=0.8 * z.size**-0.25,
+    )
+    later, now = jax.random.split(jax.random.wrap_key_data(key))
+    (state, found), _ = adaptation.run(now, z, WARM_UP)
+    return ChainState(
+        jax.random.key_data(later),
+        state.position,
+        state.logdensity,
+        state.logdensity_grad,
+        found["step_size"],
+        found["inverse_mass_matrix"],
+    )
 
 
-def _inputs(
-    found: Fit, whitened: Whitened, data: DensityData, chains: int, draws: int, seed: int
-) -> dict[str, Any]:
-    """What the draws depend on, as a record of an unfinished run."""
-    digest = hashlib.sha256()
-    for array in jax.tree.leaves(data.terms):
-        # A recording's noise is estimated anew, and the same but for the last digits.
-        digest.update(np.asarray(array, np.float32).tobytes())
-    return {
-        "law": found.law,
-        "prior": whitened.prior.record(),
-        "data": digest.hexdigest(),
-        "chains": chains,
-        "draws": draws,
-        "seed": seed,
-    }
+@partial(jit_large, static_argnames=("log_density",))
+def _block(
+    data: Any, state: ChainState, *, log_density: LogDensity
+) -> tuple[ChainState, Transitions]:
+    from blackjax.mcmc import hmc, nuts
+
+    kernel = nuts.build_kernel()
+    density = finite_density(log_density, data)
+
+    def draw(state: ChainState, _: None) -> tuple[ChainState, Transitions]:
+        key, now = jax.random.split(jax.random.wrap_key_data(state.key))
+        before = hmc.HMCState(state.z, state.log_density, state.gradient)
+        after, info = kernel(now, before, density, state.step_size, state.metric)
+        ends = info.trajectory_leftmost_state, info.trajectory_rightmost_state
+        failed = jnp.logical_or(*(~jnp.isfinite(end.logdensity) for end in ends))
+        return state._replace(
+            key=jax.random.key_data(key),
+            z=after.position,
+            log_density=after.logdensity,
+            gradient=after.logdensity_grad,
+        ), Transitions(
+            after.position,
+            after.logdensity,
+            info.acceptance_rate,
+            info.num_integration_steps,
+            info.is_divergent,
+            failed,
+            info.energy,
+        )
+
+    return jax.lax.scan(draw, state, None, length=BLOCK)
+
+
+def finite_density(log_density: LogDensity, data: Any) -> Callable[[Array], Array]:
+    """The density as a function of z alone: minus infinity, with gradient 0, where it is NaN."""
+
+    @jax.custom_vjp
+    def density(z: Array) -> Array:
+        return forward(z)[0]
+
+    def forward(z: Array) -> tuple[Array, Array]:
+        value, gradient = jax.value_and_grad(log_density)(z, data)
+        good = jnp.isfinite(value) & jnp.isfinite(gradient).all()
+        return jnp.where(good, value, -jnp.inf), jnp.where(good, gradient, 0.0)
+
+    density.defvjp(forward, lambda gradient, change: (change * gradient,))
+    return density
 
 
 @contextmanager

@@ -1,16 +1,23 @@
-"""Terms and free parameters of recorded runs, from what a user asks for."""
+"""Terms and free parameters of recorded runs, from what a user asks for.
+
+A gain of the gauge multiplies F/W. Under a constant load A, B, mu0 and K over 1/gain give the same
+recording, so that it is known from a calibration alone, which is its prior. Recordings that hold
+the same samples would count twice, and are refused.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
 from asperity.inference.runs.blocks import checked_rate
-from asperity.inference.runs.gain import GAIN, gain_of
+from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm, cut_delays
 from asperity.inference.unknowns import Prior, Unknown, unknown_of
@@ -322,3 +329,130 @@ def _initial(
         )
         own[name] = inner
     return tuple(found), own
+
+
+PARAMETER = Parameter(
+    GAIN, "dimensionless", "positive", "recorded friction over that of the law", place="drive"
+)
+
+
+def gain_of(suffix: str, priors: Mapping[str, Prior]) -> Unknown | None:
+    """The gain of a run as a free parameter; None without a prior.
+
+    Parameters
+    ----------
+    suffix : str
+        "[name of the run]" where there are several sets of data.
+    priors : mapping of str to Prior
+        ``gain`` for that of every run by itself, or ``gain[name]``.
+    """
+    name = GAIN + suffix
+    prior = priors.get(name, priors.get(GAIN))
+    if prior is None:
+        return None
+    return unknown_of(replace(PARAMETER, name=name), prior.mean, prior, None, nuisance=True)
+
+
+def require_calibrated(
+    runs: Sequence[RecordedRun],
+    free: Sequence[str],
+    priors: Mapping[str, Prior],
+    *,
+    mu0_given: bool,
+    beside_table: bool,
+) -> None:
+    """Refuse a gain without a prior, and one that a load change would seem to measure.
+
+    Parameters
+    ----------
+    runs : sequence of RecordedRun
+    free : sequence of str
+    priors : mapping of str to Prior
+    mu0_given : bool
+        Whether mu0 is free or has a number that is not taken from the recording.
+    beside_table : bool
+        Whether lock-in readings are fitted together with the runs.
+
+    Raises
+    ------
+    InputError
+    """
+    given = [n for n in priors if n.partition("[")[0] == GAIN]
+    several = len(runs) > 1 or beside_table
+    for name in free:
+        if name.partition("[")[0] == GAIN and name not in given and GAIN not in given:
+            raise InputError(
+                f"{name} must have a prior, got none: A, B, mu0 and K scale with it, so that a "
+                "recording cannot tell it; give one by a calibration of the gauge, like "
+                f'--prior "{name}=1+-0.02"'
+            )
+    known = [GAIN, *((f"{GAIN}[{run.name}]" for run in runs) if several else ())]
+    for name in [*given, *(n for n in free if n.partition("[")[0] == GAIN)]:
+        if name not in known:
+            raise InputError(
+                f"prior of a gain must name {' or '.join(known)}, got '{name}'; correct the name"
+            )
+    varying = [run.name for run in runs if run.load_varies]
+    if given and varying and not mu0_given:
+        raise InputError(
+            f"mu0 must be free or given with a gain under a load that changes, as in {varying[0]}, "
+            "got neither: the first friction would stand for it, without the gain; free mu0, or "
+            "fix it"
+        )
+
+
+#: Equal samples in a row that chance does not make, if they have so many different values.
+_EQUAL, _DIFFERENT = 64, 16
+
+
+def require_own_samples(runs: Sequence[RecordedRun]) -> None:
+    """Refuse recordings of which two hold the same samples, at whatever times.
+
+    Raises
+    ------
+    InputError
+        If 64 samples in a row of one, with 16 different values among them, are in another.
+    """
+    for first, second in combinations(runs, 2):
+        shared = _shared(first.friction, second.friction)
+        if shared is None:
+            continue
+        a, b = (run.origin + run.time[k] for run, k in zip((first, second), shared, strict=True))
+        raise InputError(
+            f"{second.name} must hold samples of its own, got those from {b:.6g} s on equal to "
+            f"those of {first.name} from {a:.6g} s on; give each recording once, in windows that "
+            "do not overlap: they would count twice"
+        )
+
+
+def _shared(x: NDArray[np.float64], y: NDArray[np.float64]) -> tuple[int, int] | None:
+    """Where the first samples of x that are also in y begin in both."""
+    if min(x.size, y.size) < _EQUAL:
+        return None
+    rows = x[: x.size // _EQUAL * _EQUAL].reshape(-1, _EQUAL)
+    various = 1 + (np.diff(np.sort(rows, axis=1), axis=1) > 0).sum(axis=1) >= _DIFFERENT
+    begins = np.flatnonzero(various)
+    marks = _marks(x)[::_EQUAL][begins]
+    order = np.argsort(marks)
+    others = _marks(y)
+    at = np.searchsorted(marks[order], others)
+    at[at == order.size] = 0
+    for j in np.flatnonzero(marks[order][at] == others) if order.size else ():
+        k = int(begins[order[at[j]]])
+        if np.array_equal(y[j : j + _EQUAL], rows[k]):
+            return k * _EQUAL, int(j)
+    return None
+
+
+def _marks(x: NDArray[np.float64]) -> NDArray[np.uint64]:
+    """A number for each 64 samples in a row that depends on all of their bits."""
+    bits = np.ascontiguousarray(x).view(np.uint64)
+    factor = 0x9E3779B97F4A7C15
+    length, mark = 1, bits * np.uint64(factor)
+    # Of twice as many samples each time; numbers wrap at 2^64.
+    while length < _EQUAL:
+        factor = (factor * factor + 2) % 2**64
+        later = mark[length:]
+        mark = mark[: mark.size - length] * np.uint64(factor) + (later ^ (later >> np.uint64(29)))
+        length *= 2
+    return mark

@@ -1,13 +1,15 @@
-"""Friction through a whole recording, at its samples or averaged over blocks, with derivatives.
+"""Recorded friction of a motion, with derivatives, and the likelihood of a recording.
 
 The states are carried from one piece of the drive to the next: velocity steps, holds, ramps and
 load changes follow each other as in the experiment. The continuous extension of the integrator
-gives the friction between its steps.
+gives the friction between its steps. A fit takes the friction and its derivatives, differentiated
+forwards; a sampler the logarithm of the likelihood and its gradient.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import equinox as eqx
@@ -18,6 +20,8 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
+from asperity.inference.runs.noise import Whitening, innovations
+from asperity.inference.runs.reading import GAIN, Reading
 from asperity.inference.runs.steps import Curve, integrated, law_fields, numbers, with_values
 from asperity.laws import Law
 from asperity.slider import Slider
@@ -36,7 +40,7 @@ _GAUSS = np.stack(np.polynomial.legendre.leggauss(3), axis=1) / 2 + [0.5, 0.0]
 
 
 class Motions(NamedTuple):
-    """Friction at the samples with its derivatives.
+    """Recorded friction with its derivatives.
 
     Attributes
     ----------
@@ -78,58 +82,44 @@ class RunMotion:
         self._equations: Motion | None = None
 
     def __call__(
-        self, values: Mapping[str, float], free: tuple[str, ...], drive: Drive, times: Float
+        self, values: Mapping[str, float], free: tuple[str, ...], drive: Drive, reading: Reading
     ) -> Motions | None:
-        """Friction at the samples; None where the motion runs away or stops being computable.
+        """Friction as recorded; None where the motion runs away or stops being computable.
 
         Parameters
         ----------
         values : mapping of str to float
-            Parameters of the law, K, W0, M, eta, eps_ratio; `start_force` and `start_state_i`,
-            departures of the initial states from steady sliding (0 where not given); `shift_j`,
-            delay of the j-th edge of the drive (s).
+            Parameters of the law, K, W0, M, eta, eps_ratio; `gain` of the gauge; `start_force` and
+            `start_state_i`, departures of the initial states from steady sliding (0 where not
+            given); `shift_j`, delay of the j-th edge of the drive (s).
         free : tuple of str
             Names for derivatives, of those.
         drive : Drive
-        times : array, shape (n,) or (n, 2)
-            Of the samples, or of the beginnings and ends of blocks over which friction is averaged,
-            from the beginning of the drive (s).
+        reading : Reading
         """
         given: dict[str, Any] = {name: np.float64(value) for name, value in values.items()}
-        motion, padded, at, taken = self.prepared(given, drive, times)
         friction, slopes, steps, done = through(
-            motion,
+            self.equations(given),
             free,
             given,
-            padded,
-            at,
+            filled_up(drive),
+            reading.filled_up(),
             room=self.room,
-            means=times.ndim == 2,
         )
         if not bool(done):
             return None
-        f = np.asarray(friction)[taken]
-        jacobian = np.asarray(slopes).T[taken]
+        n = len(reading.index)
+        f, jacobian = np.asarray(friction)[:n], np.asarray(slopes).T[:n]
         # NaN and infinity are not below it either.
         if not (np.isfinite(f).all() and (np.abs(jacobian) < _STEEPEST).all()):
             return None
         return Motions(f, jacobian, int(steps))
 
-    def prepared(
-        self, given: Mapping[str, Any], drive: Drive, times: Float
-    ) -> tuple[Motion, Drive, Float, NDArray[np.intp]]:
-        """What `through` takes: equation of motion, drive and times, filled up to a few lengths.
-
-        The numbers of the equation are replaced by those that `through` is given. The last of the
-        four says which of what it returns belongs to which of the times.
-        """
+    def equations(self, given: Mapping[str, Any]) -> Motion:
+        """Equation of motion, whose numbers are replaced by those that `through` is given."""
         if self._equations is None:
             self._equations = self._template(given)
-        at = times if times.ndim == 1 else np.unique(times)
-        taken = np.arange(at.size) if times.ndim == 1 else np.searchsorted(at, times[:, 0])
-        size = 1024 * int(np.ceil(at.size / 1024))
-        at = np.concatenate([at, np.full(size - at.size, at[-1])])
-        return self._equations, filled_up(drive), at, taken
+        return self._equations
 
     @property
     def room(self) -> int:
@@ -161,12 +151,11 @@ def through(
     free: tuple[str, ...],
     given: dict[str, Any],
     drive: Drive,
-    times: Any,
+    reading: Reading,
     *,
     room: int,
-    means: bool = False,
 ) -> tuple[Array, Array, Array, Array]:
-    """Friction at the samples under given numbers, differentiated forwards.
+    """Friction as recorded under given numbers, differentiated forwards.
 
     Parameters
     ----------
@@ -177,15 +166,14 @@ def through(
     given : dict of str to array, shape ()
         All parameters, as of `RunMotion`.
     drive : Drive
-    times : array, shape (n,)
+    reading : Reading
+        Of n samples.
     room : int
         Steps at most.
-    means : bool
-        Whether friction is averaged between neighbouring times, which are then in order.
 
     Returns
     -------
-    friction : array, shape (n,), or (n - 1,) for means
+    friction : array, shape (n,)
     derivatives : array, shape (parameters, n)
         In the order of `free`.
     steps : array, shape ()
@@ -194,12 +182,10 @@ def through(
     """
     x = numbers(free, given)
     curve, slopes, steps, done = integrated(motion, free, given, drive, room)
-    shown = _averaged if means else _observed
 
     def friction(curve: Curve, x: Array) -> Array:
         values = {**given, **dict(zip(free, x, strict=True))}
-        changed, moved = with_values(motion, values), shifted(drive, values)
-        return shown(changed, moved, values, curve, steps, times)
+        return _recorded(motion, drive, values, curve, steps, reading)
 
     f = friction(curve, x)
     if not free:
@@ -212,17 +198,16 @@ def through(
 
 
 def density_through(
-    density: Callable[[Array, Mapping[str, Array]], Array],
+    density: Callable[[Array], Array],
     motion: Motion,
     free: tuple[str, ...],
     given: dict[str, Any],
     drive: Drive,
-    times: Any,
+    reading: Reading,
     *,
     room: int,
-    means: bool = False,
 ) -> tuple[Array, Array]:
-    """A number that depends on the friction at the samples, and its gradient.
+    """A number that depends on the recorded friction, and its gradient.
 
     The motion is differentiated forwards, as by `through`, and the samples, of which there are far
     more than steps, backwards.
@@ -230,8 +215,8 @@ def density_through(
     Parameters
     ----------
     density : callable
-        Of what `through` gives as friction, and of the parameters by name.
-    motion, free, given, drive, times, room, means
+        Of what `through` gives as friction.
+    motion, free, given, drive, reading, room
         As of `through`.
 
     Returns
@@ -243,17 +228,30 @@ def density_through(
     """
     x = numbers(free, given)
     curve, slopes, steps, done = integrated(motion, free, given, drive, room)
-    shown = _averaged if means else _observed
 
     def value_of(curve: Curve, x: Array) -> Array:
         values = {**given, **dict(zip(free, x, strict=True))}
-        changed, moved = with_values(motion, values), shifted(drive, values)
-        return density(shown(changed, moved, values, curve, steps, times), values)
+        return density(_recorded(motion, drive, values, curve, steps, reading))
 
     value, (back, gradient) = jax.value_and_grad(value_of, argnums=(0, 1))(curve, x)
     for weight, slope in zip(back, slopes, strict=True):
         gradient += jnp.sum(weight * slope, axis=tuple(range(1, slope.ndim)))
     return jnp.where(done, value, jnp.nan), gradient
+
+
+def _recorded(
+    motion: Motion,
+    drive: Drive,
+    values: Mapping[str, Array],
+    curve: Curve,
+    steps: Array,
+    reading: Reading,
+) -> Array:
+    """F/W as the gauge records it."""
+    shown = _averaged if reading.means else _observed
+    changed, moved = with_values(motion, values), shifted(drive, values)
+    friction = shown(changed, moved, values, curve, steps, reading.times)
+    return values.get(GAIN, 1.0) * reading.recorded(friction)
 
 
 def _observed(
@@ -334,3 +332,75 @@ def _friction(
     at = excitation(drive, values, piece, times)
     load = drive.load[piece] + drive.load_slope[piece] * (times - drive.edges[piece])
     return motion.force(jnp.stack(y), at) / load
+
+
+class RunArrays(NamedTuple):
+    """Numbers of a recording.
+
+    Attributes
+    ----------
+    motion : Motion
+        Equation of motion whose law and slider are replaced; arrays only.
+    fixed : dict of str to array, shape ()
+        Parameters of the motion that are not free.
+    drive : Drive
+    reading : Reading
+    recorded : array, shape (n,)
+    noise : tuple of Whitening
+        Of each stretch.
+    basis : array, shape (n, columns)
+        Whitened linear nuisances, orthonormal.
+    """
+
+    motion: Any
+    fixed: dict[str, Any]
+    drive: Drive
+    reading: Reading
+    recorded: Any
+    noise: tuple[Whitening, ...]
+    basis: Any
+
+
+@dataclass(frozen=True)
+class RunLikelihood:
+    """Log likelihood of a recording under the noise of the estimate, but for a constant.
+
+    Attributes
+    ----------
+    equation : Motion
+        What of the equation of motion is no number.
+    inner : tuple of (str, str)
+        Free parameters that this recording depends on, and their names in the motion.
+    stretches : tuple of (int, int)
+        First sample and the one after the last of each stretch of noise.
+    room : int
+        Steps of the integrator at most.
+    """
+
+    equation: Any
+    inner: tuple[tuple[str, str], ...]
+    stretches: tuple[tuple[int, int], ...]
+    room: int
+
+    def __call__(self, values: Mapping[str, Array], data: RunArrays) -> Array:
+        """Log likelihood of parameters by name; NaN where the motion cannot be computed."""
+        motion = eqx.combine(data.motion, self.equation)
+        names = tuple(inner for _, inner in self.inner)
+
+        def density(friction: Array) -> Array:
+            departures = friction - data.recorded
+            white = innovations(departures, data.noise, self.stretches, data.basis, jnp)
+            return -0.5 * jnp.sum(white**2)
+
+        def both(x: Array) -> tuple[Array, Array]:
+            given = {**data.fixed, **dict(zip(names, x, strict=True))}
+            return density_through(
+                density, motion, names, given, data.drive, data.reading, room=self.room
+            )
+
+        @jax.custom_vjp
+        def likelihood(x: Array) -> Array:
+            return both(x)[0]
+
+        likelihood.defvjp(both, lambda gradient, change: (change * gradient,))
+        return likelihood(jnp.stack([values[name] for name, _ in self.inner]))

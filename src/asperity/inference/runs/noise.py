@@ -5,6 +5,12 @@ independent. Coefficients are estimated by Burg's method, which gives every lowe
 a stationary process always; the order is that of the lowest AICc, but at least 10 log10 n, since an
 order that is too low makes intervals too narrow, and one that is too high costs little. The first
 samples are predicted by the lower orders, so that the likelihood is that of all samples.
+
+The covariance of generalised least squares is that under known noise. The coefficients of the noise
+are estimated from the same samples: estimates vary with them (Kackar and Harville, J. Am. Stat.
+Assoc. 79, 853, 1984), and so does the covariance itself, whose degrees of freedom (Satterthwaite,
+Biometrics Bull. 2, 110, 1946) Student's t needs; both as Kenward and Roger (Biometrics 53, 983,
+1997) put them together, for noise that is autoregressive.
 """
 
 from __future__ import annotations
@@ -13,10 +19,13 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
+from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.stats import chi2
 
@@ -31,6 +40,63 @@ _ORDERS_PER_DECADE = 10
 _SMOOTH = 1e-6
 #: Lags of the test of whiteness, at least.
 _LAGS = 20
+
+
+class Whitening(NamedTuple):
+    """Innovations of noise as a linear function of its samples, of NumPy and of JAX arrays.
+
+    Attributes
+    ----------
+    taps : array, shape (p + 1,)
+        Weights of a sample and those before it.
+    first : array, shape (p, p)
+        Weights of the first samples, before which lower orders predict.
+    """
+
+    taps: Any
+    first: Any
+
+    def of(self, x: Any, module: Any = np) -> Any:
+        """Innovations of unit variance along the first axis, of shape (n,) or (n, columns).
+
+        Parameters
+        ----------
+        x : array
+        module : module
+            numpy, or jax.numpy within compiled programs.
+        """
+        n = x.shape[0]
+        p = min(self.first.shape[0], n)
+        columns = x.reshape(n, -1)
+        later = [module.convolve(column, self.taps)[p:n] for column in columns.T]
+        white = module.concatenate([self.first[:p, :p] @ columns[:p], module.stack(later, axis=-1)])
+        return white.reshape(x.shape)
+
+
+def innovations(
+    columns: Any,
+    noise: Sequence[Whitening],
+    stretches: Sequence[tuple[int, int]],
+    basis: Any = None,
+    module: Any = np,
+) -> Any:
+    """Innovations of unit variance, without what linear nuisances take of them.
+
+    Parameters
+    ----------
+    columns : array, shape (n,) or (n, columns)
+        Computed less recorded friction, and its derivatives; of NumPy or of JAX.
+    noise : sequence of Whitening
+        Of each stretch.
+    stretches : sequence of (int, int)
+    basis : array, shape (n, nuisances), optional
+        Whitened linear nuisances, orthonormal.
+    module : module
+        numpy, or jax.numpy within compiled programs.
+    """
+    parts = [w.of(columns[a:b], module) for w, (a, b) in zip(noise, stretches, strict=True)]
+    white = module.concatenate(parts)
+    return white if basis is None else white - basis @ (basis.T @ white)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,13 +147,13 @@ class Autoregression:
 
     def whiten(self, columns: Float) -> Float:
         """Innovations of unit variance of samples along the first axis."""
-        x = np.asarray(columns, float)
+        return np.asarray(self.whitening.of(np.asarray(columns, float)))
+
+    @property
+    def whitening(self) -> Whitening:
+        """The linear function from samples to innovations."""
         taps = np.concatenate([[1.0], -self.coefficients[-1]]) / self.innovation
-        out = np.asarray(lfilter(taps, [1.0], x, axis=0))
-        # In place of the unknown samples before the first, lower orders predict.
-        first = min(self.order, x.shape[0])
-        out[:first] = np.tensordot(self._first_taps[:first, :first], x[:first], axes=1)
-        return out
+        return Whitening(taps, self._first_taps)
 
     @functools.cached_property
     def _first_taps(self) -> Float:
@@ -117,15 +183,6 @@ class Autoregression:
         along = np.correlate(ends, a, mode="valid")
         reached = np.minimum(np.arange(white.size, 0, -1), self.order + 1)
         return np.asarray(along / np.sqrt(np.cumsum(a**2))[reached - 1])
-
-    def taps(self, n: int) -> Float:
-        """Weights c of `whiten` for n samples: w_t = sum_k c[t, k] x_(t-k), shape (n, p + 1)."""
-        found = np.zeros((n, self.order + 1))
-        found[:] = np.concatenate([[1.0], -self.coefficients[-1]]) / self.innovation
-        for t, row in enumerate(self._first_taps[:n]):
-            found[t] = 0.0
-            found[t, : t + 1] = row[t::-1]
-        return found
 
     def log_scale(self, n: int) -> float:
         """Sum of the logarithms of the standard deviations of the innovations of n samples."""
@@ -363,3 +420,69 @@ def strongest_peak(innovations: Float) -> tuple[float, float]:
     height = spectrum[k] / spectrum[inside].mean()
     chance = -math.expm1(2 * n * math.log1p(-math.exp(-height)))
     return k / (8 * n), chance
+
+
+#: Samples whose derivatives are held at once.
+_CHUNK = 4096
+
+
+def added_by_noise(
+    model: Autoregression, curves: Float, nuisances: Float, covariance: Float
+) -> tuple[Float, Float]:
+    """Covariance that estimated coefficients add, and the variance of the one without it.
+
+    Parameters
+    ----------
+    model : Autoregression
+        Estimated from a stretch of n samples.
+    curves : array, shape (n, parameters)
+        Derivatives of the signal to the parameters, less what linear nuisances take of them.
+    nuisances : array, shape (n, columns)
+        Whitened linear nuisances, orthonormal over all samples of the recording.
+    covariance : array, shape (parameters, parameters)
+        Of the parameters under known noise, by all data and priors.
+
+    Returns
+    -------
+    added : array, shape (parameters, parameters)
+    variance : array, shape (parameters,)
+        Of the diagonal of `covariance`, as the noise of this stretch is estimated.
+
+    Notes
+    -----
+    With the whitening W of the noise, dW/da_k = -B^k/s for the lag B, and the covariance S of the
+    noise, (dS^-1/da_k) S (dS^-1/da_l) = W^T G_k^T G_l W with G_k = B^k W^-1/s and its transpose
+    added. Coefficients have the covariance s^2/n times the inverse of the autocovariances.
+    """
+    n, p = curves.shape[0], model.order
+    white = model.whiten(curves)
+    weights = white @ covariance
+    # The scale of the noise, with so many samples left to estimate it.
+    left = max(n - curves.shape[1] - nuisances.shape[1] - p, 1)
+    variance = 2 / left * np.einsum("ij,ij->j", weights, weights) ** 2
+    if not p:
+        return np.zeros_like(covariance), variance
+    s = model.innovation
+    lagged = toeplitz(model.autocovariances(p))
+    root = np.linalg.cholesky(s**2 / n * np.linalg.inv(lagged))
+    a = np.concatenate([[1.0], -model.coefficients[-1]])
+    before = np.vstack([np.zeros((p, covariance.shape[0])), curves @ covariance])
+    ahead = lfilter([1.0], a, weights[::-1], axis=0)[::-1]
+    ahead = np.vstack([ahead, np.zeros((p + 1, covariance.shape[0]))])
+    square = np.zeros_like(covariance)
+    along = np.zeros((p, covariance.shape[0]))
+    on_curves = np.zeros((covariance.shape[0], covariance.shape[0], p))
+    on_nuisances = np.zeros((nuisances.shape[1], covariance.shape[0], p))
+    for first in range(0, n, _CHUNK):
+        last = min(first + _CHUNK, n)
+        rows = slice(first, last)
+        past = sliding_window_view(before[first : last + p - 1], p, axis=0)[:, :, ::-1] / s
+        future = sliding_window_view(ahead[first + 1 : last + p], p, axis=0)
+        G = (past + future) @ root
+        square += np.einsum("tik,tjk->ij", G, G, optimize=True)
+        along += np.einsum("ti,tik->ki", weights[rows], G, optimize=True)
+        on_curves += np.tensordot(white[rows], G, axes=(0, 0))
+        on_nuisances += np.tensordot(nuisances[rows], G, axes=(0, 0))
+    seen = np.einsum("aik,ab,bjk->ij", on_curves, covariance, on_curves, optimize=True)
+    seen += np.einsum("cik,cjk->ij", on_nuisances, on_nuisances, optimize=True)
+    return square - seen, variance + np.einsum("ki,ki->i", along, along)

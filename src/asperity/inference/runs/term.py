@@ -6,15 +6,24 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import equinox as eqx
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference.objective import Residuals
-from asperity.inference.runs.gain import GAIN
+from asperity.inference.runs.drive import filled_up
 from asperity.inference.runs.misfit import departures_of_jumps, misfit_after_changes
-from asperity.inference.runs.motion import RunMotion
-from asperity.inference.runs.noise import Autoregression, fitted, strongest_peak, whiteness
-from asperity.inference.runs.noise_uncertainty import added_by_noise
+from asperity.inference.runs.motion import RunArrays, RunLikelihood, RunMotion
+from asperity.inference.runs.noise import (
+    Autoregression,
+    added_by_noise,
+    fitted,
+    innovations,
+    strongest_peak,
+    whiteness,
+)
+from asperity.inference.runs.reading import GAIN, reading_at
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.wrong_samples import (
     AT_CHANGE,
@@ -28,7 +37,6 @@ from asperity.inference.runs.wrong_samples import (
 from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law
 from asperity.parameters import Parameter, law_parameters
-from asperity.tribometer.filters import between, filtered, low_pass
 
 Float = NDArray[np.float64]
 
@@ -47,12 +55,10 @@ _CUT_INTERVALS = 2.0
 _JUMPS, _NEAR_CHANGE, _SHARE_NEAR_CHANGE = 5, 20, 0.05
 #: Below this probability innovations after the changes are too large for the law.
 _LAW_FAILS = 1e-4
+#: Motions that are remembered.
+_REMEMBERED = 128
 #: Outliers that a warning names.
 _NAMED = 5
-#: Samples that the quickest part of the gauge's response is resolved by.
-_FILTER_SAMPLES = 8.0
-#: Samples of the filtered motion in a block.
-_BLOCK_SAMPLES = 4
 
 
 class NoiseState(NamedTuple):
@@ -104,6 +110,9 @@ class RunTerm:
         "compute; give start values with a stiffness above the critical one, or a shorter window"
     )
     observables = ("friction",)
+    searches = None
+    #: A motion takes ten times as long as the orbits of a table.
+    affordable = 256
 
     def __init__(
         self,
@@ -126,6 +135,7 @@ class RunTerm:
         self.motion = RunMotion(
             law, run.velocity, inertia=inertia, radiation_damping=radiation_damping
         )
+        self.reading = reading_at(run.at, gauge)
         self._known = {*law_parameters(law), "K", "W0", "M", "eta", "eps_ratio"}
         self._columns = _linear_columns(run, linear)
         self._whiteness = math.nan
@@ -194,9 +204,10 @@ class RunTerm:
         self.models = [Autoregression(slow, v / (1 - _SLOW**2)) for v in steps]
         self._prepare()
 
-    def search_from_now_on(self) -> None:
-        """Let the motion take more steps."""
-        self.motion.allow_more_steps()
+    def use_search(self, always: bool) -> None:
+        """Let the motion take more steps, from now on."""
+        if always:
+            self.motion.allow_more_steps()
 
     def residuals(
         self, values: Mapping[str, float], *, search: bool | None = None
@@ -206,8 +217,7 @@ class RunTerm:
         if raw is None:
             return None
         difference, jacobian = raw
-        white = self._whitened(np.column_stack([difference, jacobian]))
-        white -= self.basis @ (self.basis.T @ white)
+        white = self._innovations(np.column_stack([difference, jacobian]))
         n = difference.size
         scale = sum(
             m.log_scale(b - a) for m, (a, b) in zip(self.models, self.run.stretches, strict=True)
@@ -216,7 +226,21 @@ class RunTerm:
             white[:, 0], white[:, 1:], np.full(n, "friction"), np.arange(n, dtype=np.intp), scale
         )
 
-    def chi2(self, values: Mapping[str, float]) -> float:
+    def chi2_of_many(
+        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
+    ) -> Float:
+        """Sums of the squared innovations; see `DataTerm`."""
+        return np.array([self._chi2(v) for v in values])
+
+    def thinned(self, rows: int, data: int = 0) -> None:
+        """A recording has no rows."""
+        return
+
+    def observed(self) -> dict[str, Float]:
+        """Times and friction."""
+        return {"time": self.run.time, "friction": self.run.friction}
+
+    def _chi2(self, values: Mapping[str, float]) -> float:
         """Sum of the squared innovations; infinite where the motion cannot be computed.
 
         The motion is remembered, for the same values under another noise, until the noise of the
@@ -225,12 +249,13 @@ class RunTerm:
         key = tuple(values.values())
         if key not in self._differences:
             raw = self.departures(values)
+            while len(self._differences) >= _REMEMBERED:
+                del self._differences[next(iter(self._differences))]
             self._differences[key] = None if raw is None else raw[0]
         difference = self._differences[key]
         if difference is None:
             return math.inf
-        white = self._whitened(difference[:, None])[:, 0]
-        white -= self.basis @ (self.basis.T @ white)
+        white = self._innovations(difference)
         return float(white @ white)
 
     def departures(self, values: Mapping[str, float]) -> tuple[Float, Float] | None:
@@ -242,27 +267,32 @@ class RunTerm:
             if inner is not None:
                 given[inner] = values[name]
                 free.append(name)
-        gain = given.pop(GAIN, 1.0)
-        inner_names = tuple(n for name in free if (n := str(self.inner(name))) != GAIN)
-        at = self.run.at
-        if self.gauge is not None:
-            at, rate = self.filter_times()
-        computed = self.motion(given, inner_names, self.run.drive, at)
+        inner_names = tuple(str(self.inner(name)) for name in free)
+        computed = self.motion(given, inner_names, self.run.drive, self.reading)
         if computed is None:
             return None
-        whole = np.column_stack([computed.friction, computed.derivatives])
-        if self.gauge is not None:
-            poles = low_pass(*self.gauge)
-            whole = np.column_stack(
-                [self._as_recorded(filtered(c, rate, *poles), rate) for c in whole.T]
-            )
-        slopes = dict(zip(inner_names, gain * whole[:, 1:].T, strict=True))
-        slopes[GAIN] = whole[:, 0]
         jacobian = np.zeros((self.run.time.size, len(values)))
-        for j, name in enumerate(values):
-            if name in free:
-                jacobian[:, j] = slopes[str(self.inner(name))]
-        return gain * whole[:, 0] - self.run.friction, jacobian
+        jacobian[:, [name in free for name in values]] = computed.derivatives
+        return computed.friction - self.run.friction, jacobian
+
+    def likelihood(self, names: tuple[str, ...]) -> tuple[RunLikelihood, RunArrays]:
+        """The likelihood as compiled programs evaluate it, and its arrays."""
+        inner = tuple((n, found) for n in names if (found := self.inner(n)) is not None)
+        fixed = {n: np.float64(v) for n, v in {**self.fixed, "W0": self.run.W0}.items()}
+        # Any numbers serve for the template: those of the parameters take their place.
+        template = {**{name: np.float64(1.0) for _, name in inner}, **fixed}
+        arrays, equation = eqx.partition(self.motion.equations(template), eqx.is_array_like)
+        return RunLikelihood(
+            equation, inner, tuple(self.run.stretches), self.motion.room
+        ), RunArrays(
+            jax.tree.map(np.asarray, arrays),
+            fixed,
+            filled_up(self.run.drive),
+            self.reading,
+            self.run.friction,
+            tuple(m.whitening for m in self.models),
+            self.basis,
+        )
 
     def update_noise(self, values: Mapping[str, float]) -> bool:
         """Estimate the noise from the residual at `values`; False if there is no motion."""
@@ -558,39 +588,16 @@ class RunTerm:
         self._white_columns = white
 
     def _whitened(self, columns: Float) -> Float:
-        return np.concatenate(
-            [
-                m.whiten(columns[a:b])
-                for m, (a, b) in zip(self.models, self.run.stretches, strict=True)
-            ]
-        )
+        noise = [m.whitening for m in self.models]
+        return np.asarray(innovations(columns, noise, self.run.stretches))
+
+    def _innovations(self, columns: Float) -> Float:
+        noise = [m.whitening for m in self.models]
+        return np.asarray(innovations(columns, noise, self.run.stretches, self.basis))
 
     def _coefficients(self, difference: Float) -> Float:
         white = self._whitened(difference[:, None])[:, 0]
         return np.asarray(-np.linalg.solve(self._triangle, self.basis.T @ white))
-
-    def _as_recorded(self, values: Float, rate: float) -> Float:
-        """What a line through evenly spaced values has at the samples, or as means over blocks."""
-        if self.run.blocks is None:
-            return between(values, rate, self.run.time)
-        rises = np.concatenate([[0.0], np.cumsum(values[1:] + values[:-1])]) / (2 * rate)
-        edges = self.run.blocks.edges
-        position = np.clip(edges * rate, 0, values.size - 1)
-        k = np.minimum(position.astype(np.intp), values.size - 2)
-        share = position - k
-        beyond = share * (values[k] + 0.5 * share * (values[k + 1] - values[k])) / rate
-        return np.asarray(np.diff(rises[k] + beyond, axis=1)[:, 0] / np.diff(edges, axis=1)[:, 0])
-
-    def filter_times(self) -> tuple[Float, float]:
-        """Times (s) at which the gauge needs the motion, and their rate (Hz)."""
-        assert self.gauge is not None  # asked for by the caller
-        time = self.run.time
-        inside = 1 if self.run.blocks is None else _BLOCK_SAMPLES
-        rate = max(inside / float(np.median(np.diff(time))), _FILTER_SAMPLES * self.gauge[1])
-        # The last block ends after its middle.
-        end = float(self.run.at.flat[-1])
-        count = math.ceil(end * rate) + 1
-        return np.minimum(np.arange(count) / rate, end), rate
 
 
 def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:

@@ -58,10 +58,21 @@ class Weights(NamedTuple):
         As `log_scale` of `Residuals`, of each row.
     """
 
-    matrix: Float
-    target: Float
+    matrix: Any
+    target: Any
     reported: NDArray[np.bool_]
     log_scales: Float
+
+    def compared(self, columns: Any) -> Any:
+        """Residuals of predictions, shape (..., rows, columns) to (..., rows, slots).
+
+        0 in slots that a row does not report. Of NumPy and of JAX arrays.
+        """
+        return self.along(columns) - self.target
+
+    def along(self, columns: Any) -> Any:
+        """Changes of the residuals with changes of the predictions, of the same shapes."""
+        return (self.matrix @ columns[..., None])[..., 0]
 
     @property
     def log_scale(self) -> float:
@@ -158,15 +169,10 @@ def residuals_of(
     derivatives : mapping of str to Prediction
         Derivative of the prediction at each row, by free parameter.
     """
-
-    def compared(columns: Float) -> Float:
-        found: Float = np.einsum("rsc,rc->sr", weights.matrix, columns)[reported]
-        return found
-
     reported = weights.reported.T
     slots, rows = np.nonzero(reported)
-    values = compared(columns_of(predicted)) - weights.target.T[reported]
-    slopes = [compared(_slopes_of(predicted, d)) for d in derivatives.values()]
+    values = weights.compared(columns_of(predicted)).T[reported]
+    slopes = [weights.along(_slopes_of(predicted, d)).T[reported] for d in derivatives.values()]
     return Residuals(
         values,
         np.column_stack(slopes) if slopes else np.zeros((values.size, 0)),

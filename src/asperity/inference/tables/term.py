@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import math
+from collections.abc import Mapping, Sequence
 from copy import copy
-from functools import partial
+from dataclasses import dataclass
+from functools import cache, partial
 from typing import Any
 
 import jax
@@ -26,7 +28,7 @@ from asperity.inference.tables.residuals import (
 from asperity.inference.tables.table import LockInTable
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
-from asperity.orbit import KnownOrbits, Outcome, response_function
+from asperity.orbit import KnownOrbits, Outcome, ResponseFunction, response_function
 from asperity.parameters import law_parameters
 
 Float = NDArray[np.float64]
@@ -35,6 +37,10 @@ Float = NDArray[np.float64]
 _REMEMBERED = 2048
 #: Largest share of readings that are named as outliers.
 _FEW = 0.05
+#: Evaluations of an integral, and where searched orbits take a hundred times as long.
+_SAMPLES, _SEARCHED_SAMPLES = 1024, 128
+#: How many times the rows that are kept a table must have to be thinned.
+_MANY = 4
 
 
 class LockInTerm:
@@ -71,9 +77,8 @@ class LockInTerm:
     @property
     def noise(self) -> dict[str, Any]:
         """Independent normal errors, as the table gives them."""
-        count = sum(int(np.isfinite(v).sum()) for v in self.table.values.values())
         kind = "correlated within a row" if self.table.covariances else "independent"
-        return {"model": f"{kind}, normal, as given", "effective_samples": count}
+        return {"model": f"{kind}, normal, as given", "effective_samples": self._count}
 
     @property
     def weights(self) -> Weights:
@@ -94,6 +99,14 @@ class LockInTerm:
         finite = np.isfinite(found.values).all() and np.isfinite(found.jacobian).all()
         return found if finite else None
 
+    def likelihood(
+        self, names: tuple[str, ...]
+    ) -> tuple[LockInLikelihood, tuple[dict[str, Float], Weights]]:
+        """The likelihood as compiled programs evaluate it, and its arrays."""
+        f = self.forward
+        compiled = LockInLikelihood(f.law, f.inertia, f.radiation_damping, f.uses_search)
+        return compiled, (f.fixed, self.weights)
+
     def with_rows(self, kept: NDArray[np.bool_]) -> LockInTerm:
         """The same for some of the rows."""
         forward = copy(self.forward)
@@ -111,28 +124,14 @@ class LockInTerm:
         return found
 
     def chi2_of_many(
-        self, unknowns: Sequence[Unknown], u: Float, *, near: bool = False, least: float = 1.0
+        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
     ) -> Float:
-        """chi-squared at many coordinates of the unknowns, shapes (samples, n) to (samples,).
-
-        Parameters
-        ----------
-        unknowns : sequence of Unknown
-        u : array, shape (samples, n)
-        near : bool
-            Whether orbits are like those of the last call of `residuals`, and begun there.
-        least : float
-            Share of the rows that must have a periodic orbit, or else it is infinite; it is that
-            of those rows, scaled to all.
-        """
-        weights, rows = self.weights, self.table.rows
-        values = {
-            k.name: np.repeat(np.asarray(k.to_value(u[:, i])), rows) for i, k in enumerate(unknowns)
-        }
-        predicted, outcome = self.forward.predicted(values, repeats=len(u), near=near)
-        columns = columns_of(predicted).reshape(len(u), rows, -1)
-        residuals = np.einsum("rsc,nrc->nrs", weights.matrix, columns) - weights.target
-        solved = (outcome == Outcome.CONVERGED).reshape(len(u), rows)
+        """chi-squared at many sets of parameters, by one call; see `DataTerm`."""
+        weights, rows, sets = self.weights, self.table.rows, len(values)
+        free = {n: np.repeat([v[n] for v in values], rows) for n in values[0]}
+        predicted, outcome = self.forward.predicted(free, repeats=sets, near=near)
+        residuals = weights.compared(columns_of(predicted).reshape(sets, rows, -1))
+        solved = (outcome == Outcome.CONVERGED).reshape(sets, rows)
         share = np.maximum(solved.mean(1), 1 / rows)
         total = np.sum(np.where(solved[..., None], residuals, 0.0) ** 2, (1, 2)) / share
         return np.where(share >= least, np.nan_to_num(total, nan=np.inf), np.inf)
@@ -142,9 +141,40 @@ class LockInTerm:
         """Whether every call searches for the orbits that the fast method does not find."""
         return self.forward.uses_search
 
-    def search_from_now_on(self) -> None:
-        """Search for the orbits that the fast method does not find, at every call."""
-        self.forward.search_from_now_on()
+    def use_search(self, always: bool) -> None:
+        """Search for the orbits that the fast method does not find at every call, or no more."""
+        self.forward.uses_search = always
+
+    @property
+    def affordable(self) -> int:
+        """Evaluations that an integral may take."""
+        return _SEARCHED_SAMPLES if self.searches else _SAMPLES
+
+    @property
+    def _count(self) -> int:
+        """Number of readings."""
+        return sum(int(np.isfinite(v).sum()) for v in self.table.values.values())
+
+    def thinned(self, rows: int, data: int = 0) -> LockInTerm | None:
+        """The same for few rows that are spread over the operating points; see `DataTerm`."""
+        table = self.table
+        kept = max(rows, math.ceil(data / max(self._count / table.rows, 1e-9)))
+        if table.rows < _MANY * kept:
+            return None
+        # Points that lie close together repeat each other.
+        order = np.lexsort([table.points[name] for name in ("epsilon", "frequency", "V")])
+        chosen = order[np.linspace(0, table.rows - 1, kept).round().astype(int)]
+        return self.with_rows(np.isin(np.arange(table.rows), chosen))
+
+    def uncertainty_of_noise(
+        self, values: Mapping[str, float], slopes: Float, covariance: Float
+    ) -> tuple[Float, Float]:
+        """Nothing: uncertainties of readings are given."""
+        return np.zeros_like(covariance), np.zeros(slopes.size)
+
+    def observed(self) -> dict[str, Float]:
+        """Operating points and readings."""
+        return {**self.table.points, **self.table.values}
 
     def warnings(
         self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
@@ -245,12 +275,8 @@ class Forward:
         """
         search = self.uses_search if search is None else search
         applied = self.fixed["epsilon"]
-        ratio = free.get("eps_ratio", self.fixed.get("eps_ratio", np.ones(1)))
-        given = {n: v for n, v in self.fixed.items() if n != "eps_ratio"}
-        given |= {n: np.full(self.table.rows, v) for n, v in free.items() if n != "eps_ratio"}
-        given["epsilon"] = applied * ratio
         function = self._whole if search else self._quick
-        given = {n: v for n, v in given.items() if n in function.parameters}
+        given = parameters_at(self.fixed, free, function)
         known = self._nearest(free) if search else None
         values, slopes = function.value_and_jacobian(given, known, every=every)
         if known is not None and all_converged(np.asarray(values.outcome)):
@@ -293,11 +319,9 @@ class Forward:
         near : bool
             Whether orbits are like those of the last call with derivatives, and begun there.
         """
-        fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
-        given = {n: v for n, v in (fixed | dict(free)).items() if n != "eps_ratio"}
-        given["epsilon"] = fixed["epsilon"] * (fixed | dict(free)).get("eps_ratio", 1.0)
         function = self._whole if self.uses_search else self._quick
-        given = {n: v for n, v in given.items() if n in function.parameters}
+        fixed = {n: np.tile(v, repeats) for n, v in self.fixed.items()}
+        given = parameters_at(fixed, free, function)
         last = self._visited[-1][1] if self._visited else KnownOrbits(self.table.rows)
         parts, together = [], function.compiled_points(1)
         for start in range(0, repeats * self.table.rows, together):
@@ -310,10 +334,6 @@ class Forward:
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)
         )
         return Prediction(mean, steady, harmonics), outcome
-
-    def search_from_now_on(self) -> None:
-        """Search for the points that the fast method does not find, at every call."""
-        self.uses_search = True
 
     def forget_orbits(self) -> None:
         """Search from nothing at the next call."""
@@ -340,14 +360,35 @@ class Forward:
         return nearest.picked(np.arange(self.table.rows))
 
 
-def any_searched(terms: Iterable[object]) -> bool:
-    """Whether orbits of a table are searched for at every call."""
-    return any(isinstance(term, LockInTerm) and term.searches for term in terms)
-
-
 def all_converged(outcome: NDArray[np.int64]) -> bool:
     """Whether every row has an orbit."""
     return bool((outcome == Outcome.CONVERGED).all())
+
+
+def parameters_at(
+    fixed: Mapping[str, Any], free: Mapping[str, Any], function: ResponseFunction
+) -> dict[str, Any]:
+    """Parameters of a response at the rows of a table, with the amplitude on the contacts.
+
+    Parameters
+    ----------
+    fixed : mapping of str to array, shape (rows,)
+        `epsilon` is as applied.
+    free : mapping of str to float or array, shape (rows,)
+        Those that do not belong to the response are left out.
+    function : ResponseFunction
+    """
+    given = on_contacts({**fixed, **free})
+    rows = np.shape(fixed["epsilon"])
+    module = jnp if any(isinstance(v, jax.core.Tracer) for v in given.values()) else np
+    return {n: module.broadcast_to(v, rows) for n, v in given.items() if n in function.parameters}
+
+
+def on_contacts(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Parameters with the amplitude of the modulation that the contacts carry, eps_ratio of it."""
+    given = dict(parameters)
+    given["epsilon"] = given["epsilon"] * given.pop("eps_ratio", 1.0)
+    return given
 
 
 def _steady(
@@ -358,20 +399,70 @@ def _steady(
     By a program for `compiled` rows.
     """
     rows = len(given["V"])
-    own = {p: np.pad(given[p], (0, compiled - rows), "edge") for p in (*law_parameters(law), "V")}
-    value, slopes = _steady_friction(own, own.pop("V"), law=law)
+    padded = {
+        p: np.pad(given[p], (0, compiled - rows), "edge") for p in (*law_parameters(law), "V")
+    }
+    value, slopes = _steady_slopes(padded, law=law)
     return np.asarray(value)[:rows], {n: np.asarray(s)[:rows] for n, s in slopes.items()}
 
 
 @partial(jax.jit, static_argnames=("law",))
-def _steady_friction(
-    own: Mapping[str, Array], V: Array, *, law: type[Law]
-) -> tuple[Array, dict[str, Array]]:
-    fields = {f.rstrip("_"): f for f in law.__dataclass_fields__}
-
-    def mu(values: Mapping[str, Array]) -> Array:
-        return law(**{fields[n]: v for n, v in values.items()}).mu_ss(V)
-
+def _steady_slopes(given: Mapping[str, Array], *, law: type[Law]) -> tuple[Array, dict[str, Array]]:
+    V = given["V"]
     # Rows do not depend on each other: the sum's gradient is each row's own derivative.
-    value, pull = jax.vjp(mu, dict(own))
+    value, pull = jax.vjp(
+        lambda numbers: steady_friction(law, {**numbers, "V": V}),
+        {n: v for n, v in given.items() if n != "V"},
+    )
     return value, pull(jnp.ones_like(value))[0]
+
+
+def steady_friction(law: type[Law], given: Mapping[str, Array]) -> Array:
+    """mu_ss(V) at each row, for parameters of shape (rows,)."""
+    fields = {f.rstrip("_"): f for f in law.__dataclass_fields__}
+    return law(**{fields[n]: given[n] for n in law_parameters(law)}).mu_ss(given["V"])
+
+
+@dataclass(frozen=True)
+class LockInLikelihood:
+    """Log likelihood of a table but for a constant, within compiled programs.
+
+    Attributes
+    ----------
+    law : type of Law
+    inertia, radiation_damping : bool
+    search : bool
+        Whether orbits that the fast method does not find are searched for, which takes long.
+    """
+
+    law: type[Law]
+    inertia: bool
+    radiation_damping: bool
+    search: bool
+
+    def __call__(self, values: Mapping[str, Array], data: tuple[dict[str, Any], Weights]) -> Array:
+        """Log likelihood of parameters by name; those of other data are left alone.
+
+        Parameters
+        ----------
+        values : mapping of str to array, shape ()
+        data : (dict of str to array, Weights)
+            Parameters that are not free, of shape (rows,), and the weights of the residuals.
+        """
+        fixed, weights = data
+        function = _response(self.law, self.inertia, self.radiation_damping, self.search)
+        given = parameters_at(fixed, values, function)
+        found = function(given)
+        predicted = Prediction(
+            found.mean_friction, steady_friction(self.law, given), found.harmonics
+        )
+        return -0.5 * jnp.sum(weights.compared(columns_of(predicted, jnp)) ** 2)
+
+
+@cache
+def _response(
+    law: type[Law], inertia: bool, radiation_damping: bool, search: bool
+) -> ResponseFunction:
+    return response_function(
+        law, inertia=inertia, radiation_damping=radiation_damping, search=search
+    )

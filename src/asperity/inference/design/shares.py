@@ -1,0 +1,471 @@
+"""Optimal shares of the budget: criteria of a design, and the shares that maximise them.
+
+A criterion is a concave function of the information that the readings add up to.
+
+A design is a measure n over candidates: the number of readings of each, whole or not. Readings are
+independent, so that the information matrix is the sum of n_i M_i, plus that of priors.
+
+`Determinant` measures parameters (D_s-optimality: the determinant of their covariance matrix, the
+others estimated beside them). `Misfit` excludes a law (T-optimality: the smallest chi-squared that
+the rival can reach; Atkinson and Fedorov, Biometrika 62, 57, 1975).
+
+Shares: the budget is a unit of readings or of time, each candidate's share is what is spent on it.
+The candidate of the largest derivative joins the support, the shares on the support are optimised,
+and so on, until the general equivalence theorem (Kiefer and Wolfowitz, 1960) says that no design
+is better by more than the tolerance: a concave criterion exceeds its value at a design by at most
+the largest derivative less the mean derivative of the design. Whole readings follow from them.
+
+Designs are compared with an even grid of the same budget.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize
+
+Float = NDArray[np.float64]
+
+#: Added to the diagonal of an information matrix, relative to its scale, so that it has an inverse.
+_RIDGE = 1e-11
+
+
+class Criterion(Protocol):
+    """A concave, increasing function of the numbers of readings.
+
+    Attributes
+    ----------
+    size : int
+        Number of candidates.
+    """
+
+    @property
+    def size(self) -> int:
+        """Number of candidates."""
+        ...
+
+    def value(self, n: Float) -> float:
+        """Criterion of a design n, shape (candidates,)."""
+        ...
+
+    def gradient(self, n: Float) -> Float:
+        """Derivatives to the number of readings of each candidate, shape (candidates,)."""
+        ...
+
+    def exchanged(self, n: Float) -> Float:
+        """Criterion of n with one more reading, for each candidate, shape (candidates,)."""
+        ...
+
+    def least_efficiency(self, gap: float, value: float) -> float:
+        """Share of the information of the best design that is reached at least.
+
+        Parameters
+        ----------
+        gap : float
+            By how much the best design can exceed `value` at most.
+        """
+        ...
+
+    def restricted(self, rows: NDArray[np.intp]) -> Criterion:
+        """The same for some of the candidates."""
+        ...
+
+
+class Determinant:
+    """-ln det of the covariance matrix of some parameters, averaged over draws.
+
+    Parameters
+    ----------
+    information : array, shape (draws, candidates, p, p)
+        Fisher information of one reading.
+    prior : array, shape (draws, p, p)
+        Information of priors.
+    interest : sequence of int
+        The parameters to be measured; all of them for D-optimality.
+    """
+
+    def __init__(self, information: Float, prior: Float, interest: Sequence[int]) -> None:
+        self.information, self.prior = information, prior
+        p = information.shape[-1]
+        self.interest = list(interest)
+        self.others = [i for i in range(p) if i not in self.interest]
+        largest = np.einsum("kiaa->ka", information) + np.einsum("kaa->ka", prior)
+        ridge = _RIDGE * np.where(largest > 0, largest, 1.0) / max(information.shape[1], 1)
+        self._ridge = np.einsum("ka,ab->kab", ridge, np.eye(p))
+
+    @property
+    def size(self) -> int:
+        """Number of candidates."""
+        return int(self.information.shape[1])
+
+    def total(self, n: Float) -> Float:
+        """Information matrix of each draw, shape (draws, p, p)."""
+        summed = np.einsum("i,kiab->kab", n, self.information)
+        return np.asarray(summed + self.prior + self._ridge)
+
+    def value(self, n: Float) -> float:
+        """Mean over the draws."""
+        return float(self._log_ratio(self.total(n)).mean())
+
+    def _log_ratio(self, total: Float) -> Float:
+        """Ln det M - ln det M22, over the leading axes."""
+        whole = np.linalg.slogdet(total)[1]
+        if not self.others:
+            return np.asarray(whole)
+        block = total[..., self.others, :][..., self.others]
+        return np.asarray(whole - np.linalg.slogdet(block)[1])
+
+    def gradient(self, n: Float) -> Float:
+        """Tr(M^-1 M_i) less the same of the other parameters' block, averaged over the draws."""
+        total = self.total(n)
+        weight = np.linalg.inv(total)
+        if self.others:
+            pick = np.ix_(self.others, self.others)
+            for k in range(len(total)):
+                weight[k][pick] -= np.linalg.inv(total[k][pick])
+        return np.asarray(np.einsum("kab,kiab->i", weight, self.information) / len(total))
+
+    def exchanged(self, n: Float) -> Float:
+        """Criterion with one more reading of each candidate."""
+        total = self.total(n)[:, None] + self.information
+        return self._log_ratio(total).mean(0)
+
+    def least_efficiency(self, gap: float, value: float) -> float:
+        """Of the s-th root of the determinant, which is inverse to a variance."""
+        return float(np.exp(-max(gap, 0.0) / len(self.interest)))
+
+    def restricted(self, rows: NDArray[np.intp]) -> Determinant:
+        """The same for some of the candidates."""
+        part = Determinant(self.information[:, rows], self.prior, self.interest)
+        part._ridge = self._ridge
+        return part
+
+
+class Misfit:
+    """Smallest chi-squared of a rival law whose predictions are linear in its parameters.
+
+    Parameters
+    ----------
+    residual : array, shape (candidates, m)
+        Rival's prediction less the expected reading, in standard uncertainties, at some values of
+        the rival's parameters.
+    jacobian : array, shape (candidates, m, p)
+        Its derivatives there.
+    prior_residual : array, shape (q,)
+        Of the rival's priors.
+    prior_jacobian : array, shape (q, p)
+    """
+
+    def __init__(
+        self, residual: Float, jacobian: Float, prior_residual: Float, prior_jacobian: Float
+    ) -> None:
+        self.residual, self.jacobian = residual, jacobian
+        self.prior_residual, self.prior_jacobian = prior_residual, prior_jacobian
+        self._square = np.einsum("im,im->i", residual, residual)
+        self._slope = np.einsum("imp,im->ip", jacobian, residual)
+        self._curvature = np.einsum("imp,imq->ipq", jacobian, jacobian)
+        self._prior = (
+            float(prior_residual @ prior_residual),
+            prior_jacobian.T @ prior_residual,
+            prior_jacobian.T @ prior_jacobian,
+        )
+        largest = np.einsum("iaa->a", self._curvature) + np.diag(self._prior[2])
+        self._ridge = np.diag(_RIDGE * np.where(largest > 0, largest, 1.0) / max(len(residual), 1))
+
+    @property
+    def size(self) -> int:
+        """Number of candidates."""
+        return len(self.residual)
+
+    def _sums(self, n: Float) -> tuple[float, Float, Float]:
+        square, slope, curvature = self._prior
+        return (
+            square + float(n @ self._square),
+            slope + n @ self._slope,
+            curvature + np.einsum("i,ipq->pq", n, self._curvature) + self._ridge,
+        )
+
+    def step(self, n: Float) -> Float:
+        """Change of the rival's coordinates that minimises chi-squared, shape (p,)."""
+        _, slope, curvature = self._sums(n)
+        return np.asarray(-np.linalg.solve(curvature, slope))
+
+    def value(self, n: Float) -> float:
+        """chi-squared of the refitted rival."""
+        square, slope, curvature = self._sums(n)
+        return float(square - slope @ np.linalg.solve(curvature, slope))
+
+    def gradient(self, n: Float) -> Float:
+        """chi-squared of the refitted rival at each candidate."""
+        refitted = self.residual + self.jacobian @ self.step(n)
+        return np.asarray(np.einsum("im,im->i", refitted, refitted))
+
+    def exchanged(self, n: Float) -> Float:
+        """chi-squared with one more reading of each candidate."""
+        square, slope, curvature = self._sums(n)
+        slopes = slope + self._slope
+        steps = np.linalg.solve(curvature + self._curvature, slopes[..., None])[..., 0]
+        return np.asarray(square + self._square - np.einsum("ip,ip->i", slopes, steps))
+
+    def least_efficiency(self, gap: float, value: float) -> float:
+        """Of chi-squared."""
+        return float(value / (value + max(gap, 0.0))) if value > 0 else 0.0
+
+    def restricted(self, rows: NDArray[np.intp]) -> Misfit:
+        """The same for some of the candidates."""
+        part = Misfit(
+            self.residual[rows], self.jacobian[rows], self.prior_residual, self.prior_jacobian
+        )
+        part._ridge = self._ridge
+        return part
+
+
+Whole = NDArray[np.int64]
+
+#: Largest part of the information of the best design that may be missing.
+_TOLERANCE = 1e-3
+_ROUNDS = 200
+#: Shares below this are none.
+_NEGLIGIBLE = 1e-5
+#: Candidates that join the support at once.
+_JOINING = 3
+_MULTIPLICATIVE_STEPS = 200
+#: Sweeps of exchanges of whole readings.
+_SWEEPS = 30
+
+
+@dataclass(frozen=True, eq=False)
+class Shares:
+    """Shares of the budget and how good they are.
+
+    Attributes
+    ----------
+    shares : array, shape (candidates,)
+        Sum 1.
+    efficiency : float
+        Share of the information of the best design that is reached at least.
+    """
+
+    shares: Float
+    efficiency: float
+
+
+def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = None) -> Shares:
+    """Shares of the budget that maximise a criterion.
+
+    Parameters
+    ----------
+    criterion : Criterion
+    readings : array, shape (candidates,)
+        Readings of each candidate if it gets the whole budget.
+    start : array, shape (candidates,), optional
+        Shares to start from.
+    """
+    shares = np.full(criterion.size, 1 / criterion.size) if start is None else start
+    best, efficiency = shares, 0.0
+    reduced = False
+    for _ in range(_ROUNDS):
+        slope = criterion.gradient(shares * readings) * readings
+        gap = float(slope.max() - shares @ slope)
+        value = criterion.value(shares * readings)
+        reached = criterion.least_efficiency(gap, value)
+        if reached > efficiency:
+            best, efficiency = shares, reached
+        if efficiency >= 1 - _TOLERANCE:
+            break
+        if not reduced:
+            # The best candidates of the even start; the rest comes back if it is needed.
+            few = min(criterion.size, 60)
+            support = np.union1d(
+                np.argsort(-slope)[:few], np.flatnonzero(shares > 2 / criterion.size)
+            )
+            reduced = True
+        else:
+            support = np.flatnonzero(shares > _NEGLIGIBLE)
+            support = np.union1d(support, np.argsort(-slope)[:_JOINING])
+        on_support = np.where(shares[support] > 0, shares[support], 0.0)
+        on_support = 0.9 * on_support / max(on_support.sum(), 1e-300) + 0.1 / support.size
+        found = _on_support(criterion.restricted(support), readings[support], on_support)
+        shares = np.zeros(criterion.size)
+        shares[support] = np.where(found > _NEGLIGIBLE, found, 0.0)
+        shares /= shares.sum()
+    return Shares(best, efficiency)
+
+
+def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
+    """Optimal shares of a few candidates."""
+    # Multiplicative steps always improve a little; the quadratic method finishes.
+    shares = start
+    for _ in range(_MULTIPLICATIVE_STEPS // 10):
+        shares = _multiplied(criterion, readings, shares)
+    found = minimize(
+        lambda s: -criterion.value(s * readings),
+        shares,
+        jac=lambda s: -criterion.gradient(s * readings) * readings,
+        bounds=[(0.0, 1.0)] * shares.size,
+        constraints=[
+            {"type": "eq", "fun": lambda s: s.sum() - 1, "jac": lambda s: np.ones_like(s)}
+        ],
+        method="SLSQP",
+        options={"maxiter": 200, "ftol": 1e-12},
+    )
+    improved = np.clip(found.x, 0.0, None)
+    if np.isfinite(improved).all() and improved.sum() > 0:
+        improved /= improved.sum()
+        if criterion.value(improved * readings) >= criterion.value(shares * readings):
+            return np.asarray(improved)
+    for _ in range(_MULTIPLICATIVE_STEPS):
+        shares = _multiplied(criterion, readings, shares)
+    return shares
+
+
+def _multiplied(criterion: Criterion, readings: Float, shares: Float) -> Float:
+    """A multiplicative step (Silvey, Titterington and Torsney, 1978)."""
+    slope = np.maximum(criterion.gradient(shares * readings) * readings, 0.0)
+    grown = shares * np.sqrt(slope)
+    return grown / grown.sum() if grown.sum() > 0 else shares
+
+
+def whole_readings(criterion: Criterion, cost: Float, total: float, shares: Float) -> Whole:
+    """Whole numbers of readings within the budget, from optimal shares by exchanges.
+
+    Parameters
+    ----------
+    criterion : Criterion
+    cost : array, shape (candidates,)
+        Of a reading.
+    total : float
+        What may be spent.
+    shares : array, shape (candidates,)
+    """
+    n = np.floor(shares * total / cost + 1e-9)
+    slack = total * (1 + 1e-12)
+    n = _filled(criterion, cost, slack, n)
+    for _ in range(_SWEEPS):
+        value, improved = criterion.value(n), False
+        for j in np.flatnonzero(n):
+            if n[j] < 1:
+                continue
+            fewer = n.copy()
+            fewer[j] -= 1
+            gain = criterion.exchanged(fewer)
+            gain[cost > slack - fewer @ cost] = -math.inf
+            i = int(np.argmax(gain))
+            if i != j and gain[i] > value + 1e-9 * max(abs(value), 1.0):
+                fewer[i] += 1
+                n = _filled(criterion, cost, slack, fewer)
+                value, improved = criterion.value(n), True
+        if not improved:
+            break
+    return n.astype(np.int64)
+
+
+def _filled(criterion: Criterion, cost: Float, total: float, n: Float) -> Float:
+    """Readings added one by one, each where it gains most for its cost, until none fits."""
+    n = n.copy()
+    while True:
+        left = total - float(n @ cost)
+        fits = cost <= left
+        if not fits.any():
+            return n
+        gain = np.where(fits, (criterion.exchanged(n) - criterion.value(n)) / cost, -math.inf)
+        n[int(np.argmax(gain))] += 1
+
+
+@dataclass(frozen=True, eq=False)
+class EvenGrid:
+    """A full factorial over the axes of a plan.
+
+    Attributes
+    ----------
+    levels : tuple of int
+        Number of levels along each axis.
+    rows : int array
+        Candidates on the grid.
+    size : int
+        Points of the grid, those that are no candidates included.
+    """
+
+    levels: tuple[int, ...]
+    rows: NDArray[np.intp]
+    size: int
+
+    def readings(self, cost: Float, total: float) -> Float:
+        """Readings of each candidate, equally many at each point of the grid."""
+        n = np.zeros(len(cost))
+        n[self.rows] = total / cost[self.rows].sum()
+        return n
+
+
+def even_grid(
+    shape: tuple[int, ...], index: NDArray[np.intp], cost: Float, total: float
+) -> EvenGrid:
+    """The grid whose usable points come nearest to the budget with one reading each.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Number of levels of each axis in the plan.
+    index : int array, shape (candidates,)
+        Number of each candidate among all combinations.
+    cost : array, shape (candidates,)
+    total : float
+    """
+    usable = np.full(int(np.prod(shape)), -1)
+    usable[index] = np.arange(index.size)
+    usable = usable.reshape(shape)
+    best: tuple[tuple[float, float], EvenGrid] | None = None
+    for levels in itertools.product(*(range(min(2, s), s + 1) for s in shape)):
+        picks = [
+            np.unique(np.rint(np.linspace(0, s - 1, m)).astype(int))
+            for s, m in zip(shape, levels, strict=True)
+        ]
+        rows = usable[np.ix_(*picks)].ravel()
+        rows = rows[rows >= 0]
+        if not rows.size:
+            continue
+        spent = float(cost[rows].sum())
+        # Nearest in budget; of those, the one with the most equal numbers of levels.
+        rank = (round(abs(np.log(spent / total)), 1), float(np.std(np.log(levels))))
+        if best is None or rank < best[0]:
+            grid = EvenGrid(tuple(len(p) for p in picks), rows, int(np.prod(levels)))
+            best = rank, grid
+    assert best is not None  # the whole grid has all candidates
+    return best[1]
+
+
+def times_fewer(criterion: Criterion, design: Float, grid: Float) -> float:
+    """How many times the readings of a grid must be for the criterion of a design.
+
+    Parameters
+    ----------
+    criterion : Criterion
+    design, grid : array, shape (candidates,)
+        Readings of the same budget.
+
+    Returns
+    -------
+    float
+        Infinite if the grid does not get there with a million times the readings.
+    """
+    return times_fewer_of(criterion, grid, criterion.value(design))
+
+
+def times_fewer_of(criterion: Criterion, grid: Float, target: float) -> float:
+    """How many times the readings of a grid must be for a value of the criterion."""
+
+    def lacking(log_factor: float) -> float:
+        return criterion.value(np.exp(log_factor) * grid) - target
+
+    low, high = -np.log(1e3), np.log(1e6)
+    if lacking(high) < 0:
+        return float("inf")
+    if lacking(low) > 0:
+        return float(np.exp(low))
+    return float(np.exp(brentq(lacking, low, high, xtol=1e-6)))

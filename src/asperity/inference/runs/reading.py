@@ -1,0 +1,152 @@
+"""What a force gauge records of a motion: samples or means over blocks, behind its low-pass.
+
+A linear function of the friction at computed times, in JAX. The low-pass is a convolution with its
+response to one sample, by fast Fourier transforms.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+from scipy.fft import next_fast_len
+
+from asperity.tribometer.filters import between, filtered, low_pass
+
+Float = NDArray[np.float64]
+
+#: Name of the gauge's gain in the motion of a run, and of that of every run in priors.
+GAIN = "gain"
+#: Computed times, and samples, are filled up to a multiple of this.
+_ROUNDED = 1024
+#: Samples ahead that the filter of evenly spaced samples reads.
+_AHEAD = 2
+#: Samples that the quickest part of the gauge's response is resolved by.
+_FILTER_SAMPLES = 8.0
+#: Samples of the filtered motion in a block.
+_BLOCK_SAMPLES = 4
+
+
+class Reading(eqx.Module):
+    """Numbers of a gauge that records samples, or means over blocks.
+
+    Attributes
+    ----------
+    times : array, shape (m,)
+        At which the motion is computed (s), in order, filled up by the last.
+    index : array of int, shape (n, k)
+        Computed values, or filtered ones, that each sample is read from; for means behind a
+        low-pass, those before the edges of the block.
+    weight : array, shape (n, k)
+        Of those values; for means behind a low-pass, the share of an interval from there to the
+        edge.
+    response : array, shape (size,)
+        Of the low-pass to one sample, from two samples before it on, filled up by zeros; empty
+        without a low-pass.
+    per_length : array, shape (n,)
+        1 over the length of each block, in intervals; empty where there are no means behind a
+        low-pass.
+    means : bool
+        Whether the motion is averaged between each two of the times, for blocks without a low-pass.
+    """
+
+    times: Any
+    index: Any
+    weight: Any
+    response: Any
+    per_length: Any
+    means: bool = eqx.field(static=True)
+
+    def filled_up(self) -> Reading:
+        """The same with the last sample repeated, up to one of a few lengths."""
+        extra = -len(self.index) % _ROUNDED
+
+        def filled(rows: Float) -> Float:
+            return np.concatenate([rows, np.repeat(rows[-1:], extra, axis=0)])
+
+        return replace(
+            self,
+            index=filled(self.index),
+            weight=filled(self.weight),
+            per_length=filled(self.per_length),
+        )
+
+    def recorded(self, friction: Array) -> Array:
+        """Recorded samples, shape (n,).
+
+        Parameters
+        ----------
+        friction : array
+            At the times, or means between each two of them; steady before the first, and as the
+            last afterwards.
+        """
+        if not self.response.size:
+            return jnp.sum(self.weight * friction[self.index], axis=1)
+        first = friction[0]
+        shown = self._filtered(friction - first)
+        if not self.per_length.size:
+            return first + jnp.sum(self.weight * shown[self.index], axis=1)
+        steps = (shown[1:] + shown[:-1]) / 2
+        rises = jnp.append(jnp.zeros(1), jnp.cumsum(steps))
+        before, rise = shown[self.index], shown[self.index + 1] - shown[self.index]
+        at_edges = rises[self.index] + self.weight * (before + self.weight * rise / 2)
+        return first + (at_edges[:, 1] - at_edges[:, 0]) * self.per_length
+
+    def _filtered(self, values: Array) -> Array:
+        """Values at evenly spaced times, the first 0, behind the low-pass."""
+        m, size = values.size, self.response.size
+        moved = jnp.append(values, jnp.full(_AHEAD, values[-1]))
+        transfer = jnp.fft.rfft(self.response)
+        whole = jnp.fft.irfft(jnp.fft.rfft(moved, size) * transfer, size)
+        return whole[_AHEAD : _AHEAD + m]
+
+
+def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> Reading:
+    """The reading of samples at some times, or of means between them.
+
+    Parameters
+    ----------
+    times : array, shape (n,) or (n, 2)
+        Of recorded samples, or beginning and end of each block (s); the last is the latest.
+    gauge : (int, float), optional
+        Order, and corner frequency (Hz), of a Butterworth low-pass.
+    """
+    nothing = np.zeros(0)
+    if gauge is None:
+        at = times if times.ndim == 1 else np.unique(times)
+        index = np.arange(at.size) if times.ndim == 1 else np.searchsorted(at, times[:, 0])
+        weight = np.ones((index.size, 1))
+        return Reading(_filled(at), index[:, None], weight, nothing, nothing, times.ndim == 2)
+    apart = np.median(np.diff(times if times.ndim == 1 else times.mean(axis=1)))
+    inside = 1 if times.ndim == 1 else _BLOCK_SAMPLES
+    rate = max(inside / float(apart), _FILTER_SAMPLES * gauge[1])
+    end = float(times.flat[-1])
+    count = math.ceil(end * rate) + 1
+    at = _filled(np.minimum(np.arange(count) / rate, end))
+    impulse = np.zeros(at.size + 3 * _AHEAD)
+    impulse[2 * _AHEAD] = 1.0
+    response = filtered(impulse, rate, *low_pass(*gauge))[_AHEAD:]
+    # Longer than the two together, so that the end does not reach the beginning.
+    length = next_fast_len(2 * at.size + 2 * _AHEAD, real=True)
+    response = np.append(response, np.zeros(length - response.size))
+    position = np.clip(times * rate, 0, count - 1)
+    if times.ndim == 1:
+        # The cubic through four samples is linear in each of them.
+        k = np.minimum(position.astype(np.intp), max(count - 2, 0))
+        index = np.clip(k[:, None] + np.arange(-1, 3), 0, count - 1)
+        cubic = [between(row, 1.0, 1.0 + position - k) for row in np.eye(4)]
+        return Reading(at, index, np.stack(cubic, axis=1), response, nothing, False)
+    index = np.minimum(position.astype(np.intp), count - 2)
+    per_length = 1 / (np.diff(times)[:, 0] * rate)
+    return Reading(at, index, position - index, response, per_length, False)
+
+
+def _filled(times: Float) -> Float:
+    """Times with the last one repeated, up to one of a few lengths."""
+    return np.concatenate([times, np.full(-times.size % _ROUNDED, times[-1])])
