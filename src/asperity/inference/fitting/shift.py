@@ -39,12 +39,13 @@ def shift_of_estimates(
     InputError
         If the fit is of anything but one table of lock-in readings.
     """
-    (term,) = fit.objective.terms if len(fit.objective.terms) == 1 else (None,)
-    if not isinstance(term, LockInTerm):
+    tables = fit.objective.terms_of(LockInTerm)
+    if len(tables) != 1 or len(fit.objective.terms) != 1:
         raise InputError(
             f"fit must be of one table of lock-in readings, got {len(fit.objective.terms)} parts; "
             "fit the table alone"
         )
+    (term,) = tables
     sides = []
     for change in (high, low):
         forward = Forward(fit.objective.law, term.table, {**fit.objective.fixed, **change})
