@@ -86,12 +86,12 @@ def sourced_numbers(
         if isinstance(value, SourcedNumber):
             numbers[name] = value
             continue
-        found = known[name].check(value)
-        if np.ndim(found):
+        result = known[name].check(value)
+        if np.ndim(result):
             raise InputError(
                 f"{known[name].label} must be one number, got {shown(value)}; give a single value"
             )
-        numbers[name] = SourcedNumber(float(found), origin)
+        numbers[name] = SourcedNumber(float(result), origin)
     if material is None:
         return numbers
     offered = {

@@ -14,7 +14,8 @@ from pathlib import Path
 
 import pytest
 
-from asperity.app import connections, security
+from asperity.app import security
+from asperity.app import server as app_server
 from asperity.app.api import TABS
 from asperity.app.api.protocols import checked
 from asperity.app.endpoints import Upload
@@ -207,7 +208,7 @@ def is_ended(connection, again, times=600):
 
 @pytest.mark.parametrize("kind", beginnings(type("", (), {"port": 0})))
 def test_a_client_that_does_not_go_on_is_ended(server, ask, monkeypatch, kind):
-    monkeypatch.setattr(connections, "HEAD_PAUSE", 0.5)
+    monkeypatch.setattr(app_server, "HEAD_PAUSE", 0.5)
     monkeypatch.setattr(security, "BODY_PAUSE", 0.5)
     first, again = beginnings(server)[kind]
     with opened(server) as connection:
@@ -234,7 +235,7 @@ def test_a_body_that_comes_as_a_file_is_read_may_take_longer_than_a_pause(server
 
 @pytest.mark.parametrize("kind", ["nothing", "half a head", "half a body", "slow pieces"])
 def test_connections_that_are_held_leave_room(server, ask, monkeypatch, kind):
-    monkeypatch.setattr(connections, "MOST", 20)
+    monkeypatch.setattr(app_server, "MOST", 20)
     first, _ = beginnings(server)[kind]
     held = []
     try:

@@ -222,9 +222,9 @@ def test_a_port_that_is_taken_is_told(server):
 def test_without_the_extra_there_is_a_sentence(monkeypatch):
     from click.testing import CliRunner
 
-    from asperity.app import dependencies
+    from asperity.app import server
 
-    monkeypatch.setattr(dependencies, "_PACKAGES", ("no_such_package_anywhere",))
+    monkeypatch.setattr(server, "_PACKAGES", ("no_such_package_anywhere",))
     result = CliRunner().invoke(main, ["serve"])
     assert result.exit_code == 2
     assert "pip install 'asperity[app]'" in result.stderr

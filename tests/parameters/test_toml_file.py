@@ -15,7 +15,7 @@ from asperity.errors import InputError
 from asperity.inference import read_table
 from asperity.inference.design.plan_file import read_plan
 from asperity.ledger.contents import read_contents
-from asperity.parameters import file_content
+from asperity.parameters import toml_file
 from asperity.parameters.toml_file import parsed_toml
 from asperity.protocol import load_protocol
 from asperity.recording.recipe import load_recipe
@@ -95,7 +95,7 @@ def test_files_without_an_end_are_refused(tmp_path: Path, monkeypatch: pytest.Mo
             reader(Path("/dev/zero"))
     with pytest.raises(InputError, match="must be a regular file, got '/dev/zero', a device"):
         read_table("/dev/zero")
-    monkeypatch.setattr(file_content, "LARGEST", 1000)
+    monkeypatch.setattr(toml_file, "LARGEST", 1000)
     (tmp_path / "long.toml").write_text("title = 'x'\n" + "#" * 1000)
     with pytest.raises(InputError, match="it has more than 1,000 bytes"):
         load_plan(tmp_path / "long.toml")

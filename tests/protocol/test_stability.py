@@ -4,7 +4,7 @@ import pytest
 
 from asperity.errors import InputError
 from asperity.protocol import Protocol
-from asperity.protocol.stability import stability_statement
+from asperity.protocol.run import stability_statement
 
 
 def protocol(ratio, law="rice-ruina", **more):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, freqs
 
-from asperity.tribometer.filters import between, filtered, low_pass
+from asperity.tribometer.sensors import between, filtered, low_pass
 
 RATE, F = 10_000.0, 120.0
 TIME = np.arange(0, 1.0, 1 / RATE)

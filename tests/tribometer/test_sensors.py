@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from asperity.errors import InputError
-from asperity.tribometer.filters import filtered, low_pass
 from asperity.tribometer.sensors import (
     Accelerometer,
     DisplacementGauge,
     LoadCell,
     SpringGauge,
+    filtered,
+    low_pass,
 )
 
 RATE = 20_000.0

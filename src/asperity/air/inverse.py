@@ -158,14 +158,14 @@ def _invert(
     roots = _roots(log_fraction, np.array(knots), target)
     values = np.exp(np.append(scan, [log_fraction(k) for k in knots]))
     lowest, highest = float(values.min()), float(values.max())
-    found = tuple(float(np.exp(r)) for r in roots)
+    result = tuple(float(np.exp(r)) for r in roots)
     text = "found"
-    if not found:
+    if not result:
         text = (
             f"no {field} between {lower:g} and {upper:g} m gives eps_eff/eps = {ratio:g}; "
             f"there it ranges from {lowest:.6g} to {highest:.6g}"
         )
-    return InverseResult(found, lowest, highest, text)
+    return InverseResult(result, lowest, highest, text)
 
 
 def _limits(bracket: tuple[float, float]) -> tuple[float, float]:
@@ -186,7 +186,7 @@ def _extrema(
 
     slope = np.diff(scan)
     (steps,) = np.nonzero(np.abs(slope) > _FLAT)
-    found = []
+    result = []
     for left, right in pairwise(steps):
         if slope[left] * slope[right] < 0:
             sign = np.sign(slope[right])
@@ -197,8 +197,8 @@ def _extrema(
                 method="bounded",
                 options={"xatol": 1e-12},
             )
-            found.append(float(best.x))
-    return found
+            result.append(float(best.x))
+    return result
 
 
 def _roots(
@@ -207,13 +207,13 @@ def _roots(
     """One root for every monotone piece between `knots` that passes through `target`."""
     from scipy.optimize import brentq
 
-    found: list[float] = []
+    result: list[float] = []
     excess = [function(k) - target for k in knots]
     for i in range(len(knots) - 1):
         if excess[i] * excess[i + 1] > 0:
             continue
         root = float(brentq(lambda x: function(x) - target, knots[i], knots[i + 1], xtol=1e-15))
-        new = not found or root - found[-1] > _FLAT
+        new = not result or root - result[-1] > _FLAT
         if new and abs(function(root) - target) < _CLOSE:
-            found.append(root)
-    return found
+            result.append(root)
+    return result

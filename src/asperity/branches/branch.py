@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from asperity._version import __version__
 from asperity.branches.parameters import fixed_as_text
 from asperity.orbit.floquet import from_logs
-from asperity.parameters.display import Displayed, SummaryLine, count_text, number_line
+from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion
 
 if TYPE_CHECKING:

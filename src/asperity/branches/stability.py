@@ -34,7 +34,7 @@ from asperity.branches.steps import BranchFollower, BranchOrbit, follow_branch
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.parameters.arguments import counted, function, whole_number
-from asperity.parameters.display import Displayed, SummaryLine, count_text, number_line
+from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion, Slider
 from asperity.slider.problem import Problem, checked_slider
 

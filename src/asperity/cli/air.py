@@ -208,21 +208,21 @@ def _invert(
     # The layer must be complete, and does not use its own value of what is sought.
     layer = _layer({**numbers, name: 1.0})
     W0, M, lambda_z = (numbers[n] for n in _CONTACT)
-    found = solve(ratio, hertz, W0=W0, M=M, lambda_z=lambda_z, layer=layer)
+    result = solve(ratio, hertz, W0=W0, M=M, lambda_z=lambda_z, layer=layer)
     if as_json:
         record = {
             "for": sought,
             "ratio": ratio,
             "frequency": hertz,
-            "solutions": list(found.solutions),
-            "reachable": [found.reachable_min, found.reachable_max],
-            "result": found.result,
+            "solutions": list(result.solutions),
+            "reachable": [result.reachable_min, result.reachable_max],
+            "result": result.result,
             "parameters": {n: v for n, v in numbers.items() if n != name},
         }
         click.echo(to_json(record))
     else:
-        for length in found.solutions:
+        for length in result.solutions:
             click.echo(f"{name} = {format_si(length, 'length', 6)}")
-    if not found.found:
-        click.echo(f"asperity: {found.result}", err=True)
-    return 0 if found.found else 1
+    if not result.found:
+        click.echo(f"asperity: {result.result}", err=True)
+    return 0 if result.found else 1

@@ -62,21 +62,21 @@ def compare(
     options = {**options, "prior": reading.stiffness_prior(data, options)}
     read = reading.read(data, options["fixed"])
     with bar("%", raising=False) as update:
-        found = inference.compare(
+        comparison = inference.compare(
             read,
             checked_laws(laws),
             free,
             progress=lambda done, total: update(round(100 * done / total), 100),
             **options,
         )
-    if report is not None and any(j.fit.converged for j in found.laws.values()):
+    if report is not None and any(j.fit.converged for j in comparison.laws.values()):
         from asperity.fit_report import write_comparison
 
-        write_comparison(report, found)
+        write_comparison(report, comparison)
     if as_json:
-        click.echo(to_json(comparison_record(found)))
+        click.echo(to_json(comparison_record(comparison)))
     else:
-        head, rows = laws_table(found)
+        head, rows = laws_table(comparison)
         click.echo(aligned([head, *rows]))
-        click.echo(found.verdict)
-    return 0 if all(j.fit.converged for j in found.laws.values()) else 1
+        click.echo(comparison.verdict)
+    return 0 if all(j.fit.converged for j in comparison.laws.values()) else 1

@@ -58,16 +58,16 @@ def design(plan: Path, simulate: int, table: Path | None, as_json: bool) -> int:
         target = output_file(table, "--csv", example="points.csv", inputs={"plan": plan})
     checked = inference.read_plan(plan)
     with bar("step") as update:
-        found = inference.design(checked, simulate=simulate, progress=update)
+        result = inference.design(checked, simulate=simulate, progress=update)
     if target is not None:
         with written_file(target) as fresh:
-            fresh.write_text(_csv(found), encoding="utf-8")
-    click.echo(to_json(found.record()) if as_json else design_text(found))
+            fresh.write_text(_csv(result), encoding="utf-8")
+    click.echo(to_json(result.record()) if as_json else design_text(result))
     return 0
 
 
-def _csv(found: Design) -> str:
-    rows = found.rows()
+def _csv(result: Design) -> str:
+    rows = result.rows()
     text = io.StringIO()
     writer = csv.DictWriter(text, list(rows[0]), lineterminator="\n")
     writer.writeheader()
@@ -75,70 +75,71 @@ def _csv(found: Design) -> str:
     return text.getvalue()
 
 
-def design_text(found: Design) -> str:
+def design_text(result: Design) -> str:
     """A design as a person reads it."""
     from asperity.cli.report import aligned
     from asperity.parameters import point_parameters
     from asperity.units import format_si
 
-    plan = found.plan
+    plan = result.plan
     known = point_parameters(plan.truth.law)
     axes = [a.name for a in plan.axes]
     rows: list[tuple[str, ...]] = [(*axes, "readings", *plan.noise)]
-    for p in found.points:
+    for p in result.points:
         settings = [format_si(p.setting[n], known[n].kind, 4) for n in axes]
         predicted = [f"{v:.4g} +- {e:.1g}" for v, e in p.predicted.values()]
         rows.append((*settings, str(p.readings), *predicted))
     aim = f"to measure {', '.join(plan.measured)}"
     if plan.rival is not None:
         aim = f"to exclude {plan.rival.law.name}"
-    lines = [f"{plan.truth.law.name}: {found.readings} readings {aim}", aligned(rows, "  ")]
+    lines = [f"{plan.truth.law.name}: {result.readings} readings {aim}", aligned(rows, "  ")]
     if plan.budget.time is not None:
-        lines.append(f"time {found.spent:.4g} s of {plan.budget.time:.4g} s")
+        lines.append(f"time {result.spent:.4g} s of {plan.budget.time:.4g} s")
     table = [("", "expected", "std. error", "even grid", "")]
     table += [
         (n, f"{p.value:.4g}", f"{p.se:.3g}", f"{p.se_grid:.3g}", p.unit)
-        for n, p in found.parameters.items()
+        for n, p in result.parameters.items()
     ]
     lines += ["parameters", aligned(table, "  ")]
-    grid = " x ".join(f"{m} {n}" for n, m in zip(axes, found.grid_levels, strict=True))
+    grid = " x ".join(f"{m} {n}" for n, m in zip(axes, result.grid_levels, strict=True))
     what = "chi-squared" if plan.rival is not None else "interval"
-    fewer = "infinitely many" if math.isinf(found.fewer) else f"{found.fewer:.3g}"
+    fewer = "infinitely many" if math.isinf(result.fewer) else f"{result.fewer:.3g}"
     lines += [
         f"{fewer} times fewer readings than an even grid for the same {what} ({grid}; "
-        f"{found.grid_usable[0]} of {found.grid_usable[1]} usable)",
-        f"efficiency at least {found.efficiency:.3f}, of the whole readings "
-        f"{found.efficiency_whole:.3f}",
-        f"{found.candidates} of {found.combinations} combinations can be used",
-        *(f"  {count} not: {reason}" for reason, count in found.left_out.items()),
+        f"{result.grid_usable[0]} of {result.grid_usable[1]} usable)",
+        f"efficiency at least {result.efficiency:.3f}, of the whole readings "
+        f"{result.efficiency_whole:.3f}",
+        f"{result.candidates} of {result.combinations} combinations can be used",
+        *(f"  {count} not: {reason}" for reason, count in result.left_out.items()),
     ]
     if plan.rival is not None:
-        values = "; ".join(f"{n} = {v:.4g}" for n, v in (found.rival_values or {}).items())
+        values = "; ".join(f"{n} = {v:.4g}" for n, v in (result.rival_values or {}).items())
         lines.append(
-            f"expected chi-squared {found.chi2:.4g} (even grid {found.chi2_grid:.4g}), probability "
-            f"of deciding {found.probability:.3g} (even grid {found.probability_grid:.3g}); "
+            f"expected chi-squared {result.chi2:.4g} (even grid {result.chi2_grid:.4g}), "
+            f"probability of deciding {result.probability:.3g} "
+            f"(even grid {result.probability_grid:.3g}); "
             f"{plan.rival.law.name} comes nearest with {values}"
         )
-    for axis, levels in found.alone.items():
+    for axis, levels in result.alone.items():
         best = min(levels, key=lambda level: level[2])
         several = [f"{format_si(v, known[axis].kind, 3)}: {more:.3g}" for v, _, more in levels]
         lines.append(
             f"readings at one {axis} alone, in multiples of the design's: {', '.join(several)}; "
             f"best {format_si(best[0], known[axis].kind, 3)}"
         )
-    lines += _simulation_lines(found)
-    return "\n".join([*lines, *(f"warning: {w}" for w in found.warnings)])
+    lines += _simulation_lines(result)
+    return "\n".join([*lines, *(f"warning: {w}" for w in result.warnings)])
 
 
-def _simulation_lines(found: Design) -> list[str]:
+def _simulation_lines(result: Design) -> list[str]:
     from asperity.cli.report import aligned
 
-    s: Any = found.simulation
+    s: Any = result.simulation
     if s is None:
         return []
     rows = [("", "spread", "expected")]
     rows += [
-        (n, f"{x:.3g} +- {s.uncertainty[n]:.1g}", f"{found.parameters[n].se:.3g}")
+        (n, f"{x:.3g} +- {s.uncertainty[n]:.1g}", f"{result.parameters[n].se:.3g}")
         for n, x in s.spread.items()
     ]
     decided = "" if s.decided is None else f", {s.decided:.3g} of them exclude the rival"

@@ -66,21 +66,21 @@ def map(
     of the mode at each of its points.
     """
     _check_outputs(out, plot, show)
-    found = _solve(law, material, given, (x, log_x), (y, log_y), out, resume)
+    result = _solve(law, material, given, (x, log_x), (y, log_y), out, resume)
     if plot is not None:
-        _plot(found, plot, show)
-    _print(found, out, as_json)
-    unresolved = int(found.attrs["boundary_unresolved_chords"])
+        _plot(result, plot, show)
+    _print(result, out, as_json)
+    unresolved = int(result.attrs["boundary_unresolved_chords"])
     if unresolved:
         click.echo(
             f"asperity: the boundary bends too much for the grid at {unresolved} places, where "
             "it is not known to 1e-4; refine the grid",
             err=True,
         )
-    failed = int((~found["converged"]).sum())
+    failed = int((~result["converged"]).sum())
     if failed:
         click.echo(
-            f"asperity: {failed} of {found['converged'].size} points have no response; the "
+            f"asperity: {failed} of {result['converged'].size} points have no response; the "
             f"variable 'result' of {out} says why",
             err=True,
         )
@@ -142,19 +142,19 @@ def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
     output_files({"--out": out, "--plot": plot})
 
 
-def _plot(found: xarray.Dataset, path: Path, show: str) -> None:
+def _plot(dataset: xarray.Dataset, path: Path, show: str) -> None:
     from asperity.figures.map import draw_map
     from asperity.figures.style import style
     from asperity.outputs import written_file
 
     with style(), written_file(path, "--plot") as file:
-        draw_map(found, show).savefig(file, metadata={"Software": None})
+        draw_map(dataset, show).savefig(file, metadata={"Software": None})
 
 
-def _print(found: xarray.Dataset, out: Path | None, as_json: bool) -> None:
+def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool) -> None:
     from asperity.cli.report import aligned, to_json
 
-    record = _record(found, out)
+    record = _record(dataset, out)
     if as_json:
         click.echo(to_json(record))
         return
@@ -169,16 +169,16 @@ def _print(found: xarray.Dataset, out: Path | None, as_json: bool) -> None:
         click.echo(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")
 
 
-def _record(found: xarray.Dataset, out: Path | None) -> dict[str, Any]:
-    converged = found["converged"].values
-    stable = int(found["stable"].values.sum())
-    sides = (found.attrs["x"], found.attrs["y"])
-    number = found["boundary_line"].values
-    kinds = found["boundary_kind"].values.astype(str)
+def _record(dataset: xarray.Dataset, out: Path | None) -> dict[str, Any]:
+    converged = dataset["converged"].values
+    stable = int(dataset["stable"].values.sum())
+    sides = (dataset.attrs["x"], dataset.attrs["y"])
+    number = dataset["boundary_line"].values
+    kinds = dataset["boundary_kind"].values.astype(str)
 
     def line(index: Any) -> dict[str, Any]:
-        values = {name: found[f"boundary_{name}"].values[index].tolist() for name in sides}
-        frequency = found["boundary_mode_frequency"].values[index].tolist()
+        values = {name: dataset[f"boundary_{name}"].values[index].tolist() for name in sides}
+        frequency = dataset["boundary_mode_frequency"].values[index].tolist()
         return {**values, "kind": kinds[index].tolist(), "mode_frequency": frequency}
 
     return {
@@ -190,6 +190,6 @@ def _record(found: xarray.Dataset, out: Path | None) -> dict[str, Any]:
         "y": sides[1],
         "boundaries": [line(number == k) for k in range(number.max(initial=-1) + 1)],
         "boundary_not_found": int((number < 0).sum()),
-        "boundary_unresolved_chords": int(found.attrs["boundary_unresolved_chords"]),
+        "boundary_unresolved_chords": int(dataset.attrs["boundary_unresolved_chords"]),
         "out": str(out),
     }

@@ -62,11 +62,11 @@ def point_options(command: Command) -> Command:
             add_setting(given, parameter.name, value)
         return command(given=given, **others)
 
-    found: Command = set_option('--set A=0.013 --set "K=0.3 N/um"')(gathered)
+    result: Command = set_option('--set A=0.013 --set "K=0.3 N/um"')(gathered)
     for parameter in reversed(named):
-        found = _option(parameter)(found)
-    found = material_option()(found)
-    return law_option()(found)
+        result = _option(parameter)(result)
+    result = material_option()(result)
+    return law_option()(result)
 
 
 def law_option(
@@ -109,15 +109,15 @@ def settings_of(pairs: Iterable[str], option: str = "--set") -> dict[str, str]:
     InputError
         If one has no name or value, or a name is given twice.
     """
-    found: dict[str, str] = {}
+    result: dict[str, str] = {}
     for pair in pairs:
         name, _, value = (part.strip() for part in pair.partition("="))
         if not name or not value:
             raise InputError(
                 f"{option} must be NAME=VALUE, got '{pair}'; write it like {option} \"K=0.2 N/um\""
             )
-        add_setting(found, name, value)
-    return found
+        add_setting(result, name, value)
+    return result
 
 
 def add_setting(settings: dict[str, str], name: str, value: str | None) -> None:

@@ -92,17 +92,17 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
     numbers = numbers_for(
         law, sourced_numbers(given, material_named(material), "command line", law)
     )
-    found = respond(get_law(law), {name: number.value for name, number in numbers.items()})
+    result = respond(get_law(law), {name: number.value for name, number in numbers.items()})
     if as_json:
-        click.echo(to_json(response_record(found, numbers)))
-    elif found.converged:
-        click.echo(_text(law, found, numbers))
-    if not found.converged:
-        click.echo(f"asperity: {found.result[()]}", err=True)
-    return 0 if found.converged else 1
+        click.echo(to_json(response_record(result, numbers)))
+    elif result.converged:
+        click.echo(_text(law, result, numbers))
+    if not result.converged:
+        click.echo(f"asperity: {result.result[()]}", err=True)
+    return 0 if result.converged else 1
 
 
-def _text(law: str, found: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> str:
+def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> str:
     from asperity.cli.report import aligned
     from asperity.laws import get_law
     from asperity.parameters import OUTPUTS, point_parameters
@@ -115,7 +115,7 @@ def _text(law: str, found: PeriodicResponse, numbers: dict[str, SourcedNumber]) 
     ]
     outputs = []
     for name in _SHOWN:
-        value = getattr(found, name)[()]
+        value = getattr(result, name)[()]
         text = ("no", "yes")[int(value)] if name == "stable" else str(value)
         if isinstance(value, float):
             text = f"{value:.9g} {OUTPUTS[name].unit}".removesuffix(" 1")

@@ -91,22 +91,22 @@ def run(
         inputs={"protocol": protocol},
     )
     try:
-        asked = load_protocol(protocol)
-        if law is not None and asked.law != law:
+        wanted = load_protocol(protocol)
+        if law is not None and wanted.law != law:
             raise InputError(
-                f"--law must be the law of the protocol, got '{law}' and law = '{asked.law}'; "
+                f"--law must be the law of the protocol, got '{law}' and law = '{wanted.law}'; "
                 "change one of them or leave the option out"
             )
     except ProtocolError as error:
         return _print_mistakes(protocol, error.mistakes)
-    setup = None if record is None else _setup_for(asked, record)
-    _check_room(asked, out, text, record)
+    setup = None if record is None else _setup_for(wanted, record)
+    _check_room(wanted, out, text, record)
     with bar("ms") as update:
 
         def in_milliseconds(time: float, end: float) -> None:
             update(round(1e3 * time), round(1e3 * end), "")
 
-        done = run_protocol(asked, out, resume=resume, progress=in_milliseconds)
+        done = run_protocol(wanted, out, resume=resume, progress=in_milliseconds)
     statement = done.unstable_start
     files = [out]
     with _after_the_motion(files):
@@ -116,7 +116,7 @@ def run(
             files.append(_draw(out, picture))
         if record is not None and setup is not None:
             files.append(write(record_run(setup, out), record))
-    _report(asked, done, files, as_json, statement)
+    _report(wanted, done, files, as_json, statement)
     if statement:
         click.echo(f"asperity: {statement}", err=True)
     if done.stopped:
@@ -144,21 +144,21 @@ def _after_the_motion(files: list[Path]) -> Iterator[None]:
 _TEXT_BYTES = 18
 
 
-def _check_room(asked: Protocol, out: Path, text: Path | None, record: Path | None) -> None:
+def _check_room(wanted: Protocol, out: Path, text: Path | None, record: Path | None) -> None:
     """Print the size of the run; refuse one that disk or memory cannot hold."""
     from asperity.outputs import require_disk, require_memory, size_text
 
-    if asked.rows is None:
+    if wanted.rows is None:
         click.echo(f"asperity: writing the integrator's steps to {out}", err=True)
         return
     way_out = "lower solver.sampling, shorten the steps or leave the option out"
-    rows, size = f"{asked.rows:.6g} rows", asked.rows * asked.row_bytes
+    rows, size = f"{wanted.rows:.6g} rows", wanted.rows * wanted.row_bytes
     if text is not None:
-        size += 7 * _TEXT_BYTES * asked.rows
+        size += 7 * _TEXT_BYTES * wanted.rows
         require_disk(size, text.resolve().parent, "--csv", rows, way_out)
     if record is not None:
         # A recording is made of whole signals: those of the motion and those of its channels.
-        require_memory(2 * asked.rows * asked.row_bytes, "--record", rows, way_out)
+        require_memory(2 * wanted.rows * wanted.row_bytes, "--record", rows, way_out)
     require_disk(size, out.resolve().parent, "solver.sampling", rows,
                  "lower the rate, shorten the steps or write to another disk")  # fmt: skip
     click.echo(f"asperity: writing {rows}, about {size_text(size)}, to {out}", err=True)
@@ -171,17 +171,17 @@ def _print_mistakes(protocol: Path, mistakes: tuple[str, ...]) -> int:
     return 2
 
 
-def _setup_for(asked: Protocol, record: Path) -> RecordingSetup:
+def _setup_for(wanted: Protocol, record: Path) -> RecordingSetup:
     """The protocol's tribometer, before anything is computed."""
     from asperity.recording.writers import check_path
 
-    if asked.setup is None:
+    if wanted.setup is None:
         raise InputError(
             f"--record must go with a [tribometer] in the protocol, got '{record}' and none; "
             "describe its sensors or leave the option out"
         )
     check_path(record)
-    return asked.setup
+    return wanted.setup
 
 
 def _draw(run_file: Path, picture: Path) -> Path:
@@ -196,7 +196,7 @@ def _draw(run_file: Path, picture: Path) -> Path:
 
 
 def _report(
-    asked: Protocol, done: RunSummary, files: list[Path], as_json: bool, statement: str
+    wanted: Protocol, done: RunSummary, files: list[Path], as_json: bool, statement: str
 ) -> None:
     from asperity.cli.report import aligned, to_json
 
@@ -207,7 +207,7 @@ def _report(
                     "rows": done.rows,
                     "events": done.events,
                     "time": done.time,
-                    "duration": asked.programme.duration,
+                    "duration": wanted.programme.duration,
                     "stopped": done.stopped,
                     "stability": statement or None,
                     "files": [str(file) for file in files],
@@ -216,9 +216,9 @@ def _report(
         )
         return
     rows = [
-        ("time", f"{done.time:.9g} s", f"of {asked.programme.duration:.9g} s"),
+        ("time", f"{done.time:.9g} s", f"of {wanted.programme.duration:.9g} s"),
         ("rows", str(done.rows), ""),
         ("events", str(done.events), ""),
         ("files", ", ".join(map(str, files)), ""),
     ]
-    click.echo(f"{asked.law}\n{aligned(rows, '  ')}")
+    click.echo(f"{wanted.law}\n{aligned(rows, '  ')}")

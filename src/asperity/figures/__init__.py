@@ -11,10 +11,9 @@ from typing import TYPE_CHECKING
 from asperity.figures.style import COLOURS, DASHES
 
 if TYPE_CHECKING:
-    from asperity.figures.files import save_picture, save_table
     from asperity.figures.map import draw_plane
     from asperity.figures.plot import Plot
-    from asperity.figures.style import new_figure
+    from asperity.figures.style import new_figure, save_picture, save_table
 
 _HOMES = {
     "Plot": "plot",

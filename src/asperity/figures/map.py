@@ -82,23 +82,23 @@ _SPAN = (0.02, 0.98)
 _ROOM = 0.075
 
 
-def draw_map(found: xarray.Dataset, show: str = "growth_rate") -> Figure:
+def draw_map(dataset: xarray.Dataset, show: str = "growth_rate") -> Figure:
     """A quantity over the plane, with the stability boundary.
 
     Parameters
     ----------
-    found : Dataset
+    dataset : Dataset
         From `asperity.study.map.response_map`.
     show : str
         A key of `asperity.study.map.SHOWN`.
     """
     figure = new_figure(5.0, 4.1)
     axis = figure.subplots()
-    mesh = draw_plane(axis, found, show)
-    bar = figure.colorbar(mesh, ax=axis, pad=0.02, aspect=28, extend=_extend(found, show, mesh))
+    mesh = draw_plane(axis, dataset, show)
+    bar = figure.colorbar(mesh, ax=axis, pad=0.02, aspect=28, extend=_extend(dataset, show, mesh))
     bar.set_label(_SHOWN[show])
     bar.ax.minorticks_off()
-    handles = keys(found)
+    handles = keys(dataset)
     if handles:
         figure.legend(
             handles=handles, loc="outside lower center", ncols=2 if len(handles) != 3 else 3
@@ -107,31 +107,31 @@ def draw_map(found: xarray.Dataset, show: str = "growth_rate") -> Figure:
 
 
 def draw_plane(
-    axis: Axes, found: xarray.Dataset, show: str, norm: Normalize | None = None
+    axis: Axes, dataset: xarray.Dataset, show: str, norm: Normalize | None = None
 ) -> QuadMesh:
     """The plane alone, without colour bar and legend.
 
     Parameters
     ----------
     axis : Axes
-    found : Dataset
+    dataset : Dataset
     show : str
     norm : Normalize, optional
         Colours in common with another plane.
     """
-    x, y = (found[found.attrs[side]] for side in "xy")
+    x, y = (dataset[dataset.attrs[side]] for side in "xy")
     units = [axis_unit(side) for side in (x, y)]
-    log = [found.attrs[f"{side}_scale"] == "log" for side in "xy"]
-    values = np.ma.masked_invalid(found[show].values)
-    norm = norm or colours(found, show)
+    log = [dataset.attrs[f"{side}_scale"] == "log" for side in "xy"]
+    values = np.ma.masked_invalid(dataset[show].values)
+    norm = norm or colours(dataset, show)
     edges = [_edges(v.values / u[0], k) for v, u, k in zip((x, y), units, log, strict=True)]
     axis.set_facecolor(_FAILED["facecolor"])
     mesh = axis.pcolormesh(
         *edges, values, norm=norm, cmap=_colour_map(show), rasterized=True, shading="flat"
     )
-    _draw_failed(axis, found, units)
-    _draw_boundary(axis, found, units)
-    _draw_unmodulated(axis, found, units)
+    _draw_failed(axis, dataset, units)
+    _draw_boundary(axis, dataset, units)
+    _draw_unmodulated(axis, dataset, units)
     for side, values_of, unit, is_log in (("x", x, units[0], log[0]), ("y", y, units[1], log[1])):
         axis.set(**{f"{side}label": label(values_of, unit)})
         ends = values_of.values[[0, -1]] / unit[0]
@@ -140,13 +140,13 @@ def draw_plane(
             _write_numbers(axis.xaxis if side == "x" else axis.yaxis, ends[1] / ends[0])
         axis.set(**{f"{side}lim": ends})
     axis.tick_params(which="both", color="#333333")
-    _name_regions(axis, found)
+    _name_regions(axis, dataset)
     return mesh
 
 
-def colours(found: xarray.Dataset, show: str) -> Normalize:
+def colours(dataset: xarray.Dataset, show: str) -> Normalize:
     """How values become colours."""
-    values = found[show].values
+    values = dataset[show].values
     values = values[np.isfinite(values)]
     if show in _CYCLIC:
         return Normalize(-np.pi, np.pi)
@@ -160,17 +160,17 @@ def colours(found: xarray.Dataset, show: str) -> Normalize:
     return Normalize(values.min(), values.max()) if values.size else Normalize(0.0, 1.0)
 
 
-def keys(found: xarray.Dataset) -> list[Any]:
+def keys(dataset: xarray.Dataset) -> list[Any]:
     """Entries of the legend: kinds of bifurcation that occur, and whatever else is drawn."""
-    kinds = _kinds(found)
+    kinds = _kinds(dataset)
     entries: list[Any] = [
         Line2D([], [], color=_LINE, linestyle=line, label=_KIND_NAMES.get(kind, kind))
         for kind, line in KIND_LINES.items()
         if kind in kinds
     ]
-    if "critical_stiffness" in found:
+    if "critical_stiffness" in dataset:
         entries.append(Line2D([], [], label="$K=K_c$ (unmodulated)", **_UNMODULATED))
-    if not found["converged"].values.all():
+    if not dataset["converged"].values.all():
         entries.append(Patch(label="no response found", **_FAILED))
     return entries
 
@@ -219,22 +219,23 @@ def _colour_map(show: str) -> Any:
     return cm.batlow_r if show == "delta_mu" else cm.batlow
 
 
-def _draw_failed(axis: Axes, found: xarray.Dataset, units: list[tuple[float, str]]) -> None:
-    failed = ~found["converged"].values.astype(bool)
+def _draw_failed(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+    failed = ~dataset["converged"].values.astype(bool)
     if not failed.any():
         return
-    x, y = (found[found.attrs[s]].values / u[0] for s, u in zip("xy", units, strict=True))
+    x, y = (dataset[dataset.attrs[s]].values / u[0] for s, u in zip("xy", units, strict=True))
     hatched = axis.contourf(x, y, failed.astype(float), levels=[0.5, 1.5], colors="none",
                             hatches=["xxxx"])  # fmt: skip
     hatched.set_edgecolor(_FAILED["edgecolor"])
     hatched.set_linewidth(0.0)
 
 
-def _draw_boundary(axis: Axes, found: xarray.Dataset, units: list[tuple[float, str]]) -> None:
-    lines = found["boundary_line"].values
-    kinds = found["boundary_kind"].values.astype(str)
+def _draw_boundary(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+    lines = dataset["boundary_line"].values
+    kinds = dataset["boundary_kind"].values.astype(str)
     x, y = (
-        found[f"boundary_{found.attrs[s]}"].values / u[0] for s, u in zip("xy", units, strict=True)
+        dataset[f"boundary_{dataset.attrs[s]}"].values / u[0]
+        for s, u in zip("xy", units, strict=True)
     )
     halo = [patheffects.Stroke(linewidth=3.4, foreground="white", alpha=0.8), patheffects.Normal()]
     for number in range(lines.max(initial=-1) + 1):
@@ -255,23 +256,23 @@ def _runs(kinds: NDArray[np.str_]) -> list[tuple[int, int, str]]:
     return [(a, b, str(kinds[a])) for a, b in zip(starts, ends, strict=True)]
 
 
-def _draw_unmodulated(axis: Axes, found: xarray.Dataset, units: list[tuple[float, str]]) -> None:
-    if "critical_stiffness" not in found:
+def _draw_unmodulated(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+    if "critical_stiffness" not in dataset:
         return
-    Kc = found["critical_stiffness"]
+    Kc = dataset["critical_stiffness"]
     other = str(Kc.dims[0])
-    sides = [found.attrs[s] for s in "xy"]
-    along = found[other].values / units[sides.index(other)][0]
+    sides = [dataset.attrs[s] for s in "xy"]
+    along = dataset[other].values / units[sides.index(other)][0]
     stiffness = Kc.values / units[sides.index("K")][0]
     pair = (along, stiffness) if sides[0] == other else (stiffness, along)
     halo = [patheffects.withStroke(linewidth=2.2, foreground="white", alpha=0.7)]
     axis.plot(*pair, zorder=3, path_effects=halo, **_UNMODULATED)
 
 
-def _name_regions(axis: Axes, found: xarray.Dataset) -> None:
+def _name_regions(axis: Axes, dataset: xarray.Dataset) -> None:
     """The words stable and unstable, each where its region is widest."""
-    solved = found["converged"].values.astype(bool)
-    stable = found["stable"].values.astype(bool)
+    solved = dataset["converged"].values.astype(bool)
+    stable = dataset["stable"].values.astype(bool)
     room = _ROOM * min(stable.shape)
     for word, region in (("stable", solved & stable), ("unstable", solved & ~stable)):
         depth = np.asarray(distance_transform_edt(np.pad(region, 1)))[1:-1, 1:-1]
@@ -285,14 +286,14 @@ def _name_regions(axis: Axes, found: xarray.Dataset) -> None:
         )  # fmt: skip
 
 
-def _kinds(found: xarray.Dataset) -> set[str]:
-    on_lines = found["boundary_line"].values >= 0
-    return set(found["boundary_kind"].values.astype(str)[on_lines])
+def _kinds(dataset: xarray.Dataset) -> set[str]:
+    on_lines = dataset["boundary_line"].values >= 0
+    return set(dataset["boundary_kind"].values.astype(str)[on_lines])
 
 
-def _extend(found: xarray.Dataset, show: str, mesh: QuadMesh) -> str:
+def _extend(dataset: xarray.Dataset, show: str, mesh: QuadMesh) -> str:
     """Which ends of the colour bar stand for values beyond it."""
-    values = found[show].values[np.isfinite(found[show].values)]
+    values = dataset[show].values[np.isfinite(dataset[show].values)]
     if not values.size or mesh.norm.vmin is None or mesh.norm.vmax is None:
         return "neither"
     below, above = values.min() < mesh.norm.vmin, values.max() > mesh.norm.vmax

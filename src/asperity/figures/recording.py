@@ -29,42 +29,42 @@ _MEASURED, _FITTED, _LOAD = GREY, ELASTO_PLASTIC, "#9DB7D5"
 _LABELLED: dict[str, Any] = {"va": "top", "ha": "left", "fontsize": 10}
 
 
-def draw_modulated(found: Measurement) -> Figure:
+def draw_modulated(measurement: Measurement) -> Figure:
     """Recording with its window, mean cycle with the fit, and spectrum of the residual.
 
     Parameters
     ----------
-    found : Measurement
+    measurement : Measurement
     """
     figure = new_figure(5.0, 7.2)
     whole, cycle, left = figure.subplots(3, 1)
-    _draw_recording(whole, found)
-    _draw_cycle(cycle, found)
-    _draw_residual(left, found)
+    _draw_recording(whole, measurement)
+    _draw_cycle(cycle, measurement)
+    _draw_residual(left, measurement)
     for axis, letter in zip((whole, cycle, left), "abc", strict=True):
         axis.text(0.015, 0.96, f"({letter})", transform=axis.transAxes, **_LABELLED)
     return figure
 
 
-def draw_sliding(found: SlidingMeasurement) -> Figure:
+def draw_sliding(measurement: SlidingMeasurement) -> Figure:
     """Friction over time with the steady part of each segment, its steps and holds.
 
     Parameters
     ----------
-    found : SlidingMeasurement
+    measurement : SlidingMeasurement
     """
     figure = new_figure(5.0, 3.5)
     axis = figure.subplots()
-    start = found.time[0]
-    _band(axis, found.time - start, found.values, color=_MEASURED)
-    low, high = np.quantile(found.values, [0.002, 0.998])
-    low = min(low, *(s.lowest for s in found.segments))
-    high = max(high, *(s.highest for s in found.segments))
+    start = measurement.time[0]
+    _band(axis, measurement.time - start, measurement.values, color=_MEASURED)
+    low, high = np.quantile(measurement.values, [0.002, 0.998])
+    low = min(low, *(s.lowest for s in measurement.segments))
+    high = max(high, *(s.highest for s in measurement.segments))
     room = 0.22 * (high - low)
     axis.set_ylim(low - 0.3 * room, high + 1.9 * room)
-    length = float(found.time[-1] - start)
+    length = float(measurement.time[-1] - start)
     labelled = False
-    for k, s in enumerate(found.segments):
+    for k, s in enumerate(measurement.segments):
         middle = (s.start + s.end) / 2 - start
         if k:
             axis.axvline(s.start - start, color="#333333", linewidth=0.5, linestyle="dashed")
@@ -84,10 +84,10 @@ def draw_sliding(found: SlidingMeasurement) -> Figure:
             axis.text(
                 middle, high + 0.75 * room, f"{1e6 * s.velocity:.3g} µm/s", va="top", ha="center"
             )
-    if found.holds:
+    if measurement.holds:
         axis.plot(
-            [h.peak_time - start for h in found.holds],
-            [h.peak for h in found.holds],
+            [h.peak_time - start for h in measurement.holds],
+            [h.peak for h in measurement.holds],
             "v",
             markersize=4,
             color=_FITTED,
@@ -98,8 +98,8 @@ def draw_sliding(found: SlidingMeasurement) -> Figure:
     return figure
 
 
-def _draw_recording(axis: Axes, found: Measurement) -> None:
-    samples, reading = found.samples, found.reading
+def _draw_recording(axis: Axes, measurement: Measurement) -> None:
+    samples, reading = measurement.samples, measurement.reading
     start = samples.time[0]
     _band(axis, samples.time - start, samples.load / reading.W0, color=_LOAD)
     _band(axis, samples.time - start, samples.force / reading.W0, color=_FITTED)
@@ -123,9 +123,9 @@ def _draw_recording(axis: Axes, found: Measurement) -> None:
     axis.legend(handles=keys, loc="upper right", ncols=3, handlelength=1.2)
 
 
-def _draw_cycle(axis: Axes, found: Measurement) -> None:
+def _draw_cycle(axis: Axes, measurement: Measurement) -> None:
     """The mean cycle of the force against the phase of the load."""
-    cycle, scale = mean_cycle(found), 1e3
+    cycle, scale = mean_cycle(measurement), 1e3
     axis.plot(
         cycle.phase,
         scale * cycle.measured,
@@ -134,7 +134,7 @@ def _draw_cycle(axis: Axes, found: Measurement) -> None:
         color=_MEASURED,
         label="measured, mean cycle",
     )
-    harmonics = found.reading.harmonics.size
+    harmonics = measurement.reading.harmonics.size
     axis.plot(cycle.fine_phase, scale * cycle.fitted, color=_FITTED, label=f"{harmonics} harmonics")
     low, high = axis.get_ylim()
     axis.set_ylim(low, high + 0.35 * (high - low))
@@ -142,10 +142,10 @@ def _draw_cycle(axis: Axes, found: Measurement) -> None:
     axis.legend(loc="upper right", ncols=2)
 
 
-def _draw_residual(axis: Axes, found: Measurement) -> None:
+def _draw_residual(axis: Axes, measurement: Measurement) -> None:
     """Spectrum of the residual of the fit, with the fitted harmonics."""
-    reading = found.reading
-    frequency, amplitude = residual_spectrum(found)
+    reading = measurement.reading
+    frequency, amplitude = residual_spectrum(measurement)
     order = np.arange(1, reading.harmonics.size + 1)
     _band(axis, frequency, np.maximum(amplitude, 1e-300), color=_MEASURED, lines=True)
     axis.plot(

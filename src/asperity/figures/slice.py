@@ -42,11 +42,11 @@ def plot_slice(
     InputError
         If the store has no such output or axis.
     """
-    found = open_store(store)
-    outputs = [str(n) for n, v in found.data_vars.items() if x in v.dims or len(v.dims) > 0]
+    result = open_store(store)
+    outputs = [str(n) for n, v in result.data_vars.items() if x in v.dims or len(v.dims) > 0]
     if show not in outputs:
         raise InputError(f"show must be an output, got '{show}'; {closest(show, outputs)}")
-    part = found[show]
+    part = result[show]
     dims = [str(d) for d in part.dims]
     for name, side in (("x", x), ("y", y)):
         if side is not None and side not in dims:

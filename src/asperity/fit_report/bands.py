@@ -51,20 +51,20 @@ class Series(NamedTuple):
 
 
 def bands_of(
-    found: Fit, term: LockInTerm, posterior: Posterior | None, *, seed: int = 0
+    fit: Fit, term: LockInTerm, posterior: Posterior | None, *, seed: int = 0
 ) -> list[Series]:
     """Bands of mean_friction, delta_mu, mu1 and mu2 for each series of a table, slowest first.
 
     Parameters
     ----------
-    found : Fit
+    fit : Fit
     term : LockInTerm
     posterior : Posterior or None
         Without one, parameters are drawn from the normal approximation.
     seed : int
         Of the choice of draws.
     """
-    values = _drawn(found, posterior, np.random.default_rng(seed))
+    values = _drawn(fit, posterior, np.random.default_rng(seed))
     count = len(next(iter(values.values())))
     table = term.table
     series = []
@@ -76,7 +76,7 @@ def bands_of(
         points = {n: np.full(_AMPLITUDES, v[row]) for n, v in table.points.items()}
         curve = LockInTable("curve", points | {"epsilon": epsilon}, {}, {})
         forward = Forward(
-            found.objective.law,
+            fit.objective.law,
             curve,
             fixed | {"epsilon": epsilon},
             inertia=term.forward.inertia,
@@ -84,7 +84,7 @@ def bands_of(
         )
         if term.searches:
             forward.uses_search = True
-            forward(found.values)
+            forward(fit.values)
         free = {n: np.repeat(v, _AMPLITUDES) for n, v in values.items()}
         predicted, outcome = forward.predicted(free, count, near=term.searches)
         good = outcome == Outcome.CONVERGED
@@ -107,11 +107,11 @@ def _series(table: LockInTable) -> list[tuple[str, NDArray[np.bool_]]]:
     names = [n for n in ("V", "frequency", *table.points) if n != "epsilon"]
     names = [n for n in dict.fromkeys(names) if n == "V" or np.unique(table.points[n]).size > 1]
     columns = np.stack([table.points[n] for n in names])
-    found = []
+    result = []
     for values in np.unique(columns, axis=1).T:
         label = ", ".join(_label(n, v) for n, v in zip(names, values, strict=True))
-        found.append((label, (columns == values[:, None]).all(0)))
-    return found
+        result.append((label, (columns == values[:, None]).all(0)))
+    return result
 
 
 def _label(name: str, value: float) -> str:
@@ -127,23 +127,21 @@ def _band(epsilon: Float, values: Float) -> Band:
     return Band(epsilon, low, middle, high)
 
 
-def _drawn(
-    found: Fit, posterior: Posterior | None, random: np.random.Generator
-) -> dict[str, Float]:
+def _drawn(fit: Fit, posterior: Posterior | None, random: np.random.Generator) -> dict[str, Float]:
     """Sets of parameters by name, each of shape (sets,)."""
     if posterior is not None:
         chains, draws = posterior.log_density.shape
         chosen = random.choice(chains * draws, min(_SETS, chains * draws), replace=False)
         return {n: d.reshape(-1)[chosen] for n, d in posterior.draws.items()}
-    unknowns = found.objective.unknowns
-    u = found.objective.coordinates(found.values)
+    unknowns = fit.objective.unknowns
+    u = fit.objective.coordinates(fit.values)
     sd = np.array(
         [
             min(abs(p.se / k.slope(p.value)), 1.0) if p.value else 0.0
-            for k, p in zip(unknowns, found.parameters.values(), strict=True)
+            for k, p in zip(unknowns, fit.parameters.values(), strict=True)
         ]
     )
-    covariance = found.correlation * np.outer(sd, sd)
+    covariance = fit.correlation * np.outer(sd, sd)
     values, vectors = np.linalg.eigh(covariance)
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     low, high = np.array([k.bounds for k in unknowns]).T

@@ -13,10 +13,12 @@ from asperity.fit_report.folder import (
     RUN_CAPTION,
     UNDETERMINED,
     data_tables,
+    document,
+    figure,
     material_text,
     provenance,
+    table,
 )
-from asperity.fit_report.page import document, figure, table
 from asperity.fit_report.pictures import laws_figure, run_figure
 from asperity.inference import Fit
 from asperity.inference.comparison.compare import Comparison
@@ -29,13 +31,13 @@ from asperity.outputs.written import written_folder
 _MOST_NARROW = 2
 
 
-def write_comparison(folder: Path, found: Comparison) -> None:
+def write_comparison(folder: Path, comparison: Comparison) -> None:
     """Write everything that a comparison says into a folder, completely or not at all.
 
     Parameters
     ----------
     folder : Path
-    found : Comparison
+    comparison : Comparison
         With one converged fit at least.
 
     Raises
@@ -43,32 +45,33 @@ def write_comparison(folder: Path, found: Comparison) -> None:
     InputError
         If no fit has converged, or the folder cannot be written.
     """
-    fits = {name: j.fit for name, j in found.laws.items() if j.fit.converged}
+    fits = {name: j.fit for name, j in comparison.laws.items() if j.fit.converged}
     if not fits:
         raise InputError(
-            f"comparison must have a converged fit for a report, got none; {found.verdict}"
+            f"comparison must have a converged fit for a report, got none; {comparison.verdict}"
         )
     with written_folder(folder, "report") as staging:
-        record = json.dumps(comparison_record(found), indent=2)
+        record = json.dumps(comparison_record(comparison), indent=2)
         (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
-        (staging / "report.html").write_text(page(found, fits), encoding="utf-8")
+        (staging / "report.html").write_text(page(comparison, fits), encoding="utf-8")
         for name, own in fits.items():
             (staging / f"{name}.toml").write_text(material_text(own), encoding="utf-8")
 
 
-def page(found: Comparison, fits: Mapping[str, Fit]) -> str:
+def page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
     """The page as text, with its figures in it and nothing to fetch.
 
     Parameters
     ----------
-    found : Comparison
+    comparison : Comparison
     fits : mapping of str to Fit
         Those that converged.
     """
     first = next(iter(fits.values()))
     names = " and ".join(term.name for term in first.objective.terms)
     sections = {
-        "Verdict": f"<p>{escape(found.verdict)}</p>" + table(*laws_table(found, reasons=True)),
+        "Verdict": f"<p>{escape(comparison.verdict)}</p>"
+        + table(*laws_table(comparison, reasons=True)),
         "Data and laws": _figures(fits),
         "Estimates": _estimates(fits),
         "Data": data_tables(first),
@@ -122,5 +125,5 @@ def _estimates(fits: Mapping[str, Fit]) -> str:
         for law, own in fits.items()
         for said in own.warnings
     )
-    found = table(("law", "", "estimate", "standard error", "95 %", "unit", ""), rows)
-    return found + (f"<ul>{warned}</ul>" if warned else "")
+    result = table(("law", "", "estimate", "standard error", "95 %", "unit", ""), rows)
+    return result + (f"<ul>{warned}</ul>" if warned else "")

@@ -1,10 +1,15 @@
-"""The folder of a fit: report.html, fit.json, material.toml, and posterior.nc if it was sampled."""
+"""The folder of a fit: report.html, fit.json, material.toml, and posterior.nc if it was sampled.
+
+A page is one file, with nothing to fetch.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from html import escape
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +18,6 @@ import numpy as np
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.fit_report.bands import bands_of
-from asperity.fit_report.page import document, figure, table
 from asperity.fit_report.pictures import data_figure, residual_figure, run_figure
 from asperity.inference import Fit, Posterior
 from asperity.inference.fitting.result import fit_record
@@ -23,6 +27,52 @@ from asperity.materials import cited_works
 from asperity.outputs.written import written_folder
 from asperity.parameters import law_parameters, point_parameters
 
+
+def document(title: str, kicker: str, heading: str, sections: Mapping[str, str]) -> str:
+    """A page as text.
+
+    Parameters
+    ----------
+    title, kicker, heading : str
+        Plain text.
+    sections : mapping of str to str
+        HTML by heading.
+    """
+    style = files("asperity.ledger").joinpath("page.css").read_text(encoding="utf-8")
+    body = "\n".join(
+        f'<section aria-label="{escape(name)}"><h2>{escape(name)}</h2>\n{content}\n</section>'
+        for name, content in sections.items()
+    )
+    return (
+        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>\n{style}\n"
+        "table{border-collapse:collapse;display:block;overflow-x:auto}"
+        "td,th{padding:.15rem .7rem;text-align:right;white-space:nowrap}"
+        "td:first-child,th:first-child{text-align:left}"
+        "figure.wide{grid-template-columns:1fr}"
+        "svg{max-width:100%;height:auto;background:#fff}</style>\n"
+        f'</head>\n<body>\n<header><p class="kicker">{escape(kicker)}</p>'
+        f"<h1>{escape(heading)}</h1></header>\n<main>\n{body}\n</main>\n"
+        f"<footer>Written by asperity {__version__}.</footer>\n</body>\n</html>\n"
+    )
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """A table of plain texts."""
+
+    def cells(row: Sequence[str], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(c)}</{tag}>" for c in row) + "</tr>"
+
+    return f"<table>{cells(head, 'th')}{''.join(cells(row, 'td') for row in rows)}</table>"
+
+
+def figure(svg: str, caption: str, *, wide: bool = False) -> str:
+    """A figure with its caption, a plain text, beside it or, of a wide one, below."""
+    shape = ' class="wide"' if wide else ""
+    return f"<figure{shape}>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
 RUN_CAPTION = (
     "Friction of the recording, thinned where it has many samples, and the motion of the law with "
     "offset and trend of the gauge; below, what is left."
@@ -31,13 +81,13 @@ RUN_CAPTION = (
 UNDETERMINED = "not determined by these data"
 
 
-def write_report(folder: Path, found: Fit, posterior: Posterior | None = None) -> None:
+def write_report(folder: Path, fit: Fit, posterior: Posterior | None = None) -> None:
     """Write everything that a fit says into a folder, completely or not at all.
 
     Parameters
     ----------
     folder : Path
-    found : Fit
+    fit : Fit
         Converged.
     posterior : Posterior, optional
 
@@ -46,30 +96,30 @@ def write_report(folder: Path, found: Fit, posterior: Posterior | None = None) -
     InputError
         If the fit has not converged, or the folder cannot be written.
     """
-    if not found.converged:
+    if not fit.converged:
         raise InputError(
-            f"fit must have converged for a report, got '{found.message}'; correct that first"
+            f"fit must have converged for a report, got '{fit.message}'; correct that first"
         )
     with written_folder(folder, "report") as staging:
         more = {"posterior": posterior.record()} if posterior else {}
-        record = json.dumps({**fit_record(found), **more}, indent=2)
+        record = json.dumps({**fit_record(fit), **more}, indent=2)
         (staging / "fit.json").write_text(record + "\n", encoding="utf-8")
-        (staging / "material.toml").write_text(material_text(found), encoding="utf-8")
-        (staging / "report.html").write_text(page(found, posterior), encoding="utf-8")
+        (staging / "material.toml").write_text(material_text(fit), encoding="utf-8")
+        (staging / "report.html").write_text(page(fit, posterior), encoding="utf-8")
         if posterior is not None:
             posterior.to_netcdf(staging / "posterior.nc")
 
 
-def material_text(found: Fit) -> str:
+def material_text(fit: Fit) -> str:
     """A material file of the law's numbers, K and W0: fitted ones with their standard errors."""
-    known = point_parameters(found.objective.law)
+    known = point_parameters(fit.objective.law)
     lines = [
-        f"title = {json.dumps(f'{found.law} fitted to {found.objective.terms[0].name}')}",
+        f"title = {json.dumps(f'{fit.law} fitted to {fit.objective.terms[0].name}')}",
         f"notes = {json.dumps('Written by asperity ' + __version__)}",
     ]
-    for name in (*law_parameters(found.objective.law), "K", "W0", "M"):
-        estimate = found.parameters.get(name)
-        fixed = np.unique(found.objective.fixed.get(name, np.nan))
+    for name in (*law_parameters(fit.objective.law), "K", "W0", "M"):
+        estimate = fit.parameters.get(name)
+        fixed = np.unique(fit.objective.fixed.get(name, np.nan))
         if estimate is None and (fixed.size != 1 or not np.isfinite(fixed[0])):
             continue
         value = estimate.value if estimate else float(fixed[0])
@@ -90,45 +140,43 @@ def material_text(found: Fit) -> str:
     return "\n".join(lines) + "\n"
 
 
-def page(found: Fit, posterior: Posterior | None) -> str:
+def page(fit: Fit, posterior: Posterior | None) -> str:
     """The page as text, with its figures in it and nothing to fetch."""
-    name = found.objective.terms[0].name
+    name = fit.objective.terms[0].name
     sections = {
-        "Verdict": _verdict(found, posterior),
-        "Estimates": _estimates(found),
+        "Verdict": _verdict(fit, posterior),
+        "Estimates": _estimates(fit),
         **({"Posterior": _posterior(posterior)} if posterior else {}),
-        "Correlations": _correlations(found),
-        "Data and fit": _figures(found, posterior),
-        "Data": data_tables(found),
-        "Provenance": provenance(found),
+        "Correlations": _correlations(fit),
+        "Data and fit": _figures(fit, posterior),
+        "Data": data_tables(fit),
+        "Provenance": provenance(fit),
     }
-    return document(
-        f"Fit of {found.law} to {name}", "A fit", f"{found.law} fitted to {name}", sections
-    )
+    return document(f"Fit of {fit.law} to {name}", "A fit", f"{fit.law} fitted to {name}", sections)
 
 
-def _verdict(found: Fit, posterior: Posterior | None) -> str:
-    good = found.dof <= 0 or found.p_value >= 0.01
+def _verdict(fit: Fit, posterior: Posterior | None) -> str:
+    good = fit.dof <= 0 or fit.p_value >= 0.01
     lines = [
-        f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom, p = "
-        f"{found.p_value:.3g}: the law {'describes' if good else 'does not describe'} these data "
+        f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom, p = "
+        f"{fit.p_value:.3g}: the law {'describes' if good else 'does not describe'} these data "
         "within their uncertainties."
     ]
-    if not found.judged_by_chi2:
+    if not fit.judged_by_chi2:
         lines = [
             "The noise of a recording is estimated from what the law leaves, so that chi-squared "
-            f"does not judge the law; AICc {found.aicc:.6g} compares it with others."
+            f"does not judge the law; AICc {fit.aicc:.6g} compares it with others."
         ]
-    warnings = [*found.warnings, *(posterior.warnings if posterior else ())]
+    warnings = [*fit.warnings, *(posterior.warnings if posterior else ())]
     listed = "".join(f"<li>{escape(w)}</li>" for w in warnings)
     observables = table(
         ("observable", "chi-squared", "data"),
-        [(n, f"{c:.4g}", str(k)) for n, (c, k) in found.observables.items()],
+        [(n, f"{c:.4g}", str(k)) for n, (c, k) in fit.observables.items()],
     )
     return f"<p>{escape(lines[0])}</p>{observables}" + (f"<ul>{listed}</ul>" if listed else "")
 
 
-def _estimates(found: Fit) -> str:
+def _estimates(fit: Fit) -> str:
     rows = [
         (
             n,
@@ -137,14 +185,14 @@ def _estimates(found: Fit) -> str:
             f"{p.interval_68[0]:.5g} to {p.interval_68[1]:.5g}",
             f"{p.interval_95[0]:.5g} to {p.interval_95[1]:.5g}",
             p.unit,
-            UNDETERMINED if n in found.undetermined else "",
+            UNDETERMINED if n in fit.undetermined else "",
         )
-        for n, p in {**found.parameters, **found.over_load}.items()
+        for n, p in {**fit.parameters, **fit.over_load}.items()
     ]
     return table(("", "estimate", "standard error", "68 %", "95 %", "unit", ""), rows)
 
 
-def _posterior(found: Posterior) -> str:
+def _posterior(posterior: Posterior) -> str:
     rows = [
         (
             n,
@@ -155,42 +203,40 @@ def _posterior(found: Posterior) -> str:
             f"{p.ess_bulk:.0f}",
             f"{p.ess_tail:.0f}",
         )
-        for n, p in found.parameters.items()
+        for n, p in posterior.parameters.items()
     ]
     head = ("", "mean", "standard deviation", "95 %", "R-hat", "ESS bulk", "ESS tail")
     return table(head, rows)
 
 
-def _correlations(found: Fit) -> str:
-    names = list(found.parameters)
-    rows = [
-        (n, *(f"{x:+.3f}" for x in row)) for n, row in zip(names, found.correlation, strict=True)
-    ]
+def _correlations(fit: Fit) -> str:
+    names = list(fit.parameters)
+    rows = [(n, *(f"{x:+.3f}" for x in row)) for n, row in zip(names, fit.correlation, strict=True)]
     return table(("", *names), rows)
 
 
-def _figures(found: Fit, posterior: Posterior | None) -> str:
+def _figures(fit: Fit, posterior: Posterior | None) -> str:
     parts = []
     source = "posterior" if posterior else "normal approximation"
-    for term, residuals in found.parts(LockInTerm):
+    for term, residuals in fit.parts(LockInTerm):
         parts += [
             figure(
-                data_figure(term.table, bands_of(found, term, posterior)),
+                data_figure(term.table, bands_of(fit, term, posterior)),
                 "Readings with standard uncertainties; medians and 95 % bands of the "
                 f"prediction by the {source}.",
             ),
             figure(residual_figure(residuals, term.table.row_names), "Residuals."),
         ]
-    for run, _ in found.parts(RunTerm):
-        drawn = run_figure(run.run, {found.law: run.fitted_friction(found.values)})
+    for run, _ in fit.parts(RunTerm):
+        drawn = run_figure(run.run, {fit.law: run.fitted_friction(fit.values)})
         parts.append(figure(drawn, RUN_CAPTION))
     return "\n".join(parts)
 
 
-def data_tables(found: Fit) -> str:
+def data_tables(fit: Fit) -> str:
     """The data of a fit: readings of a table, drive and noise of a recording."""
     parts = []
-    for term in found.objective.terms_of(LockInTerm):
+    for term in fit.objective.terms_of(LockInTerm):
         read = term.table
         columns: dict[str, Any] = {**read.points}
         for name in read.values:
@@ -200,7 +246,7 @@ def data_tables(found: Fit) -> str:
             for i in range(read.rows)
         ]
         parts.append(table(("", *columns), rows))
-    parts += [_recording(term) for term in found.objective.terms_of(RunTerm)]
+    parts += [_recording(term) for term in fit.objective.terms_of(RunTerm)]
     return "\n".join(parts)
 
 
@@ -220,17 +266,17 @@ def _recording(term: RunTerm) -> str:
     return f"<p>{escape(said)}</p>" + table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
 
 
-def provenance(found: Fit) -> str:
+def provenance(fit: Fit) -> str:
     """What was fixed, when and by which program, and where the law is from."""
     fixed = [
         (n, f"{np.min(v):.6g}" + ("" if np.ptp(v) == 0 else f" to {np.max(v):.6g}"))
-        for n, v in found.objective.fixed.items()
+        for n, v in fit.objective.fixed.items()
     ]
     made = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     sources = "".join(
-        f"<pre>{escape(work)}</pre>" for work in cited_works(found.objective.law.source).values()
+        f"<pre>{escape(work)}</pre>" for work in cited_works(fit.objective.law.source).values()
     )
-    names = ", ".join(term.name for term in found.objective.terms)
+    names = ", ".join(term.name for term in fit.objective.terms)
     return (
         f"<p>asperity {__version__}, {made}; data: {escape(names)}; numbers that were fixed, in "
         f"SI:</p>{table(('', 'value'), fixed)}<p>The law:</p>{sources}"

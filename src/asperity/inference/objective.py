@@ -304,21 +304,21 @@ class Objective:
         changed = [n for names in sets for n in names]
         if any(moved[n] <= 0 and known[n].logarithmic for n in changed):
             return u
-        found = self.coordinates(moved)
+        result = self.coordinates(moved)
         low, high = np.array([k.bounds for k in self.unknowns]).T
-        return found if ((found >= low) & (found <= high)).all() else u
+        return result if ((result >= low) & (result <= high)).all() else u
 
     def data_residuals(self, u: Float, *, search: bool | None = None) -> list[Residuals] | None:
         """Residuals of each term, with the Jacobian to the coordinates; None without a solution."""
         values = self.named(u)
         slopes = np.array([k.slope(values[k.name]) for k in self.unknowns])
-        found = []
+        result = []
         for term in self.terms:
             residuals = term.residuals(values, search=search)
             if residuals is None:
                 return None
-            found.append(residuals._replace(jacobian=residuals.jacobian * slopes))
-        return found
+            result.append(residuals._replace(jacobian=residuals.jacobian * slopes))
+        return result
 
     def residuals(self, u: Float) -> tuple[Float, Float]:
         """Residuals of data and priors and their Jacobian; NaN without a solution."""

@@ -118,7 +118,7 @@ def _check_shapes(kind: type[Law], law: Law) -> None:
         name = f"law.{method}"
         function: Callable[..., Any] = getattr(kind, method)
         try:
-            found = jax.eval_shape(function, one, *arguments)
+            result = jax.eval_shape(function, one, *arguments)
         except InputError:
             raise
         except Exception as error:  # code of others may raise anything
@@ -128,21 +128,21 @@ def _check_shapes(kind: type[Law], law: Law) -> None:
                 f"({text}) from '{kind.name}'; {_PAGE}"
             ) from error
         if states is None:
-            _require_shape(found, v.shape, name, kind)
+            _require_shape(result, v.shape, name, kind)
             continue
-        if not isinstance(found, tuple | list) or len(found) != states:
-            got = f"{len(found)}" if isinstance(found, tuple | list) else "no tuple"
+        if not isinstance(result, tuple | list) or len(result) != states:
+            got = f"{len(result)}" if isinstance(result, tuple | list) else "no tuple"
             raise InputError(
                 f"{name} must return a tuple with an array for each of the {states} state_names, "
                 f"got {got} from '{kind.name}'; {_PAGE}"
             )
-        for one_state in found:
+        for one_state in result:
             _require_shape(one_state, v.shape, name, kind)
 
 
-def _require_shape(found: Any, shape: tuple[int, ...], name: str, kind: type[Law]) -> None:
-    if getattr(found, "shape", None) != shape or not jnp.issubdtype(found.dtype, jnp.floating):
-        got = getattr(found, "shape", type(found).__name__)
+def _require_shape(result: Any, shape: tuple[int, ...], name: str, kind: type[Law]) -> None:
+    if getattr(result, "shape", None) != shape or not jnp.issubdtype(result.dtype, jnp.floating):
+        got = getattr(result, "shape", type(result).__name__)
         raise InputError(
             f"{name} must return real numbers of the shape of its arguments, got {got} for "
             f"{shape} from '{kind.name}'; {_PAGE}"
@@ -175,9 +175,9 @@ def _probe(kind: type[Law]) -> Callable[[Law], dict[str, Array]]:
     return jax.jit(probe)
 
 
-def _fault(kind: type[Law], found: dict[str, Array]) -> str:
+def _fault(kind: type[Law], result: dict[str, Array]) -> str:
     """What is wrong with the numbers of a law; empty where nothing is."""
-    at = {name: np.asarray(values) for name, values in found.items()}
+    at = {name: np.asarray(values) for name, values in result.items()}
     finite = np.isfinite(at["friction"]) & np.isfinite(at["rates"]).all(0)
     if not finite.any():
         return (

@@ -44,13 +44,13 @@ def load_installed(point: EntryPoint) -> type[Law]:
     """
     where = f"entry point '{point.name}' of {point.value}"
     try:
-        found = point.load()
+        result = point.load()
     except Exception as error:  # code of others may raise anything
         raise InputError(
             f"law must be importable, got {where} ({type(error).__name__}: {error}); "
             "mend or uninstall the package that has it"
         ) from error
-    law = _checked(found, where)
+    law = _checked(result, where)
     if law.name != point.name:
         raise InputError(
             f"law must have the name of its entry point, got {where} and the name '{law.name}'; "
@@ -130,10 +130,10 @@ def _is_law(value: object) -> bool:
     return isinstance(value, type) and issubclass(value, Law) and value is not Law
 
 
-def _checked(found: object, where: str) -> type[Law]:
-    if not (isinstance(found, type) and issubclass(found, Law) and found is not Law):
+def _checked(result: object, where: str) -> type[Law]:
+    if not (isinstance(result, type) and issubclass(result, Law) and result is not Law):
         raise InputError(
             f"law must be a subclass of asperity.laws.Law, got {where}, a "
-            f"{type(found).__name__}; see the page 'Write your own law'"
+            f"{type(result).__name__}; see the page 'Write your own law'"
         )
-    return checked_class(found, where)
+    return checked_class(result, where)

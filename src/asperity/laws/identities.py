@@ -73,8 +73,8 @@ class BrokenIdentityError(AssertionError):
 
     def __init__(self, law: Law, broken: dict[str, str]) -> None:
         self.broken = broken
-        found = "\n\n".join(f"{name}: {message.strip()}" for name, message in broken.items())
-        super().__init__(f"{type(law).name} breaks {', '.join(broken)}\n\n{found}")
+        result = "\n\n".join(f"{name}: {message.strip()}" for name, message in broken.items())
+        super().__init__(f"{type(law).name} breaks {', '.join(broken)}\n\n{result}")
 
 
 def check_law(
@@ -158,8 +158,8 @@ def inverse(law: Law) -> None:
     """`log_velocity` inverts `friction`, and agrees with the general Newton's method."""
     v, state, w = sample(law)
     friction = law.friction(v, state, w)
-    for found in (law.log_velocity(friction, state, w), Law.log_velocity(law, friction, state, w)):
-        np.testing.assert_allclose(found, jnp.log(v), rtol=0, atol=1e-11)
+    for result in (law.log_velocity(friction, state, w), Law.log_velocity(law, friction, state, w)):
+        np.testing.assert_allclose(result, jnp.log(v), rtol=0, atol=1e-11)
     np.testing.assert_allclose(law.velocity(friction, state, w), v, rtol=1e-11)
 
 
@@ -275,8 +275,8 @@ def exchange(law: Law) -> None:
 def slope_of_steady_friction(law: Law, slope: Slope) -> None:
     """Derivative of mu_ss to ln v is what the publication says."""
     for v in SPEEDS:
-        found = jax.grad(lambda log_v: law.mu_ss(jnp.exp(log_v)))(jnp.log(v))
-        np.testing.assert_allclose(found, slope(v), rtol=1e-10, atol=EXACT)
+        result = jax.grad(lambda log_v: law.mu_ss(jnp.exp(log_v)))(jnp.log(v))
+        np.testing.assert_allclose(result, slope(v), rtol=1e-10, atol=EXACT)
 
 
 def step_of_load(law: Law, load_step: LoadStep, factor: float = 1.3) -> None:

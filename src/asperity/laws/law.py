@@ -19,7 +19,7 @@ from jax.typing import ArrayLike
 from asperity._jax import configure
 from asperity.laws.inverse import invert_friction
 from asperity.parameters import law_parameters
-from asperity.parameters.display import Displayed, SummaryLine, parameter_line
+from asperity.parameters.parameter import Displayed, SummaryLine, parameter_line
 
 configure()  # double precision, before any law makes an array
 

@@ -418,7 +418,7 @@ class MeasuredPoints:
 
     def write(self, folder: Path) -> list[CurveComparison]:
         """Write data/points.csv and agreement.json, and return what they say."""
-        from asperity.figures.files import save_table
+        from asperity.figures.style import save_table
 
         if not self.compared:
             return []

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from asperity._version import __version__
 from asperity.errors import InputError
-from asperity.parameters.file_content import file_content
+from asperity.parameters.toml_file import file_content
 
 Float = NDArray[np.float64]
 

@@ -18,7 +18,7 @@ from asperity.ledger.page import KIND_TEXTS, VERDICT_TEXTS, Plate, PlateGroup, b
 from asperity.ledger.points import CurveComparison, MeasuredPoints
 from asperity.materials import citation
 from asperity.outputs import written_folder
-from asperity.parameters.display import count_text
+from asperity.parameters.parameter import count_text
 
 if TYPE_CHECKING:
     from asperity.ledger.figures import PaperFigure, Section
@@ -194,7 +194,7 @@ def _show(
 
 
 def _draw(figure: PaperFigure, folder: Path) -> Plate:
-    from asperity.figures.files import save_picture, save_table
+    from asperity.figures.style import save_picture, save_table
 
     png, _ = save_picture(figure.draw(), folder / "figures" / figure.name)
     for table in figure.tables:

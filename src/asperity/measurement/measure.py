@@ -37,7 +37,7 @@ from asperity.measurement.window import (
     under_the_same_load,
     whole_periods,
 )
-from asperity.parameters.display import Displayed, SummaryLine
+from asperity.parameters.parameter import Displayed, SummaryLine
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace

@@ -17,7 +17,7 @@ from asperity.orbit.outcome import Outcome, sentences
 from asperity.orbit.solution import Solution
 from asperity.parameters import DRIVE, OUTPUTS, Parameter
 from asperity.parameters.arguments import shown
-from asperity.parameters.display import (
+from asperity.parameters.parameter import (
     Displayed,
     SummaryLine,
     count_text,

@@ -5,14 +5,16 @@ one piece, and `unfinished` keeps the finished blocks of a long computation so t
 after an interruption.
 """
 
-from asperity.outputs.capacity import (
+from asperity.outputs.targets import (
     free_disk,
     free_memory,
+    output_file,
+    output_files,
     require_disk,
     require_memory,
+    require_short,
     size_text,
 )
-from asperity.outputs.targets import output_file, output_files, require_short
 from asperity.outputs.unfinished import (
     Interrupted,
     UnfinishedOutput,

@@ -4,15 +4,15 @@ Command line, tables, maps, sweeps, continuation, materials, JSON and the page o
 every name from here.
 """
 
-from asperity.parameters.outputs import OUTPUTS, RESULT_COLUMNS
-from asperity.parameters.parameter import Output, Parameter
-from asperity.parameters.rules import RULES, Rule, obeying
+from asperity.parameters.parameter import RULES, Output, Parameter, Rule, obeying
 from asperity.parameters.table import (
     DRIVE,
     EXPERIMENT,
     INTERFACE,
     MACHINE,
     MODULATION,
+    OUTPUTS,
+    RESULT_COLUMNS,
     all_parameters,
     canonical_name,
     known_name,

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from asperity.errors import InputError, closest
-from asperity.parameters.rules import obeying
+from asperity.parameters.parameter import obeying
 
 T = TypeVar("T")
 

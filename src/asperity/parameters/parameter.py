@@ -1,16 +1,101 @@
-"""What is known of a parameter and of an output besides its value."""
+"""A parameter or an output without its value: kind, unit, rule, meaning, and how it is displayed.
+
+A value that breaks a rule is an error in one sentence. Objects are displayed on consoles and in
+notebooks as short texts and tables, arrays by what they hold.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import html
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from asperity.parameters.rules import RULES, obeying
-from asperity.units import KINDS, to_radians
+from asperity.errors import InputError
+from asperity.units import KINDS, format_si, to_radians, to_si
+from asperity.units.convert import is_traced
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A rule that a number obeys.
+
+    Attributes
+    ----------
+    words : str
+        What follows "must" in a message.
+    holds : callable
+        Whether each element of an array obeys the rule.
+    advice : str
+        What to do about a value that does not.
+    """
+
+    words: str
+    holds: Callable[[Any], Any]
+    advice: str
+
+
+#: Every rule, by name. NaN and infinities are refused by `asperity.units.to_si` already.
+RULES: Mapping[str, Rule] = MappingProxyType(
+    {
+        "positive": Rule("be positive", lambda x: x > 0, "give a value above zero"),
+        "not negative": Rule("not be negative", lambda x: x >= 0, "give a value of at least zero"),
+        "finite": Rule("be finite", np.isfinite, "give a finite value"),
+        "amplitude": Rule(
+            "be at least 0 and below 1, so that contact is never lost",
+            lambda x: (x >= 0) & (x < 1),
+            "give the relative amplitude of the load, such as 0.24 or '24 %'",
+        ),
+        "below a right angle": Rule(
+            "be less than a right angle, pi/2, on either side",
+            lambda x: np.abs(x) < np.pi / 2,
+            "give the angle from the normal in rad, such as 0.03, or as a text like '2 deg'",
+        ),
+        "switch": Rule(
+            "be 1 or 0",
+            lambda x: np.isin(x, (0.0, 1.0)),
+            "write 1 where it counts, 0 elsewhere",
+        ),
+    }
+)
+
+
+def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
+    """Convert a value to SI and check its rule.
+
+    Parameters
+    ----------
+    value : str, number, array or sequence of these
+        A text carries its unit, a number is SI.
+    label : str
+        What messages call the value, as ``slider.K``.
+    kind : str
+        A key of `asperity.units.KINDS`.
+    rule : str
+        A key of `RULES`.
+
+    Returns
+    -------
+    array of float
+        Of the shape of `value`. A value that JAX traces is returned as it is, unchecked.
+
+    Raises
+    ------
+    InputError
+        Naming the value, the rule, the first offending element and its unit.
+    """
+    if is_traced(value):
+        return value
+    array = np.asarray(to_si(value, kind, label), dtype=float)
+    if not np.all(RULES[rule].holds(array)):
+        bad = array[~RULES[rule].holds(array)]
+        got = f"{bad.flat[0]:g} {KINDS[kind].si}".rstrip()
+        raise InputError(f"{label} must {RULES[rule].words}, got {got}; {RULES[rule].advice}")
+    return array
+
 
 #: What a parameter belongs to: the friction law, the machine, the equation of motion, the drive,
 #: or the normal load.
@@ -161,3 +246,78 @@ class Output:
     def attributes(self) -> dict[str, str]:
         """Attributes of the variable of a dataset."""
         return {"units": self.unit, "long_name": self.meaning}
+
+
+class SummaryLine(NamedTuple):
+    """A line of a summary: name, value as text, and what it is."""
+
+    name: str
+    value: str
+    meaning: str = ""
+
+
+class Displayed:
+    """An object that shows itself by its summary.
+
+    Subclasses that are dataclasses are declared with ``repr=False``.
+    """
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """What the object is, and its most telling values."""
+        raise NotImplementedError
+
+    def __repr__(self) -> str:
+        title, lines = self.summary()
+        values = ", ".join(f"{line.name}={line.value}" for line in lines)
+        return f"<{title}: {values}>" if values else f"<{title}>"
+
+    def _repr_html_(self) -> str:
+        title, lines = self.summary()
+        rows = "".join(
+            "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in line) + "</tr>"
+            for line in lines
+        )
+        return f"<table><caption>{html.escape(title)}</caption><tbody>{rows}</tbody></table>"
+
+
+def parameter_line(parameter: Parameter, value: Any) -> SummaryLine:
+    """A parameter with its value in a unit that reads well; of an array the range and the shape."""
+    return SummaryLine(
+        parameter.name, value_text(value, parameter.kind), plain_text(parameter.meaning)
+    )
+
+
+def value_text(value: Any, kind: str) -> str:
+    """A value of a kind of quantity in a few words.
+
+    Parameters
+    ----------
+    value : float or array
+        In SI, or traced by JAX.
+    kind : str
+        A key of `asperity.units.KINDS`.
+    """
+    if is_traced(value) or (not hasattr(value, "__array__") and not np.isscalar(value)):
+        return "traced"
+    array = np.asarray(value)
+    if array.dtype.kind not in "iuf" or not array.size:
+        return f"an array of shape {array.shape}"
+    if array.size == 1:
+        return format_si(float(array.ravel()[0]), kind, 6)
+    low, high = format_si(array.min(), kind), format_si(array.max(), kind)
+    return f"{low if low == high else f'{low} to {high}'} {array.shape}"
+
+
+def count_text(count: int, noun: str) -> str:
+    """``1 point``, ``2 points``."""
+    return f"{count:,} {noun}" + ("" if count == 1 else "s")
+
+
+def number_line(name: str, values: Any, meaning: str = "") -> SummaryLine:
+    """A number, or the range of an array without what is NaN in it."""
+    array = np.asarray(values, dtype=float)
+    known = array[np.isfinite(array)]
+    if not known.size:
+        return SummaryLine(name, "none", meaning)
+    low, high = (f"{edge:.6g}" for edge in (known.min(), known.max()))
+    return SummaryLine(name, low if low == high else f"{low} to {high}", meaning)

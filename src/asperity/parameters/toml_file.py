@@ -1,9 +1,14 @@
-"""The one reader of TOML: plans, protocols, recipes, materials, and claims of papers."""
+"""The one reader of TOML: plans, protocols, recipes, materials, and claims of papers.
+
+Files are read as a whole, up to a largest size.
+"""
 
 from __future__ import annotations
 
+import errno
 import os
 import re
+import stat
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
@@ -11,7 +16,27 @@ from typing import Any
 
 from asperity.errors import InputError, printable
 from asperity.parameters.arguments import file_path
-from asperity.parameters.file_content import file_content
+
+#: Bytes of a file of texts: a table or a plan with a million rows of several numbers has less.
+LARGEST = 128 * 2**20
+
+
+def file_content(path: Path) -> bytes:
+    """The bytes of a file.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read, is a device, or is larger than any text that this package is given.
+    """
+    with path.open("rb") as stream:
+        if stat.S_ISCHR(os.fstat(stream.fileno()).st_mode):
+            raise OSError(errno.EINVAL, "it is a device")
+        content = stream.read(LARGEST + 1)
+    if len(content) > LARGEST:
+        raise OSError(errno.EFBIG, f"it has more than {LARGEST:,} bytes")
+    return content
+
 
 #: Tables and lists in each other: what is written by hand has a tenth of it.
 _DEEPEST = 100

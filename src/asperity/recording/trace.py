@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.errors import InputError, listed
-from asperity.parameters.display import Displayed, SummaryLine, count_text, number_line
+from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.recording.checks import CHECKED, check, even_rate
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.roles import find_channel

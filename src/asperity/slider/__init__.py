@@ -1,8 +1,8 @@
 """Law + spring + mass + load = equation of motion."""
 
-from asperity.slider.formulation import equation_of_motion
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.motion import Motion
+from asperity.slider.problem import equation_of_motion
 from asperity.slider.quasi_static import QuasiStatic
 from asperity.slider.radiating import Radiating
 from asperity.slider.reversing import ReversingInertial, reversing

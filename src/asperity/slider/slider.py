@@ -10,7 +10,7 @@ from asperity.laws import Law
 from asperity.laws.consistency import checked_law
 from asperity.parameters import MACHINE
 from asperity.parameters.arguments import instance
-from asperity.parameters.display import Displayed, SummaryLine, parameter_line
+from asperity.parameters.parameter import Displayed, SummaryLine, parameter_line
 
 
 class Slider(Displayed, eqx.Module):

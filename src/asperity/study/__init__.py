@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from asperity.study.estimate import dry_run
     from asperity.study.export import export_store
-    from asperity.study.load import load_plan
+    from asperity.study.grid import load_plan
     from asperity.study.outcome import reasons
     from asperity.study.plan import SweepPlan
     from asperity.study.results import SweepStatus, open_store, store_status, summary_statistics

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from asperity.study.grid import SweepGrid
-from asperity.study.load import load_plan
+from asperity.study.grid import SweepGrid, load_plan
 from asperity.study.plan import SweepPlan
 from asperity.study.solve import SOLVES
 

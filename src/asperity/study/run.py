@@ -22,11 +22,10 @@ from asperity.materials import cited_works
 from asperity.orbit.search import available_cores
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
 from asperity.parameters.arguments import file_path, whole_number
-from asperity.parameters.file_content import file_content
+from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
-from asperity.study.grid import SweepGrid
+from asperity.study.grid import SweepGrid, load_plan
 from asperity.study.job import Job, numerics, package_version
-from asperity.study.load import load_plan
 from asperity.study.plan import SweepPlan
 from asperity.study.record import is_extension, law_places
 from asperity.study.store.layout import create, extend, fresh_folder, lay_out

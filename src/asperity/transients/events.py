@@ -166,7 +166,7 @@ class EventDetector:
         if len(dense_output.begin) == 0:
             return [], None
         times = dense_output.refined()
-        found = [
+        result = [
             Event(t, "slip start" if up else "slip end")
             for t, up in self._crossings("slip", self._slip, times, samples, dense_output)
         ]
@@ -178,12 +178,12 @@ class EventDetector:
             ]
         reversals = self._crossings("friction", self._friction, times, samples, dense_output)
         if self._reverses:
-            found += [Event(t, "reversal") for t, _ in reversals]
+            result += [Event(t, "reversal") for t, _ in reversals]
         else:
             terminations += [Termination("reversal", t) for t, up in reversals if not up]
-        found += self._steadiness(times, samples, dense_output)
+        result += self._steadiness(times, samples, dense_output)
         termination = min(terminations, key=lambda s: s.time, default=None)
-        return sorted(found, key=lambda e: e.time), termination
+        return sorted(result, key=lambda e: e.time), termination
 
     def _steadiness(
         self, times: np.ndarray, samples: MotionSamples, dense_output: DenseOutput

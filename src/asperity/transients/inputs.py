@@ -163,8 +163,8 @@ def _steady_state(law: Law, v: Array, w: Array) -> State:
         return packed + jnp.clip(change, -_LEAP, _LEAP)
 
     # Under w = 1 the initial guess is exact to the last digit.
-    found = jax.lax.fori_loop(0, _STEPS, step, start)
-    return tuple(jnp.where(w == 1, start, found))
+    result = jax.lax.fori_loop(0, _STEPS, step, start)
+    return tuple(jnp.where(w == 1, start, result))
 
 
 #: A slider slips when it is so many times faster than the fastest drive.

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.loads.programme.programme import BREAK
-from asperity.parameters.display import Displayed, SummaryLine, count_text, number_line
+from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion
 from asperity.slider.named import values_as_text
 from asperity.transients.events import Event, Termination

@@ -17,8 +17,7 @@ from asperity.errors import InputError
 from asperity.recording.checks import check
 from asperity.recording.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
-from asperity.tribometer.filters import between, filtered, low_pass
-from asperity.tribometer.sensors import Accelerometer, Given, Sensor
+from asperity.tribometer.sensors import Accelerometer, Given, Sensor, between, filtered, low_pass
 from asperity.units import KINDS, to_si
 
 Array = NDArray[np.float64]

@@ -4,8 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from asperity.figures.files import save_picture
-from asperity.figures.style import style
+from asperity.figures.style import save_picture, style
 from asperity.ledger import Claim, find_paper
 from asperity.ledger.page import Plate, PlateGroup, build_page
 from asperity_papers.bureau2000.figures import SCHEMATICS

@@ -14,8 +14,7 @@ import pandas as pd
 import pytest
 
 from asperity.errors import InputError
-from asperity.figures.files import save_picture
-from asperity.figures.style import style
+from asperity.figures.style import save_picture, style
 from asperity.ledger import Claim, Headline, Paper, Sensitivity, find_paper, reproduce, rich
 from asperity.ledger.contents import SummaryWords
 from asperity.outputs import written_folder

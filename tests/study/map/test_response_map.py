@@ -11,8 +11,8 @@ import asperity as asp
 from asperity.errors import InputError
 from asperity.operating_point import SourcedNumber, respond
 from asperity.orbit import Outcome
-from asperity.outputs import Interrupted, capacity
-from asperity.study import crossing, responses
+from asperity.outputs import Interrupted, targets
+from asperity.study import responses, threshold
 from asperity.study.map import SHOWN, Axis, response_map, write_map
 
 EPS = Axis("epsilon", 0.0, 0.4, 7)
@@ -78,7 +78,7 @@ def test_chords_between_the_points_stay_on_the_boundary(rigid, pmma) -> None:
 
 
 def test_a_planted_mistake_in_the_search_is_seen(numbers, pmma, monkeypatch) -> None:
-    monkeypatch.setattr(crossing, "TOLERANCE", 0.3)
+    monkeypatch.setattr(threshold, "TOLERANCE", 0.3)
     found = response_map("rice-ruina", numbers, x=Axis("epsilon", 0.0, 0.4, 2), y=K)
     Kc = (pmma.B - pmma.A) * pmma.W0 / pmma.D0
     eps, stiffness = found["boundary_epsilon"].values, found["boundary_K"].values
@@ -253,7 +253,7 @@ def test_an_axis_of_another_modulation(numbers, pmma) -> None:
 
 
 def test_a_map_beyond_memory_is_refused_before_anything(numbers, tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(capacity, "free_memory", lambda: 16e9)
+    monkeypatch.setattr(targets, "free_memory", lambda: 16e9)
     draw = np.random.default_rng(0)
     for _ in range(5):
         columns = int(10 ** draw.uniform(0.5, 8))

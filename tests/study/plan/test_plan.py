@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import kstest
 
 from asperity.errors import InputError
-from asperity.outputs import capacity
+from asperity.outputs import targets
 from asperity.study import SweepPlan, load_plan, run_sweep
 from asperity.study.grid import SweepGrid
 
@@ -91,8 +91,8 @@ def test_plans_beyond_memory_are_refused_before_anything(
     tmp_path: Path, seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A hundred gigabytes and more, by any of the ways in which a short plan asks for them."""
-    monkeypatch.setattr(capacity, "free_memory", lambda: 16e9)
-    monkeypatch.setattr(capacity, "free_disk", lambda folder: 1e12)
+    monkeypatch.setattr(targets, "free_memory", lambda: 16e9)
+    monkeypatch.setattr(targets, "free_disk", lambda folder: 1e12)
     draw = np.random.default_rng(seed)
     rows = [int(n) for n in draw.integers(60_000, 100_000, 4)]
     lists = {n: (draw.uniform(0.1, 0.3, 1000)).tolist() for n in ("A", "B", "epsilon", "W0")}

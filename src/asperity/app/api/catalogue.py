@@ -66,8 +66,8 @@ def mathml(latex: str, *, display: bool = False) -> str:
     """A formula as a ``<math>`` element; empty for none."""
     if not latex:
         return ""
-    found: str = convert(latex, display="block" if display else "inline")
-    return found
+    result: str = convert(latex, display="block" if display else "inline")
+    return result
 
 
 def _law(name: str) -> dict[str, Any]:
@@ -143,8 +143,8 @@ def slider(name: str, material: Material) -> dict[str, Any]:
         return {"value": value, "low": 0.0, "high": span[1] if span else 0.9, "log": False}
     if parameter.rule == "positive":
         factor = _WITH_UNIT if parameter.unit else _PURE
-        found = {"low": span[0], "high": span[1], "log": True} if span else around(value, factor)
-        return {"value": value, **found}
+        result = {"low": span[0], "high": span[1], "log": True} if span else around(value, factor)
+        return {"value": value, **result}
     size = abs(value) or to_si(parameter.example, kind, name)
     return {"value": value, "low": 0.0, "high": _FROM_ZERO * size, "log": False}
 

@@ -34,7 +34,7 @@ class Nothing(Question):
     """A request without fields."""
 
 
-def overview(asked: Nothing) -> dict[str, Any]:
+def overview(question: Nothing) -> dict[str, Any]:
     """Roles of channels, protocols to begin with, and the largest file."""
     folder = Path(__file__).parents[1] / "protocols"
     return {
@@ -46,9 +46,9 @@ def overview(asked: Nothing) -> dict[str, Any]:
     }
 
 
-def _file(asked: Recording, uploads: Uploads) -> dict[str, Any]:
-    upload = uploads.get(asked.recording)
-    return {**asked.model_dump(), "path": str(upload.path), "name": upload.name}
+def _file(question: Recording, uploads: Uploads) -> dict[str, Any]:
+    upload = uploads.get(question.recording)
+    return {**question.model_dump(), "path": str(upload.path), "name": upload.name}
 
 
 def check_protocol(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
@@ -68,17 +68,17 @@ def check_protocol(argument: Mapping[str, Any], report: Callable[..., None]) -> 
     }
 
 
-def _place_for_run(asked: ProtocolText, uploads: Uploads) -> dict[str, Any]:
+def _place_for_run(question: ProtocolText, uploads: Uploads) -> dict[str, Any]:
     upload = uploads.begin("virtual recording.csv")
-    return {"text": asked.text, "path": str(upload.path), "id": upload.key, "name": upload.name}
+    return {"text": question.text, "path": str(upload.path), "id": upload.key, "name": upload.name}
 
 
 def run_protocol(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
     """Run a protocol and record it; the recording becomes a file as if it had been sent."""
     from asperity.app.api.protocols import run
 
-    found = run(argument["text"], Path(argument["path"]), report)
-    return {**found, "id": argument["id"], "name": argument["name"]}
+    result = run(argument["text"], Path(argument["path"]), report)
+    return {**result, "id": argument["id"], "name": argument["name"]}
 
 
 ENDPOINTS = (

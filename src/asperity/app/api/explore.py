@@ -75,31 +75,31 @@ def use(preparation: Preparation) -> None:
     _preparation = preparation
 
 
-def explore(asked: Explored) -> dict[str, Any]:
+def explore(question: Explored) -> dict[str, Any]:
     """Response, curves and share of the air layer, as far as the fast methods know them."""
-    numbers = asked.sourced()
+    numbers = question.sourced()
     values = {name: number.value for name, number in numbers.items()}
-    epsilon = epsilon_on_contacts(asked, values)
-    laws = list(dict.fromkeys([asked.law, *asked.laws]))
+    epsilon = epsilon_on_contacts(question, values)
+    laws = list(dict.fromkeys([question.law, *question.laws]))
     for name in laws:
         law_class(name)
     answer: dict[str, Any] = {
         "numbers": values,
         "origins": {name: number.origin for name, number in numbers.items()},
         "epsilon": epsilon,
-        "air": _air(asked, values),
-        **recipes.explore(asked, values, epsilon),
+        "air": _air(question, values),
+        **recipes.explore(question, values, epsilon),
     }
     waiting = [name for name in laws if not _prepared(name)]
     if waiting:
         answer["preparing"] = waiting[0]
-    if asked.law in waiting:
+    if question.law in waiting:
         return answer
-    point = solve(law_class(asked.law), values, epsilon, methods=_FAST, **_KEPT)
+    point = solve(law_class(question.law), values, epsilon, methods=_FAST, **_KEPT)
     answer["point"] = point_record(point, searched=False)
-    grid = asked.amplitudes()
+    grid = question.amplitudes()
     answer["amplitudes"] = grid
-    answer["curves"] = {n: _fast_curve(asked, n, grid) for n in laws if n not in waiting}
+    answer["curves"] = {n: _fast_curve(question, n, grid) for n in laws if n not in waiting}
     return answer
 
 
@@ -111,9 +111,9 @@ def _moves_by_inertia(values: Mapping[str, float]) -> bool:
     return bool(values.get("inertia", 0.0) or values.get("eta", 0.0))
 
 
-def _fast_curve(asked: Explored, name: str, grid: np.ndarray) -> dict[str, Any]:
+def _fast_curve(question: Explored, name: str, grid: np.ndarray) -> dict[str, Any]:
     """Curves against the amplitude; null where only a search will know."""
-    values = asked.values(name)
+    values = question.values(name)
     law = law_class(name)
     if not law.rate_dependent:
         return _curve_record(solve(law, values, grid))
@@ -122,16 +122,16 @@ def _fast_curve(asked: Explored, name: str, grid: np.ndarray) -> dict[str, Any]:
         return {**dict.fromkeys(_CURVES, empty), "left": list(range(len(grid)))}
     function = _function(name)
     own = {n: v for n, v in values.items() if n in function.parameters}
-    found = function({**own, "epsilon": grid})
-    c1, c2 = np.asarray(found.harmonics).T
+    result = function({**own, "epsilon": grid})
+    c1, c2 = np.asarray(result.harmonics).T
     return {
-        "mean_friction": np.asarray(found.mean_friction),
+        "mean_friction": np.asarray(result.mean_friction),
         "mu1": np.abs(c1),
         "mu2": np.abs(c2),
         # Without modulation there is no phase.
         "phase1": np.where(grid > 0, np.angle(c1), np.nan),
         "phase2": np.where(grid > 0, np.angle(c2), np.nan),
-        "left": np.flatnonzero(np.asarray(found.outcome) != Outcome.CONVERGED),
+        "left": np.flatnonzero(np.asarray(result.outcome) != Outcome.CONVERGED),
     }
 
 
@@ -140,30 +140,30 @@ def _function(name: str) -> ResponseFunction:
     return response_function(name, harmonics=2, multipliers=False, search=False)
 
 
-def _curve_record(found: PeriodicResponse) -> dict[str, Any]:
-    record = {name: getattr(found, name) for name in _CURVES}
+def _curve_record(response: PeriodicResponse) -> dict[str, Any]:
+    record = {name: getattr(response, name) for name in _CURVES}
     return {**record, "left": []}
 
 
-def point_record(found: PeriodicResponse, *, searched: bool) -> dict[str, Any]:
+def point_record(response: PeriodicResponse, *, searched: bool) -> dict[str, Any]:
     """Everything that is shown of one response."""
-    converged = bool(found.converged)
+    converged = bool(response.converged)
     record: dict[str, Any] = {"converged": converged, "searched": searched or converged}
     if not converged:
-        return {**record, "result": str(found.result[()]) if searched else ""}
-    period = over_a_period(found)
+        return {**record, "result": str(response.result[()]) if searched else ""}
+    period = over_a_period(response)
     return {
         **record,
-        "result": stability_sentence(found),
-        "stable": bool(found.stable),
+        "result": stability_sentence(response),
+        "stable": bool(response.stable),
         "phase": period.phase,
         "force": period.force,
         "slip": period.plastic_velocity,
         "age": period.age,
-        "harmonics": found.harmonics,
-        "multipliers": found.multipliers,
-        **{name: getattr(found, name)[()] for name in _SHOWN},
-        "mode": str(found.mode[()]),
+        "harmonics": response.harmonics,
+        "multipliers": response.multipliers,
+        **{name: getattr(response, name)[()] for name in _SHOWN},
+        "mode": str(response.mode[()]),
     }
 
 
@@ -173,16 +173,16 @@ _SHOWN = (
 )
 
 
-def stability_sentence(found: PeriodicResponse) -> str:
+def stability_sentence(response: PeriodicResponse) -> str:
     """Stability of one response in plain words."""
-    if found.log_multipliers.shape[-1] == 0:
+    if response.log_multipliers.shape[-1] == 0:
         return "no dynamics: the force follows the load"
-    rate, turn = float(found.growth_rate), float(found.mode_frequency)
+    rate, turn = float(response.growth_rate), float(response.mode_frequency)
     per_second = f"by a factor e in {_digits(1 / abs(rate))} s" if rate else "by nothing"
-    if bool(found.stable):
+    if bool(response.stable):
         how = f"turns at {_digits(turn)} Hz and" if turn > 0 else "does not turn and"
         return f"stable; the slowest mode {how} decays {per_second}"
-    kind = str(found.mode[()])
+    kind = str(response.mode[()])
     how = {
         "fold": "away without turning (a fold)",
         "period doubling": "with twice the period (a period doubling)",
@@ -195,19 +195,19 @@ def _digits(value: float) -> str:
     return f"{value:.3g}"
 
 
-def _air(asked: Explored, values: Mapping[str, float]) -> dict[str, Any] | None:
-    if asked.air is None:
+def _air(question: Explored, values: Mapping[str, float]) -> dict[str, Any] | None:
+    if question.air is None:
         return None
-    frequency = asked.frequencies()
-    share, phase = borne_share(asked, values, frequency)
-    here, lag = borne_share(asked, values, values["frequency"])
+    frequency = question.frequencies()
+    share, phase = borne_share(question, values, frequency)
+    here, lag = borne_share(question, values, values["frequency"])
     return {
         "frequency": frequency,
         "share": share,
         "phase": phase,
         "share_here": float(here),
         "phase_here": float(lag),
-        "numbers": asked.air_values(),
+        "numbers": question.air_values(),
     }
 
 
@@ -216,25 +216,27 @@ def search(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str
 
     Each message has ``point``, or ``curve`` with the law, the indices and the values there.
     """
-    asked = Explored.model_validate(argument)
-    values = asked.values()
-    epsilon = epsilon_on_contacts(asked, values)
+    question = Explored.model_validate(argument)
+    values = question.values()
+    epsilon = epsilon_on_contacts(question, values)
 
     def on_progress(done: int, points: int) -> None:
         report()
 
-    point = solve(law_class(asked.law), values, epsilon, progress=on_progress, **_KEPT)
+    point = solve(law_class(question.law), values, epsilon, progress=on_progress, **_KEPT)
     report(point=point_record(point, searched=True))
-    grid = asked.amplitudes()
-    for name in dict.fromkeys([asked.law, *asked.laws]):
-        left = np.asarray(_fast_curve(asked, name, grid)["left"], dtype=int)
-        own = asked.values(name)
+    grid = question.amplitudes()
+    for name in dict.fromkeys([question.law, *question.laws]):
+        left = np.asarray(_fast_curve(question, name, grid)["left"], dtype=int)
+        own = question.values(name)
         for start in range(0, len(left), _STEP):
             rows = left[start : start + _STEP]
-            found = solve(law_class(name), own, grid[rows], progress=on_progress)
-            values_there = {n: getattr(found, n) for n in _CURVES}
-            reasons = [str(text) for text in found.result]
-            report(curve=name, rows=rows, converged=found.converged, result=reasons, **values_there)
+            result = solve(law_class(name), own, grid[rows], progress=on_progress)
+            values_there = {n: getattr(result, n) for n in _CURVES}
+            reasons = [str(text) for text in result.result]
+            report(
+                curve=name, rows=rows, converged=result.converged, result=reasons, **values_there
+            )
     return {}
 
 
@@ -247,10 +249,10 @@ def preparations() -> dict[str, Callable[[], Any]]:
 
 def _prepare(name: str) -> None:
     numbers = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0}
-    asked = Explored.model_validate({"law": name, "numbers": numbers})
-    values = asked.values()
+    question = Explored.model_validate({"law": name, "numbers": numbers})
+    values = question.values()
     solve(law_class(name), values, 0.1, methods=_FAST, **_KEPT)
-    _fast_curve(asked, name, asked.amplitudes())
+    _fast_curve(question, name, question.amplitudes())
 
 
 def _prepared(name: str) -> bool:

@@ -31,7 +31,7 @@ from asperity.app.api.recordings import (
 )
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Question
-from asperity.app.jobs.limits import limited
+from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError, closest
 from asperity.outputs.json import to_json
@@ -119,38 +119,39 @@ class Fitted(Question):
     report: bool = False
 
 
-def check(asked: Fitted) -> None:
+def check(question: Fitted) -> None:
     """Refuse what cannot be fitted, before a process is asked."""
     from asperity.laws import get_law, registered
 
-    for law in asked.laws:
+    for law in question.laws:
         get_law(law) if law in registered() else _refuse_law(law, registered())
     for field in ("material", "prior"):
-        chosen = getattr(asked, field)
+        chosen = getattr(question, field)
         if chosen is not None and chosen not in known_materials():
             raise InputError(
                 f"{field} must be one of the package's, got '{chosen}'; "
                 f"{closest(chosen, known_materials())}"
             )
-    if not asked.tables and not asked.rows and not asked.runs:
+    if not question.tables and not question.rows and not question.runs:
         raise InputError(
             "data must hold readings or a recording, got none; drop a recording or a table"
         )
-    if asked.posterior:
+    if question.posterior:
         from asperity.inference.posterior import require_bayes
 
-        if len(asked.laws) > 1:
+        if len(question.laws) > 1:
             raise InputError(
-                f"posterior must be that of one law, got {len(asked.laws)}; fit the laws one by one"
+                f"posterior must be that of one law, got {len(question.laws)}; "
+                "fit the laws one by one"
             )
         require_bayes()
 
 
-def with_files(asked: Fitted, uploads: Uploads) -> dict[str, Any]:
+def with_files(question: Fitted, uploads: Uploads) -> dict[str, Any]:
     """The fields, with the place and the name of each recording."""
-    files = [uploads.get(run.recording) for run in asked.runs]
+    files = [uploads.get(run.recording) for run in question.runs]
     places = [{"path": str(file.path), "name": file.name} for file in files]
-    return {"asked": asked.model_dump(), "files": places}
+    return {"asked": question.model_dump(), "files": places}
 
 
 def _refuse_law(law: str, known: Mapping[str, Any]) -> None:
@@ -168,7 +169,7 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     from asperity.inference.comparison.record import comparison_record
     from asperity.inference.fitting.result import fit_record
 
-    asked = Fitted.model_validate(argument["asked"])
+    question = Fitted.model_validate(argument["asked"])
     files = argument["files"]
 
     def on_progress(done: int, total: int) -> None:
@@ -176,67 +177,69 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
 
     materials = known_materials()
     options: dict[str, Any] = {
-        "fixed": asked.fixed,
-        "start": asked.start,
-        "material": materials.get(asked.material or ""),
-        "prior": materials.get(asked.prior or ""),
-        "profile": asked.profile,
-        "inertia": asked.inertia,
-        "radiation_damping": asked.radiation_damping,
-        "runs": _run_options(asked),
+        "fixed": question.fixed,
+        "start": question.start,
+        "material": materials.get(question.material or ""),
+        "prior": materials.get(question.prior or ""),
+        "profile": question.profile,
+        "inertia": question.inertia,
+        "radiation_damping": question.radiation_damping,
+        "runs": _run_options(question),
         "progress": on_progress,
     }
     report(share=0.0)
     with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
-        tables, names = _tables(asked, Path(folder))
-    runs = [_run(run, file) for run, file in zip(asked.runs, files, strict=True)]
+        tables, names = _tables(question, Path(folder))
+    runs = [_run(run, file) for run, file in zip(question.runs, files, strict=True)]
     best: inference.Fit | None
-    if len(asked.laws) == 1:
-        best = inference.fit([*tables, *runs], asked.laws[0], asked.free, **options)
+    if len(question.laws) == 1:
+        best = inference.fit([*tables, *runs], question.laws[0], question.free, **options)
         whole: Any = best
         record: dict[str, Any] = {"fit": fit_record(best)}
     else:
-        whole = compared = inference.compare([*tables, *runs], asked.laws, asked.free, **options)
+        whole = compared = inference.compare(
+            [*tables, *runs], question.laws, question.free, **options
+        )
         judged = compared.laws.get(compared.best)
         best = None if judged is None else judged.fit
         record = {"comparison": comparison_record(compared)}
     pictures: list[dict[str, Any]] = []
     posterior = None
     if best is not None and best.converged:
-        if asked.posterior:
-            posterior = _sampled(best, asked, report)
+        if question.posterior:
+            posterior = _sampled(best, question, report)
             record["posterior"] = {**posterior.record(), "histograms": _histograms(posterior)}
         report(stage="figures")
         record["bands"] = _bands(best, posterior)
         record["residuals"] = _residuals(best)
         pictures = _run_pictures(best)
-        if asked.report:
+        if question.report:
             report(stage="report")
             record["report"] = _report(whole, names, posterior)
     text = to_json(record)
     for name, shown in names.items():
         text = text.replace(name, json.dumps(shown)[1:-1])
-    command = _fit_command(asked, [file["name"] for file in files])
+    command = _fit_command(question, [file["name"] for file in files])
     return {**json.loads(text), "runs": pictures, "command": command}
 
 
-def _tables(asked: Fitted, folder: Path) -> tuple[list[Any], dict[str, str]]:
+def _tables(question: Fitted, folder: Path) -> tuple[list[Any], dict[str, str]]:
     """Tables from the texts that were sent, and what people call each file of the folder."""
     from asperity import inference
     from asperity.measurement.campaign import write_csv
 
     given: dict[str, Any] = {
-        n: asked.fixed[n] for n in ("V", "epsilon", "frequency") if n in asked.fixed
+        n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
     }
     names: dict[Path, str] = {}
-    for k, table in enumerate(asked.tables):
+    for k, table in enumerate(question.tables):
         is_json = table.text.lstrip().startswith("{")
         path = folder / f"sent-table-{k}.{'json' if is_json else 'csv'}"
         path.write_text(table.text, encoding="utf-8")
         names[path] = table.name
-    if asked.rows:
+    if question.rows:
         path = folder / "sent-rows.csv"
-        write_csv(path, [_row(row) for row in asked.rows])
+        write_csv(path, [_row(row) for row in question.rows])
         names[path] = "the measured rows"
     tables = []
     for path, name in names.items():
@@ -268,30 +271,30 @@ def _run(run: Run, file: Mapping[str, str]) -> Any:
         )
 
 
-def _run_options(asked: Fitted) -> Any:
+def _run_options(question: Fitted) -> Any:
     from asperity.inference import RunOptions
 
     trends = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
     gauge = None
-    if asked.gauge:
-        corner = float(to_si(asked.gauge, "frequency", "gauge", require_unit=True))
+    if question.gauge:
+        corner = float(to_si(question.gauge, "frequency", "gauge", require_unit=True))
         if not corner > 0:
-            raise InputError(f"gauge must be positive, got '{asked.gauge}'; give its low-pass")
-        gauge = asked.gauge_order, corner
-    linear = ("offset", *trends[asked.trend], *(("drift",) if asked.drift else ()))
-    rate = asked.fit_rate or None
-    return RunOptions(linear=linear, initial=asked.initial, gauge=gauge, fit_rate=rate)
+            raise InputError(f"gauge must be positive, got '{question.gauge}'; give its low-pass")
+        gauge = question.gauge_order, corner
+    linear = ("offset", *trends[question.trend], *(("drift",) if question.drift else ()))
+    rate = question.fit_rate or None
+    return RunOptions(linear=linear, initial=question.initial, gauge=gauge, fit_rate=rate)
 
 
-def _sampled(found: Any, asked: Fitted, report: Callable[..., None]) -> Any:
+def _sampled(result: Any, question: Fitted, report: Callable[..., None]) -> Any:
     """The posterior; finished draws are reported, and the sampler asks twice a second to go on."""
     from asperity.inference import sample_posterior
 
     return sample_posterior(
-        found,
-        chains=asked.chains,
-        draws=asked.draws,
-        seed=asked.seed,
+        result,
+        chains=question.chains,
+        draws=question.draws,
+        seed=question.seed,
         progress=lambda done, total: report(draws=done, of=total),
     )
 
@@ -305,15 +308,15 @@ def _histograms(posterior: Any) -> dict[str, dict[str, list[float]]]:
     return shown
 
 
-def _bands(found: Any, posterior: Any) -> list[dict[str, Any]]:
+def _bands(result: Any, posterior: Any) -> list[dict[str, Any]]:
     """Readings of each table, and what the law predicts between them."""
     from asperity.fit_report.bands import bands_of
     from asperity.inference.tables.term import LockInTerm
 
     pictures = []
-    for term in found.objective.terms_of(LockInTerm):
+    for term in result.objective.terms_of(LockInTerm):
         table = term.table
-        predicted = bands_of(found, term, posterior)
+        predicted = bands_of(result, term, posterior)
         rows = []
         for name in table.values:
             if name not in predicted[0].bands:
@@ -335,18 +338,18 @@ def _bands(found: Any, posterior: Any) -> list[dict[str, Any]]:
     return pictures
 
 
-def _report(found: Any, names: Mapping[str, str], posterior: Any = None) -> str:
+def _report(result: Any, names: Mapping[str, str], posterior: Any = None) -> str:
     """The folder of a fit or a comparison, as ``--report`` writes it: a ZIP file in base64."""
     from asperity import fit_report, inference
 
-    one = not isinstance(found, inference.Comparison)
+    one = not isinstance(result, inference.Comparison)
     packed = io.BytesIO()
     with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
         target = Path(folder) / "report"
         if one:
-            fit_report.write_report(target, found, posterior)
+            fit_report.write_report(target, result, posterior)
         else:
-            fit_report.write_comparison(target, found)
+            fit_report.write_comparison(target, result)
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             for path in sorted(target.iterdir()):
                 if path.suffix == ".nc":
@@ -368,23 +371,23 @@ def _row(row: Mapping[str, Cell]) -> dict[str, Any]:
     return {name: math.nan if value is None else value for name, value in row.items()}
 
 
-def _residuals(found: Any) -> dict[str, list[Any]]:
+def _residuals(result: Any) -> dict[str, list[Any]]:
     """Whitened residuals of the readings, with the observable of each."""
     from asperity.inference.tables.term import LockInTerm
 
-    parts = [residuals for _, residuals in found.parts(LockInTerm)]
+    parts = [residuals for _, residuals in result.parts(LockInTerm)]
     values = [x for r in parts for x in r.values.tolist()]
     names = [str(n) for r in parts for n in r.observable]
     return {"value": values, "observable": names}
 
 
-def _run_pictures(found: Any) -> list[dict[str, Any]]:
+def _run_pictures(result: Any) -> list[dict[str, Any]]:
     """Friction of each recording, as recorded and as fitted."""
     from asperity.inference.runs.term import RunTerm
 
     pictures = []
-    for term in found.objective.terms_of(RunTerm):
-        fitted = term.fitted_friction(found.values)
+    for term in result.objective.terms_of(RunTerm):
+        fitted = term.fitted_friction(result.values)
         time, recorded = term.run.time, term.run.friction
         curves = {"recorded": recorded, "fitted": fitted, "difference": recorded - fitted}
         shown = {name: extremes(time, values, _BLOCKS) for name, values in curves.items()}
@@ -392,36 +395,38 @@ def _run_pictures(found: Any) -> list[dict[str, Any]]:
     return pictures
 
 
-def _fit_command(asked: Fitted, recordings: list[str]) -> str:
+def _fit_command(question: Fitted, recordings: list[str]) -> str:
     """The command; measured rows are those of a table that ``asperity measure`` writes."""
-    files = [t.name for t in asked.tables] + ["campaign.csv"] * bool(asked.rows) + recordings
-    one = len(asked.laws) == 1
+    files = [t.name for t in question.tables] + ["campaign.csv"] * bool(question.rows) + recordings
+    one = len(question.laws) == 1
     parts = [f"asperity {'fit' if one else 'compare'}", *map(shlex.quote, files)]
-    parts.append(f"--law {asked.laws[0]}" if one else f"--laws {','.join(asked.laws)}")
-    parts.append(f"--free {','.join(asked.free)}")
-    parts += [f"--fix {shlex.quote(f'{n}={v}')}" for n, v in asked.fixed.items()]
-    parts += [f"--start {shlex.quote(f'{n}={v}')}" for n, v in asked.start.items()]
+    parts.append(f"--law {question.laws[0]}" if one else f"--laws {','.join(question.laws)}")
+    parts.append(f"--free {','.join(question.free)}")
+    parts += [f"--fix {shlex.quote(f'{n}={v}')}" for n, v in question.fixed.items()]
+    parts += [f"--start {shlex.quote(f'{n}={v}')}" for n, v in question.start.items()]
     for option in ("material", "prior"):
-        if getattr(asked, option):
-            parts.append(f"--{option} {getattr(asked, option)}")
+        if getattr(question, option):
+            parts.append(f"--{option} {getattr(question, option)}")
     switches = ("profile", "inertia", "radiation_damping")
-    parts += [f"--{s.replace('_', '-')}" for s in switches if getattr(asked, s)]
-    if asked.runs:
-        parts += _run_arguments(asked)
-    if asked.posterior:
+    parts += [f"--{s.replace('_', '-')}" for s in switches if getattr(question, s)]
+    if question.runs:
+        parts += _run_arguments(question)
+    if question.posterior:
         parts.append("--posterior")
         defaults = {n: Fitted.model_fields[n].default for n in ("chains", "draws", "seed")}
         parts += [
-            f"--{n} {getattr(asked, n)}" for n, d in defaults.items() if d != getattr(asked, n)
+            f"--{n} {getattr(question, n)}"
+            for n, d in defaults.items()
+            if d != getattr(question, n)
         ]
-    if asked.report:
+    if question.report:
         parts.append("--report report")
     return " ".join(parts)
 
 
-def _run_arguments(asked: Fitted) -> list[str]:
+def _run_arguments(question: Fitted) -> list[str]:
     """Options on recordings; those that each may have of its own are the first one's."""
-    run = asked.runs[0]
+    run = question.runs[0]
     parts = source_options(run.source.model_dump())
     if run.window is not None:
         parts.append(f"--window {run.window[0]:g}:{run.window[1]:g}")
@@ -429,13 +434,13 @@ def _run_arguments(asked: Fitted) -> list[str]:
         parts.append("--steps " + ",".join(f"{t:g}" for t in run.steps))
     if run.velocities is not None:
         parts.append(f"--velocities {shlex.quote(','.join(run.velocities))}")
-    if asked.trend != "linear":
-        parts.append(f"--trend {asked.trend}")
-    parts += ["--drift"] * asked.drift
-    if asked.initial != "steady":
-        parts.append(f"--initial {asked.initial}")
-    if asked.gauge:
-        parts.append(f"--gauge {shlex.quote(asked.gauge)} --gauge-order {asked.gauge_order}")
-    if asked.fit_rate:
-        parts.append(f"--fit-rate {shlex.quote(asked.fit_rate)}")
+    if question.trend != "linear":
+        parts.append(f"--trend {question.trend}")
+    parts += ["--drift"] * question.drift
+    if question.initial != "steady":
+        parts.append(f"--initial {question.initial}")
+    if question.gauge:
+        parts.append(f"--gauge {shlex.quote(question.gauge)} --gauge-order {question.gauge_order}")
+    if question.fit_rate:
+        parts.append(f"--fit-rate {shlex.quote(question.fit_rate)}")
     return parts

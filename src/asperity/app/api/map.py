@@ -23,7 +23,7 @@ _COARSE = 8
 _FINEST = 128
 
 
-class AxisAsked(Question):
+class MapAxis(Question):
     """An axis: the name of a number, its ends, and whether points lie at equal ratios."""
 
     name: Name
@@ -32,20 +32,20 @@ class AxisAsked(Question):
     log: bool = False
 
 
-class MapAsked(OperatingPoint):
+class MapQuestion(OperatingPoint):
     """An operating point of which two numbers vary.
 
     Attributes
     ----------
-    x, y : AxisAsked
+    x, y : MapAxis
     show : str
         One of `asperity.study.map.SHOWN`.
     count : int
         Points along each axis of the finest grid.
     """
 
-    x: AxisAsked
-    y: AxisAsked
+    x: MapAxis
+    y: MapAxis
     show: Name = "growth_rate"
     count: Annotated[int, Field(ge=2, le=_FINEST)] = 64
 
@@ -62,56 +62,56 @@ class MapAsked(OperatingPoint):
         return {name: number for name, number in numbers.items() if name not in ends}
 
 
-def check(asked: MapAsked) -> None:
+def check(question: MapQuestion) -> None:
     """Refuse what cannot be mapped, before a process is asked."""
-    if asked.air is not None:
+    if question.air is not None:
         raise InputError(
             "map.air must be left out, got an air layer; a map has epsilon on the contacts"
         )
-    one_of(asked.show, SHOWN, "map.show")
-    x, y = asked.axes(2)
+    one_of(question.show, SHOWN, "map.show")
+    x, y = question.axes(2)
     if x.name == y.name:
         raise InputError(
             f"axes must be two numbers, got '{x.name}' on both; choose another one for y"
         )
-    refuse_foreign(asked.law, {x.name: "", y.name: ""})
-    asked.fixed()
+    refuse_foreign(question.law, {x.name: "", y.name: ""})
+    question.fixed()
     for axis in (x, y):
         for end in axis.values:
-            asked.check_reach(axis.name, float(end))
+            question.check_reach(axis.name, float(end))
 
 
-def text(asked: MapAsked) -> dict[str, Any]:
+def text(question: MapQuestion) -> dict[str, Any]:
     """The same map as Python and as a command."""
-    check(asked)
-    fixed = {name: number.value for name, number in asked.fixed().items()}
-    x, y = asked.axes(asked.count)
-    return recipes.plane(asked, fixed, x, y, asked.show)
+    check(question)
+    fixed = {name: number.value for name, number in question.fixed().items()}
+    x, y = question.axes(question.count)
+    return recipes.plane(question, fixed, x, y, question.show)
 
 
 def grow(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
     """Solve ever finer grids.
 
-    Each message has ``grid``: axes, `MapAsked.show` on the grid, where it is stable, why a point
+    Each message has ``grid``: axes, `MapQuestion.show` on the grid, where it is stable, why a point
     failed, and the boundary with its bifurcations; or ``progress``, a share of all work. The first
     of several grids has None for the boundary: searching for it takes longer than its points.
     """
-    asked = MapAsked.model_validate(argument)
-    counts = [asked.count]
+    question = MapQuestion.model_validate(argument)
+    counts = [question.count]
     while counts[0] // 2 >= _COARSE:
         counts.insert(0, counts[0] // 2)
     total, before = sum(n * n for n in counts), 0
-    fixed = asked.fixed()
+    fixed = question.fixed()
     for count in counts:
-        x, y = asked.axes(count)
+        x, y = question.axes(count)
 
         def progress(done: int, points: int, before: int = before) -> None:
             report(progress=(before + done) / total)
 
-        first = count < asked.count and count == counts[0]
-        found = response_map(asked.law, fixed, x=x, y=y, boundary=not first, progress=progress)
+        first = count < question.count and count == counts[0]
+        dataset = response_map(question.law, fixed, x=x, y=y, boundary=not first, progress=progress)
         before += count * count
-        grid = _record(found, asked, x, y) | ({"boundaries": None} if first else {})
+        grid = _record(dataset, question, x, y) | ({"boundaries": None} if first else {})
         report(grid=grid, progress=before / total)
     return {}
 
@@ -121,33 +121,33 @@ def warm(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, 
     sides = {"x": {"name": "epsilon", "low": 0.01, "high": 0.4},
              "y": {"name": "K", "low": 1e5, "high": 4e5}}  # fmt: skip
     numbers = {"V": 1e-6, "frequency": 120.0}
-    asked = MapAsked.model_validate({"law": "rice-ruina", "numbers": numbers, **sides})
-    x, y = asked.axes(_COARSE)
+    question = MapQuestion.model_validate({"law": "rice-ruina", "numbers": numbers, **sides})
+    x, y = question.axes(_COARSE)
 
     def on_progress(done: int, points: int) -> None:
         report()
 
-    response_map(asked.law, asked.fixed(), x=x, y=y, boundary=False, progress=on_progress)
+    response_map(question.law, question.fixed(), x=x, y=y, boundary=False, progress=on_progress)
     return {}
 
 
-def _record(found: Any, asked: MapAsked, x: Axis, y: Axis) -> dict[str, Any]:
-    values = found[asked.show].values
-    line = found["boundary_line"].values
-    kinds = found["boundary_kind"].values.astype(str)
+def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, Any]:
+    values = result[question.show].values
+    line = result["boundary_line"].values
+    kinds = result["boundary_kind"].values.astype(str)
     lines = []
     for number in range(line.max(initial=-1) + 1):
         on = line == number
         lines.append(
             {
-                "x": found[f"boundary_{x.name}"].values[on],
-                "y": found[f"boundary_{y.name}"].values[on],
+                "x": result[f"boundary_{x.name}"].values[on],
+                "y": result[f"boundary_{y.name}"].values[on],
                 "kind": kinds[on].tolist(),
-                "mode_frequency": found["boundary_mode_frequency"].values[on],
+                "mode_frequency": result["boundary_mode_frequency"].values[on],
             }
         )
-    results = found["result"].values.astype(str)
-    failed = ~found["converged"].values
+    results = result["result"].values.astype(str)
+    failed = ~result["converged"].values
     reasons = dict.fromkeys(results[failed].tolist())
     return {
         "count": x.count,
@@ -155,7 +155,7 @@ def _record(found: Any, asked: MapAsked, x: Axis, y: Axis) -> dict[str, Any]:
         "y": y.values,
         # As many digits as a colour and a readout need: a grid is the longest answer of all.
         "values": [[_short(v) for v in row] for row in values.tolist()],
-        "stable": found["stable"].values.astype(int),
+        "stable": result["stable"].values.astype(int),
         "failed": int(failed.sum()),
         "reasons": list(reasons)[:5],
         "boundaries": lines,
@@ -168,9 +168,9 @@ def _short(value: float) -> float | None:
 
 
 ENDPOINTS = (
-    Answer("map/text", MapAsked, text),
+    Answer("map/text", MapQuestion, text),
     Job(
-        "map", MapAsked, "asperity.app.api.map:grow", lane="map", check=check, seconds=900,
+        "map", MapQuestion, "asperity.app.api.map:grow", lane="map", check=check, seconds=900,
         warm="asperity.app.api.map:warm",
     ),
 )  # fmt: skip

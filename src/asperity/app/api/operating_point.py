@@ -71,13 +71,13 @@ class OperatingPoint(Question):
         get_law(law)
         material = self.chosen_material()
         own = point_parameters(get_law(law))
-        others = {n for found in registered().values() for n in point_parameters(found)}
+        others = {n for result in registered().values() for n in point_parameters(result)}
         given = {n: v for n, v in self.numbers.items() if n in own or n not in others}
-        found = numbers_for(law, sourced_numbers(given, material, "page", law))
+        result = numbers_for(law, sourced_numbers(given, material, "page", law))
         for name in given:
-            if name in found:
-                self.check_reach(name, found[name].value)
-        return found
+            if name in result:
+                self.check_reach(name, result[name].value)
+        return result
 
     def check_reach(self, name: str, value: float) -> None:
         """Refuse a number (SI) that lies too far from the ends of its slider."""
@@ -96,14 +96,14 @@ class OperatingPoint(Question):
         for name in given:
             if name not in AIR:
                 raise InputError(f"air must have known numbers, got '{name}'; {closest(name, AIR)}")
-        found = {
+        result = {
             n: float(obeying(given.get(n, material[n].si), n, material[n].dimension, "positive"))
             for n in AIR
         }
         for name in given:
             number = material[name]
-            _check_reach(name, found[name], around(number.si), number.dimension)
-        return found
+            _check_reach(name, result[name], around(number.si), number.dimension)
+        return result
 
 
 def _check_reach(name: str, value: float, range_: Mapping[str, Any], kind: str) -> None:
@@ -121,8 +121,8 @@ def _check_reach(name: str, value: float, range_: Mapping[str, Any], kind: str) 
 
 def law_class(name: str) -> type[Law]:
     """The law of a name."""
-    found: type[Law] = get_law(name)
-    return found
+    result: type[Law] = get_law(name)
+    return result
 
 
 def borne_share(point: OperatingPoint, values: Mapping[str, float], frequency: Any) -> Any:
@@ -155,18 +155,18 @@ def epsilon_on_contacts(point: OperatingPoint, values: Mapping[str, float]) -> f
     if point.air is None:
         return values["epsilon"]
     share, _ = borne_share(point, values, values["frequency"])
-    found = float(share) * values["epsilon"]
-    if not np.isfinite(found):
+    result = float(share) * values["epsilon"]
+    if not np.isfinite(result):
         raise InputError(
             "air must have numbers that leave a share of the modulation, got a share out of range; "
             "bring pressure, gap, radius and viscosity nearer to the material's"
         )
-    if not found < 1:
+    if not result < 1:
         raise InputError(
-            f"epsilon on the contacts must be below 1, got {found:g}; the air layer and the mass "
+            f"epsilon on the contacts must be below 1, got {result:g}; the air layer and the mass "
             "resonate: lower epsilon or change the frequency"
         )
-    return found
+    return result
 
 
 def solve(

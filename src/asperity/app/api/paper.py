@@ -85,9 +85,9 @@ def _printed_lines(paper: str, figure: str) -> list[dict[str, Any]]:
     return _paper(paper).tab[figure].lines(_paper(paper).numbers)
 
 
-def overview(asked: ChosenPaper) -> dict[str, Any]:
+def overview(question: ChosenPaper) -> dict[str, Any]:
     """Papers, figures with their sliders, and the words of all claims; nothing is solved."""
-    paper = _paper(asked.paper)
+    paper = _paper(question.paper)
     about = paper.contents.paper
     return {
         "papers": [
@@ -142,28 +142,28 @@ def _slider(paper: Paper, name: str) -> dict[str, Any]:
     }
 
 
-def check(asked: MovedFigure) -> None:
+def check(question: MovedFigure) -> None:
     """Refuse what cannot be drawn, before a process is asked."""
-    known = _paper(asked.paper).tab
-    if asked.figure not in known:
+    known = _paper(question.paper).tab
+    if question.figure not in known:
         raise InputError(
-            f"figure must be one of the paper's with curves, got '{asked.figure}'; "
-            f"{closest(asked.figure, known)}"
+            f"figure must be one of the paper's with curves, got '{question.figure}'; "
+            f"{closest(question.figure, known)}"
         )
-    _changes(asked)
+    _changes(question)
 
 
-def _moved_numbers(asked: MovedFigure) -> Material:
+def _moved_numbers(question: MovedFigure) -> Material:
     """The paper's numbers with those that are moved."""
-    return altered(_paper(asked.paper).numbers, _changes(asked))
+    return altered(_paper(question.paper).numbers, _changes(question))
 
 
-def _changes(asked: MovedFigure) -> dict[str, float]:
+def _changes(question: MovedFigure) -> dict[str, float]:
     """The moved numbers, in the units that they are printed in."""
-    paper = _paper(asked.paper)
-    known = paper.words.figures[asked.figure].numbers
+    paper = _paper(question.paper)
+    known = paper.words.figures[question.figure].numbers
     changes = {}
-    for name, value in asked.numbers.items():
+    for name, value in question.numbers.items():
         if name not in known:
             raise InputError(
                 f"numbers must be those of the figure, got '{name}'; {closest(name, known)}"
@@ -181,21 +181,21 @@ def _changes(asked: MovedFigure) -> dict[str, float]:
     return changes
 
 
-def figure(asked: MovedFigure) -> dict[str, Any]:
+def figure(question: MovedFigure) -> dict[str, Any]:
     """Curves of a figure as printed and with the moved numbers, and what the text states."""
-    check(asked)
-    paper, numbers = _paper(asked.paper), _moved_numbers(asked)
-    words, chosen = paper.words, paper.tab[asked.figure]
+    check(question)
+    paper, numbers = _paper(question.paper), _moved_numbers(question)
+    words, chosen = paper.words, paper.tab[question.figure]
     answer: dict[str, Any] = {
-        "numbers": {n: numbers[n].si for n in words.figures[asked.figure].numbers},
-        "python": chosen.python(_changes(asked)),
+        "numbers": {n: numbers[n].si for n in words.figures[question.figure].numbers},
+        "python": chosen.python(_changes(question)),
         "command": f"asperity reproduce {paper.name} --out report",
     }
-    task = _task(paper, asked.figure)
+    task = _task(paper, question.figure)
     if _preparation is not None and not _preparation.want(task):
         return {**answer, "preparing": task}
-    before = _printed_lines(paper.name, asked.figure)
-    after = chosen.lines(numbers) if asked.numbers else before
+    before = _printed_lines(paper.name, question.figure)
+    after = chosen.lines(numbers) if question.numbers else before
 
     def axis(column: str) -> dict[str, Any]:
         label = words.label.get(column, column)
@@ -217,20 +217,20 @@ _slow_as_printed: dict[tuple[str, str, str], dict[str, Any]] = {}
 
 def inertia(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
     """Lines that take seconds, a message each: ``curve``, and ``printed`` next to it."""
-    asked = MovedFigure.model_validate(argument)
-    paper, numbers = _paper(asked.paper), _moved_numbers(asked)
-    chosen = paper.tab[asked.figure]
+    question = MovedFigure.model_validate(argument)
+    paper, numbers = _paper(question.paper), _moved_numbers(question)
+    chosen = paper.tab[question.figure]
     for done, name in enumerate(chosen.slow):
         assert chosen.slow_line is not None  # a figure with slow lines has what computes them
 
         def on_progress(points: int, total: int, done: int = done) -> None:
             report(progress=(done + points / total) / len(chosen.slow))
 
-        key = paper.name, asked.figure, name
+        key = paper.name, question.figure, name
         if key not in _slow_as_printed:
             _slow_as_printed[key] = chosen.slow_line(paper.numbers, name, on_progress)
         before = after = _slow_as_printed[key]
-        if asked.numbers:
+        if question.numbers:
             after = chosen.slow_line(numbers, name, on_progress)
         report(curve=after, printed=before, progress=(done + 1) / len(chosen.slow))
     return {}

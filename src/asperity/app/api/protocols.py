@@ -68,7 +68,7 @@ def run(text: str, out: Path, report: Callable[..., None]) -> dict[str, Any]:
     report : callable
         Called with ``reached`` and ``duration`` (s).
     """
-    from asperity.protocol.stability import stability_statement
+    from asperity.protocol.run import stability_statement
     from asperity.recording.writers import write
 
     report(stage="checking")
@@ -161,23 +161,23 @@ def _steps(steps: Any, prefix: str) -> Iterator[tuple[str, str]]:
 
 def _lines(text: str, content: dict[str, Any]) -> dict[str, int]:
     """Line of each step and field by its place, such as "step 3.1" and "solver.sampling"."""
-    found: dict[str, int] = {}
+    result: dict[str, int] = {}
     table = ""
     for number, line in enumerate(text.splitlines(), start=1):
         plain = line.strip()
         if head := re.match(r"\[+\s*([^\]]+?)\s*\]+", plain):
             table = head[1].replace('"', "").replace("'", "")
-            found.setdefault(table, number)
+            result.setdefault(table, number)
         elif field := re.match(r"""["']?([\w ]+?)["']?\s*=""", plain):
-            found.setdefault(f"{table}.{field[1]}" if table else field[1], number)
+            result.setdefault(f"{table}.{field[1]}" if table else field[1], number)
     at = max(text.find("steps"), 0)
     for place, step in _steps(content.get("steps"), "step "):
         there = text.find(step, at)
         if there < 0:  # written with escapes
             continue
         at = there + len(step)
-        found[place] = text.count("\n", 0, there) + 1
-    return found
+        result[place] = text.count("\n", 0, there) + 1
+    return result
 
 
 def _line_of(sentence: str, lines: dict[str, int], text: str) -> int | None:

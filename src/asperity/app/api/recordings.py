@@ -1,12 +1,15 @@
 """Recordings: read and measured in a process of its own, with limits.
 
 This module imports what it needs late and nothing else: it is loaded anew for every file.
+
+Sentences of the library name the page's fields in place of arguments.
 """
 
 from __future__ import annotations
 
 import csv
 import json
+import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -17,7 +20,6 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 import numpy as np
 from pydantic import Field
 
-from asperity.app.api.wording import in_page_words
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Question
 from asperity.errors import InputError, printable
@@ -26,6 +28,71 @@ from asperity.recording.roles import ROLES, candidates
 
 if TYPE_CHECKING:
     from asperity.measurement.sliding.measure import SlidingMeasurement
+
+
+#: What begins a sentence, and what the page calls it.
+_SUBJECTS = {
+    "measure.window": "Window",
+    "measure.detrend": "Drift",
+    "measure.load": "Normal load",
+    "measure.force": "Shear force",
+    "measure.steps": "Velocity steps",
+    "measure.holds": "Holds",
+    "measure.frequency": "Frequency",
+    "measure.trace": "The recording",
+    "lock_in.detrend": "Drift",
+    "lock_in.harmonics": "Harmonics",
+    "lock_in.frequency": "Frequency",
+    "lock_in.load and force": "Normal load and shear force",
+    "lock_in.load": "Normal load",
+    "lock_in.time": "Time column",
+    "read.rate": "Sampling rate",
+    "read.group": "Group",
+    "read.format": "The format",
+    "read.delimiter": "Delimiter",
+    "read.decimal": "Decimal mark",
+    "read.columns": "Role",
+    "read.units": "Unit",
+    "stress_to_force.area": "Area",
+    "recording.path": "The recording",
+    "slice.start and slice.end": "Window",
+}
+_ROLES = {
+    "time": "Time column", "W": "Normal load", "F": "Shear force", "velocity": "Velocity",
+    "displacement": "Displacement", "friction": "Friction",
+}  # fmt: skip
+
+
+def in_page_words(sentence: str) -> str:
+    """A sentence of the library with fields of the page in place of arguments."""
+    for name, field in _SUBJECTS.items():
+        if sentence.startswith(f"{name} "):
+            sentence = field + sentence[len(name) :]
+            break
+    sentence = re.sub(
+        r"^Trace\.channel must name (a|one) channel, got '(\w+)'",
+        lambda match: (
+            f"{_role(match[2])} must be {match[1]} channel, got "
+            f"{'none' if match[1] == 'a' else 'several'} with that role"
+        ),
+        sentence,
+    )
+    sentence = re.sub(r"^columns\['(\w+)'\]", lambda match: _role(match[1]), sentence)
+    sentence = re.sub(r"^units\['([^']*)'\]", r"Unit of \1", sentence)
+    sentence = re.sub(r"^Trace\.channel\b", "Role", sentence)
+    sentence = re.sub(
+        r"columns=\{'(\w+)': (?:'([^']*)'|(\d+))\}",
+        lambda match: f"{_role(match[1])}: {match[2] or match[3]}",
+        sentence,
+    )
+    sentence = re.sub(r"units=\{'([^']*)': '([^']*)'\}", r"Unit of \1: \2", sentence)
+    sentence = re.sub(r"units=\{'([^']*)': \.\.\.\}", r"Unit of \1", sentence)
+    return re.sub(r"\brate='([^']*)'", r"Sampling rate: \1", sentence)
+
+
+def _role(name: str) -> str:
+    return _ROLES.get(name, f"Role {name}")
+
 
 #: Address space (bytes) and processor time (s) of a process that reads a recording.
 LIMITS = {"memory": 6 * 1024**3, "seconds": 240}
@@ -183,21 +250,23 @@ def _measured(
 
     options = Options.model_validate(argument["options"])
     name = argument["name"]
-    found: dict[str, Any] | SlidingMeasurement
+    result: dict[str, Any] | SlidingMeasurement
     report(stage="measuring")
     if options.mode == "modulated":
-        found, note = _modulated(trace, options, name), ""
+        result, note = _modulated(trace, options, name), ""
     elif options.mode == "sliding":
-        found, note = _sliding(trace, options), ""
+        result, note = _sliding(trace, options), ""
     else:
-        found, note = modulated_or_sliding(
+        result, note = modulated_or_sliding(
             trace,
             lambda: _modulated(trace, options, name),
             lambda: _sliding(trace, options),
             plain=True,
         )
-    modulated = isinstance(found, dict)
-    measured = found if isinstance(found, dict) else {**_sliding_record(found, name), "note": note}
+    modulated = isinstance(result, dict)
+    measured = (
+        result if isinstance(result, dict) else {**_sliding_record(result, name), "note": note}
+    )
     recipes = _recipes(name, argument["source"], options, modulated=modulated)
     return {"measured": measured, **recipes}
 
@@ -220,14 +289,14 @@ def _modulated(trace: Any, options: Options, name: str) -> dict[str, Any]:
     if options.exact_frequency and not frequency:
         raise InputError("frequency must be given to be taken as exact, got none; give it")
     window = None if options.window is None else (options.window[0], options.window[1])
-    found = measured(trace, window=window, **lock_in)
-    several = window is None and sum(part.modulated for part in found.stretches) > 1
-    parts = measure_amplitudes(trace, **lock_in) if several else [found]
-    samples, reading = found.samples, found.reading
-    cycle = mean_cycle(found)
-    frequencies, amplitudes = residual_spectrum(found)
+    measurement = measured(trace, window=window, **lock_in)
+    several = window is None and sum(part.modulated for part in measurement.stretches) > 1
+    parts = measure_amplitudes(trace, **lock_in) if several else [measurement]
+    samples, reading = measurement.samples, measurement.reading
+    cycle = mean_cycle(measurement)
+    frequencies, amplitudes = residual_spectrum(measurement)
     return {
-        "record": modulated_record(found),
+        "record": modulated_record(measurement),
         "rows": modulated_rows(Path(name), parts),
         "curves": {
             "load": extremes(samples.time, samples.load / reading.W0, _BLOCKS),
@@ -248,14 +317,14 @@ def _sliding(trace: Any, options: Options) -> SlidingMeasurement:
     )
 
 
-def _sliding_record(found: SlidingMeasurement, name: str) -> dict[str, Any]:
+def _sliding_record(measurement: SlidingMeasurement, name: str) -> dict[str, Any]:
     from asperity.measurement.campaign import sliding_rows
     from asperity.measurement.record import sliding_record
 
     return {
-        "record": sliding_record(found),
-        "rows": sliding_rows(Path(name), found),
-        "curves": {"friction": extremes(found.time, found.values, _BLOCKS)},
+        "record": sliding_record(measurement),
+        "rows": sliding_rows(Path(name), measurement),
+        "curves": {"friction": extremes(measurement.time, measurement.values, _BLOCKS)},
     }
 
 

@@ -253,8 +253,8 @@ class _Worker:
         line = await self._lines.get()
         if not line:
             return None
-        found: dict[str, Any] = json.loads(line)
-        return found
+        result: dict[str, Any] = json.loads(line)
+        return result
 
     async def _read_lines(self) -> None:
         assert self._process.stdout is not None

@@ -94,7 +94,7 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         reading = FitData(source, window, steps, velocities, stiffness_from)
         return command(free=names, options=options, reading=reading, **others)
 
-    found: Callable[..., Any] = source_options(gathered)
+    result: Callable[..., Any] = source_options(gathered)
     for option in (
         click.argument("data", nargs=-1, required=True, type=Path),
         click.option(
@@ -119,8 +119,8 @@ def fit_options(command: Callable[..., Any]) -> Callable[..., Any]:
         *RUN_OPTIONS,
         json_option(),
     ):
-        found = option(found)
-    return found
+        result = option(result)
+    return result
 
 
 @click.command(epilog=_EPILOG)
@@ -163,39 +163,39 @@ def fit(
         with bar("window", raising=False) as update:
             options["progress"] = update
             over = reading.fit_windows(data, windows, law_named(law), free, options)
-        found = over.fits[0]
+        result = over.fits[0]
     else:
         read = reading.read(data, options["fixed"])
         with bar("step", raising=False) as update:
-            found = inference.fit(read, law_named(law), free, progress=update, **options)
-    posterior = sampling.sample(found)
-    if report is not None and found.converged:
+            result = inference.fit(read, law_named(law), free, progress=update, **options)
+    posterior = sampling.sample(result)
+    if report is not None and result.converged:
         from asperity.fit_report import write_report
 
-        write_report(report, found, posterior)
+        write_report(report, result, posterior)
     if as_json:
         more = {"posterior": posterior.record()} if posterior else {}
         more |= {"windows": over.record()} if over else {}
-        click.echo(to_json({**fit_record(found), **more}))
+        click.echo(to_json({**fit_record(result), **more}))
     else:
-        click.echo(fit_text(found))
+        click.echo(fit_text(result))
         if over:
             click.echo(windows_text(over))
         if posterior:
             click.echo(posterior_text(posterior))
-    return 0 if found.converged and (posterior is None or posterior.converged) else 1
+    return 0 if result.converged and (posterior is None or posterior.converged) else 1
 
 
-def fit_text(found: Fit) -> str:
+def fit_text(result: Fit) -> str:
     """A fit as a person reads it."""
     from asperity.cli.report import aligned
 
-    if not found.converged:
-        return f"{found.law}: {found.message}"
+    if not result.converged:
+        return f"{result.law}: {result.message}"
     rows = [("", "estimate", "std. error", "95 % interval", "", "")]
-    for name, p in {**found.parameters, **found.over_load}.items():
+    for name, p in {**result.parameters, **result.over_load}.items():
         notes = "at its bound" if p.at_bound else ""
-        if name in found.undetermined:
+        if name in result.undetermined:
             notes = "not determined by these data"
         elif p.prior is not None:
             notes = f"prior {p.prior.mean:.4g} +- {p.prior.sd:.2g} ({p.prior.source})"
@@ -203,16 +203,16 @@ def fit_text(found: Fit) -> str:
         rows.append(
             (name, f"{p.value:.6g}", f"{p.se:.2g}", f"{low:.5g} to {high:.5g}", p.unit, notes)
         )
-    names = list(found.parameters)
+    names = list(result.parameters)
     matrix = [
-        (n, *(f"{found.correlation[i, j]:+.2f}" for j in range(i)))
+        (n, *(f"{result.correlation[i, j]:+.2f}" for j in range(i)))
         for i, n in enumerate(names)
         if i
     ]
     fits = [
-        (n, f"{chi2:.4g}", f"for {count} data") for n, (chi2, count) in found.observables.items()
+        (n, f"{chi2:.4g}", f"for {count} data") for n, (chi2, count) in result.observables.items()
     ]
-    lines = [found.law, aligned(rows, "  ")]
+    lines = [result.law, aligned(rows, "  ")]
     if matrix:
         width = len(names)
         filled = [tuple(row) + ("",) * (width - len(row)) for row in matrix]
@@ -220,17 +220,17 @@ def fit_text(found: Fit) -> str:
     lines += [
         *(
             (
-                f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom, "
-                f"p = {found.p_value:.3g}",
+                f"chi-squared {result.chi2:.4g} for {result.dof} degrees of freedom, "
+                f"p = {result.p_value:.3g}",
                 aligned(fits, "  "),
             )
-            if found.judged_by_chi2
+            if result.judged_by_chi2
             else ("the noise is estimated from what the law leaves: chi-squared judges nothing",)
         ),
-        *_runs(found),
-        f"log-likelihood {found.log_likelihood:.6g}, AICc {found.aicc:.6g}, BIC {found.bic:.6g}",
+        *_runs(result),
+        f"log-likelihood {result.log_likelihood:.6g}, AICc {result.aicc:.6g}, BIC {result.bic:.6g}",
     ]
-    return "\n".join([*lines, *(f"warning: {w}" for w in found.warnings)])
+    return "\n".join([*lines, *(f"warning: {w}" for w in result.warnings)])
 
 
 def windows_text(over: WindowedFit) -> str:
@@ -263,12 +263,12 @@ def windows_text(over: WindowedFit) -> str:
     )
 
 
-def _runs(found: Fit) -> list[str]:
+def _runs(result: Fit) -> list[str]:
     """Noise of the recordings."""
     from asperity.inference.runs.term import RunTerm
 
     lines = []
-    for term in found.objective.terms_of(RunTerm):
+    for term in result.objective.terms_of(RunTerm):
         noise = term.noise
         lines.append(
             f"{term.name}: noise {noise['model']}, {noise['effective_samples']:.4g} effective "

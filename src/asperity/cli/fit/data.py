@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.measure.source import RecordingSource
-from asperity.cli.measure.times import span_of, times_of
-from asperity.cli.measure.words import naming_options
+from asperity.cli.measure.command import span_of, times_of
+from asperity.cli.measure.source import RecordingSource, naming_options
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
@@ -125,8 +124,8 @@ class FitData:
                     "window without it: its samples would count twice"
                 )
         with naming_options():
-            found = inference.measured_stiffness(self.source.read(paths[0]), (low, high))
-        return {**priors, "K": found.prior}
+            result = inference.measured_stiffness(self.source.read(paths[0]), (low, high))
+        return {**priors, "K": result.prior}
 
     def read(
         self, paths: Sequence[Path], fixed: Mapping[str, str]
@@ -148,13 +147,13 @@ class FitData:
                 "recordings beforehand"
             )
         at = {n: fixed[n] for n in ("V", "epsilon", "frequency") if n in fixed}
-        found: list[LockInTable | RecordedRun] = []
+        result: list[LockInTable | RecordedRun] = []
         for path, table in zip(paths, tables, strict=True):
             if table:
-                found.append(inference.read_table(path, at))
+                result.append(inference.read_table(path, at))
                 continue
             with naming_options():
-                found.append(
+                result.append(
                     inference.recorded_run(
                         self.source.read(path),
                         name=path.stem,
@@ -163,7 +162,7 @@ class FitData:
                         velocities=None if self.velocities is None else _speeds(self.velocities),
                     )
                 )
-        return found
+        return result
 
     def fit_windows(
         self,
@@ -263,7 +262,7 @@ def priors_of(texts: Sequence[str], free: Sequence[str] | None) -> dict[str, Pri
     from asperity.laws import registered
     from asperity.parameters import all_parameters
 
-    found: dict[str, Prior] = {}
+    result: dict[str, Prior] = {}
     known = {**all_parameters(registered().values()), GAIN: PARAMETER}
     for text in texts:
         name, equals, rest = (part.strip() for part in text.partition("="))
@@ -273,7 +272,7 @@ def priors_of(texts: Sequence[str], free: Sequence[str] | None) -> dict[str, Pri
                     f"--prior {text} must go with --free, got no free parameters; name those that "
                     "the priors of the material are meant for"
                 )
-            found |= material_priors(materials.load(text), free)
+            result |= material_priors(materials.load(text), free)
             continue
         match = _PRIOR.match(rest)
         if match is None:
@@ -293,8 +292,8 @@ def priors_of(texts: Sequence[str], free: Sequence[str] | None) -> dict[str, Pri
             ) from None
         if not sd > 0:
             raise InputError(f"--prior {name} must have a positive deviation, got {sd:g}; give one")
-        found[name] = Prior(mean, sd, "given", si)
-    return found
+        result[name] = Prior(mean, sd, "given", si)
+    return result
 
 
 def _unit_of(parameter: Any, unit: str, label: str) -> tuple[float, str]:

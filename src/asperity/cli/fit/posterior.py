@@ -56,9 +56,9 @@ class PosteriorOptions:
                 )
             output_file(self.out, "--out", example="posterior.nc")
 
-    def sample(self, found: Fit) -> Posterior | None:
+    def sample(self, fit: Fit) -> Posterior | None:
         """Sample, with a progress bar, and write the draws."""
-        if not self.wanted or not found.converged:
+        if not self.wanted or not fit.converged:
             return None
         from asperity.cli.progress import bar
         from asperity.inference.posterior import sample_posterior
@@ -66,7 +66,7 @@ class PosteriorOptions:
 
         with bar("draw") as update:
             posterior = sample_posterior(
-                found,
+                fit,
                 chains=self.chains,
                 draws=self.draws,
                 seed=self.seed,
@@ -94,7 +94,7 @@ def posterior_options(command: Callable[..., Any]) -> Callable[..., Any]:
         sampling = PosteriorOptions(posterior, chains, draws, seed, out)
         return command(sampling=sampling, **others)
 
-    found: Callable[..., Any] = gathered
+    result: Callable[..., Any] = gathered
     for option in (
         click.option("--posterior", is_flag=True, help="Sample the posterior (extra 'bayes')."),
         click.option("--chains", default=4, show_default=True, metavar="N", help="Chains."),
@@ -104,15 +104,15 @@ def posterior_options(command: Callable[..., Any]) -> Callable[..., Any]:
         click.option("--seed", default=0, show_default=True, metavar="N", help="Of the draws."),
         click.option("--out", type=Path, metavar="NC", help="Where the draws go, for ArviZ."),
     ):
-        found = option(found)
-    return found
+        result = option(result)
+    return result
 
 
-def posterior_text(found: Posterior) -> str:
+def posterior_text(posterior: Posterior) -> str:
     """A posterior as a person reads it."""
     from asperity.cli.report import aligned
 
-    chains, draws = found.log_density.shape
+    chains, draws = posterior.log_density.shape
     rows = [("", "mean", "sd", "95 % interval", "", "R-hat", "ESS bulk", "ESS tail")]
     rows += [
         (
@@ -125,10 +125,10 @@ def posterior_text(found: Posterior) -> str:
             f"{p.ess_bulk:.0f}",
             f"{p.ess_tail:.0f}",
         )
-        for name, p in found.parameters.items()
+        for name, p in posterior.parameters.items()
     ]
     lines = [
-        f"posterior, {chains} chains of {draws} draws, {int(found.diverging.sum())} diverging",
+        f"posterior, {chains} chains of {draws} draws, {int(posterior.diverging.sum())} diverging",
         aligned(rows, "  "),
     ]
-    return "\n".join([*lines, *(f"warning: {w}" for w in found.warnings)])
+    return "\n".join([*lines, *(f"warning: {w}" for w in posterior.warnings)])

@@ -1,21 +1,83 @@
-"""``asperity measure``: friction in a recording, with uncertainties and verdicts."""
+"""``asperity measure``: friction in a recording, with uncertainties and verdicts.
+
+Options give times and spans of time themselves or in a file.
+"""
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from asperity.cli.measure.reading import FileRows, ReadingOptions
-from asperity.cli.measure.source import RecordingSource, source_options
-from asperity.cli.measure.times import span_of, spans_of, times_of
-from asperity.cli.measure.words import in_options, naming_options
+from asperity.cli.measure.source import RecordingSource, in_options, naming_options, source_options
 from asperity.cli.options import json_option
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
     from asperity.measurement.verdicts.verdict import Check
+
+
+def span_of(text: str, option: str) -> tuple[float, float]:
+    """Seconds of a START:END text, with or without their unit; an open end is infinite."""
+    start, colon, end = (part.strip() for part in text.partition(":"))
+    if not colon:
+        raise InputError(f"{option} must be START:END, got '{text}'; write it like {option} 10:60")
+    return (
+        _seconds(start, option) if start else -math.inf,
+        _seconds(end, option) if end else math.inf,
+    )
+
+
+def times_of(text: str, option: str) -> list[float]:
+    """Seconds of a list like ``12.5,60``, or of a file with one time a line.
+
+    Raises
+    ------
+    InputError
+        If a part is no time, or there is none.
+    """
+    times = [_seconds(part, option) for part in _parts(text, option)]
+    return sorted(times)
+
+
+def spans_of(text: str, option: str) -> list[tuple[float, float]]:
+    """Seconds of a list like ``100:110,200:300``, or of a file with one span a line."""
+    spans = [span_of(part, option) for part in _parts(text, option)]
+    if not all(math.isfinite(edge) for span in spans for edge in span):
+        raise InputError(f"{option} must have a start and an end, got '{text}'; write both")
+    return sorted(spans)
+
+
+def _parts(text: str, option: str) -> list[str]:
+    path = Path(text)
+    if not re.fullmatch(r"[-+.\d\s,:;eE\w]*", text) or path.is_file():
+        try:
+            lines = path.read_text(encoding="utf-8").splitlines()
+        except (OSError, UnicodeDecodeError):
+            raise InputError(
+                f"{option} must be times or a file that can be read, got '{text}'; check the name"
+            ) from None
+        # Two columns are a span.
+        parts = [re.sub(r"[\s,;]+", ":", line.split("#")[0].strip()) for line in lines]
+    else:
+        parts = re.split(r"[,;]", text)
+    result = [part.strip() for part in parts if part.strip()]
+    if not result:
+        raise InputError(
+            f"{option} must hold times, got '{text}'; write them like {option} 12.5,60"
+        )
+    return result
+
+
+def _seconds(part: str, option: str) -> float:
+    from asperity.units import to_si
+
+    return to_si(part if part[-1:].isalpha() else f"{part} s", "time", option)
+
 
 _EPILOG = """\b
 Examples:
@@ -160,14 +222,14 @@ def measure(
         _check_picture(plot, recording)
     with naming_options():
         trace = source.read(recording)
-        found, reason = options.measure(trace)
+        result, reason = options.measure(trace)
     if reason:
         why = in_options(reason).partition(";")[0]
         click.echo(f"asperity: read as with --no-modulation, since {why}", err=True)
-    _print(found, recording, trace.provenance, as_json)
+    _print(result, recording, trace.provenance, as_json)
     if plot is not None:
-        _plot(found, plot)
-    return _verdict(found.checks)
+        _plot(result, plot)
+    return _verdict(result.checks)
 
 
 def _amplitudes(
@@ -253,28 +315,28 @@ def _frequency(text: str, exact: bool) -> float | None:
     return None
 
 
-def _print(found: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
+def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
     from asperity._version import __version__
     from asperity.cli.measure.text import modulated_text, sliding_text
     from asperity.cli.report import to_json
     from asperity.measurement.record import modulated_record, sliding_record
 
-    modulated = hasattr(found, "reading")
+    modulated = hasattr(result, "reading")
     if as_json:
-        record = modulated_record(found) if modulated else sliding_record(found)
+        record = modulated_record(result) if modulated else sliding_record(result)
         provenance_record = {"recording": str(recording), "version": __version__, **provenance}
         click.echo(to_json({**record, "provenance": provenance_record}))
     else:
-        click.echo((modulated_text if modulated else sliding_text)(found, recording.name))
+        click.echo((modulated_text if modulated else sliding_text)(result, recording.name))
 
 
-def _plot(found: Any, path: Path) -> None:
+def _plot(result: Any, path: Path) -> None:
     from asperity.figures.recording import draw_modulated, draw_sliding
     from asperity.figures.style import style
     from asperity.outputs import written_file
 
     with style(), written_file(path, "--plot") as file:
-        figure = (draw_modulated if hasattr(found, "reading") else draw_sliding)(found)
+        figure = (draw_modulated if hasattr(result, "reading") else draw_sliding)(result)
         figure.savefig(file, metadata={"Software": None})
 
 

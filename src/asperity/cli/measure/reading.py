@@ -7,8 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from asperity.cli.measure.source import RecordingSource
-from asperity.cli.measure.words import in_options, naming_options
+from asperity.cli.measure.source import RecordingSource, in_options, naming_options
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
@@ -130,9 +129,9 @@ class FileRows:
         try:
             with naming_options():
                 trace = self.source.read(path)
-                found, _ = self.options.either(trace, lambda: self.options.amplitudes(trace))
-                several = isinstance(found, list)
-                rows = modulated_rows(path, found) if several else sliding_rows(path, found)
+                result, _ = self.options.either(trace, lambda: self.options.amplitudes(trace))
+                several = isinstance(result, list)
+                rows = modulated_rows(path, result) if several else sliding_rows(path, result)
         except InputError as error:
             return [failed_row(path, 1, str(error))]
         except Exception as error:  # one damaged file must not cost the others

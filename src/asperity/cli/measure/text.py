@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from asperity.cli.measure.words import in_options
+from asperity.cli.measure.source import in_options
 from asperity.cli.report import aligned
 
 if TYPE_CHECKING:
@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 _STILL = 1e-15
 
 
-def modulated_text(found: Measurement, name: str) -> str:
+def modulated_text(measurement: Measurement, name: str) -> str:
     """A reading, as the command prints it.
 
     Parameters
     ----------
-    found : Measurement
+    measurement : Measurement
     name : str
         Of the recording.
     """
-    reading, unit = found.reading, found.samples.unit
+    reading, unit = measurement.reading, measurement.samples.unit
     rows = [
         _row("W0", reading.W0, reading.uncertainty("W0"), unit, "mean load"),
         _row("epsilon", reading.epsilon, reading.uncertainty("epsilon"), "", "amplitude of W/W0"),
@@ -43,17 +43,17 @@ def modulated_text(found: Measurement, name: str) -> str:
             "mean of F/W0",
         ),
     ]
-    if math.isfinite(found.delta_mu):
+    if math.isfinite(measurement.delta_mu):
         rows.append(
             _row(
                 "delta_mu",
-                found.delta_mu,
-                found.delta_mu_uncertainty,
+                measurement.delta_mu,
+                measurement.delta_mu_uncertainty,
                 "",
                 "mean_friction - F(0)/W0 without modulation",
             )
         )
-    for side, level in (("before", found.before), ("after", found.after)):
+    for side, level in (("before", measurement.before), ("after", measurement.after)):
         if level is not None:
             rows.append(_row(f"F0_{side}", level.value, level.uncertainty, unit, "no modulation"))
     for n in range(1, reading.harmonics.size + 1):
@@ -65,15 +65,15 @@ def modulated_text(found: Measurement, name: str) -> str:
         )
     head = (
         f"{name}: {reading.start:.6g} s to {reading.end:.6g} s, {reading.samples} samples, "
-        f"{reading.periods:.5g} periods; window chosen by the {found.chosen_by}"
+        f"{reading.periods:.5g} periods; window chosen by the {measurement.chosen_by}"
     )
     return "\n".join(
         [
             head,
             aligned(rows, "  "),
-            *_quality(found.checks),
-            *_findings(found.samples.findings),
-            *_unread(found.samples.unread),
+            *_quality(measurement.checks),
+            *_findings(measurement.samples.findings),
+            *_unread(measurement.samples.unread),
         ]
     )
 
@@ -110,31 +110,45 @@ def amplitudes_text(rows: list[dict[str, Any]], name: str) -> str:
     return "\n".join([count, aligned(table, "  "), *reasons, *named])
 
 
-def sliding_text(found: SlidingMeasurement, name: str) -> str:
+def sliding_text(measurement: SlidingMeasurement, name: str) -> str:
     """A recording without modulation, as the command prints it.
 
     Parameters
     ----------
-    found : SlidingMeasurement
+    measurement : SlidingMeasurement
     name : str
         Of the recording.
     """
-    friction = found.friction
-    rates = ", ".join(f"{rate:.4g} Hz ({100 * share:.0f} %)" for rate, share in found.rates)
+    friction = measurement.friction
+    rates = ", ".join(f"{rate:.4g} Hz ({100 * share:.0f} %)" for rate, share in measurement.rates)
     rows = [_row("friction", friction.value, friction.uncertainty, "", "mean of F/W")]
-    if found.load is not None:
-        rows.append(_row("load", found.load.value, found.load.uncertainty, found.load_unit, "mean"))
+    if measurement.load is not None:
+        rows.append(
+            _row(
+                "load",
+                measurement.load.value,
+                measurement.load.uncertainty,
+                measurement.load_unit,
+                "mean",
+            )
+        )
     head = (
-        f"{name}: {friction.start:.10g} s to {friction.end:.10g} s, {found.time.size} samples "
-        f"at {rates}"
+        f"{name}: {friction.start:.10g} s to {friction.end:.10g} s, "
+        f"{measurement.time.size} samples at {rates}"
     )
-    lines = [head, aligned(rows, "  "), *_segments(found), *_steps(found), *_holds(found)]
-    return "\n".join([*lines, *_quality(found.checks), *_unread(found.unread)])
+    lines = [
+        head,
+        aligned(rows, "  "),
+        *_segments(measurement),
+        *_steps(measurement),
+        *_holds(measurement),
+    ]
+    return "\n".join([*lines, *_quality(measurement.checks), *_unread(measurement.unread)])
 
 
-def _segments(found: SlidingMeasurement) -> list[str]:
+def _segments(measurement: SlidingMeasurement) -> list[str]:
     table = [("from (s)", "to (s)", "velocity", "mean friction", "drift (1/s)", "scatter")]
-    for s in found.segments:
+    for s in measurement.segments:
         shown = [*_row("", s.steady.value, s.steady.uncertainty, "", "")[1:3]]
         steady = " ".join(part for part in shown if part)
         table.append(
@@ -147,7 +161,7 @@ def _segments(found: SlidingMeasurement) -> list[str]:
                 f"{s.scatter:.2g}",
             )
         )
-    return [f"segments, chosen by the {found.chosen_by}", aligned(table, "  ")]
+    return [f"segments, chosen by the {measurement.chosen_by}", aligned(table, "  ")]
 
 
 def velocity_text(velocity: float) -> str:
@@ -159,9 +173,9 @@ def velocity_text(velocity: float) -> str:
     return "0 m/s" if abs(velocity) < _STILL else format_si(velocity, "velocity", 4)
 
 
-def _steps(found: SlidingMeasurement) -> list[str]:
+def _steps(measurement: SlidingMeasurement) -> list[str]:
     lines = []
-    for k, step in enumerate(found.steps, 1):
+    for k, step in enumerate(measurement.steps, 1):
         rows = [
             _row(
                 "change",
@@ -189,8 +203,8 @@ def _steps(found: SlidingMeasurement) -> list[str]:
                     "trend",
                     step.trend,
                     "",
-                    f"{_slope(found, step.slope_before)} before, "
-                    f"{_slope(found, step.slope_after)} after",
+                    f"{_slope(measurement, step.slope_before)} before, "
+                    f"{_slope(measurement, step.slope_after)} after",
                 )
             )
         speeds = f"{velocity_text(step.velocity_before)} to {velocity_text(step.velocity_after)}"
@@ -198,17 +212,17 @@ def _steps(found: SlidingMeasurement) -> list[str]:
     return lines
 
 
-def _slope(found: SlidingMeasurement, slope: float) -> str:
-    return f"{1e-3 * slope:.2g} /mm" if found.velocity_from else f"{slope:.2g} /s"
+def _slope(measurement: SlidingMeasurement, slope: float) -> str:
+    return f"{1e-3 * slope:.2g} /mm" if measurement.velocity_from else f"{slope:.2g} /s"
 
 
-def _holds(found: SlidingMeasurement) -> list[str]:
-    if not found.holds:
+def _holds(measurement: SlidingMeasurement) -> list[str]:
+    if not measurement.holds:
         return []
     table: list[tuple[str, ...]] = [
         ("from (s)", "hold (s)", "level", "relaxation", "peak", "healing", "reload (1/mm)")
     ]
-    for hold in found.holds:
+    for hold in measurement.holds:
         numbers = (
             (hold.level, hold.level_uncertainty),
             (hold.relaxation, hold.relaxation_uncertainty),
@@ -222,8 +236,8 @@ def _holds(found: SlidingMeasurement) -> list[str]:
         reload = f"{1e-3 * hold.reload_slope:.3g}" if math.isfinite(hold.reload_slope) else "-"
         table.append((f"{hold.start:.10g}", f"{hold.hold_time:.4g}", *cells, reload))
     lines = ["holds", aligned(table, "  ")]
-    if found.healing is not None:
-        rate = found.healing
+    if measurement.healing is not None:
+        rate = measurement.healing
         rows = [
             _row(
                 "healing rate",

@@ -1,14 +1,107 @@
-"""``asperity sweep``: a plan into a store, and what can be done with one."""
+"""``asperity sweep``: a plan into a store, and what can be done with one.
+
+Progress is a bar on a terminal, a line every ten seconds in a log.
+"""
 
 from __future__ import annotations
 
+import math
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity.cli.interrupt import interruptible
 from asperity.cli.options import json_option
 from asperity.errors import InputError
+
+if TYPE_CHECKING:
+    from asperity.study.engine import SweepProgress
+
+
+#: Seconds between lines of a log.
+_LINES = 10.0
+
+_PERIODS = ((86_400 * 365.25, "years"), (86_400, "days"), (3600, "h"), (60, "min"))
+
+
+def time_text(seconds: float) -> str:
+    """A duration as a person says it; "unknown" where there is no estimate."""
+    if not math.isfinite(seconds):
+        return "unknown"
+    for length, name in _PERIODS:
+        if seconds >= 1.5 * length:
+            return f"{seconds / length:.3g} {name}"
+    return f"{seconds:.3g} s"
+
+
+@contextmanager
+def shown() -> Iterator[tuple[Callable[[SweepProgress], None], Callable[[str], None]]]:
+    """Two functions: for the progress of a sweep, and for lines about it.
+
+    Inside, Ctrl-C raises; what is in the store stays, and the message says so.
+    """
+    last: SweepProgress | None = None
+    on_terminal = sys.stderr.isatty()
+    with interruptible() as check:
+        report, line, close = _bar() if on_terminal else _lines()
+
+        def progress(now: SweepProgress) -> None:
+            nonlocal last
+            last = now
+            check()
+            report(now)
+
+        try:
+            yield progress, line
+        except KeyboardInterrupt:
+            done = f"{last.points:,} of {last.total:,} points" if last else "nothing"
+            raise KeyboardInterrupt(
+                f"interrupted with {done} solved; chunks that are done stay in the store, and the "
+                "same command goes on from there"
+            ) from None
+        finally:
+            close()
+
+
+def _text(now: SweepProgress) -> str:
+    return (
+        f"{now.points:,} of {now.total:,} points, {now.failed:,} failed, {now.rate:,.0f} points/s, "
+        f"{time_text(now.left)} left"
+    )
+
+
+def _lines() -> tuple[Callable[[SweepProgress], None], Callable[[str], None], Callable[[], None]]:
+    next_line = time.monotonic() + _LINES
+
+    def report(now: SweepProgress) -> None:
+        nonlocal next_line
+        if time.monotonic() >= next_line:
+            next_line = time.monotonic() + _LINES
+            line(_text(now))
+
+    def line(text: str) -> None:
+        click.echo(f"{time.strftime('%H:%M:%S')} {text}", err=True)
+
+    return report, line, lambda: None
+
+
+def _bar() -> tuple[Callable[[SweepProgress], None], Callable[[str], None], Callable[[], None]]:
+    from tqdm import tqdm
+
+    bar = tqdm(unit="point", file=sys.stderr, leave=False, dynamic_ncols=True,
+               bar_format="{percentage:3.0f}%|{bar}| {desc}")  # fmt: skip
+
+    def report(now: SweepProgress) -> None:
+        bar.total, bar.n = now.total, now.points
+        bar.set_description_str(_text(now), refresh=True)
+
+    return report, lambda text: tqdm.write(text, file=sys.stderr), bar.close
+
 
 _EPILOG = """\b
 Examples:
@@ -85,12 +178,12 @@ def run(
             "--out must be given, got nothing; name the store, like --out results.zarr"
         )
     from asperity.cli.report import aligned, to_json
-    from asperity.cli.sweep.progress import shown
+    from asperity.cli.sweep.command import shown
     from asperity.outputs import size_text
     from asperity.study import run_sweep
 
     with shown() as (progress, log):
-        found = run_sweep(
+        result = run_sweep(
             plan,
             out,
             workers=workers,
@@ -101,43 +194,43 @@ def run(
             progress=progress,
             log=log,
         )
-    record: dict[str, Any] = {**vars(found), "out": str(found.out)}
+    record: dict[str, Any] = {**vars(result), "out": str(result.out)}
     rows = [
-        ("points", f"{found.points:,}"),
-        ("failed", f"{found.failed:,}"),
-        ("solved now", f"{found.solved:,} in {found.seconds:.1f} s"),
-        ("memory", f"{size_text(found.memory)} in the largest worker"),
-        ("store", str(found.out)),
+        ("points", f"{result.points:,}"),
+        ("failed", f"{result.failed:,}"),
+        ("solved now", f"{result.solved:,} in {result.seconds:.1f} s"),
+        ("memory", f"{size_text(result.memory)} in the largest worker"),
+        ("store", str(result.out)),
     ]
     click.echo(to_json(record) if as_json else aligned(rows))
-    if found.failed:
+    if result.failed:
         click.echo(
-            f"asperity: {found.failed:,} of {found.points:,} points have no answer; the variable "
+            f"asperity: {result.failed:,} of {result.points:,} points have no answer; the variable "
             "'outcome' says why, and asperity.study.results counts the reasons",
             err=True,
         )
-    return 1 if found.failed else 0
+    return 1 if result.failed else 0
 
 
 def _estimate(plan: Path, as_json: bool) -> int:
     from asperity.cli.report import aligned, to_json
-    from asperity.cli.sweep.progress import time_text
+    from asperity.cli.sweep.command import time_text
     from asperity.orbit.search import available_cores
     from asperity.outputs import size_text
     from asperity.study import dry_run
 
-    found = dry_run(plan)
+    result = dry_run(plan)
     cores = available_cores()
-    alone, together = time_text(found.seconds), time_text(found.seconds / cores)
+    alone, together = time_text(result.seconds), time_text(result.seconds / cores)
     rows = [
-        ("points", f"{found.points:,} ({' x '.join(map(str, found.shape))})"),
-        ("chunks", f"{found.chunks:,} of {' x '.join(map(str, found.chunk_shape))} points"),
-        ("disk", f"{size_text(found.bytes)} at most"),
-        ("sample", f"{found.sample:,} points"),
-        ("failed", f"{found.failed:.2%} of the sample"),
+        ("points", f"{result.points:,} ({' x '.join(map(str, result.shape))})"),
+        ("chunks", f"{result.chunks:,} of {' x '.join(map(str, result.chunk_shape))} points"),
+        ("disk", f"{size_text(result.bytes)} at most"),
+        ("sample", f"{result.sample:,} points"),
+        ("failed", f"{result.failed:.2%} of the sample"),
         ("time", f"{alone} of one core, about; {together} on {cores}"),
     ]
-    click.echo(to_json({**vars(found), "cores": cores}) if as_json else aligned(rows))
+    click.echo(to_json({**vars(result), "cores": cores}) if as_json else aligned(rows))
     return 0
 
 
@@ -151,26 +244,26 @@ def status(store: Path, as_json: bool) -> int:
     from asperity.study import store_status
     from asperity.study.results import status_record
 
-    found = store_status(store)
+    result = store_status(store)
     if as_json:
-        click.echo(to_json(status_record(found)))
+        click.echo(to_json(status_record(result)))
         return 0
-    done = found.done / found.points
+    done = result.done / result.points
     rows = [
-        ("title", found.title),
-        ("points", f"{found.done:,} of {found.points:,} ({done:.1%})"),
-        ("chunks", f"{found.chunks_done:,} of {found.chunks:,}"),
+        ("title", result.title),
+        ("points", f"{result.done:,} of {result.points:,} ({done:.1%})"),
+        ("chunks", f"{result.chunks_done:,} of {result.chunks:,}"),
         *(
-            [("damaged", f"{found.chunks_damaged:,} chunks, which the next run solves again")]
-            if found.chunks_damaged
+            [("damaged", f"{result.chunks_damaged:,} chunks, which the next run solves again")]
+            if result.chunks_damaged
             else []
         ),
-        ("failed", f"{found.failed:,}"),
-        *((f"  {name}", f"{count:,}") for name, count in found.outcomes.items()),
-        ("disk", size_text(found.bytes)),
-        ("running", found.running or "no"),
-        ("runs", f"{len(found.runs)}"),
-        *((f"  {run['started']}", _run_text(run)) for run in found.runs),
+        ("failed", f"{result.failed:,}"),
+        *((f"  {name}", f"{count:,}") for name, count in result.outcomes.items()),
+        ("disk", size_text(result.bytes)),
+        ("running", result.running or "no"),
+        ("runs", f"{len(result.runs)}"),
+        *((f"  {run['started']}", _run_text(run)) for run in result.runs),
     ]
     click.echo(aligned(rows))
     return 0
@@ -191,14 +284,14 @@ def summary(store: Path, as_json: bool) -> int:
     from asperity.cli.report import aligned, to_json
     from asperity.study import summary_statistics
 
-    found = summary_statistics(store)
+    result = summary_statistics(store)
     if as_json:
-        click.echo(to_json(found))
+        click.echo(to_json(result))
         return 0
     names = ("count", "mean", "std", "min", "max")
     rows = [
         (name, f"{s['count']:,}", *(f"{s[key]:.6g}" for key in names[1:]))
-        for name, s in found.items()
+        for name, s in result.items()
     ]
     click.echo(aligned([("", *names), *rows]))
     return 0

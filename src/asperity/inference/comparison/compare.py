@@ -229,19 +229,19 @@ def compare(
             f"laws must have numbers of two or more, got them of {len(fits)}; "
             + "; ".join(not_compared.values())
         )
-    found = judge(fits)
+    result = judge(fits)
     outliers = _common_outliers(fits)
     if outliers:
         table = joined([d for d in several if isinstance(d, LockInTable)])[0]
         out = np.isin(np.arange(table.rows), outliers)
         rest = judge(fits_to([table.without(out)], lambda _: None, fits))
-        found = _without(found, rest, table.row_names[out].tolist())
-    found = replace(
-        found,
+        result = _without(result, rest, table.row_names[out].tolist())
+    result = replace(
+        result,
         not_compared=not_compared,
-        verdict=found.verdict + _freed(found) + _without_numbers(not_compared),
+        verdict=result.verdict + _freed(result) + _without_numbers(not_compared),
     )
-    return _examined(found, lambda laws: report(len(own) + laws)) if evidence else found
+    return _examined(result, lambda laws: report(len(own) + laws)) if evidence else result
 
 
 def _without_numbers(not_compared: Mapping[str, str]) -> str:
@@ -260,9 +260,9 @@ def _within_law(report: Report, laws: int, done: int, total: int) -> None:
     report(laws + done / total)
 
 
-def _freed(found: Comparison) -> str:
+def _freed(comparison: Comparison) -> str:
     """What a free stiffness would change, where no law describes the data."""
-    fits = [j.fit for j in found.laws.values() if j.fit.converged]
+    fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
     if any(f.dof <= 0 or f.p_value >= _IMPOSSIBLE for f in fits):
         return ""
     # The law with the fewest parameters that does: those that extend it do as well.
@@ -286,8 +286,8 @@ def _common_outliers(fits: Mapping[str, Fit]) -> list[int]:
 def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Comparison:
     """The comparison without outliers, with a verdict that says what they do."""
 
-    def excluded(found: Comparison) -> list[str]:
-        return sorted(name for name, j in found.laws.items() if j.excluded)
+    def excluded(comparison: Comparison) -> list[str]:
+        return sorted(name for name, j in comparison.laws.items() if j.excluded)
 
     beside = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
     said = (
@@ -297,14 +297,14 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
     return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
 
 
-def _examined(found: Comparison, report: Report) -> Comparison:
+def _examined(comparison: Comparison, report: Report) -> Comparison:
     """The comparison with evidence and cross-validation of every law.
 
     Orbits that are searched for, and motions through recordings, take minutes for it: of an
     excluded law, only the normal approximation of the evidence.
     """
     judged = {}
-    for k, (name, j) in enumerate(found.laws.items(), 1):
+    for k, (name, j) in enumerate(comparison.laws.items(), 1):
         terms = j.fit.objective.terms
         slow = any(term.searches or term.profiled for term in terms)
         if j.fit.converged and j.excluded and slow:
@@ -313,7 +313,11 @@ def _examined(found: Comparison, report: Report) -> Comparison:
             j = replace(j, evidence=evidence_of(j.fit), cross_validation=leave_one_run_out(j.fit))
         judged[name] = j
         report(k)
-    return replace(found, laws=judged, verdict=found.verdict + _second_opinion(judged, found.best))
+    return replace(
+        comparison,
+        laws=judged,
+        verdict=comparison.verdict + _second_opinion(judged, comparison.best),
+    )
 
 
 def _second_opinion(judged: Mapping[str, Judged], best: str) -> str:
@@ -357,12 +361,12 @@ def judge(fits: Mapping[str, Fit]) -> Comparison:
     total = sum(math.exp(-(f.aicc - top.aicc) / 2) for f in done.values())
     judged = {}
     for name in sorted(fits, key=lambda n: fits[n].aicc if n in done else math.inf):
-        found = fits[name]
+        result = fits[name]
         if name not in done:
-            judged[name] = Judged(found, False, found.message, math.nan)
+            judged[name] = Judged(result, False, result.message, math.nan)
             continue
-        weight = math.exp(-(found.aicc - top.aicc) / 2) / total
-        judged[name] = Judged(found, *_excluded(found, top, describes, inflation), weight)
+        weight = math.exp(-(result.aicc - top.aicc) / 2) / total
+        judged[name] = Judged(result, *_excluded(result, top, describes, inflation), weight)
     left = [name for name, j in judged.items() if name in done and not j.excluded]
     decided = describes and len(left) == 1 and len(done) == len(fits)
     return Comparison(judged, decided, best, _verdict(judged, left, best, describes))
@@ -378,37 +382,37 @@ def _of_any_law() -> set[str]:
 
 def _own(name: str, free: Sequence[str], laws: Sequence[str]) -> list[str]:
     others = {p for law in laws for p in _parameters(law)}
-    mine = _parameters(name)
-    return [p for p in free if p in mine or p not in others]
+    own = _parameters(name)
+    return [p for p in free if p in own or p not in others]
 
 
-def _excluded(found: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:
-    if found is best:
+def _excluded(result: Fit, best: Fit, describes: bool, inflation: float) -> tuple[bool, str]:
+    if result is best:
         return False, ""
-    behind = found.aicc - best.aicc
-    if not found.judged_by_chi2:
+    behind = result.aicc - best.aicc
+    if not result.judged_by_chi2:
         if behind < LARGEST_AICC_DIFFERENCE:
             return False, ""
         return True, (
-            f"its log-likelihood is {best.log_likelihood - found.log_likelihood:.4g} lower than "
+            f"its log-likelihood is {best.log_likelihood - result.log_likelihood:.4g} lower than "
             f"that of {best.law}, noise included, and its AICc {behind:.4g} above"
         )
     worst = max(
-        found.observables,
-        key=lambda n: found.observables[n][0] - best.observables.get(n, (0.0, 0))[0],
+        result.observables,
+        key=lambda n: result.observables[n][0] - best.observables.get(n, (0.0, 0))[0],
     )
-    (chi2, n), rival = found.observables[worst], best.observables.get(worst, (0.0, 0))[0]
+    (chi2, n), rival = result.observables[worst], best.observables.get(worst, (0.0, 0))[0]
     where = (
         f"the worst observable is {worst} with chi-squared {chi2:.4g} for {n} data, where "
         f"{best.law} has {rival:.4g}"
     )
-    misfit = found.dof > 0 and found.p_value < _IMPOSSIBLE
+    misfit = result.dof > 0 and result.p_value < _IMPOSSIBLE
     if misfit and describes and behind >= _AS_GOOD:
         return True, (
-            f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom has a probability of "
-            f"{found.p_value:.2g}; {where}"
+            f"chi-squared {result.chi2:.4g} for {result.dof} degrees of freedom has a probability "
+            f"of {result.p_value:.2g}; {where}"
         )
-    deviance = 2 * (best.log_likelihood - found.log_likelihood)
+    deviance = 2 * (best.log_likelihood - result.log_likelihood)
     fair = behind - deviance + deviance / inflation
     if fair >= LARGEST_AICC_DIFFERENCE:
         even = (
@@ -452,9 +456,9 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join(names) if len(names) < 3 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def _value(found: Fit, name: str) -> Any:
+def _value(result: Fit, name: str) -> Any:
     """A parameter of a fit, free or fixed."""
-    return found.values.get(name, found.objective.fixed.get(name))
+    return result.values.get(name, result.objective.fixed.get(name))
 
 
 def what_would_tell(first: Fit, second: Fit) -> str:

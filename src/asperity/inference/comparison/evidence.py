@@ -66,12 +66,12 @@ class Evidence:
         return self.effective_samples >= _ENOUGH
 
 
-def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evidence:
+def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evidence:
     """Evidence of a fitted law.
 
     Parameters
     ----------
-    found : Fit
+    fit : Fit
         Converged.
     samples : int, optional
         By default what the data afford, 1024 for a table, 256 with a recording, and 128 where
@@ -84,20 +84,20 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     lowers the logarithm by ln k.
     """
     if samples is None:
-        samples = min(term.affordable for term in found.objective.terms)
-    if not found.objective.unknowns:
+        samples = min(term.affordable for term in fit.objective.terms)
+    if not fit.objective.unknowns:
         # Nothing to average over.
-        density = found.log_likelihood
+        density = fit.log_likelihood
         return Evidence(density, 0.0, float(samples), density, 0, {})
-    whitened = whitened_posterior(found)
+    whitened = whitened_posterior(fit)
     n = whitened.mode.size
-    at_mode = float(_log_target(found, whitened, np.zeros((1, n)))[0])
+    at_mode = float(_log_target(fit, whitened, np.zeros((1, n)))[0])
     laplace = at_mode + 0.5 * n * math.log(2 * math.pi)
     if samples == 0:
         return Evidence(laplace, math.nan, 0.0, laplace, 0, whitened.prior.record())
     proposal = multivariate_t(np.zeros(n), np.eye(n), df=_TAILS, seed=seed)
     z = np.asarray(proposal.rvs(samples)).reshape(samples, n)
-    log_weights = _log_target(found, whitened, z) - proposal.logpdf(z).reshape(samples)
+    log_weights = _log_target(fit, whitened, z) - proposal.logpdf(z).reshape(samples)
     failed = int((~np.isfinite(log_weights)).sum())
     log_weights = np.where(np.isfinite(log_weights), log_weights, -np.inf)
     top = log_weights.max()
@@ -113,15 +113,15 @@ def evidence_of(found: Fit, *, samples: int | None = None, seed: int = 0) -> Evi
     )
 
 
-def _log_target(found: Fit, whitened: Whitened, z: Float) -> Float:
+def _log_target(fit: Fit, whitened: Whitened, z: Float) -> Float:
     """Logarithm of likelihood times prior times the volume dq/dz du/dq, shape (samples,)."""
     q = whitened.mode + z @ whitened.root.T
     u = np.asarray(whitened.coordinates.to_u(q))
     volume = np.asarray(whitened.coordinates.log_slope(q)).sum(-1)
     volume = volume + np.linalg.slogdet(whitened.root)[1]
     total = whitened.prior.log_density(u) + volume
-    values = [found.objective.named(x) for x in u]
-    for term, residuals in zip(found.objective.terms, found.residuals, strict=True):
+    values = [fit.objective.named(x) for x in u]
+    for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         # The density where all residuals are 0.
         total += log_density(residuals) + 0.5 * float(np.sum(residuals.values**2))
         total -= 0.5 * term.chi2_of_many(values, near=True)
@@ -154,14 +154,14 @@ class CrossValidation:
         return float(apart.sum()), float(apart.std(ddof=1) * math.sqrt(apart.size))
 
 
-def leave_one_run_out(found: Fit) -> CrossValidation:
+def leave_one_run_out(fit: Fit) -> CrossValidation:
     """Cross-validation of a converged fit to tables of lock-in readings.
 
     The density of a run is normal about the prediction of the fit to the others, with their
     uncertainty of the parameters on top of the errors.
     """
-    tables = found.objective.terms_of(LockInTerm)
-    if not tables or len(found.objective.terms) > 1:
+    tables = fit.objective.terms_of(LockInTerm)
+    if not tables or len(fit.objective.terms) > 1:
         return CrossValidation(math.nan, {}, "data other than tables have no runs to leave out")
     (term,) = tables
     names = list(dict.fromkeys(term.table.run.tolist()))
@@ -169,17 +169,17 @@ def leave_one_run_out(found: Fit) -> CrossValidation:
         return CrossValidation(
             math.nan, {}, "all rows are of one run; name the runs in a column 'run'"
         )
-    runs = {name: _predictive(found, term, term.table.run == name) for name in names}
+    runs = {name: _predictive(fit, term, term.table.run == name) for name in names}
     if not all(math.isfinite(value) for value in runs.values()):
         return CrossValidation(math.nan, runs, "the other runs do not determine the parameters")
     return CrossValidation(sum(runs.values()), runs)
 
 
-def _predictive(found: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> float:
+def _predictive(fit: Fit, term: LockInTerm, left_out: NDArray[np.bool_]) -> float:
     """Log density of the rows left out, given the others."""
-    objective = found.objective
+    objective = fit.objective
     rest = replace(objective, terms=(term.weighted(np.where(left_out, 0.0, 1.0)),))
-    u = rest.minimise(objective.coordinates(found.values))[0]
+    u = rest.minimise(objective.coordinates(fit.values))[0]
     data = objective.data_residuals(u)
     if data is None:
         return math.nan

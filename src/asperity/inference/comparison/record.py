@@ -11,7 +11,7 @@ from asperity.inference.fitting.result import fit_record
 from asperity.outputs.json import plain
 
 
-def comparison_record(found: Comparison) -> dict[str, Any]:
+def comparison_record(comparison: Comparison) -> dict[str, Any]:
     """Everything that a comparison says."""
     return {
         "laws": {
@@ -23,32 +23,32 @@ def comparison_record(found: Comparison) -> dict[str, Any]:
                 "evidence": _evidence(judged.evidence),
                 "leave_one_run_out": _cross_validation(judged.cross_validation),
             }
-            for name, judged in found.laws.items()
+            for name, judged in comparison.laws.items()
         },
-        "left_out": list(found.left_out),
-        "not_compared": dict(found.not_compared),
-        "decided": found.decided,
-        "best": found.best,
-        "verdict": found.verdict,
+        "left_out": list(comparison.left_out),
+        "not_compared": dict(comparison.not_compared),
+        "decided": comparison.decided,
+        "best": comparison.best,
+        "verdict": comparison.verdict,
     }
 
 
 def laws_table(
-    found: Comparison, *, reasons: bool = False
+    comparison: Comparison, *, reasons: bool = False
 ) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Laws in the order of the comparison, as texts for people: columns' names and rows.
 
     What decides stands in it: chi-squared where uncertainties are given, the logarithm of the
     likelihood where the noise is estimated. With `reasons`, why a law is excluded.
     """
-    fits = [j.fit for j in found.laws.values() if j.fit.converged]
+    fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
     lowest = min((f.aicc for f in fits), default=0.0)
     by_chi2 = any(f.judged_by_chi2 for f in fits)
     numbers = ("chi-squared", "dof", "p") if by_chi2 else ("log-likelihood",)
     head = ("law", *numbers, "AICc - lowest", "weight", "ln evidence", "")
     nothing = ("",) * (len(head) - 2)
     rows = []
-    for name, j in found.laws.items():
+    for name, j in comparison.laws.items():
         f = j.fit
         if not f.converged:
             rows.append((name, *nothing, f.message))
@@ -71,28 +71,30 @@ def laws_table(
                 "; ".join(notes),
             )
         )
-    rows += [(name, *nothing, f"not compared: {why}") for name, why in found.not_compared.items()]
+    rows += [
+        (name, *nothing, f"not compared: {why}") for name, why in comparison.not_compared.items()
+    ]
     return head, rows
 
 
-def _evidence(found: Evidence | None) -> dict[str, Any] | None:
-    if found is None:
+def _evidence(result: Evidence | None) -> dict[str, Any] | None:
+    if result is None:
         return None
     return {
-        "log": plain(found.log),
-        "standard_error": plain(found.standard_error),
-        "effective_samples": plain(found.effective_samples),
-        "laplace": plain(found.laplace),
-        "failed": found.failed,
-        "prior": found.prior,
+        "log": plain(result.log),
+        "standard_error": plain(result.standard_error),
+        "effective_samples": plain(result.effective_samples),
+        "laplace": plain(result.laplace),
+        "failed": result.failed,
+        "prior": result.prior,
     }
 
 
-def _cross_validation(found: CrossValidation | None) -> dict[str, Any] | None:
-    if found is None:
+def _cross_validation(result: CrossValidation | None) -> dict[str, Any] | None:
+    if result is None:
         return None
     return {
-        "log_density": plain(found.log_density),
-        "runs": {name: plain(value) for name, value in found.runs.items()},
-        "message": found.message,
+        "log_density": plain(result.log_density),
+        "runs": {name: plain(value) for name, value in result.runs.items()},
+        "message": result.message,
     }

@@ -19,7 +19,7 @@ from scipy.stats.qmc import Sobol
 from asperity.inference.design.plan import DesignPlan, Hypothesis
 from asperity.inference.tables.term import on_contacts
 from asperity.orbit import Outcome, periodic_response, response_function
-from asperity.parameters.rules import RULES
+from asperity.parameters.parameter import RULES
 from asperity.slider.named import slider_from
 
 Float = NDArray[np.float64]
@@ -93,10 +93,10 @@ def candidates_of(plan: DesignPlan, progress: Progress) -> Candidates:
     for k, values in enumerate(draws):
         label = f"draw {k + 1} of {len(draws)}"
         some = {n: v[where] for n, v in points.items()}
-        found, also_slow = _reasons(
+        result, also_slow = _reasons(
             plan, plan.truth, some, values, partial(_relabelled, progress, label)
         )
-        usable[k, where] = [not r for r in found]
+        usable[k, where] = [not r for r in result]
         slow[where] |= also_slow
     risky = kept & (usable.mean(0) < plan.usable_share)
     if risky.any():
@@ -133,16 +133,16 @@ def drawn_values(plan: DesignPlan) -> tuple[dict[str, float], ...]:
         return ()
     rules = {u.name: RULES[u.parameter.rule] for u in plan.truth.unknowns}
     sequence = Sobol(len(names), seed=plan.seed)
-    found: list[dict[str, float]] = []
-    while len(found) < plan.draws:
+    result: list[dict[str, float]] = []
+    while len(result) < plan.draws:
         for row in norm.ppf(sequence.random(max(8, 1 << (plan.draws - 1).bit_length()))):
             drawn = {
                 n: plan.truth.values[n] + plan.uncertainty[n] * float(z)
                 for n, z in zip(names, row, strict=True)
             }
             if all(bool(rules[n].holds(x)) for n, x in drawn.items()):
-                found.append({**plan.truth.values, **drawn})
-    return tuple(found[: plan.draws])
+                result.append({**plan.truth.values, **drawn})
+    return tuple(result[: plan.draws])
 
 
 def _reasons(
@@ -164,9 +164,9 @@ def _reasons(
     given["epsilon"] = np.where(beyond, 0.5, given["epsilon"])
     if not inertial:
         quick = response_function(hypothesis.law, multipliers=True, search=False)
-        found = quick({n: given[n] for n in quick.parameters})
-        slow = np.asarray(found.outcome) != Outcome.CONVERGED
-        growing = np.asarray(found.log_multipliers).real.max(-1) >= 0
+        result = quick({n: given[n] for n in quick.parameters})
+        slow = np.asarray(result.outcome) != Outcome.CONVERGED
+        growing = np.asarray(result.log_multipliers).real.max(-1) >= 0
         for i in np.flatnonzero(~slow & growing & ~beyond):
             reasons[i] = UNSTABLE
     left = np.flatnonzero(slow & ~beyond)
@@ -200,15 +200,15 @@ def _short(reason: str) -> str:
     return "no response was found: " + reason.removesuffix(" at").removesuffix(" before")
 
 
-def without_rows(found: Candidates, keep: Bool, reason: str) -> Candidates:
+def without_rows(result: Candidates, keep: Bool, reason: str) -> Candidates:
     """The candidates without some of them, which are counted under a reason."""
     if keep.all():
-        return found
+        return result
     return replace(
-        found,
-        points={n: v[keep] for n, v in found.points.items()},
-        index=found.index[keep],
-        slow=found.slow[keep],
-        usable=found.usable[:, keep],
-        left_out={**found.left_out, reason: int((~keep).sum())},
+        result,
+        points={n: v[keep] for n, v in result.points.items()},
+        index=result.index[keep],
+        slow=result.slow[keep],
+        usable=result.usable[:, keep],
+        left_out={**result.left_out, reason: int((~keep).sum())},
     )

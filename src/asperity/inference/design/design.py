@@ -91,32 +91,32 @@ def design(
     elif isinstance(plan, Mapping):
         plan = plan_of(plan)
     report = progress or (lambda done, total, label: None)
-    found = candidates_of(plan, report)
-    _require_candidates(plan, found)
-    model = PointModel(plan, plan.truth, found.points, found.slow)
+    result = candidates_of(plan, report)
+    _require_candidates(plan, result)
+    model = PointModel(plan, plan.truth, result.points, result.slow)
     expected, jacobian = _in_blocks(model, plan.truth.values, report, "derivatives")
     seen = np.asarray(np.isfinite(jacobian).all(axis=(1, 2)))
     if not seen.all():
-        found = without_rows(found, seen, "its derivatives were not found")
-        _require_candidates(plan, found)
+        result = without_rows(result, seen, "its derivatives were not found")
+        _require_candidates(plan, result)
         expected, jacobian = expected.without(~seen), jacobian[seen]
-    cost, total = plan.budget.cost(found.points["V"]), plan.budget.total
+    cost, total = plan.budget.cost(result.points["V"]), plan.budget.total
     if cost.min() > total:
         raise InputError(
             f"{plan.name}.time must suffice for one reading, got {total:g} s; the shortest takes "
             f"{cost.min():g} s"
         )
-    grid = even_grid(plan.shape, found.index, cost, total)
-    task = _Task(plan, found, expected, jacobian, cost, total, grid, report)
+    grid = even_grid(plan.shape, result.index, cost, total)
+    task = _Task(plan, result, expected, jacobian, cost, total, grid, report)
     return task.measuring(simulate) if plan.rival is None else task.excluding(simulate)
 
 
-def _require_candidates(plan: DesignPlan, found: Candidates) -> None:
-    if not found.size:
-        why = "; ".join(f"{count} times: {reason}" for reason, count in found.left_out.items())
+def _require_candidates(plan: DesignPlan, result: Candidates) -> None:
+    if not result.size:
+        why = "; ".join(f"{count} times: {reason}" for reason, count in result.left_out.items())
         raise InputError(
             f"{plan.name}.ranges must hold operating points at which the slider slides steadily, "
-            f"got none of {found.total} ({why}); lower W0, stiffen the spring, or widen the ranges"
+            f"got none of {result.total} ({why}); lower W0, stiffen the spring, or widen the ranges"
         )
 
 
@@ -131,9 +131,9 @@ def _in_blocks(
             rows = some[start : start + block]
             points = {n: v[rows] for n, v in model.points.items()}
             part = PointModel(model.plan, model.hypothesis, points, model.slow[rows])
-            readings, found = part.expected(values)
+            readings, result = part.expected(values)
             tables.append(readings)
-            jacobians.append(found.jacobian)
+            jacobians.append(result.jacobian)
             order.append(rows)
             report(sum(r.size for r in order), model.size, label)
     back = np.argsort(np.concatenate(order))
@@ -182,7 +182,7 @@ class _Task:
         self, criterion: Determinant, value: float
     ) -> dict[str, tuple[tuple[float, int, float], ...]]:
         """What each setting gives by itself, the others chosen best."""
-        found: dict[str, tuple[tuple[float, int, float], ...]] = {}
+        result: dict[str, tuple[tuple[float, int, float], ...]] = {}
         for axis in self.plan.axes:
             if axis.levels.size == 1:
                 continue
@@ -196,19 +196,19 @@ class _Task:
                     n = optimal_shares(part, readings).shares * readings
                     more = times_fewer_of(part, n, value)
                 levels.append((float(level), int(rows.size), more))
-            found[axis.name] = tuple(levels)
-        return found
+            result[axis.name] = tuple(levels)
+        return result
 
     def excluding(self, simulate: int) -> Design:
         """The design that excludes the rival."""
         plan = self.plan
         assert plan.rival is not None  # by the choice of the aim
         fits = RivalFit(plan, plan.rival, self.candidates, self.expected)
-        found = separation(fits, self.cost, self.total, self.report)
-        n = found.readings
+        result = separation(fits, self.cost, self.total, self.report)
+        n = result.readings
         grid = self.grid.readings(self.cost, self.total)
         starts = np.array(
-            [[float(u.to_coordinate(found.values[u.name])) for u in plan.rival.unknowns]]
+            [[float(u.to_coordinate(result.values[u.name])) for u in plan.rival.unknowns]]
         )
         starts = np.vstack([starts, plan.rival.coordinates])
         on_grid = fits.fitted(grid, starts)
@@ -216,47 +216,47 @@ class _Task:
         probable = [
             probability_of_deciding(self.jacobian, linear, readings, counts, plan.seed)
             for linear, readings in (
-                (found.criterion, n.astype(float)),
+                (result.criterion, n.astype(float)),
                 (fits.criterion(on_grid.coordinates[0])[0], grid),
             )
         ]
         behind = float(on_grid.chi2[0])
         separated = {
-            "chi2": found.chi2,
+            "chi2": result.chi2,
             "chi2_grid": behind,
             "probability": probable[0],
             "probability_grid": probable[1],
-            "rival_values": found.values,
+            "rival_values": result.values,
         }
         warnings = []
-        if found.unseen:
+        if result.unseen:
             warnings.append(
-                f"{plan.rival.law.name} has no response at {found.unseen} candidates with the "
+                f"{plan.rival.law.name} has no response at {result.unseen} candidates with the "
                 "values that come nearest; they were not judged"
             )
-        fewer = found.chi2 / behind if behind > 0 else math.inf
-        whole = found.criterion.least_efficiency(found.chi2_shares - found.chi2, found.chi2)
-        reached = found.shares.efficiency * whole
+        fewer = result.chi2 / behind if behind > 0 else math.inf
+        whole = result.criterion.least_efficiency(result.chi2_shares - result.chi2, result.chi2)
+        reached = result.shares.efficiency * whole
         return self._described(
-            n, found.shares, reached, fewer, simulate, separated, warnings, (fits, found)
+            n, result.shares, reached, fewer, simulate, separated, warnings, (fits, result)
         )
 
     def _determinant(self) -> Determinant:
         """The criterion at the expected values, or averaged over the draws."""
-        plan, found = self.plan, self.candidates
+        plan, result = self.plan, self.candidates
         interest = [plan.truth.names.index(name) for name in plan.measured]
         if not plan.draws:
             information = fisher_information(self.jacobian)[None]
             return Determinant(information, self.prior[None], interest)
         parts = []
-        for k, values in enumerate(found.draws):
-            rows = np.flatnonzero(found.usable[k])
-            some = {n: v[rows] for n, v in found.points.items()}
-            model = PointModel(plan, plan.truth, some, found.slow[rows])
-            label = f"derivatives, draw {k + 1} of {len(found.draws)}"
+        for k, values in enumerate(result.draws):
+            rows = np.flatnonzero(result.usable[k])
+            some = {n: v[rows] for n, v in result.points.items()}
+            model = PointModel(plan, plan.truth, some, result.slow[rows])
+            label = f"derivatives, draw {k + 1} of {len(result.draws)}"
             _, jacobian = _in_blocks(model, values, self.report, label)
             # A point that slides unsteadily tells nothing.
-            information = np.zeros((found.size, len(plan.truth.names), len(plan.truth.names)))
+            information = np.zeros((result.size, len(plan.truth.names), len(plan.truth.names)))
             information[rows] = np.nan_to_num(fisher_information(jacobian))
             parts.append(information)
         prior = np.broadcast_to(self.prior, (len(parts), *self.prior.shape))
@@ -273,7 +273,7 @@ class _Task:
         warnings: Sequence[str] = (),
         rival: tuple[RivalFit, Separation] | None = None,
     ) -> Design:
-        plan, found = self.plan, self.candidates
+        plan, result = self.plan, self.candidates
         errors, correlation = self._errors(n.astype(float))
         said = [*warnings, *self._warnings(errors, shares)]
         simulation = None
@@ -292,9 +292,9 @@ class _Task:
             fewer=fewer,
             grid_levels=self.grid.levels,
             grid_usable=(self.grid.rows.size, self.grid.size),
-            candidates=found.size,
-            combinations=found.total,
-            left_out=found.left_out,
+            candidates=result.size,
+            combinations=result.total,
+            left_out=result.left_out,
             simulation=simulation,
             warnings=tuple(said),
             **(separated or {}),
@@ -366,8 +366,8 @@ class _Task:
         model = PointModel(self.plan, self.plan.truth, some, self.candidates.slow[rows])
         other = None
         if rival is not None:
-            fits, found = rival
-            other = fits.at(rows)[0], found.values
+            fits, result = rival
+            other = fits.at(rows)[0], result.values
         return simulated(
             model,
             self.expected.without(~keep),
@@ -379,16 +379,16 @@ class _Task:
         )
 
 
-def _surprises(found: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
+def _surprises(result: Simulated, errors: Mapping[str, ExpectedError]) -> list[str]:
     """Where the simulated fits differ from what was expected."""
     said = []
-    if found.failed:
+    if result.failed:
         said.append(
-            f"{found.failed} of {found.failed + found.sets} simulated fits did not converge"
+            f"{result.failed} of {result.failed + result.sets} simulated fits did not converge"
         )
-    for name, spread in found.spread.items():
+    for name, spread in result.spread.items():
         expected = errors[name].se
-        if abs(spread - expected) > _SURPRISING * found.uncertainty[name] + _LINEAR * expected:
+        if abs(spread - expected) > _SURPRISING * result.uncertainty[name] + _LINEAR * expected:
             said.append(
                 f"the simulated spread of {name}, {spread:.3g}, is not the expected standard error "
                 f"{expected:.3g}: predictions are not linear in it over so wide a range"

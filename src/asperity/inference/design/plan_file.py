@@ -253,15 +253,15 @@ class PlanFields:
 
     def numbers(self, key: str, known: Mapping[str, Parameter]) -> dict[str, float]:
         """A table of values of parameters, in SI."""
-        found = {}
+        result = {}
         for name, value in self.table(key).items():
             if name not in known:
                 raise InputError(
                     f"{self.name}.{key} must have names of parameters, got '{name}'; "
                     f"{closest(name, known)}"
                 )
-            found[name] = float(self.quantity(value, known[name], f"{self.name}.{key}.{name}"))
-        return found
+            result[name] = float(self.quantity(value, known[name], f"{self.name}.{key}.{name}"))
+        return result
 
     def axes(self, known: Mapping[str, Parameter]) -> tuple[Axis, ...]:
         """The ranges, in the order of the plan."""
@@ -339,13 +339,13 @@ class PlanFields:
                     f"{self.name}.noise must be of observables, got '{name}'; "
                     f"{closest(name, OBSERVABLES)}"
                 )
-        found = {n: self.level(n, table[n]) for n in OBSERVABLES if n in table}
+        result = {n: self.level(n, table[n]) for n in OBSERVABLES if n in table}
         for n in (1, 2):
-            if f"phase{n}" in found and f"mu{n}" not in found:
+            if f"phase{n}" in result and f"mu{n}" not in result:
                 raise InputError(
                     f"{self.name}.noise must have mu{n} where it has phase{n}, got none; add it"
                 )
-        return found
+        return result
 
     def level(self, name: str, given: Any) -> NoiseLevel:
         """Standard uncertainty of one observable."""
@@ -471,28 +471,28 @@ class PlanFields:
     ) -> dict[str, float]:
         """Standard deviations of the free parameters that are drawn, in SI."""
         given = self.numbers_of_spread(known)
-        found = {}
+        result = {}
         for name in truth.names:
             if name in given:
-                found[name] = given[name]
+                result[name] = given[name]
             elif material is not None and name in material and material[name].uncertainty:
-                found[name] = float(material[name].si_uncertainty or 0.0)
+                result[name] = float(material[name].si_uncertainty or 0.0)
         for name in given:
             if name not in truth.names:
                 raise InputError(
                     f"{self.name}.uncertainty must be of free parameters, got '{name}'; free it or "
                     "leave it out"
                 )
-        if not found:
+        if not result:
             raise InputError(
                 f"{self.name}.uncertainty must have a free parameter to draw, got none; add one, "
                 "or leave draws out"
             )
-        return found
+        return result
 
     def numbers_of_spread(self, known: Mapping[str, Parameter]) -> dict[str, float]:
         """The table of standard deviations, in SI."""
-        found = {}
+        result = {}
         for name, value in self.table("uncertainty").items():
             label = f"{self.name}.uncertainty.{name}"
             if name not in known:
@@ -500,12 +500,12 @@ class PlanFields:
                     f"{self.name}.uncertainty must have names of parameters, got '{name}'; "
                     f"{closest(name, known)}"
                 )
-            found[name] = float(
+            result[name] = float(
                 to_si(value, known[name].kind, label, require_unit=self.require_unit)
             )
-            if found[name] < 0:
-                raise InputError(f"{label} must not be negative, got {found[name]:g}; change it")
-        return found
+            if result[name] < 0:
+                raise InputError(f"{label} must not be negative, got {result[name]:g}; change it")
+        return result
 
     def whole(self, key: str, default: int, low: int, high: int) -> int:
         """A whole number between two limits."""
@@ -514,12 +514,12 @@ class PlanFields:
     def share(self, key: str, default: float) -> float:
         """A number above 0 and at most 1."""
         value = self.content.get(key, default)
-        found = float(to_si(value, "dimensionless", f"{self.name}.{key}"))
-        if not 0 < found <= 1:
+        result = float(to_si(value, "dimensionless", f"{self.name}.{key}"))
+        if not 0 < result <= 1:
             raise InputError(
-                f"{self.name}.{key} must be above 0 and at most 1, got {found:g}; change it"
+                f"{self.name}.{key} must be above 0 and at most 1, got {result:g}; change it"
             )
-        return found
+        return result
 
     def switch(self, key: str) -> bool:
         """True or false."""

@@ -120,13 +120,13 @@ class PointModel:
     ) -> Whitened:
         n = self.size
         # Numbers in place of missing responses, so that each point keeps its rows.
-        found = residuals_of(weights_of(_filled(expected)), predicted, slopes)
-        residual = found.values.reshape(-1, n).T
+        result = residuals_of(weights_of(_filled(expected)), predicted, slopes)
+        residual = result.values.reshape(-1, n).T
         scale = [
             np.broadcast_to(values[u.name] if u.logarithmic else u.scale, (n,))
             for u in self.hypothesis.unknowns
         ]
-        jacobian = found.jacobian.reshape(-1, n, len(slopes)).transpose(1, 0, 2)
+        jacobian = result.jacobian.reshape(-1, n, len(slopes)).transpose(1, 0, 2)
         jacobian = jacobian * np.stack(scale, axis=-1)[:, None, :]
         return Whitened(
             np.where(converged[:, None], residual, np.nan),
@@ -306,12 +306,12 @@ def _normal(
         k.name: np.repeat(k.to_value(u[:, i]), points)
         for i, k in enumerate(model.hypothesis.unknowns)
     }
-    found = tiled.whitened(part, values)
-    return _summed(found, np.tile(weights, sets), sets, model.hypothesis, u, prior_noise)
+    result = tiled.whitened(part, values)
+    return _summed(result, np.tile(weights, sets), sets, model.hypothesis, u, prior_noise)
 
 
 def _summed(
-    found: Whitened,
+    result: Whitened,
     weights: Float,
     sets: int,
     hypothesis: Hypothesis,
@@ -320,8 +320,8 @@ def _summed(
 ) -> tuple[Float, Float, Float]:
     p = u.shape[1]
     root = np.sqrt(weights)[:, None]
-    r = (found.values * root).reshape(sets, -1)
-    jacobian = (found.jacobian * root[..., None]).reshape(sets, -1, p)
+    r = (result.values * root).reshape(sets, -1)
+    jacobian = (result.jacobian * root[..., None]).reshape(sets, -1, p)
     prior, slopes = prior_terms(hypothesis, u)
     r = np.concatenate([r, prior - prior_noise[:, : prior.shape[1]]], axis=1)
     jacobian = np.concatenate([jacobian, slopes], axis=1)

@@ -127,7 +127,7 @@ class Design:
     def record(self) -> dict[str, Any]:
         """Everything as plain numbers and texts, for JSON; numbers that are infinite are None."""
         plan, axes = self.plan, [a.name for a in self.plan.axes]
-        found: dict[str, Any] = {
+        result: dict[str, Any] = {
             "law": plan.truth.law.name,
             "aim": "measure" if plan.rival is None else "exclude",
             "measured": list(plan.measured),
@@ -174,7 +174,7 @@ class Design:
             "asperity_version": __version__,
         }
         if plan.rival is not None:
-            found["separation"] = {
+            result["separation"] = {
                 "chi2": self.chi2,
                 "chi2_even_grid": self.chi2_grid,
                 "probability": self.probability,
@@ -183,7 +183,7 @@ class Design:
             }
         if self.simulation is not None:
             s = self.simulation
-            found["simulation"] = {
+            result["simulation"] = {
                 "sets": s.sets,
                 "failed": s.failed,
                 "decided": s.decided,
@@ -196,7 +196,7 @@ class Design:
                     for n in s.spread
                 },
             }
-        return found
+        return result
 
     def rows(self) -> list[dict[str, Any]]:
         """The points as rows of a table that ``asperity response --table`` reads.

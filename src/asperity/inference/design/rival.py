@@ -108,17 +108,17 @@ class RivalFit:
         """The best of the fits from several starts, as one set."""
         rows = np.flatnonzero(n > 0)
         model, expected = self.at(rows)
-        found = refit(model, repeated(expected, len(starts)), n[rows], starts)
-        k = [int(np.argmin(found.chi2))]
-        return Refitted(found.coordinates[k], found.chi2[k], found.converged[k])
+        result = refit(model, repeated(expected, len(starts)), n[rows], starts)
+        k = [int(np.argmin(result.chi2))]
+        return Refitted(result.coordinates[k], result.chi2[k], result.converged[k])
 
     def criterion(self, u: Float) -> tuple[Misfit, Bool]:
         """Misfit linear at the coordinates u, and the candidates at which there is a response."""
-        found = self.everywhere(u)
-        seen = np.asarray(np.isfinite(found.values).all(axis=-1))
+        result = self.everywhere(u)
+        seen = np.asarray(np.isfinite(result.values).all(axis=-1))
         prior, slopes = prior_terms(self.rival, u[None])
-        blank = np.where(seen[:, None], found.values, 0.0)
-        jacobian = np.where(seen[:, None, None], found.jacobian, 0.0)
+        blank = np.where(seen[:, None], result.values, 0.0)
+        jacobian = np.where(seen[:, None, None], result.jacobian, 0.0)
         return Misfit(blank, jacobian, prior[0], slopes[0]), seen
 
 
@@ -166,9 +166,9 @@ def separation(
         proposed = _cleaned(optimal_shares(criterion, readings, start=_mixed(shares)).shares)
         for part in _PARTS:
             tried = _cleaned((1 - part) * shares + part * proposed)
-            found = fits.fitted(tried * readings, np.array([u, nominal]))
-            if found.chi2[0] > chi2 * (1 + 1e-6):
-                shares, best = tried, found
+            result = fits.fitted(tried * readings, np.array([u, nominal]))
+            if result.chi2[0] > chi2 * (1 + 1e-6):
+                shares, best = tried, result
                 break
         else:
             break
@@ -235,14 +235,14 @@ def probability_of_deciding(
     apart = (rival.residual[rows] * root).ravel()
     data = round(float(readings[rows].sum())) * rival.residual.shape[1]
     q = rival.prior_residual.size
-    mine = (jacobian[rows] * root[..., None]).reshape(apart.size, -1)
+    own = (jacobian[rows] * root[..., None]).reshape(apart.size, -1)
     theirs = (rival.jacobian[rows] * root[..., None]).reshape(apart.size, -1)
     apart = np.concatenate([apart, rival.prior_residual])
-    mine = np.vstack([mine, np.zeros((q, mine.shape[1]))])
+    own = np.vstack([own, np.zeros((q, own.shape[1]))])
     theirs = np.vstack([theirs, rival.prior_jacobian])
     noise = np.random.default_rng(seed).normal(size=(_DRAWS, apart.size))
     noise[:, apart.size - q :] = 0.0
-    difference = _outside(theirs, apart - noise) - _outside(mine, noise)
+    difference = _outside(theirs, apart - noise) - _outside(own, noise)
     penalty = [
         2 * k + (2 * k * (k + 1) / (data - k - 1) if data > k + 1 else np.inf) for k in parameters
     ]

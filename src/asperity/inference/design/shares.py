@@ -291,9 +291,9 @@ def optimal_shares(criterion: Criterion, readings: Float, start: Float | None = 
             support = np.union1d(support, np.argsort(-slope)[:_JOINING])
         on_support = np.where(shares[support] > 0, shares[support], 0.0)
         on_support = 0.9 * on_support / max(on_support.sum(), 1e-300) + 0.1 / support.size
-        found = _on_support(criterion.restricted(support), readings[support], on_support)
+        result = _on_support(criterion.restricted(support), readings[support], on_support)
         shares = np.zeros(criterion.size)
-        shares[support] = np.where(found > _NEGLIGIBLE, found, 0.0)
+        shares[support] = np.where(result > _NEGLIGIBLE, result, 0.0)
         shares /= shares.sum()
     return Shares(best, efficiency)
 
@@ -304,7 +304,7 @@ def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
     shares = start
     for _ in range(_MULTIPLICATIVE_STEPS // 10):
         shares = _multiplied(criterion, readings, shares)
-    found = minimize(
+    result = minimize(
         lambda s: -criterion.value(s * readings),
         shares,
         jac=lambda s: -criterion.gradient(s * readings) * readings,
@@ -315,7 +315,7 @@ def _on_support(criterion: Criterion, readings: Float, start: Float) -> Float:
         method="SLSQP",
         options={"maxiter": 200, "ftol": 1e-12},
     )
-    improved = np.clip(found.x, 0.0, None)
+    improved = np.clip(result.x, 0.0, None)
     if np.isfinite(improved).all() and improved.sum() > 0:
         improved /= improved.sum()
         if criterion.value(improved * readings) >= criterion.value(shares * readings):

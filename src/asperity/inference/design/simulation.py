@@ -82,7 +82,7 @@ def simulated(
     for first in range(0, sets, _BLOCK):
         count = min(_BLOCK, sets - first)
         data = noisy(repeated(expected, count), np.tile(readings, count), noise)
-        found = refit(
+        result = refit(
             model,
             data,
             readings,
@@ -90,7 +90,7 @@ def simulated(
             prior_noise=noise.normal(size=(count, q)),
             progress=partial(_sets_done, progress, first, sets),
         )
-        good = found.converged
+        good = result.converged
         if rival is not None:
             other, values = rival
             start = [float(u.to_coordinate(values[u.name])) for u in other.hypothesis.unknowns]
@@ -99,9 +99,9 @@ def simulated(
             n = float(readings.sum()) * len(expected.values)
             k = len(other.hypothesis.unknowns)
             penalty = _penalty(k, n) - _penalty(p, n)
-            behind += list((theirs.chi2 - found.chi2 + penalty)[good])
+            behind += list((theirs.chi2 - result.chi2 + penalty)[good])
         failed += int((~good).sum())
-        estimates.append(found.coordinates[good])
+        estimates.append(result.coordinates[good])
         progress(first + count, sets, "synthetic sets")
     u = np.concatenate(estimates)
     spread, uncertainty = {}, {}

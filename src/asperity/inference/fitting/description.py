@@ -195,13 +195,13 @@ def _fit_at_the_next(
     """
     if not minima[1:]:
         return failed_fit(objective)
-    found = described_fit(objective, minima[1:], profile=profile, described=described)
+    result = described_fit(objective, minima[1:], profile=profile, described=described)
     lost = (
         f"a lower minimum, of chi-squared {minima[0][1]:.4g}, lies where the law hardly has "
         "periodic orbits, and was not found again: this is the next one; leave out the rows of the "
         "slowest modulation and compare"
     )
-    return replace(found, warnings=(lost, *found.warnings))
+    return replace(result, warnings=(lost, *result.warnings))
 
 
 def _ends(
@@ -362,7 +362,7 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
     """
     low, high = np.array([k.bounds for k in objective.unknowns]).reshape(-1, 2).T
     sd = at.sd
-    found = []
+    result = []
     for i, unknown in enumerate(objective.unknowns):
         if unknown.nuisance or at.missing[i] or not _PRECISE < sd[i] <= UNDETERMINED:
             continue
@@ -375,9 +375,9 @@ def _bent(objective: Objective, at: Parabola) -> list[str]:
                 # The valley may bend, and be as wide as it should be nevertheless.
                 rise = _lowered(objective, point, i) - at.chi2
             if not _LOWEST_RISE <= rise <= _HIGHEST_RISE:
-                found.append(unknown.name)
+                result.append(unknown.name)
                 break
-    return found
+    return result
 
 
 def _lowered(objective: Objective, u: Float, i: int) -> float:
@@ -436,72 +436,70 @@ def _hull(
     return max(low, min(interval[0], bounds[0])), min(high, max(interval[1], bounds[1]))
 
 
-def _with_warnings(found: Fit, said: list[str]) -> Fit:
+def _with_warnings(fit: Fit, said: list[str]) -> Fit:
     """The fit with what its user must know beside the numbers, after what was said before."""
-    if found.dof > 0 and found.p_value < _MISFIT:
-        worst = max(found.observables, key=lambda n: _excess(*found.observables[n]))
+    if fit.dof > 0 and fit.p_value < _MISFIT:
+        worst = max(fit.observables, key=lambda n: _excess(*fit.observables[n]))
         said.append(
-            f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom (p = "
-            f"{found.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
+            f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom (p = "
+            f"{fit.p_value:.2g}) says that the law or the uncertainties are wrong, most of all "
             f"for {worst}; intervals do not hold then"
         )
     if (
-        found.dof > 0
-        and FAR_OFF < found.p_value < DOUBTFUL
-        and any(term.searches for term in found.objective.terms)
+        fit.dof > 0
+        and FAR_OFF < fit.p_value < DOUBTFUL
+        and any(term.searches for term in fit.objective.terms)
     ):
         said.append(
-            f"orbits of this table are searched for, and with p = {found.p_value:.2g} a better "
+            f"orbits of this table are searched for, and with p = {fit.p_value:.2g} a better "
             "minimum may lie where the search, which is a short one, found none at some row: fit "
             "again from other start values, and without the slowest modulations"
         )
-    if found.dof > 5 and found.p_value > 1 - _MISFIT / 10:
+    if fit.dof > 5 and fit.p_value > 1 - _MISFIT / 10:
         said.append(
-            f"chi-squared {found.chi2:.4g} for {found.dof} degrees of freedom is too small: the "
+            f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom is too small: the "
             "uncertainties are too large, and so are the intervals"
         )
-    u = _coordinates(found)
-    slopes = [r.jacobian for r in found.residuals] + [found.objective.prior_residuals(u)[1]]
+    u = _coordinates(fit)
+    slopes = [r.jacobian for r in fit.residuals] + [fit.objective.prior_residuals(u)[1]]
     information = np.sum([J.T @ J for J in slopes], axis=0)
-    outliers = _outliers(found)
-    for term, residuals in zip(found.objective.terms, found.residuals, strict=True):
+    outliers = _outliers(fit)
+    for term, residuals in zip(fit.objective.terms, fit.residuals, strict=True):
         said += term.warnings(residuals, information, outliers)
-    for name in found.undetermined:
-        said.append(_why_undetermined(found, name))
-    for name, estimate in found.parameters.items():
+    for name in fit.undetermined:
+        said.append(_why_undetermined(fit, name))
+    for name, estimate in fit.parameters.items():
         if estimate.at_bound:
             said.append(f"{name} is at its bound {estimate.value:.4g} {estimate.unit}".rstrip())
-    for other in found.optima:
+    for other in fit.optima:
         at = ", ".join(
-            f"{n} {other.values[n]:.4g} {p.unit}".rstrip() for n, p in found.parameters.items()
+            f"{n} {other.values[n]:.4g} {p.unit}".rstrip() for n, p in fit.parameters.items()
         )
         said.append(
-            f"another minimum of chi-squared lies {other.chi2 - found.chi2:.3g} higher, at {at}: "
+            f"another minimum of chi-squared lies {other.chi2 - fit.chi2:.3g} higher, at {at}: "
             "intervals hold both where the data allow both; measure at other operating points to "
             "tell them apart"
         )
-    return replace(found, warnings=tuple(said), outliers=outliers)
+    return replace(fit, warnings=tuple(said), outliers=outliers)
 
 
-def _coordinates(found: Fit) -> Float:
-    return found.objective.coordinates(
-        {k.name: found.values[k.name] for k in found.objective.unknowns}
-    )
+def _coordinates(fit: Fit) -> Float:
+    return fit.objective.coordinates({k.name: fit.values[k.name] for k in fit.objective.unknowns})
 
 
-def _outliers(found: Fit) -> tuple[int, ...]:
+def _outliers(fit: Fit) -> tuple[int, ...]:
     """Rows of the table without which the law describes it.
 
     Beside recordings, of which a fit takes minutes, predictions count as linear.
     """
-    objective = found.objective
-    tables = found.parts(LockInTerm)
+    objective = fit.objective
+    tables = fit.parts(LockInTerm)
     if not tables:
         return ()
     ((term, residuals),) = tables
     if len(objective.terms) > 1:
         return tuple(outlying_rows(residuals))
-    u = _coordinates(found)
+    u = _coordinates(fit)
 
     def whole(u: Float) -> Residuals | None:
         data = objective.data_residuals(u)
@@ -528,11 +526,11 @@ def _excess(chi2: float, n: int) -> float:
     return (chi2 - n) / math.sqrt(2 * n)
 
 
-def _why_undetermined(found: Fit, name: str) -> str:
-    names = list(found.parameters)
+def _why_undetermined(fit: Fit, name: str) -> str:
+    names = list(fit.parameters)
     i = names.index(name)
     partners = [
-        other for j, other in enumerate(names) if j != i and abs(found.correlation[i, j]) > 0.98
+        other for j, other in enumerate(names) if j != i and abs(fit.correlation[i, j]) > 0.98
     ]
     if partners:
         return (

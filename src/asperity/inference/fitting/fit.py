@@ -185,9 +185,9 @@ def fit(
     if not minima or not math.isfinite(minima[0][1]):
         return failed_fit(objective)
     if recordings:
-        found = described_fit(objective, minima, profile=profile, described=steps.described)
+        result = described_fit(objective, minima, profile=profile, described=steps.described)
         said = [] if agreed else ["the noise and the parameters did not agree after several rounds"]
-        said += unusual_numbers(found, recordings)
+        said += unusual_numbers(result, recordings)
         given = (fixed or {}).get("K")
         shared = "K" in names and len(recordings) > 1
         if table is None and (given is not None or shared):
@@ -198,7 +198,7 @@ def fit(
                 fixed={n: v for n, v in (fixed or {}).items() if n != "K"},
                 material=material,
                 prior=prior,
-                start={**(start or {}), **_begun(found, recordings, given)},
+                start={**(start or {}), **_begun(result, recordings, given)},
                 inertia=inertia,
                 radiation_damping=radiation_damping,
                 runs=runs,
@@ -206,13 +206,13 @@ def fit(
                 seed=seed,
             )
             if shared:
-                said += contradicted_sharing(found, freed, recordings)
+                said += contradicted_sharing(result, freed, recordings)
             else:
-                said += contradicted_stiffness(found, freed, recordings, given)
-        return replace(found, warnings=(*said, *found.warnings))
-    found = described_fit(objective, minima, profile=profile, described=steps.described)
-    other = stiffness_that_describes(found, steps.again) if check_stiffness else ""
-    return replace(found, warnings=(*found.warnings, other)) if other else found
+                said += contradicted_stiffness(result, freed, recordings, given)
+        return replace(result, warnings=(*said, *result.warnings))
+    result = described_fit(objective, minima, profile=profile, described=steps.described)
+    other = stiffness_that_describes(result, steps.again) if check_stiffness else ""
+    return replace(result, warnings=(*result.warnings, other)) if other else result
 
 
 class _Steps:
@@ -236,9 +236,9 @@ class _Steps:
         self._report(self._total + done, self._total + total)
 
 
-def _begun(found: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[str, Any]:
+def _begun(result: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[str, Any]:
     """Where a fit with a stiffness for each recording begins: at one with it fixed or shared."""
-    laws = {k.name: found.values[k.name] for k in found.objective.unknowns if not k.nuisance}
+    laws = {k.name: result.values[k.name] for k in result.objective.unknowns if not k.nuisance}
     several = len(recordings) > 1
     return laws | {
         f"K[{run.name}]" if several else "K": (

@@ -172,22 +172,22 @@ def fixed_values(
                 f"fixed must be parameters of {law.name}, got '{name}'; leave it out or choose "
                 "another law"
             )
-    found: dict[str, Any] = {}
+    result: dict[str, Any] = {}
     missing = []
     for name, parameter in known.items():
         if name in free or name == "inertia":
             continue
         if name in given:
             over = over_load(given[name]) if name == "K" else None
-            found[name] = _checked(law, name, given[name]) if over is None else over
+            result[name] = _checked(law, name, given[name]) if over is None else over
         elif name in points and np.isfinite(points[name]).all():
-            found[name] = points[name]
+            result[name] = points[name]
         elif material is not None and name in material and material[name].value is not None:
-            found[name] = material[name].si
+            result[name] = material[name].si
         elif name in assumed:
-            found[name] = assumed[name]
+            result[name] = assumed[name]
         elif parameter.default is not None:
-            found[name] = parameter.default
+            result[name] = parameter.default
         else:
             missing.append(name)
     if missing:
@@ -196,20 +196,20 @@ def fixed_values(
             "them, add columns, or name a material"
         )
     if over_load(given.get("K")) is not None:
-        if "W0" not in found:
+        if "W0" not in result:
             raise InputError(
                 f"K over the load must come with a fixed W0, got '{given['K']}' and W0 free; give "
                 "K as a stiffness, or fix W0"
             )
-        found["K"] = found["K"] * found["W0"]
+        result["K"] = result["K"] * result["W0"]
     if "eps_ratio" not in free:
-        found["eps_ratio"] = ratio = float(_checked(law, "eps_ratio", given.get("eps_ratio", 1.0)))
+        result["eps_ratio"] = ratio = float(_checked(law, "eps_ratio", given.get("eps_ratio", 1.0)))
         largest = ratio * float(np.max(points.get("epsilon", 0.0)))
         if largest >= 1:
             raise InputError(
                 f"eps_ratio times epsilon must be below 1, got {largest:g}; contact would be lost"
             )
-    return found
+    return result
 
 
 def _checked(law: type[Law], name: str, value: Any) -> Any:

@@ -404,12 +404,12 @@ class Profile:
             for begin in (self._start(x), self.path[nearest][0]):
                 if self.objective.searches and self.objective.unsolved > self.most:
                     raise ProfileAtEdgeError
-                found, value = self.objective.minimise(begin, {self.i: x}, tolerance=_TOLERANCE)
+                result, value = self.objective.minimise(begin, {self.i: x}, tolerance=_TOLERANCE)
                 if math.isfinite(value):
                     break
             else:
                 return math.sqrt(_NO_ORBIT)
-            self.path[x] = found, value
+            self.path[x] = result, value
         low, high = self.objective.unknowns[self.i].bounds
         distance = min(x - low, high - x) / (wider * self.sd)
         limit = wider**2 * bounded_threshold(distance, level)

@@ -98,12 +98,12 @@ def minima_of(
     advance = counted(progress, len(begun.followed))
     advance(0)
     if begun.few is not None:
-        found = _followed_on_few_rows(objective, begun, begun.few, advance)
+        result = _followed_on_few_rows(objective, begun, begun.few, advance)
     else:
-        found = _followed(objective, begun, advance)
+        result = _followed(objective, begun, advance)
     if not begun.searched:
-        found = _beyond_the_fast_method(objective, found)
-    return _with_other_lengths(objective, _with_those_beside(objective, found))
+        result = _beyond_the_fast_method(objective, result)
+    return _with_other_lengths(objective, _with_those_beside(objective, result))
 
 
 class _Beginnings(NamedTuple):
@@ -171,30 +171,30 @@ def _followed(
     objective: Objective, begun: _Beginnings, advance: Callable[[int], None]
 ) -> list[Minimum]:
     """Minima at the ends of the ways from the starts, best first."""
-    found = []
+    result = []
     for start in begun.followed:
-        found.append(objective.minimise(start))
+        result.append(objective.minimise(start))
         advance(1)
     for start in begun.starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF] if begun.searched else ():
-        if found and not _far_off(objective, min(found, key=_CHI2)):
+        if result and not _far_off(objective, min(result, key=_CHI2)):
             break
-        found.append(objective.minimise(start))
-    return sorted(found, key=_CHI2)
+        result.append(objective.minimise(start))
+    return sorted(result, key=_CHI2)
 
 
 def _followed_on_few_rows(
     objective: Objective, begun: _Beginnings, few: Objective, advance: Callable[[int], None]
 ) -> list[Minimum]:
     """Minima that are looked for on few rows, and from there on all, best first."""
-    found = _of_all_rows(objective, _ends_on_few_rows(few, begun.followed, begun.starts, advance))
+    result = _of_all_rows(objective, _ends_on_few_rows(few, begun.followed, begun.starts, advance))
     for u in begun.special:
-        if objective.chi2(u) < min((end.chi2 for end in found), default=math.inf):
-            found.append(objective.minimise(u))
-    if not found:
+        if objective.chi2(u) < min((end.chi2 for end in result), default=math.inf):
+            result.append(objective.minimise(u))
+    if not result:
         # Another row may have no orbit at any of the ends.
         starts = [u for u in begun.starts if math.isfinite(objective.chi2(u))]
-        found = [objective.minimise(u) for u in starts[: _FOLLOWED + 1]]
-    return sorted(found, key=_CHI2)
+        result = [objective.minimise(u) for u in starts[: _FOLLOWED + 1]]
+    return sorted(result, key=_CHI2)
 
 
 def _some_way(objective: Objective, u: Float, kept: Mapping[int, float] | None = None) -> Minimum:
@@ -207,16 +207,16 @@ def _near_minimum(objective: Objective, u: Float) -> Minimum:
     return objective.minimise(u, tolerance=_NEARBY, evaluations=_LONG_WAY)
 
 
-def _beyond_the_fast_method(objective: Objective, found: list[Minimum]) -> list[Minimum]:
+def _beyond_the_fast_method(objective: Objective, result: list[Minimum]) -> list[Minimum]:
     """Minima that the fast method has kept from their end, followed on with the slower one."""
-    if not found or not _blocked(objective, found[0]):
-        return found
+    if not result or not _blocked(objective, result[0]):
+        return result
     objective.use_search(True)
-    stopped = distinct(found)
+    stopped = distinct(result)
     beyond = [_onwards(objective, end) for end in stopped[:_SEARCHED]]
-    if min(end.chi2 for end in beyond) > found[0].chi2 - _GAIN:
+    if min(end.chi2 for end in beyond) > result[0].chi2 - _GAIN:
         objective.use_search(False)
-        return found
+        return result
     # The others are minima, or only where the fast method ends.
     others = [end for end in stopped[_SEARCHED:] if not _blocked(objective, end)]
     return sorted([*beyond, *others], key=_CHI2)
@@ -237,18 +237,18 @@ def _onwards(objective: Objective, end: Minimum) -> Minimum:
     return objective.minimise(end.u)
 
 
-def _with_those_beside(objective: Objective, found: list[Minimum]) -> list[Minimum]:
+def _with_those_beside(objective: Objective, result: list[Minimum]) -> list[Minimum]:
     """Minima with those that lie beside the best one where that is doubtful, of tables.
 
     Under slow modulation, where slip events may come early or late in the period, parameters that
     are wrong by a factor describe most of the data: minima hide each other from drawn starts.
     """
     if not objective.has_table:
-        return found
+        return result
     for _ in range(_ROUNDS_BESIDE):
-        if not found or _p_value(objective, found[0]) > DOUBTFUL:
+        if not result or _p_value(objective, result[0]) > DOUBTFUL:
             break
-        best = found[0]
+        best = result[0]
         beside = []
         for i, unknown in enumerate(objective.unknowns):
             low, high = (float(unknown.to_coordinate(v)) for v in unknown.start)
@@ -266,20 +266,20 @@ def _with_those_beside(objective: Objective, found: list[Minimum]) -> list[Minim
         end = min((_some_way(objective, u) for u in beside), key=_CHI2, default=best)
         if end.chi2 > enough:
             break
-        found = [objective.minimise(end.u), *found]
-    return found
+        result = [objective.minimise(end.u), *result]
+    return result
 
 
-def _with_other_lengths(objective: Objective, found: list[Minimum]) -> list[Minimum]:
+def _with_other_lengths(objective: Objective, result: list[Minimum]) -> list[Minimum]:
     """Minima with those at other memory lengths, of tables that the law does not contradict.
 
     Where sliding over D0 takes far longer than a period, or far less, the evolution of friction
     leaves little but a phase in the readings: values of D0 that differ by a factor of ten, with
     other A and B, may describe them equally well. Intervals that do not know of it are too short.
     """
-    if not objective.has_table or not found or _far_off(objective, found[0]):
-        return found
-    best = found[0].u
+    if not objective.has_table or not result or _far_off(objective, result[0]):
+        return result
+    best = result[0].u
     # Where orbits are searched for, few rows show where minima are.
     rough = (_few_rows(objective) if objective.searches else None) or objective
     highest = rough.chi2(best) + _WORTH
@@ -303,7 +303,7 @@ def _with_other_lengths(objective: Objective, found: list[Minimum]) -> list[Mini
             if apart:
                 u = min(apart, key=_CHI2).u
                 others.append(objective.minimise(u, evaluations=_LONG_WAY))
-    return sorted([*found, *others], key=_CHI2)
+    return sorted([*result, *others], key=_CHI2)
 
 
 def _p_value(objective: Objective, minimum: Minimum) -> float:
@@ -333,10 +333,10 @@ def _chi2_of_many(objective: Objective, candidates: Sequence[Float]) -> Float:
     # The first is the given start, which is tried whatever few rows say of it.
     left = np.array(list(dict.fromkeys([0, *np.argsort(first)[:_TRIED]])))
     left = left[np.isfinite(first[left])]
-    found = np.full(len(u), math.inf)
+    result = np.full(len(u), math.inf)
     if left.size:
-        found[left] = objective.chi2_of_many(u[left], least=_LEAST)
-    return found
+        result[left] = objective.chi2_of_many(u[left], least=_LEAST)
+    return result
 
 
 def _ends_on_few_rows(
@@ -423,7 +423,7 @@ def _far_off(objective: Objective, minimum: Minimum) -> bool:
 
 def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float]]) -> list[Float]:
     """Coordinates of special cases of the law, where a parameter that extends it nearly is zero."""
-    found = []
+    result = []
     for values in simpler:
         u = []
         for unknown in objective.unknowns:
@@ -432,14 +432,14 @@ def _of_special_cases(objective: Objective, simpler: Sequence[Mapping[str, float
             extending &= not unknown.logarithmic  # such as D2, which B2 = 0 leaves without effect
             near = _NEARLY_ZERO if extending else unknown.to_coordinate(value)
             u.append(float(np.clip(near, *unknown.bounds)))
-        found.append(np.array(u))
-    return found
+        result.append(np.array(u))
+    return result
 
 
 def extends(law: type[Law], other: type[Law]) -> bool:
     """Whether a law has the parameters of another and some that extend it, which may be zero."""
-    mine, others = set(law_parameters(law)), set(law_parameters(other))
-    return others < mine and mine - others <= set(_EXTENSIONS)
+    own, others = set(law_parameters(law)), set(law_parameters(other))
+    return others < own and own - others <= set(_EXTENSIONS)
 
 
 def _special_cases(objective: Objective, starts: list[Float]) -> list[Float]:
@@ -448,7 +448,7 @@ def _special_cases(objective: Objective, starts: list[Float]) -> list[Float]:
     Laws have others as special cases, elasto-plastic Rice-Ruina for lambda = 0: data of the special
     case have their minimum there, and others away from it.
     """
-    found = []
+    result = []
     for i, unknown in enumerate(objective.unknowns):
         if unknown.logarithmic or unknown.name not in _EXTENSIONS:
             continue
@@ -461,6 +461,6 @@ def _special_cases(objective: Objective, starts: list[Float]) -> list[Float]:
         chi2 = _chi2_of_many(objective, trials)
         for at in np.argsort(chi2):
             if math.isfinite(chi2[at]) and math.isfinite(objective.chi2(trials[at])):
-                found.append(trials[at])
+                result.append(trials[at])
                 break
-    return found
+    return result

@@ -91,11 +91,11 @@ def with_noise(
         term.restore_noise(state)
     objective.forget()
     chi2 = objective.chi2(best.u)
-    found = [Minimum(best.u, chi2)]
+    result = [Minimum(best.u, chi2)]
     for end in sorted(ends, key=lambda end: end.deviance):
         if end is not best and math.isfinite(end.deviance):
-            found.append(Minimum(end.u, chi2 + end.deviance - best.deviance))
-    return found, best.agreed
+            result.append(Minimum(end.u, chi2 + end.deviance - best.deviance))
+    return result, best.agreed
 
 
 def without_bad_samples(objective: Objective, search: Callable[[], Found]) -> Found:

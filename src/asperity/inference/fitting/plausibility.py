@@ -28,19 +28,19 @@ _FAR_STIFFNESS = (1e2, 1e6)
 
 
 def contradicted_stiffness(
-    found: Fit, freed: Fit, runs: Sequence[RecordedRun], given: Any
+    fit: Fit, freed: Fit, runs: Sequence[RecordedRun], given: Any
 ) -> list[str]:
     """Sentences on a fixed stiffness that recordings contradict.
 
     Parameters
     ----------
-    found, freed : Fit
+    fit, freed : Fit
         With the stiffness fixed, and the same with it free.
     runs : sequence of RecordedRun
     given : str or float
         The fixed stiffness.
     """
-    if not freed.converged or found.aicc - freed.aicc < _CONTRADICTED_AICC:
+    if not freed.converged or fit.aicc - freed.aicc < _CONTRADICTED_AICC:
         return []
     said = []
     for run in runs:
@@ -54,25 +54,25 @@ def contradicted_stiffness(
         said.append(
             f"the fixed K of {fixed:.4g} {estimate.unit} is contradicted by {run.name}, which has "
             f"{estimate.value:.4g} ({low:.4g} to {high:.4g}, 95 %): AICc falls by "
-            f"{found.aicc - freed.aicc:.3g} with K free"
-            + _moved(found, freed)
+            f"{fit.aicc - freed.aicc:.3g} with K free"
+            + _moved(fit, freed)
             + "; leave K free, or give it a prior"
         )
     return said
 
 
-def contradicted_sharing(found: Fit, freed: Fit, runs: Sequence[RecordedRun]) -> list[str]:
+def contradicted_sharing(fit: Fit, freed: Fit, runs: Sequence[RecordedRun]) -> list[str]:
     """A sentence on a stiffness that is one for several recordings while theirs differ.
 
     Parameters
     ----------
-    found, freed : Fit
+    fit, freed : Fit
         With one stiffness for all, and the same with one for each.
     runs : sequence of RecordedRun
     """
-    if not freed.converged or found.aicc - freed.aicc < _CONTRADICTED_AICC:
+    if not freed.converged or fit.aicc - freed.aicc < _CONTRADICTED_AICC:
         return []
-    shared = found.parameters["K"]
+    shared = fit.parameters["K"]
     own = []
     for run in runs:
         estimate = freed.parameters[f"K[{run.name}]"]
@@ -84,37 +84,37 @@ def contradicted_sharing(found: Fit, freed: Fit, runs: Sequence[RecordedRun]) ->
     return [
         f"the K of {shared.value:.4g} {shared.unit} that the recordings share is contradicted: "
         + ", ".join(own)
-        + f"; AICc falls by {found.aicc - freed.aicc:.3g} with a K for each"
-        + _moved(found, freed)
+        + f"; AICc falls by {fit.aicc - freed.aicc:.3g} with a K for each"
+        + _moved(fit, freed)
         + "; leave K out of the free parameters, so that each has its own"
     ]
 
 
-def _moved(found: Fit, freed: Fit) -> str:
+def _moved(fit: Fit, freed: Fit) -> str:
     """What the law's parameters are with the stiffness free, and what they were."""
     moved = ", ".join(
-        f"{n} {freed.values[n]:.4g} instead of {found.values[n]:.4g}"
+        f"{n} {freed.values[n]:.4g} instead of {fit.values[n]:.4g}"
         for n in ("A", "B", "D0")
-        if n in found.values and n in freed.values
+        if n in fit.values and n in freed.values
     )
     return f", which gives {moved}" if moved else ""
 
 
-def unusual_numbers(found: Fit, runs: Sequence[RecordedRun]) -> list[str]:
+def unusual_numbers(fit: Fit, runs: Sequence[RecordedRun]) -> list[str]:
     """Sentences on estimates far from those of any contact: units are wrong, or the law is.
 
     Parameters
     ----------
-    found : Fit
+    fit : Fit
         Converged.
     runs : sequence of RecordedRun
     """
-    numbers = [(n, found.values[n], found.parameters[n].unit) for n in _FAR if n in found.values]
+    numbers = [(n, fit.values[n], fit.parameters[n].unit) for n in _FAR if n in fit.values]
     ranges = dict(_FAR)
     for run in runs:
-        name = next((n for n in (f"K[{run.name}]", "K") if n in found.values), None)
+        name = next((n for n in (f"K[{run.name}]", "K") if n in fit.values), None)
         if name is not None:
-            numbers.append((f"{name}/W0", found.values[name] / run.W0, "1/m"))
+            numbers.append((f"{name}/W0", fit.values[name] / run.W0, "1/m"))
             ranges[f"{name}/W0"] = _FAR_STIFFNESS
     said = []
     for name, value, unit in numbers:
@@ -134,26 +134,26 @@ def unusual_numbers(found: Fit, runs: Sequence[RecordedRun]) -> list[str]:
 _FAILS, _DESCRIBES = 1e-3, 0.01
 
 
-def stiffness_that_describes(found: Fit, progress: Callable[[int, int], None] | None = None) -> str:
+def stiffness_that_describes(fit: Fit, progress: Callable[[int, int], None] | None = None) -> str:
     """A sentence on the stiffness with which the law describes a table after all, or nothing.
 
     Parameters
     ----------
-    found : Fit
+    fit : Fit
         Converged, to one table; nothing is said of one that describes it, or has K free.
     progress : callable, optional
         Called with the number of minimisations done, and of all.
     """
-    freed = _freed(found, progress)
+    freed = _freed(fit, progress)
     if freed is None or not freed.converged or freed.dof <= 0 or freed.p_value < _DESCRIBES:
         return ""
-    estimate, given = freed.parameters["K"], float(np.ravel(found.objective.fixed["K"])[0])
+    estimate, given = freed.parameters["K"], float(np.ravel(fit.objective.fixed["K"])[0])
     low, high = estimate.interval_95
     if low <= given <= high:
         return ""
     numbers = ", ".join(f"{n} {freed.values[n]:.4g}" for n in ("A", "B", "D0") if n in freed.values)
     return (
-        f"with K free, {found.law} describes these data (p = {freed.p_value:.2g}) at a K of "
+        f"with K free, {fit.law} describes these data (p = {freed.p_value:.2g}) at a K of "
         f"{estimate.value:.4g} N/m ({low:.4g} to {high:.4g}, 95 %), {estimate.value / given:.3g} "
         f"times the given {given:.4g} N/m"
         + (f", with {numbers}" if numbers else "")
@@ -162,14 +162,14 @@ def stiffness_that_describes(found: Fit, progress: Callable[[int, int], None] | 
     )
 
 
-def _freed(found: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
+def _freed(fit: Fit, progress: Callable[[int, int], None] | None) -> Fit | None:
     """The fit with K free; None where that is not asked for."""
-    objective = found.objective
+    objective = fit.objective
     given = np.unique(objective.fixed.get("K", ()))
     tables = objective.terms_of(LockInTerm)
-    if not (tables and len(objective.terms) == 1 and given.size == 1 and found.converged):
+    if not (tables and len(objective.terms) == 1 and given.size == 1 and fit.converged):
         return None
-    if found.dof <= 0 or found.p_value >= _FAILS:
+    if fit.dof <= 0 or fit.p_value >= _FAILS:
         return None
     (term,) = tables
     before = term.forward
@@ -191,5 +191,5 @@ def _freed(found: Fit, progress: Callable[[int, int], None] | None) -> Fit | Non
         fixed=fixed,
     )
     # Special cases and drawn starts as in any fit, and the estimate with the given stiffness.
-    minima = minima_of(freed, 0, progress, simpler=[{**found.values, **start}])
+    minima = minima_of(freed, 0, progress, simpler=[{**fit.values, **start}])
     return described_fit(freed, minima, profile=False) if minima else None

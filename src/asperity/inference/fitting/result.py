@@ -17,7 +17,7 @@ from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain
 from asperity.parameters import point_parameters
-from asperity.parameters.display import Displayed, SummaryLine
+from asperity.parameters.parameter import Displayed, SummaryLine
 
 Float = NDArray[np.float64]
 T = TypeVar("T")
@@ -143,12 +143,12 @@ class Fit(Displayed):
             loads.setdefault(name, []).append(term.run.W0 if term.run.load_unit else math.nan)
         if not loads and "K" in self.parameters:
             loads["K"] = list(np.unique(self.objective.fixed.get("W0", math.nan)))
-        found = {}
+        result = {}
         for name, several in loads.items():
             if not name or not np.ptp(several) <= _ONE_LOAD * several[0]:
                 continue
             p, load = self.parameters[name], 1e6 * float(np.mean(several))
-            found[f"{name}/W0"] = replace(
+            result[f"{name}/W0"] = replace(
                 p,
                 name=f"{name}/W0",
                 unit="1/um",
@@ -158,7 +158,7 @@ class Fit(Displayed):
                 interval_95=(p.interval_95[0] / load, p.interval_95[1] / load),
                 prior=None,
             )
-        return found
+        return result
 
     @property
     def values(self) -> dict[str, float]:
@@ -185,68 +185,68 @@ class Fit(Displayed):
         return title, lines + [SummaryLine("warning", text) for text in self.warnings]
 
 
-def fit_record(found: Fit) -> dict[str, Any]:
+def fit_record(fit: Fit) -> dict[str, Any]:
     """Everything that a fit says; infinite and undefined numbers are None."""
     return {
-        "law": found.law,
-        "converged": found.converged,
-        "message": found.message,
+        "law": fit.law,
+        "converged": fit.converged,
+        "message": fit.message,
         "parameters": {
-            name: {**_estimate(p), "determined": name not in found.undetermined}
-            for name, p in found.parameters.items()
+            name: {**_estimate(p), "determined": name not in fit.undetermined}
+            for name, p in fit.parameters.items()
         },
-        "over_load": {name: _estimate(p) for name, p in found.over_load.items()},
-        "fixed": _fixed(found),
+        "over_load": {name: _estimate(p) for name, p in fit.over_load.items()},
+        "fixed": _fixed(fit),
         "correlation": {
-            "names": list(found.parameters),
-            "matrix": [[plain(x) for x in row] for row in found.correlation.tolist()],
+            "names": list(fit.parameters),
+            "matrix": [[plain(x) for x in row] for row in fit.correlation.tolist()],
         },
-        "undetermined": list(found.undetermined),
-        "chi2": plain(found.chi2),
-        "dof": found.dof,
-        "p_value": plain(found.p_value),
-        "log_likelihood": plain(found.log_likelihood),
-        "aicc": plain(found.aicc),
-        "bic": plain(found.bic),
+        "undetermined": list(fit.undetermined),
+        "chi2": plain(fit.chi2),
+        "dof": fit.dof,
+        "p_value": plain(fit.p_value),
+        "log_likelihood": plain(fit.log_likelihood),
+        "aicc": plain(fit.aicc),
+        "bic": plain(fit.bic),
         "observables": {
-            name: {"chi2": chi2, "n": n} for name, (chi2, n) in found.observables.items()
+            name: {"chi2": chi2, "n": n} for name, (chi2, n) in fit.observables.items()
         },
-        "noise": _noise(found),
-        "optima": [{"chi2": o.chi2, "values": dict(o.values)} for o in found.optima],
-        "warnings": list(found.warnings),
-        "data": " and ".join(term.name for term in found.objective.terms),
+        "noise": _noise(fit),
+        "optima": [{"chi2": o.chi2, "values": dict(o.values)} for o in fit.optima],
+        "warnings": list(fit.warnings),
+        "data": " and ".join(term.name for term in fit.objective.terms),
         "asperity_version": __version__,
     }
 
 
-def _estimate(found: Estimate) -> dict[str, Any]:
-    prior = found.prior
+def _estimate(result: Estimate) -> dict[str, Any]:
+    prior = result.prior
     return {
-        "value": plain(found.value),
-        "unit": found.unit,
-        "se": plain(found.se),
-        "interval_68": [plain(x) for x in found.interval_68],
-        "interval_95": [plain(x) for x in found.interval_95],
-        "at_bound": found.at_bound,
+        "value": plain(result.value),
+        "unit": result.unit,
+        "se": plain(result.se),
+        "interval_68": [plain(x) for x in result.interval_68],
+        "interval_95": [plain(x) for x in result.interval_95],
+        "at_bound": result.at_bound,
         "prior": None
         if prior is None
         else {"mean": prior.mean, "sd": prior.sd, "source": prior.source},
     }
 
 
-def _fixed(found: Fit) -> dict[str, Any]:
+def _fixed(fit: Fit) -> dict[str, Any]:
     """Numbers that were not fitted; None for those that each row of a table has its own of."""
-    known = {**point_parameters(found.objective.law), EPS_RATIO.name: EPS_RATIO}
-    several = {n: np.unique(v) for n, v in found.objective.fixed.items()}
+    known = {**point_parameters(fit.objective.law), EPS_RATIO.name: EPS_RATIO}
+    several = {n: np.unique(v) for n, v in fit.objective.fixed.items()}
     return {
         name: {"value": plain(v[0]) if v.size == 1 else None, "unit": known[name].unit}
         for name, v in several.items()
     }
 
 
-def _noise(found: Fit) -> dict[str, Any]:
+def _noise(fit: Fit) -> dict[str, Any]:
     """Noise of the data together, and of each set of data where there are several."""
-    parts = {term.name: dict(term.noise) for term in found.objective.terms}
+    parts = {term.name: dict(term.noise) for term in fit.objective.terms}
     if len(parts) == 1:
         return next(iter(parts.values()))
     models = list(dict.fromkeys(part["model"] for part in parts.values()))

@@ -166,9 +166,9 @@ def fit_windows(
     for span in spans[1:]:
         fits.append(fit(recorded_run(trace, **given, window=span), law, free, **options))
         advance(1)
-    failed = [i for i, found in enumerate(fits) if not found.converged]
+    failed = [i for i, result in enumerate(fits) if not result.converged]
     said = [f"{_shown(spans[i])}: {fits[i].message}" for i in failed]
-    usable = [found for found in fits if found.converged]
+    usable = [result for result in fits if result.converged]
     estimates: dict[str, WindowEstimate] = {}
     undetermined = []
     for unknown in _physical(usable[0]) if usable else []:
@@ -177,8 +177,8 @@ def fit_windows(
         if far_off or not known:
             undetermined.append(unknown.name)
         said += far_off
-    for i, found in enumerate(fits):
-        said += [f"{_shown(spans[i])}: {w}" for w in found.warnings]
+    for i, result in enumerate(fits):
+        said += [f"{_shown(spans[i])}: {w}" for w in result.warnings]
     return WindowedFit(spans, tuple(fits), estimates, tuple(undetermined), tuple(said))
 
 
@@ -186,8 +186,8 @@ def _shown(span: tuple[float, float]) -> str:
     return f"window {span[0]:.6g} to {span[1]:.6g} s"
 
 
-def _physical(found: Fit) -> list[Any]:
-    return [k for k in found.objective.unknowns if not k.nuisance]
+def _physical(result: Fit) -> list[Any]:
+    return [k for k in result.objective.unknowns if not k.nuisance]
 
 
 def _automatic(run: RecordedRun) -> tuple[tuple[float, float], ...]:
@@ -210,22 +210,22 @@ def disagreeing(
     """A sentence on a window that is far off: it has another minimum, or is too short."""
     mean = float(unknown.to_coordinate(over.value))
     total = over.se / abs(float(unknown.slope(over.value)))
-    found = []
+    result = []
     for span, value in zip(spans, over.values, strict=True):
         if abs(float(unknown.to_coordinate(value)) - mean) > _FAR_OFF * total:
-            found.append(
+            result.append(
                 f"{_shown(span)}: {over.name} is {value:.4g} {over.unit}, far outside what the "
                 "other windows say, and counts for little; look at its fit before believing theirs"
             )
-    return found
+    return result
 
 
 def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
     """One parameter over the windows, and whether they say anything about it."""
-    found = [f.parameters[unknown.name] for f in fits if f.converged]
-    u = np.array([float(unknown.to_coordinate(p.value)) for p in found])
+    result = [f.parameters[unknown.name] for f in fits if f.converged]
+    u = np.array([float(unknown.to_coordinate(p.value)) for p in result])
     noise = np.array(
-        [abs(p.se / unknown.slope(p.value)) if np.isfinite(p.se) else 1e6 for p in found]
+        [abs(p.se / unknown.slope(p.value)) if np.isfinite(p.se) else 1e6 for p in result]
     )
     weight = np.maximum(noise, 1e-12) ** -2.0
     weight /= weight.sum()
@@ -243,7 +243,7 @@ def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
 
     estimate = WindowEstimate(
         unknown.name,
-        found[0].unit,
+        result[0].unit,
         value,
         slope * total,
         slope * own,

@@ -198,22 +198,22 @@ class PriorDensity:
 
     def record(self) -> dict[str, dict[str, float | str]]:
         """Each prior in SI, for JSON."""
-        found: dict[str, dict[str, float | str]] = {}
+        result: dict[str, dict[str, float | str]] = {}
         for i, k in enumerate(self.unknowns):
             if k.prior is not None:
-                found[k.name] = {
+                result[k.name] = {
                     "kind": "normal",
                     "mean": k.prior.mean,
                     "sd": k.prior.sd,
                     "source": k.prior.source,
                 }
             else:
-                found[k.name] = {
+                result[k.name] = {
                     "kind": "uniform in the logarithm" if k.logarithmic else "uniform",
                     "low": float(k.to_value(self.low[i])),
                     "high": float(k.to_value(self.high[i])),
                 }
-        return found
+        return result
 
 
 class DensityData(NamedTuple):

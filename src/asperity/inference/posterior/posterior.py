@@ -196,7 +196,7 @@ class Posterior:
 
 
 def posterior_of(
-    found: Fit, whitened: Whitened, runs: Sequence[Sequence[Transitions]], *, seed: int
+    fit: Fit, whitened: Whitened, runs: Sequence[Sequence[Transitions]], *, seed: int
 ) -> Posterior:
     """The posterior from the blocks of all chains, without their warm-up."""
     # Untyped, and only there with the extra.
@@ -207,7 +207,7 @@ def posterior_of(
     stats = Transitions(*(np.stack(part) for part in zip(*whole, strict=True)))
     u = whitened.u_of(stats.z)
     draws, marginals = {}, {}
-    for i, unknown in enumerate(found.objective.unknowns):
+    for i, unknown in enumerate(fit.objective.unknowns):
         x = np.asarray(unknown.to_value(u[..., i]))
         draws[unknown.name] = x
         quantiles = np.quantile(x, [0.5, *_tails(math.erf(math.sqrt(0.5))), *_tails(0.95)])
@@ -224,7 +224,7 @@ def posterior_of(
             float(array_stats.ess(x, method="tail", prob=(0.05, 0.95))),
         )
     return Posterior(
-        found,
+        fit,
         marginals,
         draws,
         stats.log_density,
@@ -272,9 +272,9 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
     return said
 
 
-def _observed(found: Fit) -> dict[str, Float]:
+def _observed(fit: Fit) -> dict[str, Float]:
     """Columns of all data; those of recordings have the name of theirs where there are several."""
-    terms = found.objective.terms
+    terms = fit.objective.terms
     return {
         f"{name}[{term.name}]" if term.profiled and len(terms) > 1 else name: column
         for term in terms

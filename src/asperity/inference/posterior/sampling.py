@@ -68,7 +68,7 @@ class ChainState(NamedTuple):
 
 
 def sample_posterior(
-    found: Fit,
+    fit: Fit,
     *,
     chains: int = 4,
     draws: int = 1000,
@@ -80,7 +80,7 @@ def sample_posterior(
 
     Parameters
     ----------
-    found : Fit
+    fit : Fit
         Converged. Its priors hold; parameters without one are uniform as `PriorDensity` says.
     chains, draws : int
         At least 2 chains, for R-hat, and 100 draws each after the warm-up; draws are rounded up
@@ -106,15 +106,15 @@ def sample_posterior(
         On Ctrl-C.
     """
     require_bayes()
-    if not found.converged:
+    if not fit.converged:
         raise InputError(
-            f"fit must have converged, got '{found.message}'; a posterior is sampled from its "
+            f"fit must have converged, got '{fit.message}'; a posterior is sampled from its "
             "maximum on"
         )
-    if not found.parameters:
+    if not fit.parameters:
         raise InputError("posterior must be of free parameters, got none; free one, such as A")
     require_sizes(chains, draws)
-    whitened = whitened_posterior(found)
+    whitened = whitened_posterior(fit)
     density, data = whitened.compiled()
     blocks = -(-draws // BLOCK)
     kept: list[list[Transitions]] = [[] for _ in range(chains)]
@@ -140,7 +140,7 @@ def sample_posterior(
                 report(done, total)
     except KeyboardInterrupt:
         raise Interrupted() from None
-    return posterior_of(found, whitened, kept, seed=seed)
+    return posterior_of(fit, whitened, kept, seed=seed)
 
 
 def require_sizes(chains: int, draws: int) -> None:
@@ -161,14 +161,14 @@ def require_sizes(chains: int, draws: int) -> None:
         )
 
 
-def whitened_posterior(found: Fit) -> Whitened:
+def whitened_posterior(fit: Fit) -> Whitened:
     """The posterior of a fit, whitened at its mode."""
-    objective = found.objective
-    u = objective.coordinates(found.values)
+    objective = fit.objective
+    u = objective.coordinates(fit.values)
     sd = np.array(
         [
             min(abs(p.se / k.slope(p.value)) if np.isfinite(p.se) and p.value else 1.0, 1.0)
-            for k, p in zip(objective.unknowns, found.parameters.values(), strict=True)
+            for k, p in zip(objective.unknowns, fit.parameters.values(), strict=True)
         ]
     )
     prior = PriorDensity.about(objective.unknowns, u, sd)
@@ -225,14 +225,14 @@ def _warm_up(data: Any, key: Any, z: Any, *, log_density: LogDensity) -> ChainSt
         initial_step_size=0.8 * z.size**-0.25,
     )
     later, now = jax.random.split(jax.random.wrap_key_data(key))
-    (state, found), _ = adaptation.run(now, z, WARM_UP)
+    (state, result), _ = adaptation.run(now, z, WARM_UP)
     return ChainState(
         jax.random.key_data(later),
         state.position,
         state.logdensity,
         state.logdensity_grad,
-        found["step_size"],
-        found["inverse_mass_matrix"],
+        result["step_size"],
+        result["inverse_mass_matrix"],
     )
 
 

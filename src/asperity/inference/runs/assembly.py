@@ -316,7 +316,7 @@ def require_newtons(runs: Sequence[RecordedRun]) -> None:
 def _initial(
     run: RecordedRun, law: type[Law], suffix: str
 ) -> tuple[tuple[Unknown, ...], dict[str, str]]:
-    found, own = [], {}
+    result, own = [], {}
     places = [("start_force", _START_FORCE)]
     places += [(f"start_state_{i}", _START_STATE) for i in range(len(law.state_names))]
     for inner, sd in places:
@@ -324,11 +324,11 @@ def _initial(
         meaning = "departure of the initial state from steady sliding"
         parameter = Parameter(name, "dimensionless", "finite", meaning, place="drive")
         prior = Prior(0.0, sd, "wide")
-        found.append(
+        result.append(
             Unknown(parameter, False, sd, -10 * sd, 10 * sd, (0.0, 0.0), 0.0, prior, nuisance=True)
         )
         own[name] = inner
-    return tuple(found), own
+    return tuple(result), own
 
 
 PARAMETER = Parameter(

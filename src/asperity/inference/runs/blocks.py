@@ -218,12 +218,12 @@ def _needed(run: RecordedRun) -> tuple[float, bool]:
     finest = max(min(_intervals(run)), duration / _MOST)
     # The force, which a step of the load leaves continuous: what friction does then is known.
     series = averaged(replace(run, friction=run.friction * run.drive.load_at(run.time)), finest / 2)
-    found, lengths = [], [finest]
+    result, lengths = [], [finest]
     while lengths[-1] <= duration / _LEVELS:
-        found.append(_within(series, lengths[-1]))
+        result.append(_within(series, lengths[-1]))
         series = averaged(series, lengths[-1])
         lengths.append(2 * lengths[-1])
-    small = np.cumsum(found) <= _LEFT_OUT * np.sum(found)
+    small = np.cumsum(result) <= _LEFT_OUT * np.sum(result)
     # The first level is what the shortest blocks lose.
     allowed = small & (np.array(lengths[:-1]) <= duration / _FEWEST)
     kept = int(np.argmin(np.append(allowed, False)))
@@ -381,16 +381,22 @@ def _lines(x: Float, step: float, lowest: float) -> list[float]:
     frequency, power = welch(x, 1 / step, nperseg=size, detrend="linear")
     height = power / np.maximum(median_filter(power, _ABOUT), 1e-300)
     height[frequency < lowest] = 0.0
-    found: list[float] = []
+    result: list[float] = []
     for k in np.argsort(-height):
-        if height[k] < _HEIGHT or len(found) >= _LINES:
+        if height[k] < _HEIGHT or len(result) >= _LINES:
             break
         beside = power[k - 1 : k + 2]
-        if beside.size < 3 or beside.argmax() != 1 or any(abs(frequency[k] - f) < 1 for f in found):
+        if (
+            beside.size < 3
+            or beside.argmax() != 1
+            or any(abs(frequency[k] - f) < 1 for f in result)
+        ):
             continue
         low, top, high = np.log(beside)
-        found.append(float(frequency[k] + frequency[1] * (low - high) / 2 / (low - 2 * top + high)))
-    return found
+        result.append(
+            float(frequency[k] + frequency[1] * (low - high) / 2 / (low - 2 * top + high))
+        )
+    return result
 
 
 def _take_off(x: Float, turns: float) -> None:

@@ -58,9 +58,9 @@ def departures_of_jumps(model: Autoregression, white: Float, curves: Float) -> F
     size = np.cumsum(rise**2)[left - 1] + rise[-1] ** 2 * np.maximum(np.arange(n, 0, -1) - p - 1, 0)
     shared = np.column_stack([along(c) for c in curves.T]) if curves.size else np.zeros((n, 0))
     own = size - np.einsum("ij,ij->i", shared, shared)
-    found = along(white) - shared @ (curves.T @ white)
+    result = along(white) - shared @ (curves.T @ white)
     seen = own > _LEFT * size
-    return np.asarray(np.where(seen, found / np.sqrt(np.where(seen, own, 1.0)), 0.0))
+    return np.asarray(np.where(seen, result / np.sqrt(np.where(seen, own, 1.0)), 0.0))
 
 
 def misfit_after_changes(white: Float, first: Sequence[int]) -> tuple[float, float]:

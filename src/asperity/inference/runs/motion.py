@@ -25,8 +25,8 @@ from asperity.inference.runs.reading import GAIN, Reading
 from asperity.inference.runs.steps import Curve, integrated, law_fields, numbers, with_values
 from asperity.laws import Law
 from asperity.slider import Slider
-from asperity.slider.formulation import equation_of_motion
 from asperity.slider.motion import Motion
+from asperity.slider.problem import equation_of_motion
 
 Float = NDArray[np.float64]
 

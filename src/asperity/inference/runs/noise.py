@@ -135,15 +135,15 @@ class Autoregression:
 
     def autocovariances(self, n: int) -> Float:
         """Of the first n lags, from 0 on; n is at most the order (Levinson's recursion)."""
-        found = np.zeros(n)
-        found[:1] = self.variance
+        result = np.zeros(n)
+        result[:1] = self.variance
         rest = self.variance
         for k, (a, partial) in enumerate(zip(self.coefficients, self.reflection, strict=False)):
             if k + 1 >= n:
                 break
-            found[k + 1] = partial * rest + a @ found[k:0:-1]
+            result[k + 1] = partial * rest + a @ result[k:0:-1]
             rest *= 1 - partial**2
-        return found
+        return result
 
     def whiten(self, columns: Float) -> Float:
         """Innovations of unit variance of samples along the first axis."""
@@ -158,12 +158,12 @@ class Autoregression:
     @functools.cached_property
     def _first_taps(self) -> Float:
         """Weights of the first samples, by which lower orders predict, shape (p, p)."""
-        found = np.zeros((self.order, self.order))
+        result = np.zeros((self.order, self.order))
         scale = self.variance
         for t, (b, partial) in enumerate(zip(self.coefficients, self.reflection, strict=False)):
-            found[t, : t + 1] = np.concatenate([-b[::-1], [1.0]]) / math.sqrt(scale)
+            result[t, : t + 1] = np.concatenate([-b[::-1], [1.0]]) / math.sqrt(scale)
             scale *= 1 - partial**2
-        return found
+        return result
 
     def departures_of_single_samples(self, white: Float) -> Float:
         """How far each sample alone is off what the others predict, in standard deviations.
@@ -248,9 +248,9 @@ def fitted(
     if order is None:
         best = min(best, max(int(np.argmin(criteria)), _lowest_order(n)))
     chosen = np.array(reflection[:best])
-    found = Autoregression(chosen, variance)
+    result = Autoregression(chosen, variance)
     # The variance of the likelihood: innovations of unit mean square.
-    white = np.concatenate([found.whiten(s) for s in stretches])
+    white = np.concatenate([result.whiten(s) for s in stretches])
     left = max(n - parameters - best, 1)
     return Autoregression(chosen, variance * float(white @ white) / left)
 
@@ -265,8 +265,8 @@ def _reflections(stretches: Sequence[Float], highest: int) -> list[float]:
     products = [_LaggedProducts(rows, highest) for rows in stretches]
     power = rest = sum(p.power for p in products)
     predictor = np.ones(1)
-    found: list[float] = []
-    while len(found) < highest:
+    result: list[float] = []
+    while len(result) < highest:
         if rest <= _SMOOTH * power:
             return _reflections_of_smooth(stretches, highest)
         for p in products:
@@ -275,10 +275,10 @@ def _reflections(stretches: Sequence[Float], highest: int) -> list[float]:
         forward, backward = np.append(predictor, 0.0), np.append(0.0, predictor[::-1])
         along = table @ backward
         partial = 2 * float(forward @ along) / float(forward @ table @ forward + backward @ along)
-        found.append(_inside(partial))
-        predictor = forward - found[-1] * backward
-        rest *= 1 - found[-1] ** 2
-    return found
+        result.append(_inside(partial))
+        predictor = forward - result[-1] * backward
+        rest *= 1 - result[-1] ** 2
+    return result
 
 
 class _LaggedProducts:
@@ -324,7 +324,7 @@ class _LaggedProducts:
 def _reflections_of_smooth(stretches: Sequence[Float], highest: int) -> list[float]:
     """The same from the prediction errors of every sample, which rounding hardly touches."""
     forward, backward = list(stretches), list(stretches)
-    found: list[float] = []
+    result: list[float] = []
     for _ in range(highest):
         ahead = [f[:, 1:] for f in forward]
         behind = [b[:, :-1] for b in backward]
@@ -334,8 +334,8 @@ def _reflections_of_smooth(stretches: Sequence[Float], highest: int) -> list[flo
         k = _inside(2 * sum(_dot(f, b) for f, b in zip(ahead, behind, strict=True)) / power)
         forward = [f - k * b for f, b in zip(ahead, behind, strict=True)]
         backward = [b - k * f for f, b in zip(ahead, behind, strict=True)]
-        found.append(k)
-    return found
+        result.append(k)
+    return result
 
 
 def _inside(partial: float) -> float:

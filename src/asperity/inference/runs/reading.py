@@ -17,7 +17,7 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
 
-from asperity.tribometer.filters import between, filtered, low_pass
+from asperity.tribometer.sensors import between, filtered, low_pass
 
 Float = NDArray[np.float64]
 

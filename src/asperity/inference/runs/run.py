@@ -370,7 +370,7 @@ def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
         return _line_knots(t, W, max(_LOAD_NOISE * noise, least))
     chance = float(norm.isf(_LOAD_BY_CHANCE / t.size))
     knots = _line_knots(t, W, max(2 * chance * noise, least))
-    found = set(knots)
+    result = set(knots)
     for a, b in pairwise(knots):
         q = max(1, (b - a) // _LOAD_BLOCKS)
         if q == 1:
@@ -378,8 +378,8 @@ def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
         whole = (b - a) // q * q
         means = [x[a : a + whole].reshape(-1, q).mean(1) for x in (t, W)]
         limit = max(_LOAD_NOISE * noise / np.sqrt(q), least)
-        found |= {a + k * q + q // 2 for k in _line_knots(means[0], means[1], limit)[1:-1]}
-    return sorted(found)
+        result |= {a + k * q + q // 2 for k in _line_knots(means[0], means[1], limit)[1:-1]}
+    return sorted(result)
 
 
 def _between_samples(t: Float, y: Float, knots: Sequence[int], tolerance: float) -> Float:
@@ -432,9 +432,9 @@ def _placed(t: Float, y: Float, at: Float) -> Float:
             return float(np.sum((line - values) ** 2))
 
         inside = max(t[middle - 1], near[1]), min(t[middle + 1], near[-2])
-        found = minimize_scalar(squares, bounds=inside, method="bounded")
-        if found.fun < squares(at[k]):
-            placed[k] = found.x
+        result = minimize_scalar(squares, bounds=inside, method="bounded")
+        if result.fun < squares(at[k]):
+            placed[k] = result.x
     return placed
 
 

@@ -108,16 +108,16 @@ def integrated(
             return jax.jvp(moved, (x, step.states), along)[1]
 
         each_direction = jax.vmap(one, (None, 0))
-        after, found = jax.vmap(each_direction, (0, None), 1)(part, jnp.eye(count + m))
+        after, result = jax.vmap(each_direction, (0, None), 1)(part, jnp.eye(count + m))
 
         def onwards(dy: Array, own: Array) -> tuple[Array, Array]:
             return own[:count] + jnp.sum(dy[:, :, None] * own[count:], axis=1), dy
 
         change, before = jax.lax.scan(onwards, change, jnp.moveaxis(after, 1, 0))
         by_states = jnp.moveaxis(before, 0, 1)[..., None, None]
-        whole = jnp.sum(by_states * found.coefficients[count:].swapaxes(0, 1), axis=2)
+        whole = jnp.sum(by_states * result.coefficients[count:].swapaxes(0, 1), axis=2)
         return change, Curve(
-            found.begin[:count], found.length[:count], found.coefficients[:count] + whole
+            result.begin[:count], result.length[:count], result.coefficients[:count] + whole
         )
 
     def body(carry: Any) -> Any:
@@ -125,11 +125,11 @@ def integrated(
         part = jax.tree.map(
             lambda all_: jax.lax.dynamic_slice_in_dim(all_, first, _SIDE_BY_SIDE), taken
         )
-        change, found = slopes_of(part, change)
+        change, result = slopes_of(part, change)
         slopes = jax.tree.map(
             lambda all_, new: jax.lax.dynamic_update_slice_in_dim(all_, new, first, 1),
             slopes,
-            found,
+            result,
         )
         return first + _SIDE_BY_SIDE, change, slopes
 

@@ -277,7 +277,7 @@ class RunTerm:
 
     def likelihood(self, names: tuple[str, ...]) -> tuple[RunLikelihood, RunArrays]:
         """The likelihood as compiled programs evaluate it, and its arrays."""
-        inner = tuple((n, found) for n in names if (found := self.inner(n)) is not None)
+        inner = tuple((n, result) for n in names if (result := self.inner(n)) is not None)
         fixed = {n: np.float64(v) for n, v in {**self.fixed, "W0": self.run.W0}.items()}
         # Any numbers serve for the template: those of the parameters take their place.
         template = {**{name: np.float64(1.0) for _, name in inner}, **fixed}
@@ -612,14 +612,14 @@ def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
 
 def cut_delays(run: RecordedRun, suffix: str) -> tuple[tuple[Unknown, ...], dict[str, str]]:
     """Delays of the velocity changes as nuisances, and their names in the motion."""
-    found, own = [], {}
+    result, own = [], {}
     for k, (edge, sd) in enumerate(zip(run.cuts, run.cut_uncertainty, strict=True), start=1):
         name = f"step_time_{k}{suffix}"
         sd = _CUT_INTERVALS * sd
         near = np.diff(run.drive.edges)[max(edge - 1, 0) : edge + 1].min()
         limit = min(20 * sd, 0.9 * float(near))
         parameter = Parameter(name, "time", "finite", "delay of a velocity change", place="drive")
-        found.append(
+        result.append(
             Unknown(
                 parameter,
                 logarithmic=False,
@@ -633,4 +633,4 @@ def cut_delays(run: RecordedRun, suffix: str) -> tuple[tuple[Unknown, ...], dict
             )
         )
         own[name] = f"shift_{edge}"
-    return tuple(found), own
+    return tuple(result), own

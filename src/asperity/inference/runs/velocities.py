@@ -62,7 +62,7 @@ def constant_velocities(
         If there are not as many velocities as segments, nothing says how the drive moves, the
         recording begins with a hold, or the direction turns.
     """
-    found, speeds, holds = _given_or_measured(signals, name, steps, velocities)
+    result, speeds, holds = _given_or_measured(signals, name, steps, velocities)
     moving = [v for v, hold in zip(speeds, holds, strict=True) if not hold]
     if not moving or holds[0]:
         raise InputError(
@@ -76,13 +76,13 @@ def constant_velocities(
         )
     speeds = [0.0 if hold else sign * v for v, hold in zip(speeds, holds, strict=True)]
     # A hold that was cut in two is one.
-    kept = [k for k in range(len(found.cuts)) if speeds[k] or speeds[k + 1]]
-    doubts = list(found.doubts)
+    kept = [k for k in range(len(result.cuts)) if speeds[k] or speeds[k + 1]]
+    doubts = list(result.doubts)
     if velocities is not None and signals.displacement is not None:
         measured = partition_at(signals.time, signals.displacement, np.array(steps)).velocities
         doubts += contradicted_velocities(velocities, measured)
     return ConstantVelocities(
-        [found.cuts[k] for k in kept], [speeds[0], *(speeds[k + 1] for k in kept)], doubts
+        [result.cuts[k] for k in kept], [speeds[0], *(speeds[k + 1] for k in kept)], doubts
     )
 
 
@@ -109,20 +109,20 @@ def _given_or_measured(
             f"{name} must have the displacement or velocity of the drive, got none: "
             f"{signals.no_motion}; name a channel, or give steps and velocities"
         )
-    found = (
+    result = (
         partition(time, displacement, signals.friction)
         if steps is None
         else partition_at(time, displacement, np.array(steps))
     )
-    speeds = list(found.velocities)
+    speeds = list(result.velocities)
     noise = displacement_noise(time, displacement)
     fastest = max(abs(v) for v in speeds)
-    spans = np.diff([time[0], *(c.time for c in found.cuts), time[-1]])
+    spans = np.diff([time[0], *(c.time for c in result.cuts), time[-1]])
     holds = [
         hold or abs(v) * t < _STILL_NOISE * noise or abs(v) < _STILL_SHARE * fastest
-        for hold, v, t in zip(found.holds, speeds, spans, strict=True)
+        for hold, v, t in zip(result.holds, speeds, spans, strict=True)
     ]
-    return found, speeds, holds
+    return result, speeds, holds
 
 
 def _require_segments(time: Float, steps: Sequence[float], name: str) -> None:

@@ -63,7 +63,7 @@ def far_off_alone(
         Samples that are left out already.
     """
     limit, room = largest_by_chance(white.size), int(MOST * white.size) - len(known)
-    found: list[int] = []
+    result: list[int] = []
     for model, (a, b) in zip(models, run.stretches, strict=True):
         apart = np.abs(model.departures_of_single_samples(white[a:b]))
         apart[[k - a for k in known if a <= k < b]] = 0.0
@@ -73,12 +73,12 @@ def far_off_alone(
             apart[max(first - AT_CHANGE, 0) : max(first + AT_CHANGE, 0)] = 0.0
         reach = max(3, model.order)
         for k in np.argsort(-apart):
-            if apart[k] <= limit or len(found) >= room:
+            if apart[k] <= limit or len(result) >= room:
                 break
             # Beside a sample that is far off, others seem to be.
-            if all(abs(k + a - other) > reach for other in found):
-                found.append(int(k) + a)
-    return found
+            if all(abs(k + a - other) > reach for other in result):
+                result.append(int(k) + a)
+    return result
 
 
 def alone_at_changes(run: RecordedRun) -> dict[int, float]:
@@ -91,12 +91,12 @@ def alone_at_changes(run: RecordedRun) -> dict[int, float]:
     dict of int to float
         Distance from the nearer neighbour.
     """
-    found: dict[int, float] = {}
+    result: dict[int, float] = {}
     for a, b in run.stretches:
         near = [first - a for first in first_after_changes(run)]
         alone = standing_out(run.friction[a:b], near, AT_CHANGE)
-        found |= {k + a: size for k, size in alone.items()}
-    return found
+        result |= {k + a: size for k, size in alone.items()}
+    return result
 
 
 def standing_out(friction: Float, near: Sequence[int], reach: int) -> dict[int, float]:
@@ -114,7 +114,7 @@ def standing_out(friction: Float, near: Sequence[int], reach: int) -> dict[int, 
     dict of int to float
         Distance from the nearer neighbour.
     """
-    found: dict[int, float] = {}
+    result: dict[int, float] = {}
     friction = friction.copy()
     bends = np.abs(friction[1:-1] - 0.5 * (friction[:-2] + friction[2:]))
     scatter = 1.4826 * float(np.median(bends))
@@ -125,10 +125,10 @@ def standing_out(friction: Float, near: Sequence[int], reach: int) -> dict[int, 
             k = low + int(np.argmax(apart))
             if apart[k - low] <= _STANDS_OUT * scatter:
                 break
-            found[k] = float(apart[k - low])
+            result[k] = float(apart[k - low])
             # Its neighbours are judged without it.
             friction[k] = 0.5 * (friction[k - 1] + friction[k + 1])
-    return found
+    return result
 
 
 def beyond_any_motion(
@@ -149,15 +149,15 @@ def beyond_any_motion(
     """
     drive, time = run.drive, run.time
     stretching = stiffness / (run.W0 * float(np.min(drive.load))) * run.velocity
-    found = []
+    result = []
     for k, size in samples.items():
         near = time[[max(k - 2 * AT_CHANGE, 0), min(k + 2 * AT_CHANGE, time.size - 1)]]
         first, last = np.searchsorted(drive.edges[1:-1], near)
         pull = float(np.max(np.abs(drive.pull[first : last + 1])))
         longest = float(np.max(np.diff(time[k - 1 : k + 2])))
         if size > CLEARLY * stretching * pull * longest:
-            found.append(k)
-    return found
+            result.append(k)
+    return result
 
 
 def _beyond_neighbours(x: Float) -> Float:

@@ -57,10 +57,10 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
     refit = refit or partial(_linear_refit, residuals)
 
     def fitted(weights: Float) -> Residuals:
-        found = refit(weights)
-        if found is None:
+        result = refit(weights)
+        if result is None:
             raise _NoFitError
-        return found
+        return result
 
     try:
         now = residuals

@@ -22,7 +22,7 @@ from asperity.errors import InputError
 from asperity.laws import registered
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import MODULATION, all_parameters, canonical_name
-from asperity.parameters.file_content import file_content
+from asperity.parameters.toml_file import file_content
 from asperity.units import to_si
 
 Float = NDArray[np.float64]
@@ -102,7 +102,7 @@ class LockInTable:
     def correlations(self) -> Float:
         """Correlations of the observables of each row, shape (rows, n, n), n = len(OBSERVABLES)."""
         size = len(OBSERVABLES)
-        found = np.broadcast_to(np.eye(size), (self.rows, size, size)).copy()
+        result = np.broadcast_to(np.eye(size), (self.rows, size, size)).copy()
         for (first, second), column in self.covariances.items():
             if first not in self.values or second not in self.values:
                 continue
@@ -110,8 +110,8 @@ class LockInTable:
             both = np.isfinite(self.values[first]) & np.isfinite(self.values[second])
             errors = np.where(both, self.errors[first] * self.errors[second], 1.0)
             value = np.where(both, np.nan_to_num(column) / errors, 0.0)
-            found[:, i, j] = found[:, j, i] = value
-        return found
+            result[:, i, j] = result[:, j, i] = value
+        return result
 
     def without(self, rows: NDArray[np.bool_]) -> LockInTable:
         """The table without some of its rows."""

@@ -94,10 +94,10 @@ class LockInTerm:
         predicted, derivatives, outcome = self.forward(values, search=search, every=True)
         if not all_converged(outcome):
             return None
-        found = residuals_of(self.weights, predicted, derivatives)
+        result = residuals_of(self.weights, predicted, derivatives)
         # Derivatives may overflow far from all data, where an orbit still converges.
-        finite = np.isfinite(found.values).all() and np.isfinite(found.jacobian).all()
-        return found if finite else None
+        finite = np.isfinite(result.values).all() and np.isfinite(result.jacobian).all()
+        return result if finite else None
 
     def likelihood(
         self, names: tuple[str, ...]
@@ -117,11 +117,11 @@ class LockInTerm:
 
     def weighted(self, weights: Float) -> LockInTerm:
         """The same with the residuals of each row multiplied by a weight, shape (rows,)."""
-        found, own = LockInTerm(self.table, self.forward), self.weights
-        found._weights = own._replace(
+        result, own = LockInTerm(self.table, self.forward), self.weights
+        result._weights = own._replace(
             matrix=own.matrix * weights[:, None, None], target=own.target * weights[:, None]
         )
-        return found
+        return result
 
     def chi2_of_many(
         self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
@@ -452,9 +452,9 @@ class LockInLikelihood:
         fixed, weights = data
         function = _response(self.law, self.inertia, self.radiation_damping, self.search)
         given = parameters_at(fixed, values, function)
-        found = function(given)
+        result = function(given)
         predicted = Prediction(
-            found.mean_friction, steady_friction(self.law, given), found.harmonics
+            result.mean_friction, steady_friction(self.law, given), result.harmonics
         )
         return -0.5 * jnp.sum(weights.compared(columns_of(predicted, jnp)) ** 2)
 

@@ -20,7 +20,7 @@ from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, worst
-from asperity.parameters.display import Displayed, SummaryLine
+from asperity.parameters.parameter import Displayed, SummaryLine
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

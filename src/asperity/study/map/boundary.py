@@ -16,11 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.study.crossing import Crossings, find_crossings
 from asperity.study.map.plane import OUTPUTS, MapPlane
 from asperity.study.outcome import Answers
 from asperity.study.points import Float, Index
 from asperity.study.responses import is_stable
+from asperity.study.threshold import Crossings, find_crossings
 
 #: Largest distance of the boundary from the chord between two of its points, in fractions of the
 #: axes.

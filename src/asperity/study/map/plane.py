@@ -14,10 +14,10 @@ from asperity.laws import Law
 from asperity.operating_point import known_parameters, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
 from asperity.parameters.arguments import number, shown, switch, whole_number
-from asperity.study.crossing import STABILITY
 from asperity.study.outcome import Answers
 from asperity.study.points import Float
 from asperity.study.responses import answers_of_law
+from asperity.study.threshold import STABILITY
 
 #: Outputs that are kept of each point.
 OUTPUTS = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", *STABILITY)

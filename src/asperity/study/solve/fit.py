@@ -24,7 +24,7 @@ from asperity.parameters import (
     point_parameters,
 )
 from asperity.parameters.arguments import some_of
-from asperity.parameters.file_content import file_content
+from asperity.parameters.toml_file import file_content
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.plan import FitTable, SweepPlan
 from asperity.study.points import Points
