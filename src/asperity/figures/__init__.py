@@ -19,8 +19,8 @@ _HOMES = {
     "Plot": "plot",
     "draw_plane": "map",
     "new_figure": "style",
-    "save_picture": "files",
-    "save_table": "files",
+    "save_picture": "style",
+    "save_table": "style",
 }
 
 __all__ = [

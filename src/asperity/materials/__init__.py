@@ -1,6 +1,6 @@
 """Published numbers, one file a paper: ``materials.load("bureau2000")``.
 
-A material file is TOML; `asperity.materials.record` says what it holds. Loading one loads
+A material file is TOML; `asperity.materials.number` says what it holds. Loading one loads
 pydantic, importing this package does not.
 """
 
@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any
 from asperity.materials.loader import available_citations, citation, cited_works
 
 if TYPE_CHECKING:
-    from asperity.materials.record import Material, Number
+    from asperity.materials.number import Number
+    from asperity.materials.record import Material
 
 __all__ = [
     "Material",
@@ -57,7 +58,7 @@ def __getattr__(name: str) -> Any:
 
         return Material
     if name == "Number":
-        from asperity.materials.record import Number
+        from asperity.materials.number import Number
 
         return Number
     raise AttributeError(f"module 'asperity.materials' has no attribute '{name}'")

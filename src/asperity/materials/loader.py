@@ -17,7 +17,8 @@ from typing import Any
 from pydantic import ValidationError
 
 from asperity.errors import InputError, closest
-from asperity.materials.record import Material, Number
+from asperity.materials.number import Number
+from asperity.materials.record import Material
 from asperity.parameters.arguments import file_path
 from asperity.parameters.mistakes import worded
 from asperity.parameters.toml_file import parsed_toml, toml_content

@@ -2,139 +2,24 @@
 
 A material file is TOML with a ``title``, a ``source`` (key of `CITATIONS.bib`, or empty),
 ``notes``, and one table ``[numbers.NAME]`` a number, with the fields of `Number`.
-
-A `Number` is what is printed, where, how sure, and its value in SI.
 """
 
 from __future__ import annotations
 
 import keyword
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self
+from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, field_validator
 
 from asperity.errors import InputError, closest
+from asperity.materials.number import Number
 from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters, obeying
 from asperity.parameters.arguments import shown
-from asperity.units import KINDS, to_si
+from asperity.units import to_si
 
 if TYPE_CHECKING:
     from asperity.laws import Law
-
-
-Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-
-
-class Number(BaseModel):
-    """One number of a paper.
-
-    Attributes
-    ----------
-    value, uncertainty, range, values : float, float, (float, float), tuple of float
-        As printed, in `unit`; at least one of `value`, `range` and `values` is given.
-    unit : str
-        Empty for a pure number.
-    dimension : str
-        A key of `asperity.units.KINDS`.
-    kind : {"published", "fitted", "assumed"}
-        Printed in the paper; printed there as the outcome of a fit; not in the paper.
-    relation : {"equal", "about", "order", "below", "above"}
-        How the text qualifies the number.
-    place : str
-        Section, equation or figure.
-    note : str
-    """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    value: Finite | None = None
-    uncertainty: Annotated[Finite, Field(ge=0)] | None = None
-    range: tuple[Finite, Finite] | None = None
-    values: tuple[Finite, ...] | None = None
-    unit: str
-    dimension: str
-    kind: Literal["published", "fitted", "assumed"]
-    relation: Literal["equal", "about", "order", "below", "above"] = "equal"
-    place: str
-    note: str = ""
-
-    @field_validator("dimension")
-    @classmethod
-    def _dimension_is_known(cls, dimension: str) -> str:
-        if dimension not in KINDS:
-            raise ValueError(
-                f"be a kind of quantity, got '{dimension}'; {closest(dimension, KINDS)}"
-            )
-        return dimension
-
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
-        if self.value is None and self.range is None and not self.values:
-            raise ValueError("have a value, a range or values, got none of them; add one")
-        if self.uncertainty is not None and self.value is None:
-            raise ValueError(
-                f"have a value, got only its uncertainty {self.uncertainty:g}; add the value"
-            )
-        if self.range is not None and self.range[0] > self.range[1]:
-            raise ValueError(
-                f"have a range from low to high, got {list(self.range)}; swap its ends"
-            )
-        try:
-            self._to_si(1.0)
-        except InputError:
-            raise ValueError(
-                f"have a unit of the dimension {self.dimension}, got '{self.unit}'; "
-                f"write the unit as in '{KINDS[self.dimension].example}'"
-            ) from None
-        return self
-
-    @property
-    def si(self) -> float:
-        """The value in SI; raises `InputError` where the paper gives only a range or a list."""
-        if self.value is None:
-            raise InputError(
-                f"number.value must be given, got only {'a range' if self.range else 'a list'}; "
-                "take si_range or si_values"
-            )
-        return self._to_si(self.value)
-
-    @property
-    def si_uncertainty(self) -> float | None:
-        """The uncertainty in SI, None where the paper gives none."""
-        return None if self.uncertainty is None else self._to_si(self.uncertainty)
-
-    @property
-    def si_range(self) -> tuple[float, float] | None:
-        """The range in SI, None where the paper gives none."""
-        return (
-            None if self.range is None else (self._to_si(self.range[0]), self._to_si(self.range[1]))
-        )
-
-    @property
-    def si_values(self) -> tuple[float, ...] | None:
-        """The list of settings in SI, None where the paper gives none."""
-        return None if self.values is None else tuple(self._to_si(v) for v in self.values)
-
-    @property
-    def si_unit(self) -> str:
-        """SI unit of the number; empty for a pure number."""
-        return KINDS[self.dimension].si
-
-    def __str__(self) -> str:
-        shown = {"equal": "", "about": "about ", "order": "of order ", "below": "< ", "above": "> "}
-        parts = [] if self.value is None else [f"{shown[self.relation]}{self.value:g}"]
-        if self.uncertainty is not None:
-            parts.append(f"+- {self.uncertainty:g}")
-        if self.range is not None:
-            parts.append(f"{self.range[0]:g} to {self.range[1]:g}")
-        if self.values is not None:
-            parts.append(", ".join(f"{v:g}" for v in self.values))
-        return " ".join([*parts, self.unit]).rstrip()
-
-    def _to_si(self, value: float) -> float:
-        # Through text: the shortest text of a double is the decimal that the file holds.
-        return to_si(f"{value!r} {self.unit}", self.dimension, "number.value")
 
 
 class Material(BaseModel):

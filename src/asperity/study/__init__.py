@@ -23,7 +23,7 @@ _HOMES = {
     "SweepSummary": "run",
     "dry_run": "estimate",
     "export_store": "export",
-    "load_plan": "load",
+    "load_plan": "grid",
     "open_store": "results",
     "reasons": "outcome",
     "run_sweep": "run",
