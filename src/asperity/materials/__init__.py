@@ -9,7 +9,7 @@ from __future__ import annotations
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from asperity.materials.loader import available_citations, citation, cited_works
+from asperity.materials.bibliography import available_citations, citation, cited_works
 
 if TYPE_CHECKING:
     from asperity.materials.number import Number

@@ -1,12 +1,8 @@
-"""Material files to `Material`; what is wrong with one is one sentence.
-
-`CITATIONS.bib` has the works that laws and materials name as their source.
-"""
+"""Material files to `Material`, and what is wrong with one in one sentence."""
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from functools import cache
 from importlib.resources import files
@@ -22,57 +18,6 @@ from asperity.materials.record import Material
 from asperity.parameters.arguments import file_path
 from asperity.parameters.mistakes import worded
 from asperity.parameters.toml_file import parsed_toml, toml_content
-
-_ENTRY = re.compile(r"^@\w+\{(?P<key>[^,\s]+),.*?^\}", re.MULTILINE | re.DOTALL)
-
-
-def citation(key: str) -> str:
-    """Return the BibTeX entry of a source, such as ``"bureau2000"``.
-
-    Raises
-    ------
-    InputError
-        If no source has that key; the message gives the nearest one.
-    """
-    entries = _entries()
-    try:
-        return entries[key]
-    except KeyError:
-        raise InputError(
-            f"citation must be a known source, got '{key}'; {closest(key, entries)}"
-        ) from None
-
-
-def cited_works(source: str) -> dict[str, str]:
-    """Works that a law names as its source, by citation key.
-
-    Parameters
-    ----------
-    source : str
-        Keys with commas between them, or the reference as a text.
-
-    Returns
-    -------
-    dict of str to str
-        BibTeX entries. What has none, as the source of a law from outside the package, stands for
-        itself.
-    """
-    entries = _entries()
-    keys = [key.strip() for key in source.split(",") if key.strip()]
-    if any(" " in key for key in keys):
-        keys = [source.strip()]
-    return {key: entries.get(key, key) for key in keys}
-
-
-def available_citations() -> tuple[str, ...]:
-    """Keys that `citation` knows."""
-    return tuple(sorted(_entries()))
-
-
-@cache
-def _entries() -> Mapping[str, str]:
-    text = files("asperity.materials").joinpath("CITATIONS.bib").read_text(encoding="utf-8")
-    return {match["key"]: match[0] for match in _ENTRY.finditer(text)}
 
 
 @cache
