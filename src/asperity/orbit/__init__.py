@@ -1,16 +1,37 @@
-"""Periodic orbits: several methods, Floquet multipliers, derivatives."""
+"""Periodic orbits: several methods, Floquet multipliers, derivatives.
 
-from asperity.orbit.differentiable import (
-    ResponseFunction,
-    response_function,
-)
-from asperity.orbit.gradient.known import KnownOrbits
-from asperity.orbit.gradient.parametrised import ResponseValues
-from asperity.orbit.outcome import Outcome
-from asperity.orbit.period import Period, over_a_period
-from asperity.orbit.periodic import averaged_response, periodic_response
-from asperity.orbit.response import PeriodicResponse
-from asperity.orbit.sensitivity import Sensitivities, sensitivities
+Names are imported when first used: derivatives, with what they need, take a while to load.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from asperity.orbit.differentiable import ResponseFunction, response_function
+    from asperity.orbit.gradient.known import KnownOrbits
+    from asperity.orbit.gradient.parametrised import ResponseValues
+    from asperity.orbit.outcome import Outcome
+    from asperity.orbit.period import Period, over_a_period
+    from asperity.orbit.periodic import averaged_response, periodic_response
+    from asperity.orbit.response import PeriodicResponse
+    from asperity.orbit.sensitivity import Sensitivities, sensitivities
+
+#: Public names and their modules.
+_HOMES = {
+    "KnownOrbits": "gradient.known",
+    "Outcome": "outcome",
+    "Period": "period",
+    "PeriodicResponse": "response",
+    "ResponseFunction": "differentiable",
+    "ResponseValues": "gradient.parametrised",
+    "Sensitivities": "sensitivity",
+    "averaged_response": "periodic",
+    "over_a_period": "period",
+    "periodic_response": "periodic",
+    "response_function": "differentiable",
+    "sensitivities": "sensitivity",
+}
 
 __all__ = [
     "KnownOrbits",
@@ -26,3 +47,15 @@ __all__ = [
     "response_function",
     "sensitivities",
 ]
+
+
+def __getattr__(name: str) -> object:
+    from importlib import import_module
+
+    if name not in _HOMES:
+        raise AttributeError(f"module 'asperity.orbit' has no attribute '{name}'")
+    return getattr(import_module(f"asperity.orbit.{_HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -125,6 +125,7 @@ def test_a_posterior_is_the_normalised_likelihood(found, posterior, tmp_path):
     tree.close()
 
 
+@pytest.mark.long
 def test_draws_do_not_depend_on_the_number_of_processes(found, posterior):
     again = sample_posterior(found, **{**SAMPLED, "draws": 100, "jobs": 2})
     for name, draws in posterior.draws.items():
@@ -164,10 +165,10 @@ def test_a_posterior_of_nothing_is_refused(steps):
 @pytest.mark.parametrize(
     ("options", "samples"),
     [
-        (RunOptions(fit_rate=2.5), 350),
+        pytest.param(RunOptions(fit_rate=2.5), 350, marks=pytest.mark.long),
         (RunOptions(fit_rate=2.5, gauge=(2, 1.0)), 350),
         # At 14 Hz: between the samples, and as many times as the other gauge has, filled up.
-        (RunOptions(gauge=(1, 1.75)), 1400),
+        pytest.param(RunOptions(gauge=(1, 1.75)), 1400, marks=pytest.mark.long),
     ],
 )
 def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, options, samples):

@@ -70,6 +70,7 @@ def test_short_recordings_are_compared_sample_by_sample(clean, ringing):
     assert reduced(run).blocks is not None
 
 
+@pytest.mark.long
 def test_intervals_agree_with_those_of_every_sample(by_blocks, clean, ringing):
     """Noise that an autoregression at the full rate can be: both are right, and nothing is lost."""
     (term,) = by_blocks.objective.terms
