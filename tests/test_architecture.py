@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "src" / "asperity"
 
 #: What every room may use.
-_BASE = {"_jax", "_version", "errors", "outputs", "parameters", "units"}
+_BASE = {"_jax", "_lazy", "_version", "errors", "outputs", "parameters", "units"}
 _EQUATIONS = _BASE | {"laws", "loads", "slider"}
 _SOLVERS = {"algebra", "theory", "orbit", "branches", "transients"}
 _SIGNALS = {"recording", "lock_in", "measurement", "tribometer"}
@@ -25,6 +25,7 @@ _STUDIES = {"experiment", "protocol", "study"}
 MAY_IMPORT: dict[str, set[str]] = {
     "_version": set(),
     "_jax": set(),
+    "_lazy": set(),
     "errors": set(),
     "units": {"errors"},
     "outputs": {"errors", "_version"},  # files of any content

@@ -5,9 +5,9 @@ Each name below is imported when first used: Matplotlib takes its time.
 
 from __future__ import annotations
 
-from importlib import import_module
 from typing import TYPE_CHECKING
 
+from asperity._lazy import lazy_names
 from asperity.figures.style import COLOURS, DASHES
 
 if TYPE_CHECKING:
@@ -34,7 +34,4 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    if name not in _HOMES:
-        raise AttributeError(f"module 'asperity.figures' has no attribute '{name}'")
-    return getattr(import_module(f"asperity.figures.{_HOMES[name]}"), name)
+__getattr__ = lazy_names(__name__, _HOMES)

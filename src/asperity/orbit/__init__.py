@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from asperity._lazy import lazy_names
+
 if TYPE_CHECKING:
     from asperity.orbit.differentiable import ResponseFunction, response_function
     from asperity.orbit.gradient.known import KnownOrbits
@@ -49,12 +51,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    from importlib import import_module
-
-    if name not in _HOMES:
-        raise AttributeError(f"module 'asperity.orbit' has no attribute '{name}'")
-    return getattr(import_module(f"asperity.orbit.{_HOMES[name]}"), name)
+__getattr__ = lazy_names(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from asperity._lazy import lazy_names
+
 if TYPE_CHECKING:
     from asperity.study.estimate import dry_run
     from asperity.study.export import export_store
@@ -46,12 +48,7 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> object:
-    from importlib import import_module
-
-    if name not in _HOMES:
-        raise AttributeError(f"module 'asperity.study' has no attribute '{name}'")
-    return getattr(import_module(f"asperity.study.{_HOMES[name]}"), name)
+__getattr__ = lazy_names(__name__, _HOMES)
 
 
 def __dir__() -> list[str]:

@@ -479,21 +479,7 @@ class RunTerm:
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
-        """What estimating the noise adds to a covariance, and the variance of its diagonal.
-
-        Parameters
-        ----------
-        values : mapping of str to float
-            Free parameters and nuisances of the fit, in SI, at the estimate.
-        slopes : array, shape (parameters,)
-            Derivatives of the values to the coordinates of the covariance.
-        covariance : array, shape (parameters, parameters)
-            Under known noise.
-
-        Returns
-        -------
-        array, shape (parameters, parameters), and array, shape (parameters,)
-        """
+        """As in `DataTerm`."""
         raw = self.departures(values)
         assert raw is not None  # there is a motion at the estimate
         curves = raw[1] * slopes
