@@ -5,9 +5,10 @@ import itertools
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
+from scipy.integrate import DOP853, solve_ivp
 
 import asperity as asp
+from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.errors import InputError
 from asperity.laws import registered
 from asperity.loads import (
@@ -266,3 +267,16 @@ def test_questions_without_an_answer_are_named(physical) -> None:
     amontons = asp.Slider(asp.laws.Amontons(0.5), spring=1e5, load=7.0)
     with pytest.raises(InputError, match="must depend on velocity"):
         transient(amontons, MIXED)
+
+
+def test_coefficients_of_order_8_are_those_of_scipy() -> None:
+    table = dormand_prince_8()
+    np.testing.assert_array_equal(table.A, np.vstack([DOP853.A[:12, :12], DOP853.B]))
+    np.testing.assert_array_equal(table.C, np.append(DOP853.C[:12], 1.0))
+    for ours, theirs in (
+        (table.E5, DOP853.E5),
+        (table.E3, DOP853.E3),
+        (table.extra_A, DOP853.A_EXTRA),
+        (table.extra_C, DOP853.C_EXTRA),
+    ):
+        np.testing.assert_array_equal(ours, theirs)
