@@ -139,10 +139,8 @@ def inertial_guess(problem: Problem, orbit: Orbit) -> Orbit:
     converted = _converted(problem, sliding, slopes.reshape(shape), theta)
     states, slopes = (np.asarray(a) for a in converted)
     nodes = states[:, 0]
-    return Orbit(
-        orbit.mesh,
-        nodes[:, 0],
-        nodes - nodes[:, :1],
-        slopes[:, 1:],
-        scheme_for(problem.system),
-    )
+    # An interface that sticks has no finite logarithm of its slip rate.
+    with np.errstate(invalid="ignore"):
+        deviations = nodes - nodes[:, :1]
+    scheme = scheme_for(problem.system)
+    return Orbit(orbit.mesh, nodes[:, 0], deviations, slopes[:, 1:], scheme)
