@@ -30,6 +30,7 @@ from asperity.orbit.gradient.fourier import (
 )
 from asperity.orbit.gradient.parametrised import Parameters, Program, ResponseValues, only_where
 from asperity.orbit.methods.fourier.balance import BalanceEquations, balanced_orbit
+from asperity.orbit.methods.fourier.method import LARGEST_CONTRACTING_RATE
 from asperity.orbit.methods.fourier.orbit import (
     force_spectrum,
     fourier_orbit,
@@ -108,8 +109,6 @@ def _implicit_rule(equations: Equations, primals: tuple, tangents: tuple) -> tup
 _NODES, _GRADING, _SHARPEST = 32, 0.3, 18.0
 #: Nodes with damping alone, and with inertia, in which the slider swings several times a period.
 _DAMPED_NODES, _INERTIAL_NODES = 32, 64
-#: Rate per radian above which the iterations cannot contract.
-_STIFFEST = 1.0
 #: Estimated error that must be reached.
 _ERROR = 1e-9
 _TOLERANCE, _MOST_STEPS = 1e-10, 40
@@ -160,7 +159,7 @@ def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
     valid = program.equations.valid(parameters)
     rate, sharpness, unloading = steady_sliding_of(problem)
     # Points out of range are left to the search, which says so.
-    good = valid & (rate >= SMALLEST_RATE) & (rate < _STIFFEST)
+    good = valid & (rate >= SMALLEST_RATE) & (rate < LARGEST_CONTRACTING_RATE)
     good &= (unloading <= LARGEST_UNLOADING) & (sharpness <= _SHARPEST)
     solve = _fourier_orbits if _quasi_static(program) else _balanced_orbits
     return solve(problem, program, valid, good)

@@ -60,7 +60,7 @@ _CHUNK = 4 * FAST_BLOCK
 #: Estimated error that is accepted.
 _ERROR = 1e-9
 #: Rate per radian of a disturbance above which the iteration does not contract, from experience.
-LARGEST_RATE = 1.0
+LARGEST_CONTRACTING_RATE = 1.0
 
 
 class Fourier(Method):
@@ -80,7 +80,7 @@ class Fourier(Method):
         points = np.arange(problem.system.V.shape[-1])
         solution = Solution.unsolved(problem, len(points), options)
         rate, sharpness, _ = steady_sliding(problem)
-        left = points[rate < LARGEST_RATE]
+        left = points[rate < LARGEST_CONTRACTING_RATE]
         # Blocks run until their slowest point is done: points of like difficulty belong together.
         left = left[np.argsort(rate[left], kind="stable")]
         for sharpest, nodes, grading in _GRIDS:
