@@ -89,11 +89,11 @@ class InputError(ValueError):
     """
 
     def __init__(
-        self, field: str | Argument, rule: str = "", got: str = "", advice: str = ""
+        self, field: str | Argument = "", rule: str = "", got: object = "", advice: str = ""
     ) -> None:
         super().__init__(field, rule, got, advice)
         self.field = field if isinstance(field, Argument) else Argument(field)
-        self.rule, self.got, self.advice = rule, got, advice
+        self.rule, self.got, self.advice = rule, str(got), advice
 
     def __str__(self) -> str:
         if not self.rule:
@@ -108,6 +108,12 @@ class InputError(ValueError):
             return self
         return type(self)(field, self.rule, self.got, self.advice)
 
+    def noting(self, addition: str) -> InputError:
+        """The same mistake with an addition at its end."""
+        if not self.rule:
+            return type(self)(f"{self}{addition}")
+        return type(self)(self.field, self.rule, self.got, self.advice + addition)
+
 
 class ConstantLoadError(InputError):
     """A recording that is to have a modulated load has a constant one."""
@@ -118,30 +124,33 @@ class MistakesError(InputError):
 
     Parameters
     ----------
-    mistakes : sequence of str
+    mistakes : sequence of str or InputError
         One sentence each.
     source : str
         The file, if there is one.
-
-    Attributes
-    ----------
-    mistakes : tuple of str
     """
 
     #: What has the mistakes, for the message.
     subject: ClassVar[str] = "input"
 
-    def __init__(self, mistakes: Sequence[str], source: str = "") -> None:
-        self.mistakes = tuple(mistakes)
-        where = f" (in '{source}')" if source else ""
-        if len(self.mistakes) == 1:
-            super().__init__(f"{self.mistakes[0]}{where}")
-        else:
-            numbered = "; ".join(f"({i}) {m}" for i, m in enumerate(self.mistakes, start=1))
-            count = f"{len(self.mistakes)}{where}: {numbered}"
-            super().__init__(self.subject, "be free of mistakes", count)
+    def __init__(self, mistakes: Sequence[str | InputError], source: str = "") -> None:
+        super().__init__(self.subject)
+        self.errors = tuple(m if isinstance(m, InputError) else InputError(m) for m in mistakes)
+        self.source = source
         # Which a copy in another process is made of.
-        self.args = (self.mistakes, source)
+        self.args = (self.errors, source)
+
+    @property
+    def mistakes(self) -> tuple[str, ...]:
+        """A sentence for each."""
+        return tuple(map(str, self.errors))
+
+    def __str__(self) -> str:
+        where = f" (in '{self.source}')" if self.source else ""
+        if len(self.errors) == 1:
+            return f"{self.errors[0]}{where}"
+        numbered = "; ".join(f"({i}) {m}" for i, m in enumerate(self.errors, start=1))
+        return f"{self.subject} must be free of mistakes, got {len(self.errors)}{where}: {numbered}"
 
 
 def closest(name: str, known: Iterable[str]) -> str:

@@ -268,7 +268,7 @@ def _quantities(
         try:
             quantities[key] = to_si(text, _KINDS[key], f"{name}.{key}", require_unit=True)
         except InputError as error:
-            raise InputError(f"{error}, as in '{example}' (in '{line}')") from None
+            raise error.noting(f", as in '{example}' (in '{line}')") from None
     return quantities
 
 
@@ -281,7 +281,7 @@ class PlannedStep:
     step: ProgrammeStep
 
 
-def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[str]]:
+def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[InputError]]:
     """All steps in their order, repetitions written out, and the mistakes in them.
 
     Parameters
@@ -290,11 +290,11 @@ def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[st
     folder : Path
         Where files that lines name lie.
     """
-    mistakes: list[str] = []
+    mistakes: list[InputError] = []
     return _planned(steps, "step ", folder, mistakes), mistakes
 
 
-def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iterator[str]:
+def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iterator[InputError]:
     """Mistakes in the values of the steps, each at the load and velocity before it."""
     reported: set[str] = set()
     for one in planned:
@@ -310,11 +310,11 @@ def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iter
         except InputError as error:
             if one.place not in reported:
                 reported.add(one.place)
-                yield f"{error} (in '{one.text}')"
+                yield error.noting(f" (in '{one.text}')")
 
 
 def _planned(
-    steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[str]
+    steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[InputError]
 ) -> list[PlannedStep]:
     planned: list[PlannedStep] = []
     for number, step in enumerate(steps, start=1):
@@ -322,11 +322,11 @@ def _planned(
         try:
             planned += _one(step, place, folder, mistakes)
         except InputError as error:
-            mistakes.append(str(error))
+            mistakes.append(error)
     return planned
 
 
-def _one(step: Any, place: str, folder: Path, mistakes: list[str]) -> list[PlannedStep]:
+def _one(step: Any, place: str, folder: Path, mistakes: list[InputError]) -> list[PlannedStep]:
     if isinstance(step, ProgrammeStep):
         return [PlannedStep(place, repr(step), step)]
     if isinstance(step, str):

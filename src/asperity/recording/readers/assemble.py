@@ -181,9 +181,11 @@ def _by_name(
             name = roles[str(role)]
         elif role and key not in labels:
             fitting = candidates(role, dict.fromkeys(names))
-            name = fitting[0] if len(fitting) == 1 else _name_of(key, names, labels, "units")
+            name = (
+                fitting[0] if len(fitting) == 1 else _name_of(key, names, labels, Argument("units"))
+            )
         else:
-            name = _name_of(key, names, labels, "units")
+            name = _name_of(key, names, labels, Argument("units"))
         by_name[name] = text
     return by_name
 
