@@ -97,7 +97,7 @@ def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
     if not np.all(RULES[rule].holds(array)):
         bad = array[~RULES[rule].holds(array)]
         got = f"{bad.flat[0]:g} {KINDS[kind].si}".rstrip()
-        raise InputError(f"{label} must {RULES[rule].words}, got {got}; {RULES[rule].advice}")
+        raise InputError(label, RULES[rule].words, got, RULES[rule].advice)
     return array
 
 
