@@ -12,15 +12,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-<<<<<<< HEAD
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.recording.defects.check import check
 from asperity.recording.defects.rounded_time import even_times
 from asperity.recording.defects.rows import rows_to_avoid, usable_rows
-=======
-from asperity.errors import Argument, InputError
-from asperity.recording.checks import check, spikes
->>>>>>> w-doors
 from asperity.recording.finding import Finding
 
 if TYPE_CHECKING:
