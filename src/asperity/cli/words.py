@@ -18,6 +18,7 @@ _OPTIONS: Mapping[str, str] = {
     "measure.holds": "--holds",
     "measure.frequency": "--frequency",
     "measure.trace": "the recording",
+    "measure.events": "--events",
     "lock_in.detrend": "--detrend",
     "lock_in.harmonics": "--harmonics",
     "lock_in.frequency": "--frequency",

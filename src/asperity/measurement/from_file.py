@@ -6,14 +6,23 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from asperity.errors import ConstantLoadError, InputError
+from asperity.errors import Argument, ConstantLoadError, InputError
 from asperity.measurement.measure import Measurement, measure
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
+from asperity.measurement.stick_slip.measure import (
+    Machine,
+    StickSlipMeasurement,
+    measure_stick_slip,
+)
 from asperity.parameters.arguments import number, one_of, pair, switch, whole_number
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
 Read = TypeVar("Read")
+
+#: Share of the displacement in the slips above which it is the slider's, and slip events for each
+#: velocity step or hold above which these are read within stick-slip.
+_SLIDER, _EVENTS = 0.5, 10
 
 
 def measure_recording(
@@ -30,7 +39,12 @@ def measure_recording(
     refine: bool = True,
     steps: Sequence[float] | None = None,
     holds: Sequence[tuple[float, float]] | None = None,
-) -> Measurement | SlidingMeasurement:
+    stick_slip: bool | None = None,
+    stiffness: float | str | None = None,
+    velocity: float | str | None = None,
+    mass: float | str | None = None,
+    normal_load: float | str | None = None,
+) -> Measurement | SlidingMeasurement | StickSlipMeasurement:
     """Measure a recording, as ``asperity measure`` does.
 
     Parameters
@@ -55,10 +69,15 @@ def measure_recording(
         Of a recording without modulation: times (s) of velocity steps.
     holds : sequence of (float, float), optional
         Of a recording without modulation: begin and end (s) of holds.
+    stick_slip : bool
+        Whether slip events are read; by default they are if there are some, and no modulation.
+    stiffness, velocity, mass, normal_load : float or str, optional
+        K, V, M and W0 of the machine (N/m, m/s, kg, N), for slips, velocities and energies of slip
+        events. Without a recorded load W0 is M g unless it is given.
 
     Returns
     -------
-    Measurement or SlidingMeasurement
+    Measurement, SlidingMeasurement or StickSlipMeasurement
 
     Raises
     ------
@@ -79,6 +98,25 @@ def measure_recording(
         between = (number(first, "window", "time"), number(last, "window", "time"))
     trace = recording if isinstance(recording, Trace) else read(recording)
     common: dict[str, Any] = {"load": load, "force": force, "window": between, "detrend": detrend}
+    if stick_slip is not None:
+        stick_slip = switch(stick_slip, "stick_slip")
+    machine = Machine(
+        *(
+            None if value is None else number(value, name, kind, "positive")
+            for value, name, kind in (
+                (stiffness, "stiffness", "stiffness"),
+                (velocity, "velocity", "velocity"),
+                (mass, "mass", "mass"),
+                (normal_load, "normal_load", "force"),
+            )
+        )
+    )
+
+    def events() -> StickSlipMeasurement:
+        return measure_stick_slip(trace, load=load, force=force, window=between, machine=machine)
+
+    if stick_slip:
+        return events()
     if modulated is False:
         return measure_sliding(trace, steps=steps, holds=holds, **common)
     lock_in: dict[str, Any] = {
@@ -95,6 +133,7 @@ def measure_recording(
         trace,
         lambda: measure(trace, **lock_in, **common),
         lambda: measure_sliding(trace, **common),
+        events if stick_slip is None else None,
         load=load,
     )[0]
 
@@ -103,10 +142,11 @@ def modulated_or_sliding(
     trace: Trace,
     modulated: Callable[[], Read],
     sliding: Callable[[], SlidingMeasurement],
+    stick_slip: Callable[[], StickSlipMeasurement] | None = None,
     *,
     load: str = "W",
     plain: bool = False,
-) -> tuple[Read | SlidingMeasurement, str]:
+) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
     """Measure a recording as what it is.
 
     Parameters
@@ -116,14 +156,17 @@ def modulated_or_sliding(
         Measures a modulated recording.
     sliding : callable
         Measures one of which the load is constant, or not recorded.
+    stick_slip : callable, optional
+        Measures the slip events of one; None where these are not asked for.
     load : str
         Channel, by name or role.
     plain : bool
-        Whether sliding at one velocity counts; if not, velocity steps or holds are needed.
+        Whether sliding at one velocity counts whatever it is; if not, there must be velocity steps,
+        holds, slip events, or sliding that is steady.
 
     Returns
     -------
-    measurement : Measurement or SlidingMeasurement
+    measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
         Or what else `modulated` returns.
     reason : str
         What the recording is, where it was not read as modulated; else empty.
@@ -131,7 +174,7 @@ def modulated_or_sliding(
     Raises
     ------
     InputError
-        If it is neither.
+        If it is none of these.
     """
     try:
         return modulated(), ""
@@ -140,14 +183,54 @@ def modulated_or_sliding(
         if not constant and _recorded(trace, load):
             raise
         reason = error
+    what = "The normal load is constant" if constant else "No channel is the normal load"
+    events = _events(stick_slip)
     try:
         measurement = sliding()
     except InputError as error:
+        if not constant and len(trace.channels) == 1:
+            raise _which_force(trace) from None
         raise (error if constant and plain else reason) from None
-    if not (plain or measurement.steps or measurement.holds):
+    changes = len(measurement.steps) + len(measurement.holds)
+    if events is not None and _rather_events(events, changes):
+        return events, f"{what}: {events.kind} is read, not a modulation."
+    if changes:
+        return measurement, f"{what}: velocity steps and holds are read, not a modulation."
+    steady = events is not None and events.kind == "steady sliding"
+    if not (plain or steady):
         raise reason
-    what = "The normal load is constant" if constant else "No channel is the normal load"
-    return measurement, f"{what}: velocity steps and holds are read, not a modulation."
+    return measurement, f"{what}: steady sliding is read, not a modulation."
+
+
+def _events(read: Callable[[], StickSlipMeasurement] | None) -> StickSlipMeasurement | None:
+    try:
+        return None if read is None else read()
+    except InputError:
+        return None
+
+
+def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
+    """Whether slip events say more of a recording than its velocity steps and holds do.
+
+    Where the displacement is the slider's, each stick looks like a hold.
+    """
+    if not events.clear:
+        return False
+    if not changes or events.slip_share > _SLIDER:
+        return True
+    return any(r.sticks for r in events.regimes) and len(events.events) > _EVENTS * changes
+
+
+def _which_force(trace: Trace) -> InputError:
+    (name,) = trace.channels
+    friction, force = (Argument("columns", role, name) for role in ("friction", "F"))
+    return InputError(
+        Argument("columns", "friction"),
+        "name the friction in a recording of one column",
+        f"'{name}'",
+        f"where it is F/W write {friction}; where it is the force write {force} and give the load "
+        "too",
+    )
 
 
 def _recorded(trace: Trace, name: str) -> bool:

@@ -185,7 +185,7 @@ def _measured(
 
     options = Options.model_validate(argument["options"])
     name = argument["name"]
-    result: dict[str, Any] | SlidingMeasurement
+    result: Any
     report(stage="measuring")
     if options.mode == "modulated":
         result, note = _modulated(trace, options, name), ""

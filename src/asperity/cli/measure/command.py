@@ -14,10 +14,11 @@ import click
 
 from asperity.cli.measure.reading import FileRows, ReadingOptions
 from asperity.cli.measure.source import RecordingSource, source_options
-from asperity.cli.options import json_option
+from asperity.cli.options import json_option, set_option, settings_of
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
+    from asperity.measurement.stick_slip.measure import Machine
     from asperity.measurement.verdicts.verdict import Check
 
 
@@ -86,6 +87,8 @@ Examples:
       --frequency "120 Hz" --window 10:60 --json --plot recording.png
   asperity measure velocity_step.txt --no-modulation --plot steps.png
   asperity measure amplitudes.csv --amplitudes
+  asperity measure stick_slip.mat --set "K=168 N/m" --set "V=42 um/s" \\
+      --set "M=30.7 g" --events events.csv --plot events.png
   asperity measure day1/*.csv --out campaign.csv
 
 \b
@@ -139,6 +142,18 @@ in place of numbers; 2: bad input.
     help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
 @click.option(
+    "--stick-slip",
+    is_flag=True,
+    help="Slip events; by default, those of a recording that is stick-slip and not modulated.",
+)
+@set_option('--set "K=168 N/m" --set "V=42 um/s"', "K, V, M or W0 of the machine, for slip events")
+@click.option(
+    "--events",
+    type=Path,
+    metavar="CSV|NC|JSON",
+    help="Where the catalogue of slip events goes.",
+)
+@click.option(
     "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
 )
 @click.option(
@@ -168,6 +183,9 @@ def measure(
     no_modulation: bool,
     steps: str | None,
     holds: str | None,
+    stick_slip: bool,
+    settings: tuple[str, ...],
+    events: Path | None,
     amplitudes: bool,
     out: Path | None,
     resume: bool,
@@ -190,16 +208,23 @@ def measure(
         detrend=detrend,
         steps=None if steps is None else times_of(steps, "--steps"),
         holds=None if holds is None else spans_of(holds, "--holds"),
+        stick_slip=True if stick_slip else None,
+        machine=_machine(settings),
     )
+    if stick_slip and (no_modulation or frequency != "auto" or amplitudes):
+        raise InputError(
+            "--stick-slip must go without --no-modulation, --frequency and --amplitudes, got both; "
+            "leave one out"
+        )
     if (steps or holds) and not no_modulation:
         raise InputError(
             "--steps and --holds must go with --no-modulation, got them without; add it"
         )
     if out is not None:
-        if plot is not None or steps or holds:
+        if plot is not None or events is not None or steps or holds:
             raise InputError(
-                "--plot, --steps and --holds must go with one recording without --out, got both; "
-                "measure that recording by itself"
+                "--plot, --events, --steps and --holds must go with one recording without --out, "
+                "got both; measure that recording by itself"
             )
         return _campaign(recordings, source, options, out, resume, jobs, as_json)
     if len(recordings) > 1:
@@ -220,10 +245,14 @@ def measure(
         return _amplitudes(recording, source, options, as_json)
     if plot is not None:
         _check_picture(plot, recording)
+    if events is not None:
+        _check_catalogue(events, recording)
     trace = source.read(recording)
     result, why = options.measure(trace)
     if why:
         click.echo(f"asperity: {why}", err=True)
+    if events is not None:
+        _catalogue(result, events)
     _print(result, recording, trace.provenance, as_json)
     if plot is not None:
         _plot(result, plot)
@@ -298,6 +327,42 @@ def _check_picture(path: Path, recording: Path) -> None:
     output_files({"--plot": path}, inputs={"recording": recording})
 
 
+def _check_catalogue(path: Path, recording: Path) -> None:
+    from asperity.measurement.stick_slip.catalogue import check_catalogue
+    from asperity.outputs import output_files
+
+    check_catalogue(path)
+    output_files({"--events": path}, inputs={"recording": recording})
+
+
+def _catalogue(result: Any, path: Path) -> None:
+    from asperity.measurement.stick_slip.catalogue import write_catalogue
+
+    if not hasattr(result, "regimes"):
+        raise InputError(
+            "--events must go with a stick-slip recording, got another; leave it out, or read slip "
+            "events with --stick-slip"
+        )
+    write_catalogue(result, path)
+
+
+def _machine(settings: tuple[str, ...]) -> Machine:
+    from asperity.measurement.stick_slip.measure import Machine
+    from asperity.parameters.arguments import number
+
+    kinds = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "force"}
+    fields = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "load"}
+    numbers = {}
+    for name, text in settings_of(settings).items():
+        if name not in kinds:
+            raise InputError(
+                f"--set must name one of {', '.join(kinds)}, got '{name}'; write it like "
+                '--set "K=168 N/m"'
+            )
+        numbers[fields[name]] = number(text, f"--set {name}", kinds[name], "positive")
+    return Machine(**numbers)
+
+
 def _frequency(text: str, exact: bool) -> float | None:
     from asperity.units import to_si
 
@@ -313,27 +378,37 @@ def _frequency(text: str, exact: bool) -> float | None:
 
 def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
     from asperity._version import __version__
-    from asperity.cli.measure.text import modulated_text, sliding_text
+    from asperity.cli.measure.text import modulated_text, sliding_text, stick_slip_text
     from asperity.cli.report import to_json
     from asperity.measurement.record import modulated_record, sliding_record
+    from asperity.measurement.stick_slip.catalogue import stick_slip_record
 
-    modulated = hasattr(result, "reading")
-    if as_json:
-        record = modulated_record(result) if modulated else sliding_record(result)
-        provenance_record = {"recording": str(recording), "version": __version__, **provenance}
-        click.echo(to_json({**record, "provenance": provenance_record}))
+    record_of: Any
+    text_of: Any
+    if hasattr(result, "reading"):
+        record_of, text_of = modulated_record, modulated_text
+    elif hasattr(result, "regimes"):
+        record_of, text_of = stick_slip_record, stick_slip_text
     else:
-        click.echo((modulated_text if modulated else sliding_text)(result, recording.name))
+        record_of, text_of = sliding_record, sliding_text
+    if as_json:
+        provenance_record = {"recording": str(recording), "version": __version__, **provenance}
+        click.echo(to_json({**record_of(result), "provenance": provenance_record}))
+    else:
+        click.echo(text_of(result, recording.name))
 
 
 def _plot(result: Any, path: Path) -> None:
     from asperity.figures.recording import draw_modulated, draw_sliding
+    from asperity.figures.stick_slip import draw_stick_slip
     from asperity.figures.style import style
     from asperity.outputs import written_file
 
+    draw: Any = draw_modulated if hasattr(result, "reading") else draw_sliding
+    if hasattr(result, "regimes"):
+        draw = draw_stick_slip
     with style(), written_file(path, "--plot") as file:
-        figure = (draw_modulated if hasattr(result, "reading") else draw_sliding)(result)
-        figure.savefig(file, metadata={"Software": None})
+        draw(result).savefig(file, metadata={"Software": None})
 
 
 def _verdict(checks: tuple[Check, ...]) -> int:

@@ -14,7 +14,10 @@ from asperity.errors import InputError, naming
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.stick_slip.measure import Machine, StickSlipMeasurement
     from asperity.recording.trace import Trace
+
+    AnyMeasurement = Measurement | SlidingMeasurement | StickSlipMeasurement
 
 Read = TypeVar("Read")
 
@@ -39,6 +42,10 @@ class ReadingOptions:
         Seconds.
     holds : list of (float, float) or None
         Seconds.
+    stick_slip : bool or None
+        Whether slip events are read; None reads them where there are some.
+    machine : Machine or None
+        What is known of it, for slip events.
     """
 
     modulated: bool | None
@@ -50,15 +57,17 @@ class ReadingOptions:
     detrend: str
     steps: list[float] | None = None
     holds: list[tuple[float, float]] | None = None
+    stick_slip: bool | None = None
+    machine: Machine | None = None
 
-    def measure(self, trace: Trace) -> tuple[Measurement | SlidingMeasurement, str]:
-        """Measure a recording: its longest modulated stretch, or its sliding.
+    def measure(self, trace: Trace) -> tuple[AnyMeasurement, str]:
+        """Measure a recording: its longest modulated stretch, its slip events, or its sliding.
 
         Returns
         -------
-        measurement : Measurement or SlidingMeasurement
+        measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
         reason : str
-            Why the program reads it as sliding, where the options leave that to it.
+            Why the program reads it as not modulated, where the options leave that to it.
         """
         from asperity.measurement.measure import measure
 
@@ -74,11 +83,21 @@ class ReadingOptions:
         """
         from asperity.measurement.from_file import modulated_or_sliding
 
+        if self.stick_slip:
+            return self.slip_events(trace), ""
         if self.modulated is False:
             return self.sliding(trace), ""
         if self.modulated or self.frequency is not None:
             return modulated(), ""
-        return modulated_or_sliding(trace, modulated, lambda: self.sliding(trace))
+        return modulated_or_sliding(
+            trace, modulated, lambda: self.sliding(trace), lambda: self.slip_events(trace)
+        )
+
+    def slip_events(self, trace: Trace) -> StickSlipMeasurement:
+        """Measure the slip events of a recording."""
+        from asperity.measurement.stick_slip.measure import measure_stick_slip
+
+        return measure_stick_slip(trace, window=self.window, machine=self.machine)
 
     def sliding(self, trace: Trace) -> SlidingMeasurement:
         """Measure a recording without modulation."""
@@ -126,11 +145,14 @@ class FileRows:
     def __call__(self, path: Path) -> list[dict[str, Any]]:
         """Rows of a file; one row with the reason if it cannot be measured."""
         from asperity.measurement.campaign import failed_row, modulated_rows, sliding_rows
+        from asperity.measurement.stick_slip.catalogue import stick_slip_row
 
         with naming(in_options):
             try:
                 trace = self.source.read(path)
                 result, _ = self.options.either(trace, lambda: self.options.amplitudes(trace))
+                if hasattr(result, "regimes"):
+                    return [stick_slip_row(path, result)]
                 several = isinstance(result, list)
                 return modulated_rows(path, result) if several else sliding_rows(path, result)
             except InputError as error:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.measurement.samples import about_channels
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.stick_slip.detection import Falls, find_falls
@@ -18,13 +18,16 @@ from asperity.measurement.stick_slip.regimes import Regime, regimes
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, percent, worst
 from asperity.parameters.parameter import Displayed, SummaryLine
-from asperity.recording.sampling import even_rate
+from asperity.recording.defects.sampling import even_rate
+from asperity.recording.trace import Channel
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
 Array = NDArray[np.float64]
 
+#: Events that tell no regime.
+_FEW = 2
 #: Standard gravity (m/s^2), by which F/(m g) is a friction coefficient.
 GRAVITY = 9.80665
 #: Where suspicious and bad begin.
@@ -36,8 +39,6 @@ LIMITS = {
     "stiffness": (0.05, 0.3),
     "impulses": (0.05, 0.3),
 }
-#: Names of a force divided by the weight.
-_NORMALISED = frozenset({"fnorm", "forcenorm", "normforce", "fnormalised", "fnormalized"})
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,9 @@ class StickSlipMeasurement(Displayed):
         Standard deviation of a sample of F/W.
     impulses : int array
         Samples that were replaced.
+    slip_share : float
+        Share of the recorded displacement that falls into the slips: near 1 where it is the
+        slider's, small where it is the load point's; NaN where none is recorded.
     slip, slip_velocity, energy : array, (k,)
         Of each event: slip (m), largest slip velocity (m/s), energy that the spring releases (J);
         NaN where stiffness, velocity or load are not known.
@@ -102,6 +106,7 @@ class StickSlipMeasurement(Displayed):
     smallest_drop: float
     noise: float
     impulses: NDArray[np.intp]
+    slip_share: float
     slip: Array
     slip_velocity: Array
     energy: Array
@@ -125,6 +130,12 @@ class StickSlipMeasurement(Displayed):
         return worst(self.checks)
 
     @property
+    def clear(self) -> bool:
+        """Whether stick-slip, or an oscillation, takes more of the recording than all else."""
+        moving = sum(r.end - r.start for r in self.regimes if r.stop - r.first > _FEW)
+        return moving > float(self.time[-1] - self.time[0]) / 2
+
+    @property
     def kind(self) -> str:
         """Kinds of the regimes, in their order."""
         return ", then ".join(regime.kind for regime in self.regimes)
@@ -139,22 +150,6 @@ class StickSlipMeasurement(Displayed):
         return "StickSlipMeasurement", lines + [
             d for d in doubts if d.value in ("suspicious", "bad")
         ]
-
-
-def with_normalised_force(trace: Trace) -> Trace:
-    """The same recording, with a force that is named as F/(m g) in the role of the friction.
-
-    Parameters
-    ----------
-    trace : Trace
-        Its only channel may be called ``Fnorm``; next to others such a name is the normal force.
-    """
-    if len(trace.channels) != 1 or trace.roles:
-        return trace
-    (name,) = trace.channels
-    if "".join(c for c in name.lower() if c.isalnum()) not in _NORMALISED:
-        return trace
-    return replace(trace, roles={"friction": name})
 
 
 def measure_stick_slip(
@@ -181,17 +176,17 @@ def measure_stick_slip(
     InputError
         If neither force and load nor friction is recorded, or the sampling is uneven.
     """
-    signals = sliding_signals(with_normalised_force(trace), load, force, window)
-    return of_signals(trace, signals, machine or Machine())
-
-
-def of_signals(trace: Trace, signals: SlidingSignals, machine: Machine) -> StickSlipMeasurement:
-    """As `measure_stick_slip`, of channels that are chosen."""
+    machine = machine or Machine()
+    if machine.load is not None:
+        trace = _with_load(trace, machine.load)
+    signals = sliding_signals(trace, load, force, window)
     time = signals.time
     if even_rate(time) is None:
         raise InputError(
-            "measure.trace must be sampled evenly for slip events, got uneven times or gaps; give "
-            "a window without gaps, or resample the recording"
+            Argument("measure.trace"),
+            "be sampled evenly for slip events",
+            "uneven times or gaps",
+            "give a window without gaps, or resample the recording",
         )
     machine = _completed(machine, signals)
     friction, impulses = without_impulses(signals.friction)
@@ -216,6 +211,7 @@ def of_signals(trace: Trace, signals: SlidingSignals, machine: Machine) -> Stick
         smallest_drop=smallest,
         noise=float(falls.scatter[0]),
         impulses=impulses,
+        slip_share=_slip_share(signals, events),
         slip=slip,
         slip_velocity=speed,
         energy=energy,
@@ -226,6 +222,16 @@ def of_signals(trace: Trace, signals: SlidingSignals, machine: Machine) -> Stick
     about += signals.signs
     checks = _checks(result) + findings(about, len(trace), float(time[-1] - time[0]))
     return replace(result, checks=tuple(checks))
+
+
+def _with_load(trace: Trace, load: float) -> Trace:
+    """The recording with a constant load, where none is recorded."""
+    try:
+        trace.channel("W")
+    except InputError:
+        constant = Channel(np.full(len(trace), load), "force", "N", "load", "N")
+        return replace(trace, channels={**trace.channels, "load": constant})
+    return trace
 
 
 def _completed(machine: Machine, signals: SlidingSignals) -> Machine:
@@ -259,6 +265,15 @@ def _smallest_drop(falls: Falls, slope: float) -> float:
     width = 2.0 ** np.arange(falls.thresholds.size)
     rise = slope if np.isfinite(slope) else 0.0
     return float((falls.thresholds + width * max(rise, 0.0)).min())
+
+
+def _slip_share(signals: SlidingSignals, events: SlipEvents) -> float:
+    if signals.displacement is None or not len(events):
+        return np.nan
+    at = np.interp(np.stack([events.onset, events.end]), signals.time, signals.displacement)
+    while_events = np.interp([events.onset[0], events.end[-1]], signals.time, signals.displacement)
+    moved = abs(float(np.diff(while_events)[0]))
+    return float(np.abs(at[1] - at[0]).sum()) / moved if moved else np.nan
 
 
 def _spring(events: SlipEvents, machine: Machine) -> tuple[Array, Array, Array]:
