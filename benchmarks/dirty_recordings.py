@@ -67,7 +67,9 @@ def clipped(random: np.random.Generator, case: Case, time: Float, x: Float) -> F
     """Friction at the end of its range, above or below, for 5 to 50 % of its height."""
     low, high = x.min(), x.max()
     share = random.uniform(0.05, 0.5) * (high - low)
-    return np.clip(x, low + share, None) if random.random() < 0.5 else np.clip(x, None, high - share)
+    return (
+        np.clip(x, low + share, None) if random.random() < 0.5 else np.clip(x, None, high - share)
+    )
 
 
 def slow(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
@@ -106,7 +108,16 @@ def clean(random: np.random.Generator, case: Case, time: Float, x: Float) -> Flo
 KINDS: dict[str, Callable[[np.random.Generator, Case, Float, Float], Float]] = {
     f.__name__: f
     for f in (
-        clean, slow, spikes, spike_at_change, jump, hum, clipped, heavy, burst, missing,
+        clean,
+        slow,
+        spikes,
+        spike_at_change,
+        jump,
+        hum,
+        clipped,
+        heavy,
+        burst,
+        missing,
     )
 }
 
@@ -191,9 +202,7 @@ def main() -> None:
     chosen = parser.parse_args()
     names = chosen.case or list(CASES)
     cases = {name: replace(CASES[name]) for name in names}
-    exact = {
-        n: friction(c, np.arange(int(c.end * c.rate)) / c.rate) for n, c in cases.items()
-    }
+    exact = {n: friction(c, np.arange(int(c.end * c.rate)) / c.rate) for n, c in cases.items()}
     print("| kind | recordings | refused | flagged | wrong | wrong, no word | 95 % | of those ok |")
     print("|---|---|---|---|---|---|---|---|")
     for kind in chosen.kind or list(KINDS):

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference.objective import Residuals
+from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
 from asperity.inference.runs.misfit import misfit_after_changes
 from asperity.inference.runs.motion import RunArrays, RunLikelihood, RunMotion
@@ -22,7 +23,7 @@ from asperity.inference.runs.noise import (
     whiteness,
 )
 from asperity.inference.runs.reading import reading_at
-from asperity.inference.runs.run import RecordedRun, first_after_changes
+from asperity.inference.runs.run import RecordedRun
 from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law
 from asperity.parameters import Parameter, law_parameters
@@ -154,7 +155,7 @@ class RunTerm:
                 sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
             "lines_removed": list(self._lines),
-            "outliers": list(self.run.spikes),
+            "outliers": list(self.run.spikes or ()),
             "jumps": list(self.run.jumps or ()),
             "whiteness_p": self._whiteness,
             "standard_deviation": [math.sqrt(m.variance) for m in self.models],
@@ -405,7 +406,7 @@ class RunTerm:
         return said
 
     def _said_of_spikes(self) -> str:
-        times = [f"{time:.6g}" for time in self.run.spikes]
+        times = [f"{time:.6g}" for time in self.run.spikes or ()]
         shown = ", ".join(times[:_NAMED]) + (", ..." if len(times) > _NAMED else "")
         those = f"{len(times)} samples" if len(times) > 1 else "a sample"
         return (
