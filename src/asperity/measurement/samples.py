@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.recording.defects.check import check
 from asperity.recording.defects.rounded_time import even_times
 from asperity.recording.defects.rows import rows_to_avoid, usable_rows
@@ -129,10 +129,13 @@ def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Arr
         return
     names = [next(n for n, c in trace.channels.items() if c is used) for used in (shear, recorded)]
     raise InputError(
-        f"measure.force must agree with the recorded friction, got {made:.4g} for the median of "
-        f"F/W with '{names[0]}' and {written:.4g} for that of '{names[1]}'; choose one, like "
-        f"columns={{'F': '{names[0]}'}} or columns={{'friction': '{names[1]}'}}, or correct the "
-        "unit of the force or the load"
+        "measure.force",
+        "agree with the recorded friction",
+        f"{made:.4g} for the median of "
+        f"F/W with '{names[0]}' and {written:.4g} for that of '{names[1]}'",
+        "choose one, like "
+        f"{Argument('columns', 'F', names[0])} or {Argument('columns', 'friction', names[1])}, or "
+        "correct the unit of the force or the load",
     )
 
 
@@ -239,14 +242,18 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     F, name = _force(trace, force, W)
     if W.kind != F.kind:
         raise InputError(
-            f"measure.force must have the dimension of the load, got {_dimension_text(F)} for "
-            f"'{force}' and {_dimension_text(W)} for '{load}'; name the units when reading"
+            "measure.force",
+            "have the dimension of the load",
+            f"{_dimension_text(F)} for '{force}' and {_dimension_text(W)} for '{load}'",
+            "name the units when reading",
         )
     names = (_name(trace, W), name)
     if names[0] == names[1]:
         raise InputError(
-            f"measure.force must be another channel than the load, got '{names[0]}' for both; name "
-            "the one that is the shear force"
+            "measure.force",
+            "be another channel than the load",
+            f"'{names[0]}' for both",
+            "name the one that is the shear force",
         )
     two = replace(trace, channels={names[0]: W, names[1]: F}, findings=())
     findings = about_channels(trace, names)
@@ -263,8 +270,10 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
         time, values = time[keep], (values[0][keep], values[1][keep])
     if time.size < 16:
         raise InputError(
-            f"measure.trace must hold at least 16 usable samples, got {time.size}; give a longer "
-            "recording or window"
+            "measure.trace",
+            "hold at least 16 usable samples",
+            time.size,
+            "give a longer recording or window",
         )
     require_computable(time=time - time[0], **dict(zip(names, values, strict=True)))
     seen = {"gap", "spike", "saturation"} & names_found
@@ -290,9 +299,10 @@ def require_computable(**channels: Array) -> None:
         largest = float(np.abs(values).max(initial=0.0))
         if largest and not 1 / _LARGEST < largest < _LARGEST:
             raise InputError(
-                f"measure.trace must hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size, "
-                f"got {largest:.4g} as the largest of '{name}'; correct its unit, or cut damaged "
-                "rows out with a window"
+                "measure.trace",
+                f"hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size",
+                f"{largest:.4g} as the largest of '{name}'",
+                "correct its unit, or cut damaged rows out with a window",
             )
 
 
