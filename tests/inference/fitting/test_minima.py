@@ -218,7 +218,7 @@ class TwoNoises(RunTerm):
         return True
 
     def noise_state(self):
-        return NoiseState(tuple(self.sizes), None, 1.0, (), (1.0, 1.0))
+        return NoiseState(tuple(self.sizes), 1.0, (1.0, 1.0))
 
     def restore_noise(self, state):
         self.sizes = np.array(state.models)
