@@ -34,8 +34,22 @@ T = TypeVar("T")
 Given = bool | float | str
 #: Characters of a part of a field's place.
 _LONGEST = 60
-#: What pydantic puts behind the place of a field that may be of several types.
+#: What pydantic puts into the place of a field that may be of several types, besides texts with
+#: brackets and the names of records.
 _TYPES = frozenset({"bool", "float", "int", "str", "nullable"})
+
+#: What a value must be, by the beginning of pydantic's name of the mistake.
+_WORDS = {
+    "bool_": "true or false",
+    "int_": "a whole number",
+    "float_": "a number",
+    "string_type": "a text",
+    "tuple_": "a list",
+    "list_": "a list",
+    "dict_": "a table",
+    "mapping_": "a table",
+    "model_": "a table",
+}
 
 _units_required: ContextVar[bool] = ContextVar("units_required", default=False)
 
@@ -248,10 +262,16 @@ def mistakes_in(
     shown : callable
         Words for a value.
     """
-    mistakes: dict[str, InputError] = {}
+    mistakes: dict[tuple[str, ...], InputError] = {}
     for reported in error.errors(include_url=False):
         for mistake in _mistakes(reported, model, subject, prefix, shown):
-            mistakes.setdefault(str(mistake), mistake)
+            key = (*mistake.field, mistake.got, mistake.advice)
+            other = mistakes.get(key)
+            if other is not None and mistake.rule not in other.rule:
+                # A field of several types, which the value fits none of.
+                rule = f"{other.rule} or {mistake.rule.removeprefix('be ')}"
+                mistake = InputError(mistake.field, rule, mistake.got, mistake.advice)
+            mistakes[key] = mistake if other is None or mistake.rule not in other.rule else other
     return list(mistakes.values())
 
 
@@ -265,9 +285,12 @@ def _mistakes(
     raised = reported.get("ctx", {}).get("error")
     if isinstance(raised, MistakesError):
         return raised.errors
-    place = [str(part)[:_LONGEST] for part in reported["loc"]]
-    while len(place) > 1 and place[-1] in _TYPES:
-        place.pop()
+    records = {kind.__name__ for kind in _models_in(model)}
+    place = [
+        str(part)[:_LONGEST]
+        for i, part in enumerate(reported["loc"])
+        if not (i and isinstance(part, str) and ("[" in part or part in _TYPES | records))
+    ]
     field = prefix + ".".join(place) if place else subject
     if isinstance(raised, InputError):
         # Types of values do not know where they are used.
@@ -282,7 +305,10 @@ def _mistakes(
         known = _fields_at(model, reported["loc"][:-1])
         advice = closest(place[-1], known) if known else "leave it out"
         return (InputError(field, "be a known field", value, advice),)
-    rule = " ".join(reported["msg"].split()).removeprefix("Input should be ")
+    said = " ".join(reported["msg"].split()).removeprefix("Input should be ")
+    rule = next(
+        (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), said
+    )
     return (InputError(field, f"be {rule}", value, "correct the value"),)
 
 
@@ -303,8 +329,10 @@ def _is_model(kind: Any) -> bool:
 
 
 def _models_in(kind: Any) -> Iterator[type[BaseModel]]:
-    """Models within a type such as ``Mapping[str, Model] | None``."""
+    """Models within a type such as ``Mapping[str, Model] | None``, the outermost first."""
     if _is_model(kind):
         yield kind
+        for field in kind.model_fields.values():
+            yield from _models_in(field.annotation)
     for part in getattr(kind, "__args__", ()):
         yield from _models_in(part)
