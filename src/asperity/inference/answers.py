@@ -86,7 +86,9 @@ def read_data(
             raise InputError(
                 name, "go with one recording", recordings, "cut the recordings beforehand"
             )
-    at = {n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed}
+    at: dict[str, Any] = {
+        n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
+    }
     result: list[LockInTable | RecordedRun] = []
     for data, table in zip(question.data, tables, strict=True):
         if table:
@@ -160,13 +162,12 @@ def _prior_of_unloading(
     assert question.stiffness_from is not None  # by the caller
     (data,) = question.data
     low, high = question.stiffness_from
-    windows = getattr(question, "windows", None) or data.window
-    spans = [windows] if windows is data.window or windows == "auto" else windows
+    windows: Any = getattr(question, "windows", None)
+    spans = [data.window] if windows in (None, "auto") else windows
     for span in spans:
-        whole = span is None or span == "auto"
-        begin, end = (-math.inf, math.inf) if whole else span
+        begin, end = span or (-math.inf, math.inf)
         if low < end and begin < high:
-            where = "the whole recording" if whole else f"{begin:g} to {end:g} s"
+            where = "the whole recording" if span is None else f"{begin:g} to {end:g} s"
             raise InputError(
                 label,
                 "lie outside what is fitted",
@@ -201,16 +202,20 @@ def answer_fit(
     """
     options = _options(question, read, progress)
     law = None if question.law is None else known_law(question.law)
-    if question.windows is None:
+    windows: Any = question.windows
+    if windows is None:
         data = read_data(question, read)
         return fit(data, law or default_law(data), question.free, **options)
-    (data,) = question.data
-    if is_table(data):
+    (recording,) = question.data
+    if is_table(recording):
         raise InputError("windows", "go with one recording", "a table", "give one recording")
-    spans = None if question.windows == "auto" else question.windows  # type: ignore[comparison-overlap]
-    reading = {n: v for n, v in _reading(data).items() if v is not None}
     return fit_windows(
-        read(data), law or default_law(()), question.free, spans, reading=reading, **options
+        read(recording),
+        law or default_law(()),
+        question.free,
+        None if windows == "auto" else windows,
+        reading={n: v for n, v in _reading(recording).items() if v is not None},
+        **options,
     )
 
 
