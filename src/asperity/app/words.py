@@ -50,6 +50,8 @@ def in_labels(argument: Argument) -> str:
         label = _ROLES.get(key, f"Role {key}")
     elif name == "units" and key:
         label = f"Unit of {key}"
+    elif name == "modulated":
+        return "Velocity steps and holds"
     else:
         label = _LABELS.get(name, name)
     return f"{label}: {value}" if value and value != "..." else label

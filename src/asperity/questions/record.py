@@ -206,31 +206,22 @@ def _seconds(value: Any) -> float:
     return float(to_si(value, "time", ""))
 
 
-def _ends(value: Any) -> Any:
+def _span(value: Any) -> tuple[float, float]:
     """Both ends of a span; one that is left open in a text is infinite."""
-    if not isinstance(value, str):
-        if isinstance(value, list | tuple | np.ndarray) and len(value) == 2:
-            return tuple(value)
+    if isinstance(value, str):
+        start, colon, end = (part.strip() for part in value.partition(":"))
+        if not colon:
+            raise InputError("", "be START:END", f"'{value}'", "write it like 10:60")
+        value = (start or -np.inf, end or np.inf)
+    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
         raise InputError("", "be two times", shown(value), "give (start, end)")
-    start, colon, end = (part.strip() for part in value.partition(":"))
-    if not colon:
-        raise InputError("", "be START:END", f"'{value}'", "write it like 10:60")
-    return start or -np.inf, end or np.inf
-
-
-def _end_of_a_span(value: Any) -> float:
-    return value if value in (-np.inf, np.inf) else _seconds(value)
+    start, end = (end if end in (-np.inf, np.inf) else _seconds(end) for end in value)
+    return start, end
 
 
 Seconds = Annotated[float, BeforeValidator(_seconds)]
 #: Start and end of a stretch of time (s), or a text such as ``"10:60"``.
-Span = Annotated[
-    tuple[
-        Annotated[float, BeforeValidator(_end_of_a_span)],
-        Annotated[float, BeforeValidator(_end_of_a_span)],
-    ],
-    BeforeValidator(_ends),
-]
+Span = Annotated[tuple[float, float], BeforeValidator(_span)]
 
 
 def shown(value: Any) -> str:
@@ -305,6 +296,9 @@ def _mistakes(
         known = _fields_at(model, reported["loc"][:-1])
         advice = closest(place[-1], known) if known else "leave it out"
         return (InputError(field, "be a known field", value, advice),)
+    if reported["type"] == "literal_error":
+        expected = reported["ctx"]["expected"].replace("'", "")
+        return (InputError(field, f"be {expected}", value, "choose one"),)
     said = " ".join(reported["msg"].split()).removeprefix("Input should be ")
     rule = next(
         (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), said
@@ -328,11 +322,13 @@ def _is_model(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 
-def _models_in(kind: Any) -> Iterator[type[BaseModel]]:
+def _models_in(kind: Any, known: tuple[Any, ...] = ()) -> Iterator[type[BaseModel]]:
     """Models within a type such as ``Mapping[str, Model] | None``, the outermost first."""
+    if kind in known:
+        return
     if _is_model(kind):
         yield kind
         for field in kind.model_fields.values():
-            yield from _models_in(field.annotation)
+            yield from _models_in(field.annotation, (*known, kind))
     for part in getattr(kind, "__args__", ()):
-        yield from _models_in(part)
+        yield from _models_in(part, known)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.questions.record import Question, Seconds, Span, quantity
 
 Column = str | int
@@ -69,6 +70,18 @@ class Source(ReadingRecipe):
         return {name: value for name, value in named.items() if value not in (None, {}, "")}
 
 
+def _in_order(times: tuple[Any, ...]) -> tuple[Any, ...]:
+    return tuple(sorted(times))
+
+
+def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """Holds in their order, each with a begin and an end."""
+    for start, end in spans:
+        if not (math.isfinite(start) and math.isfinite(end)):
+            raise InputError("", "have a start and an end", f"{start:g} to {end:g} s", "write both")
+    return tuple(sorted(spans))
+
+
 class Measurement(Question):
     """What is measured in a recording.
 
@@ -106,22 +119,22 @@ class Measurement(Question):
     window: Span | None = None
     whole_periods: bool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
-    steps: tuple[Seconds, ...] | None = None
-    holds: tuple[Span, ...] | None = None
+    steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
+    holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
 
     @model_validator(mode="after")
     def _consistent(self) -> Measurement:
         if self.exact_frequency and self.frequency is None:
             raise InputError(
-                "exact_frequency",
-                "go with a frequency",
+                "measure.exact_frequency",
+                f"go with {Argument('measure.frequency')}",
                 "none",
                 "give the frequency or leave it out",
             )
         if self.modulated is not False and (self.steps or self.holds):
             raise InputError(
-                "steps and holds",
-                "go with modulated=False",
+                "measure.steps and holds",
+                f"go with {Argument('modulated', value='False')}",
                 "them without",
                 "leave them out or say so",
             )
