@@ -11,7 +11,7 @@ import click
 
 from asperity.cli.options import json_option, law_options, settings_of
 from asperity.cli.recording import listed_times, source_options
-from asperity.cli.words import FIT_OPTIONS, fields_as_options
+from asperity.cli.words import fields_as_options
 from asperity.errors import InputError
 from asperity.outputs import require_folder
 
@@ -139,6 +139,8 @@ def _question_options(*own: Any) -> Callable[[Callable[..., Any]], Callable[...,
             velocities: str | None,
             **others: Any,
         ) -> Any:
+            from asperity.questions.options import FIT_OPTIONS
+
             with fields_as_options(FIT_OPTIONS):
                 of_run = {
                     "window": window,
@@ -332,7 +334,8 @@ def compare(
         )
     if report is not None:
         require_folder(report, "--report")
-    question = Question(**fields, laws=laws or listed)
+    fields["laws"] = laws or listed
+    question = Question(**fields)
     with bar("%", raising=False) as update:
         comparison = answer_comparison(
             question, progress=lambda done, total: update(round(100 * done / total), 100)

@@ -10,7 +10,6 @@ from typing import Any
 
 import click
 
-from asperity.cli.words import COLUMN_OPTIONS
 from asperity.errors import InputError
 
 Command = Callable[..., Any]
@@ -98,6 +97,7 @@ def source_options(command: Command) -> Command:
         channels: tuple[str, ...],
         **others: Any,
     ) -> Any:
+        from asperity.questions.options import COLUMN_OPTIONS
         from asperity.questions.recording import Source
 
         roles = {role: others.pop(o.lstrip("-")) for role, o in COLUMN_OPTIONS.items()}

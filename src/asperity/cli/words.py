@@ -2,61 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from asperity.errors import Argument, InputError, naming
 
-#: Options that choose the column of a role; other roles have --column.
-COLUMN_OPTIONS: Mapping[str, str] = {"W": "--load", "F": "--force", "time": "--time"}
-
 _OPTIONS: Mapping[str, str] = {
-    "measure.window": "--window",
-    "measure.detrend": "--detrend",
-    "measure.load": "--load",
-    "measure.force": "--force",
-    "measure.steps": "--steps",
-    "measure.holds": "--holds",
-    "measure.steps and holds": "--steps and --holds",
-    "measure.frequency": "--frequency",
-    "measure.exact_frequency": "--exact-frequency",
-    "measure.harmonics": "--harmonics",
     "measure.trace": "the recording",
+    "measure.steps and holds": "--steps and --holds",
     "lock_in.detrend": "--detrend",
     "lock_in.harmonics": "--harmonics",
     "lock_in.frequency": "--frequency",
     "lock_in.load and force": "the load and the force",
     "lock_in.load": "the load",
     "lock_in.time": "the time column",
-    "rate": "--rate",
-    "read.rate": "--rate",
-    "read.group": "--group",
-    "read.format": "--format",
-    "read.delimiter": "--delimiter",
-    "read.decimal": "--decimal",
-    "columns": "--column",
-    "units": "--unit",
     "stress_to_force.area": "--area",
     "recording.path": "the recording",
     "slice.start and slice.end": "--window",
 }
 
-#: Options of the fields of a fit and of a comparison.
-FIT_OPTIONS: Mapping[str, str] = {
-    **{
-        name: f"--{name.replace('_', '-')}"
-        for name in (
-            *("law", "laws", "free", "start", "prior", "material", "window", "windows", "steps"),
-            *("velocities", "stiffness_from", "trend", "drift", "initial", "gauge"),
-            *("gauge_order", "fit_rate", "profile", "inertia", "radiation_damping"),
-        )
-    },
-    "fixed": "--fix",
-}
 
+def in_options(argument: Argument, own: Mapping[str, str] | None = None) -> str:
+    """The words of the command line: ``--load``, ``--column "velocity=speed"``.
 
-def in_options(argument: Argument, own: Mapping[str, str] = _OPTIONS) -> str:
-    """The words of the command line: ``--load``, ``--column "velocity=speed"``."""
+    Parameters
+    ----------
+    argument : Argument
+    own : mapping of str to str, optional
+        Option of each field of a question, which other commands mean otherwise.
+    """
+    from asperity.questions.options import COLUMN_OPTIONS, MEASURE_OPTIONS, SOURCE_OPTIONS
+
     name, key, value = argument
     # A part of a list has the option of the list.
     while name.rpartition(".")[2].isdigit():
@@ -65,11 +41,15 @@ def in_options(argument: Argument, own: Mapping[str, str] = _OPTIONS) -> str:
         if key in COLUMN_OPTIONS:
             return f"{COLUMN_OPTIONS[key]} {_quoted(value)}".rstrip()
         return f'--column "{key}={value}"' if value else f"--column {key}=NAME"
-    if name == "modulated":
-        return "--no-modulation"
     if name == "units" and key and value:
         return f'--unit "{key}={"UNIT" if value == "..." else value}"'
-    option = own.get(name) or _OPTIONS.get(name, name)
+    known = {**_OPTIONS, **SOURCE_OPTIONS, **(own or {})}
+    known |= {f"read.{n}": option for n, option in SOURCE_OPTIONS.items()}
+    known |= {f"measure.{n}": option for n, option in MEASURE_OPTIONS.items()}
+    option = known.get(name)
+    if option is None:
+        whole, _, part = name.partition(".")
+        option, key = (known[whole], part) if whole in (own or {}) else (name, key)
     return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])
 
 
@@ -88,18 +68,13 @@ def fields_as_options(own: Mapping[str, str]) -> Iterator[None]:
     """
 
     def words(argument: Argument) -> str:
-        name = argument.name
-        # What files are given is a list, of which every part has the same options.
-        if name.startswith("data.") and name.count(".") >= 2:
-            name = name.split(".", 2)[2]
-        name, dot, part = name.partition(".")
-        if dot and name in own and not argument.key:
-            key = "" if part.isdigit() else part
-            return in_options(Argument(name, key, argument.value), own)
-        return in_options(argument._replace(name=name + dot + part), own)
+        head, _, rest = argument.name.partition(".")
+        # All files of data have the same options.
+        if head == "data" and rest:
+            argument = argument._replace(name=rest.partition(".")[2] or rest)
+        return in_options(argument, own)
 
-    chosen: Callable[[Argument], str] = words
-    with naming(chosen):
+    with naming(words):
         try:
             yield
         except InputError as error:

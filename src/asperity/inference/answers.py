@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from asperity import materials
@@ -92,7 +93,7 @@ def read_data(
     result: list[LockInTable | RecordedRun] = []
     for data, table in zip(question.data, tables, strict=True):
         if table:
-            result.append(read_table(data.file, at))
+            result.append(read_table(data.file, at, name=data.name))
         else:
             result.append(recorded_run(read(data), window=data.window, **_reading(data)))
     return result
@@ -101,7 +102,7 @@ def read_data(
 def _reading(data: questions.Data) -> dict[str, Any]:
     """How a trace becomes a run, but for its window."""
     return {
-        "name": data.name or data.file.stem,
+        "name": Path(data.name or data.file).stem,
         "steps": data.steps,
         "velocities": data.velocities,
     }

@@ -87,8 +87,8 @@ _PLUS_MINUS = re.compile(r"^\s*(.+?)\s*(?:\+-|±|\+/-)\s*([-+.\deE]+)\s*(.*?)\s*
 
 def _priors(value: Any) -> Any:
     """Materials stand under their names, with None."""
-    if isinstance(value, Mapping):
-        return value
+    if value is None or isinstance(value, Mapping):
+        return value or {}
     texts = (value,) if isinstance(value, str) else value
     if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
         raise InputError(
@@ -127,13 +127,11 @@ class Estimation(Record):
     seed: Annotated[int, Field(ge=0)] = 0
 
 
-class _OfData(Question, Estimation):
-    """What a fit and a comparison have in common.
+class FitOptions(Estimation):
+    """How data are compared with a law.
 
     Attributes
     ----------
-    data : tuple of Data
-        All in one likelihood.
     fixed, start : dict of str to float or str
         Numbers in SI, or texts with units.
     material : str, optional
@@ -155,9 +153,6 @@ class _OfData(Question, Estimation):
         Stretch (s) of unloading and reloading of the one recording, whose slope is the prior of K.
     """
 
-    subject = "fit"
-
-    data: tuple[Data, ...]
     fixed: dict[str, Given] = Field(default_factory=dict)
     start: dict[str, Given] = Field(default_factory=dict)
     material: str | None = None
@@ -170,6 +165,20 @@ class _OfData(Question, Estimation):
     gauge_order: Annotated[int, Field(ge=1, le=8)] = 1
     fit_rate: float | str | None = None
     stiffness_from: Span | None = None
+
+
+class _OfData(Question, FitOptions):
+    """What a fit and a comparison have in common.
+
+    Attributes
+    ----------
+    data : tuple of Data
+        All in one likelihood.
+    """
+
+    subject = "fit"
+
+    data: tuple[Data, ...]
 
     @model_validator(mode="after")
     def _some_data(self) -> _OfData:

@@ -215,8 +215,8 @@ def _span(value: Any) -> tuple[float, float]:
         value = (start or -np.inf, end or np.inf)
     if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
         raise InputError("", "be two times", shown(value), "give (start, end)")
-    start, end = (end if end in (-np.inf, np.inf) else _seconds(end) for end in value)
-    return start, end
+    first, last = (end if end in (-np.inf, np.inf) else _seconds(end) for end in value)
+    return first, last
 
 
 Seconds = Annotated[float, BeforeValidator(_seconds)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -88,7 +89,8 @@ class Measurement(Question):
     Attributes
     ----------
     modulated : bool, optional
-        Whether the load is; by default velocity steps and holds are read where it is constant.
+        Whether the load is; by default velocity steps and holds are read where it is constant, or
+        where some are given.
     load, force : str
         Channels, by name or role.
     frequency : float or str, optional
@@ -122,6 +124,15 @@ class Measurement(Question):
     steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
 
+    @model_validator(mode="before")
+    @classmethod
+    def _without_modulation(cls, fields: Any) -> Any:
+        """Steps and holds are those of a recording without modulation."""
+        given = isinstance(fields, Mapping) and (fields.get("steps") or fields.get("holds"))
+        if given and fields.get("modulated") is None:
+            return {**fields, "modulated": False}
+        return fields
+
     @model_validator(mode="after")
     def _consistent(self) -> Measurement:
         if self.exact_frequency and self.frequency is None:
@@ -131,11 +142,11 @@ class Measurement(Question):
                 "none",
                 "give the frequency or leave it out",
             )
-        if self.modulated is not False and (self.steps or self.holds):
+        if self.modulated and (self.steps or self.holds):
             raise InputError(
                 "measure.steps and holds",
                 f"go with {Argument('modulated', value='False')}",
-                "them without",
-                "leave them out or say so",
+                "them of a modulated recording",
+                "leave one of them out",
             )
         return self
