@@ -19,7 +19,7 @@ _EQUATIONS = _BASE | {"laws", "loads", "slider"}
 _SOLVERS = {"algebra", "theory", "orbit", "branches", "transients"}
 _SIGNALS = {"recording", "lock_in", "measurement", "tribometer"}
 _RESULTS = _EQUATIONS | _SOLVERS | _SIGNALS | {"air", "materials", "questions"}
-_STUDIES = {"experiment", "protocol", "study"}
+_STUDIES = {"experiment", "protocol", "samples", "study"}
 
 #: The rooms, and what each may import besides itself: the one place where the order is written.
 MAY_IMPORT: dict[str, set[str]] = {
@@ -49,6 +49,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "experiment": _RESULTS,
     "operating_point": _EQUATIONS | {"algebra", "materials", "orbit"},  # numbers by name
     "protocol": _RESULTS | {"experiment", "operating_point"},
+    "samples": _BASE | {"operating_point", "protocol", "recording"},
     "study": _RESULTS | {"operating_point", "protocol", "inference"},  # varies all of these
     "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material

@@ -37,7 +37,7 @@ from asperity.measurement.window import (
     under_the_same_load,
     whole_periods,
 )
-from asperity.parameters.parameter import Displayed, SummaryLine
+from asperity.parameters.parameter import Drawn, SummaryLine
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
@@ -58,7 +58,7 @@ _PIECES, _PIECE, _FEWEST_PERIODS = 32, 1 << 15, 8.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Measurement(Displayed):
+class Measurement(Drawn):
     """A reading of one modulated stretch, what was around it, and what is to be thought of it.
 
     Attributes
@@ -81,6 +81,8 @@ class Measurement(Displayed):
     chosen_by : {"program", "user"}
         Who chose the window.
     """
+
+    _drawn_by = "asperity.figures.recording:draw_modulated"
 
     reading: LockInReading
     before: MeanLevel | None

@@ -13,9 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import Argument, InputError
-from asperity.recording.checks import check, spikes
+from asperity.recording.defects.check import check
+from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.rows import rows_to_avoid, usable_rows
 from asperity.recording.finding import Finding
-from asperity.recording.rounded_time import even_times
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Channel, Trace
@@ -27,8 +28,7 @@ Array = NDArray[np.float64]
 #: or zero is more.
 _CONTRADICTS = 0.1
 
-#: A step of this many median steps is a gap.
-_GAP = 1.5
+_NONE: NDArray[np.intp] = np.empty(0, dtype=np.intp)
 
 #: Largest size of a value, and one over the smallest of a channel's largest: fits take squares of
 #: squares of ratios, which doubles must hold.
@@ -266,7 +266,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     names_found = {finding.name for finding in findings}
     keep = None
     if names_found & {"nan", "infinite", "backward time", "repeated time"}:
-        keep = _kept(time, values)
+        keep = usable_rows(time, values)
         time, values = time[keep], (values[0][keep], values[1][keep])
     if time.size < 16:
         raise InputError(
@@ -276,7 +276,8 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
             "give a longer recording or window",
         )
     require_computable(time=time - time[0], **dict(zip(names, values, strict=True)))
-    defects = _defects(time, values, names_found, keep)
+    seen = {"gap", "spike", "saturation"} & names_found
+    defects = rows_to_avoid(time, values, keep) if seen or keep is not None else _NONE
     dropped = len(trace) - time.size
     return Samples(time, *values, W.unit, names, defects, findings, dropped, unread, two)
 
@@ -336,37 +337,6 @@ def about_channels(trace: Trace, names: tuple[str, ...]) -> tuple[Finding, ...]:
         for f in trace.findings
         if not any(f.where == name or f.where.startswith(f"{name}, ") for name in others)
     )
-
-
-def _kept(time: Array, values: tuple[Array, Array]) -> NDArray[np.bool_]:
-    finite = np.isfinite(time) & np.isfinite(values[0]) & np.isfinite(values[1])
-    latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
-    finite[1:] &= time[1:] > latest[:-1]
-    return finite
-
-
-def _defects(
-    time: Array,
-    values: tuple[Array, Array],
-    names_found: set[str],
-    keep: NDArray[np.bool_] | None,
-) -> NDArray[np.intp]:
-    defects = [np.empty(0, dtype=np.intp)]
-    if keep is not None:
-        rows = np.flatnonzero(keep)
-        defects.append(np.flatnonzero(np.diff(rows) > 1) + 1)
-    if "gap" in names_found:
-        steps = np.diff(time)
-        defects.append(np.flatnonzero(steps > _GAP * np.median(steps)) + 1)
-    if "spike" in names_found:
-        defects += [spikes(channel) for channel in values]
-    if "saturation" in names_found:
-        for channel in values:
-            for extreme in (channel.max(), channel.min()):
-                at = channel == extreme
-                # A single largest value is none: saturation stands still.
-                defects.append(np.flatnonzero(at[1:] & at[:-1]) + 1)
-    return np.unique(np.concatenate(defects))
 
 
 def _name(trace: Trace, channel: Channel) -> str:

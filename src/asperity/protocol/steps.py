@@ -31,7 +31,7 @@ from asperity.loads import (
 from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.parameters.arguments import shown
 from asperity.recording import read
-from asperity.recording.rounded_time import even_times
+from asperity.recording.defects.rounded_time import even_times
 from asperity.units import to_si
 
 #: What a recording can prescribe: the role of its channel, and the kind that it must be of.

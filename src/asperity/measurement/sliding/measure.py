@@ -20,7 +20,7 @@ from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, worst
-from asperity.parameters.parameter import Displayed, SummaryLine
+from asperity.parameters.parameter import Drawn, SummaryLine
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,7 +77,7 @@ class SlidingSegment:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SlidingMeasurement(Displayed):
+class SlidingMeasurement(Drawn):
     """What a recording without modulation says.
 
     Attributes
@@ -108,6 +108,8 @@ class SlidingMeasurement(Displayed):
         Findings about channels that were not read.
     checks : tuple of Check
     """
+
+    _drawn_by = "asperity.figures.recording:draw_sliding"
 
     friction: MeanLevel
     load: MeanLevel | None

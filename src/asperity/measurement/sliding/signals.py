@@ -17,8 +17,9 @@ from asperity.measurement.samples import (
     require_computable,
     shear_channel,
 )
+from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.rows import usable_rows
 from asperity.recording.roles import candidates, words
-from asperity.recording.rounded_time import even_times
 
 if TYPE_CHECKING:
     from asperity.recording.finding import Finding
@@ -101,11 +102,7 @@ def sliding_signals(
     names = tuple(key for key, c in trace.channels.items() if any(c is used for used in read))
     name = "" if moved is None else moved.recorded_name or names[-1]
     time = even_times(trace.time)
-    use = np.isfinite(time) & np.isfinite(friction)
-    if motion is not None:
-        use &= np.isfinite(motion)
-    latest = np.maximum.accumulate(np.where(use, time, -np.inf))
-    use[1:] &= time[1:] > latest[:-1]
+    use = usable_rows(time, [friction] if motion is None else [friction, motion])
     outside = np.zeros(time.size, bool)
     if window is not None:
         outside = (time < window[0]) | (time > window[1])

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from asperity.errors import Argument, InputError, closest, listed, printable
 from asperity.parameters.arguments import shown
-from asperity.recording.checks import check
+from asperity.recording.defects.check import check
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
 from asperity.recording.readers.raw import refuse_truncated
