@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from asperity.errors import ConstantLoadError, InputError
-from asperity.measurement.measure import Measurement, measure
+from asperity.measurement.measure import Measurement, measure, measure_amplitudes
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
-from asperity.parameters.arguments import number, one_of, pair, switch, whole_number
+from asperity.questions.recording import Measurement as Question
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
@@ -65,38 +65,102 @@ def measure_recording(
     InputError
         If the file cannot be read, the recording lacks a channel, or an argument does not fit.
     """
-    if modulated is not None:
-        modulated = switch(modulated, "modulated")
-    one_of(detrend, ("none", "linear", "quadratic"), "detrend")
-    if modulated is not False and (steps is not None or holds is not None):
-        raise InputError(
-            "steps and holds must go with modulated=False, got them without; leave them out or say "
-            "so"
-        )
-    between = None
-    if window is not None:
-        first, last = pair(window, "window")
-        between = (number(first, "window", "time"), number(last, "window", "time"))
-    trace = recording if isinstance(recording, Trace) else read(recording)
-    common: dict[str, Any] = {"load": load, "force": force, "window": between, "detrend": detrend}
-    if modulated is False:
-        return measure_sliding(trace, steps=steps, holds=holds, **common)
-    lock_in: dict[str, Any] = {
-        "frequency": None,
-        "harmonics": whole_number(harmonics, "harmonics", least=1),
-        "only_whole_periods": switch(only_whole_periods, "only_whole_periods"),
-        "refine": switch(refine, "refine"),
+    fields: dict[str, Any] = {
+        "modulated": modulated,
+        "load": load,
+        "force": force,
+        "frequency": frequency,
+        "exact_frequency": not refine,
+        "harmonics": harmonics,
+        "window": window,
+        "whole_periods": only_whole_periods,
+        "detrend": detrend,
+        "steps": steps,
+        "holds": holds,
     }
-    if frequency is not None:
-        lock_in["frequency"] = number(frequency, "frequency", "frequency", "positive")
-    if modulated or frequency is not None:
-        return measure(trace, **lock_in, **common)
-    return modulated_or_sliding(
+    question = Question(**fields)
+    trace = recording if isinstance(recording, Trace) else read(recording)
+    return answer_measurement(trace, question)[0]
+
+
+def answer_measurement(
+    trace: Trace, question: Question, *, plain: bool = False
+) -> tuple[Measurement | SlidingMeasurement, str]:
+    """What a question asks of a recording: its longest modulated stretch, or its sliding.
+
+    Parameters
+    ----------
+    trace : Trace
+    question : asperity.questions.recording.Measurement
+    plain : bool
+        As of `modulated_or_sliding`.
+
+    Returns
+    -------
+    measurement : Measurement or SlidingMeasurement
+    what : str
+        What the recording is, where the program reads it as sliding by itself; else empty.
+
+    Raises
+    ------
+    InputError
+        As of `measure_recording`.
+    """
+    return _either(
         trace,
-        lambda: measure(trace, **lock_in, **common),
-        lambda: measure_sliding(trace, **common),
-        load=load,
-    )[0]
+        question,
+        lambda: measure(trace, window=question.window, **_lock_in(question)),
+        plain=plain,
+    )
+
+
+def measured_parts(
+    trace: Trace, question: Question
+) -> list[Measurement | InputError] | SlidingMeasurement:
+    """As `answer_measurement`, with every modulated stretch of the recording or of the window."""
+    return _either(trace, question, lambda: modulated_parts(trace, question))[0]
+
+
+def modulated_parts(trace: Trace, question: Question) -> list[Measurement | InputError]:
+    """Every modulated stretch of a recording; that of the window, if one is given."""
+    if question.window is not None:
+        return [measure(trace, window=question.window, **_lock_in(question))]
+    return measure_amplitudes(trace, **_lock_in(question))
+
+
+def _either(
+    trace: Trace, question: Question, modulated: Callable[[], Read], *, plain: bool = False
+) -> tuple[Read | SlidingMeasurement, str]:
+    """What `modulated` reads, or the sliding, as the question or the recording says."""
+
+    def sliding() -> SlidingMeasurement:
+        return measure_sliding(
+            trace,
+            load=question.load,
+            force=question.force,
+            window=question.window,
+            detrend=question.detrend,
+            steps=question.steps,
+            holds=question.holds,
+        )
+
+    if question.modulated is False:
+        return sliding(), ""
+    if question.modulated or question.frequency is not None:
+        return modulated(), ""
+    return modulated_or_sliding(trace, modulated, sliding, load=question.load, plain=plain)
+
+
+def _lock_in(question: Question) -> dict[str, Any]:
+    return {
+        "load": question.load,
+        "force": question.force,
+        "frequency": question.frequency,
+        "harmonics": question.harmonics,
+        "detrend": question.detrend,
+        "only_whole_periods": question.whole_periods,
+        "refine": not question.exact_frequency,
+    }
 
 
 def modulated_or_sliding(
