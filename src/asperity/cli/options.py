@@ -80,6 +80,21 @@ def law_option(
     return click.option("--law", metavar="NAME", callback=_named_law, help=help_text)
 
 
+def law_options() -> Decorator:
+    """``--law`` that may be repeated, as `law_option`; the command gets `laws`."""
+    return click.option(
+        "--law",
+        "laws",
+        metavar="NAME",
+        multiple=True,
+        callback=lambda context, option, texts: tuple(
+            str(_named_law(context, option, text)) for text in texts
+        ),
+        help="Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
+        "of a comparison, repeatable.",
+    )
+
+
 def _named_law(context: click.Context, option: click.Parameter, text: str | None) -> str | None:
     if text is None or ":" not in text:
         return text

@@ -7,14 +7,14 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from asperity.errors import Argument, ConstantLoadError, InputError
-from asperity.measurement.measure import Measurement, measure
+from asperity.measurement.measure import Measurement, measure, measure_amplitudes
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
 from asperity.measurement.stick_slip.measure import (
     Machine,
     StickSlipMeasurement,
     measure_stick_slip,
 )
-from asperity.parameters.arguments import number, one_of, pair, switch, whole_number
+from asperity.questions.recording import Measurement as Question
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
@@ -84,58 +84,123 @@ def measure_recording(
     InputError
         If the file cannot be read, the recording lacks a channel, or an argument does not fit.
     """
-    if modulated is not None:
-        modulated = switch(modulated, "modulated")
-    one_of(detrend, ("none", "linear", "quadratic"), "detrend")
-    if modulated is not False and (steps is not None or holds is not None):
-        raise InputError(
-            "steps and holds must go with modulated=False, got them without; leave them out or say "
-            "so"
-        )
-    between = None
-    if window is not None:
-        first, last = pair(window, "window")
-        between = (number(first, "window", "time"), number(last, "window", "time"))
+    fields: dict[str, Any] = {
+        "modulated": modulated,
+        "load": load,
+        "force": force,
+        "frequency": frequency,
+        "exact_frequency": not refine,
+        "harmonics": harmonics,
+        "window": window,
+        "whole_periods": only_whole_periods,
+        "detrend": detrend,
+        "steps": steps,
+        "holds": holds,
+        "stick_slip": stick_slip,
+        "stiffness": stiffness,
+        "velocity": velocity,
+        "mass": mass,
+        "normal_load": normal_load,
+    }
+    question = Question(**fields)
     trace = recording if isinstance(recording, Trace) else read(recording)
-    common: dict[str, Any] = {"load": load, "force": force, "window": between, "detrend": detrend}
-    if stick_slip is not None:
-        stick_slip = switch(stick_slip, "stick_slip")
-    machine = Machine(
-        *(
-            None if value is None else number(value, name, kind, "positive")
-            for value, name, kind in (
-                (stiffness, "stiffness", "stiffness"),
-                (velocity, "velocity", "velocity"),
-                (mass, "mass", "mass"),
-                (normal_load, "normal_load", "force"),
-            )
-        )
+    return answer_measurement(trace, question)[0]
+
+
+def answer_measurement(
+    trace: Trace, question: Question, *, plain: bool = False
+) -> tuple[Measurement | SlidingMeasurement | StickSlipMeasurement, str]:
+    """What a question asks of a recording: its longest modulated stretch, slip events, or sliding.
+
+    Parameters
+    ----------
+    trace : Trace
+    question : asperity.questions.recording.Measurement
+    plain : bool
+        As of `modulated_or_sliding`.
+
+    Returns
+    -------
+    measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
+    what : str
+        What the recording is, where the program reads no modulation by itself; else empty.
+
+    Raises
+    ------
+    InputError
+        As of `measure_recording`.
+    """
+    return _either(
+        trace,
+        question,
+        lambda: measure(trace, window=question.window, **_lock_in(question)),
+        plain=plain,
     )
 
-    def events() -> StickSlipMeasurement:
-        return measure_stick_slip(trace, load=load, force=force, window=between, machine=machine)
 
-    if stick_slip:
-        return events()
-    if modulated is False:
-        return measure_sliding(trace, steps=steps, holds=holds, **common)
-    lock_in: dict[str, Any] = {
-        "frequency": None,
-        "harmonics": whole_number(harmonics, "harmonics", least=1),
-        "only_whole_periods": switch(only_whole_periods, "only_whole_periods"),
-        "refine": switch(refine, "refine"),
+def measured_parts(
+    trace: Trace, question: Question
+) -> list[Measurement | InputError] | SlidingMeasurement | StickSlipMeasurement:
+    """As `answer_measurement`, with every modulated stretch of the recording or of the window."""
+    return _either(trace, question, lambda: modulated_parts(trace, question))[0]
+
+
+def modulated_parts(trace: Trace, question: Question) -> list[Measurement | InputError]:
+    """Every modulated stretch of a recording; that of the window, if one is given."""
+    if question.window is not None:
+        return [measure(trace, window=question.window, **_lock_in(question))]
+    return measure_amplitudes(trace, **_lock_in(question))
+
+
+def _either(
+    trace: Trace, question: Question, modulated: Callable[[], Read], *, plain: bool = False
+) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
+    """What `modulated` reads, slip events or the sliding, as the question or the recording says."""
+
+    def sliding() -> SlidingMeasurement:
+        return measure_sliding(
+            trace,
+            load=question.load,
+            force=question.force,
+            window=question.window,
+            detrend=question.detrend,
+            steps=question.steps,
+            holds=question.holds,
+        )
+
+    def slip_events() -> StickSlipMeasurement:
+        machine = Machine(
+            question.stiffness, question.velocity, question.mass, question.normal_load
+        )
+        return measure_stick_slip(
+            trace,
+            load=question.load,
+            force=question.force,
+            window=question.window,
+            machine=machine,
+        )
+
+    if question.stick_slip:
+        return slip_events(), ""
+    if question.modulated is False:
+        return sliding(), ""
+    if question.modulated or question.frequency is not None:
+        return modulated(), ""
+    # The page has no place for slip events yet.
+    events = None if plain or question.stick_slip is False else slip_events
+    return modulated_or_sliding(trace, modulated, sliding, events, load=question.load, plain=plain)
+
+
+def _lock_in(question: Question) -> dict[str, Any]:
+    return {
+        "load": question.load,
+        "force": question.force,
+        "frequency": question.frequency,
+        "harmonics": question.harmonics,
+        "detrend": question.detrend,
+        "only_whole_periods": question.whole_periods,
+        "refine": not question.exact_frequency,
     }
-    if frequency is not None:
-        lock_in["frequency"] = number(frequency, "frequency", "frequency", "positive")
-    if modulated or frequency is not None:
-        return measure(trace, **lock_in, **common)
-    return modulated_or_sliding(
-        trace,
-        lambda: measure(trace, **lock_in, **common),
-        lambda: measure_sliding(trace, **common),
-        events if stick_slip is None else None,
-        load=load,
-    )[0]
 
 
 def modulated_or_sliding(

@@ -48,9 +48,10 @@ from asperity.inference.runs.assembly import (
     stiffness_in,
     usual_ranges,
 )
-from asperity.inference.runs.blocks import coarser, reduced
+from asperity.inference.runs.blocks import coarser
+from asperity.inference.runs.cleaning import cleaned
 from asperity.inference.runs.reading import GAIN
-from asperity.inference.runs.run import RecordedRun, run_of, with_jumps
+from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
@@ -250,7 +251,7 @@ def listed_data(
     ready = [d if isinstance(d, LockInTable) else run_of(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate
-    return [d if isinstance(d, LockInTable) else with_jumps(reduced(d, rate)) for d in ready]
+    return [d if isinstance(d, LockInTable) else cleaned(d, rate) for d in ready]
 
 
 def _objective(

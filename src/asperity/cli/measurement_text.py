@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from asperity.cli.report import aligned
+from asperity.outputs.tables import aligned, rounded
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -307,16 +307,8 @@ def _holds(measurement: SlidingMeasurement) -> list[str]:
 
 def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tuple[str, ...]:
     """A number with as many digits as its uncertainty allows: two uncertain ones."""
-    if not (math.isfinite(doubt) and doubt > 0 and math.isfinite(value)):
-        return name, f"{value:.9g} {unit}".strip(), "", meaning
-    last = math.floor(math.log10(doubt)) - 1
-    digits = max(0, min(15, -last))
-    if value and (abs(value) < 1e-3 or abs(value) >= 1e6):
-        power = math.floor(math.log10(abs(value)))
-        shown = f"{value:.{max(0, min(15, power - last))}e}"
-    else:
-        shown = f"{value:.{digits}f}"
-    return name, f"{shown} {unit}".strip(), f"+- {doubt:.2g}", meaning
+    number, uncertain = rounded(value, doubt)
+    return name, f"{number} {unit}".strip(), uncertain, meaning
 
 
 def _quality(checks: Iterable[Check]) -> list[str]:

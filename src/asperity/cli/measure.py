@@ -1,83 +1,78 @@
-"""``asperity measure``: friction in a recording, with uncertainties and verdicts.
-
-Options give times and spans of time themselves or in a file.
-"""
+"""``asperity measure``: friction in a recording, with uncertainties and verdicts."""
 
 from __future__ import annotations
 
-import math
-import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.measure.reading import FileRows, ReadingOptions
-from asperity.cli.measure.source import RecordingSource, source_options
-from asperity.cli.options import json_option, set_option, settings_of
-from asperity.errors import InputError
+from asperity.cli.options import json_option
+from asperity.cli.recording import listed_times, source_options
+from asperity.cli.words import in_options
+from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
-    from asperity.measurement.stick_slip.measure import Machine
     from asperity.measurement.verdicts.verdict import Check
+    from asperity.questions.recording import Measurement as Question
+    from asperity.questions.recording import Source
 
 
-def span_of(text: str, option: str) -> tuple[float, float]:
-    """Seconds of a START:END text, with or without their unit; an open end is infinite."""
-    start, colon, end = (part.strip() for part in text.partition(":"))
-    if not colon:
-        raise InputError(f"{option} must be START:END, got '{text}'; write it like {option} 10:60")
-    return (
-        _seconds(start, option) if start else -math.inf,
-        _seconds(end, option) if end else math.inf,
-    )
+Rows = list[dict[str, Any]]
 
 
-def times_of(text: str, option: str) -> list[float]:
-    """Seconds of a list like ``12.5,60``, or of a file with one time a line.
+@dataclass(frozen=True)
+class FileRows:
+    """Measures one file of a campaign; it can be sent to another process.
 
-    Raises
-    ------
-    InputError
-        If a part is no time, or there is none.
+    Attributes
+    ----------
+    source : Source
+    question : Question
     """
-    times = [_seconds(part, option) for part in _parts(text, option)]
-    return sorted(times)
 
+    source: Source
+    question: Question
 
-def spans_of(text: str, option: str) -> list[tuple[float, float]]:
-    """Seconds of a list like ``100:110,200:300``, or of a file with one span a line."""
-    spans = [span_of(part, option) for part in _parts(text, option)]
-    if not all(math.isfinite(edge) for span in spans for edge in span):
-        raise InputError(f"{option} must have a start and an end, got '{text}'; write both")
-    return sorted(spans)
+    def __call__(self, path: Path) -> Rows:
+        """Rows of a file; one row with the reason if it cannot be measured."""
+        from asperity.measurement.campaign import failed_row, modulated_rows, sliding_rows
+        from asperity.measurement.from_file import measured_parts
+        from asperity.measurement.stick_slip.catalogue import stick_slip_row
+        from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+        from asperity.recording.readers.from_file import read_source
 
+        with naming(in_options):
+            try:
+                result = measured_parts(read_source(path, self.source), self.question)
+                if isinstance(result, list):
+                    return modulated_rows(path, result)
+                if isinstance(result, StickSlipMeasurement):
+                    return [stick_slip_row(path, result)]
+                return sliding_rows(path, result)
+            except InputError as error:
+                return [failed_row(path, 1, str(error))]
+            except Exception as error:  # one damaged file must not cost the others
+                reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+                return [failed_row(path, 1, f"the recording could not be measured ({reason})")]
 
-def _parts(text: str, option: str) -> list[str]:
-    path = Path(text)
-    if not re.fullmatch(r"[-+.\d\s,:;eE\w]*", text) or path.is_file():
-        try:
-            lines = path.read_text(encoding="utf-8").splitlines()
-        except (OSError, UnicodeDecodeError):
-            raise InputError(
-                f"{option} must be times or a file that can be read, got '{text}'; check the name"
-            ) from None
-        # Two columns are a span.
-        parts = [re.sub(r"[\s,;]+", ":", line.split("#")[0].strip()) for line in lines]
-    else:
-        parts = re.split(r"[,;]", text)
-    result = [part.strip() for part in parts if part.strip()]
-    if not result:
-        raise InputError(
-            f"{option} must hold times, got '{text}'; write them like {option} 12.5,60"
-        )
-    return result
+    def inputs(self) -> dict[str, Any]:
+        """All that rows depend on besides the files, as JSON values.
 
+        Of a reduction file its contents: a campaign is not resumed with another one.
 
-def _seconds(part: str, option: str) -> float:
-    from asperity.units import to_si
+        Raises
+        ------
+        InputError
+            If the reduction file cannot be read.
+        """
+        source = self.source.model_dump(mode="json")
+        if self.source.recipe is not None:
+            from asperity.recording.recipe import load_recipe
 
-    return to_si(part if part[-1:].isalpha() else f"{part} s", "time", option)
+            source["recipe"] = load_recipe(self.source.recipe).model_dump()
+        return {"source": source, "options": self.question.model_dump(mode="json")}
 
 
 _EPILOG = """\b
@@ -87,8 +82,8 @@ Examples:
       --frequency "120 Hz" --window 10:60 --json --plot recording.png
   asperity measure velocity_step.txt --no-modulation --plot steps.png
   asperity measure amplitudes.csv --amplitudes
-  asperity measure stick_slip.mat --set "K=168 N/m" --set "V=42 um/s" \\
-      --set "M=30.7 g" --events events.csv --plot events.png
+  asperity measure stick_slip.mat --stiffness "168 N/m" --velocity "42 um/s" \\
+      --mass "30.7 g" --events events.csv --plot events.png
   asperity measure day1/*.csv --out campaign.csv
 
 \b
@@ -146,7 +141,14 @@ in place of numbers; 2: bad input.
     is_flag=True,
     help="Slip events; by default, those of a recording that is stick-slip and not modulated.",
 )
-@set_option('--set "K=168 N/m" --set "V=42 um/s"', "K, V, M or W0 of the machine, for slip events")
+@click.option("--stiffness", metavar="VALUE", help='Of the spring, for slip events: "168 N/m".')
+@click.option("--velocity", metavar="VALUE", help='Of its far end, for slip events: "42 um/s".')
+@click.option("--mass", metavar="VALUE", help='Of the slider, for slip events: "30.7 g".')
+@click.option(
+    "--normal-load",
+    metavar="VALUE",
+    help='Where none is recorded, for slip events: "0.3 N"; by default the weight of --mass.',
+)
 @click.option(
     "--events",
     type=Path,
@@ -173,7 +175,7 @@ in place of numbers; 2: bad input.
 @click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
 def measure(
     recordings: tuple[Path, ...],
-    source: RecordingSource,
+    source: Source,
     frequency: str,
     exact_frequency: bool,
     harmonics: int,
@@ -184,7 +186,10 @@ def measure(
     steps: str | None,
     holds: str | None,
     stick_slip: bool,
-    settings: tuple[str, ...],
+    stiffness: str | None,
+    velocity: str | None,
+    mass: str | None,
+    normal_load: str | None,
     events: Path | None,
     amplitudes: bool,
     out: Path | None,
@@ -198,35 +203,32 @@ def measure(
     RECORDINGS are files of a laboratory: CSV or other text, HDF5, MATLAB, TDMS or LOOK. Several
     are measured into one table with --out.
     """
-    options = ReadingOptions(
-        modulated=False if no_modulation else None,
-        frequency=_frequency(frequency, exact_frequency),
-        exact_frequency=exact_frequency,
-        harmonics=harmonics,
-        window=None if window is None else span_of(window, "--window"),
-        whole_periods=whole_periods,
-        detrend=detrend,
-        steps=None if steps is None else times_of(steps, "--steps"),
-        holds=None if holds is None else spans_of(holds, "--holds"),
-        stick_slip=True if stick_slip else None,
-        machine=_machine(settings),
-    )
-    if stick_slip and (no_modulation or frequency != "auto" or amplitudes):
-        raise InputError(
-            "--stick-slip must go without --no-modulation, --frequency and --amplitudes, got both; "
-            "leave one out"
-        )
-    if (steps or holds) and not no_modulation:
-        raise InputError(
-            "--steps and --holds must go with --no-modulation, got them without; add it"
-        )
+    from asperity.questions.recording import Measurement as Question
+
+    fields: dict[str, Any] = {
+        "modulated": False if no_modulation else None,
+        "frequency": None if frequency == "auto" else frequency,
+        "exact_frequency": exact_frequency,
+        "harmonics": harmonics,
+        "window": window,
+        "whole_periods": whole_periods,
+        "detrend": detrend,
+        "steps": None if steps is None else listed_times(steps, "--steps"),
+        "holds": None if holds is None else listed_times(holds, "--holds"),
+        "stick_slip": True if stick_slip else None,
+        "stiffness": stiffness,
+        "velocity": velocity,
+        "mass": mass,
+        "normal_load": normal_load,
+    }
+    question = Question(**fields)
     if out is not None:
         if plot is not None or events is not None or steps or holds:
             raise InputError(
                 "--plot, --events, --steps and --holds must go with one recording without --out, "
                 "got both; measure that recording by itself"
             )
-        return _campaign(recordings, source, options, out, resume, jobs, as_json)
+        return _campaign(recordings, source, question, out, resume, jobs, as_json)
     if len(recordings) > 1:
         raise InputError(
             f"--out must be given with several recordings, got {len(recordings)} without; name "
@@ -238,17 +240,21 @@ def measure(
         )
     (recording,) = recordings
     if amplitudes:
-        if no_modulation or plot is not None:
+        if no_modulation or stick_slip or plot is not None or events is not None:
             raise InputError(
-                "--amplitudes must go without --no-modulation and --plot, got both; leave one out"
+                "--amplitudes must go without --no-modulation, --stick-slip, --events and --plot, "
+                "got both; leave one out"
             )
-        return _amplitudes(recording, source, options, as_json)
+        return _amplitudes(recording, source, question, as_json)
     if plot is not None:
         _check_picture(plot, recording)
     if events is not None:
         _check_catalogue(events, recording)
-    trace = source.read(recording)
-    result, why = options.measure(trace)
+    from asperity.measurement.from_file import answer_measurement
+    from asperity.recording.readers.from_file import read_source
+
+    trace = read_source(recording, source)
+    result, why = answer_measurement(trace, question)
     if why:
         click.echo(f"asperity: {why}", err=True)
     if events is not None:
@@ -259,14 +265,14 @@ def measure(
     return _verdict(result.checks)
 
 
-def _amplitudes(
-    recording: Path, source: RecordingSource, options: ReadingOptions, as_json: bool
-) -> int:
-    from asperity.cli.measure.text import amplitudes_text
+def _amplitudes(recording: Path, source: Source, question: Question, as_json: bool) -> int:
+    from asperity.cli.measurement_text import amplitudes_text
     from asperity.cli.report import to_json
     from asperity.measurement.campaign import modulated_rows
+    from asperity.measurement.from_file import modulated_parts
+    from asperity.recording.readers.from_file import read_source
 
-    rows = modulated_rows(recording, options.amplitudes(source.read(recording)))
+    rows = modulated_rows(recording, modulated_parts(read_source(recording, source), question))
     if as_json:
         click.echo(to_json({"recording": str(recording), "amplitudes": rows}))
     else:
@@ -276,8 +282,8 @@ def _amplitudes(
 
 def _campaign(
     recordings: tuple[Path, ...],
-    source: RecordingSource,
-    options: ReadingOptions,
+    source: Source,
+    question: Question,
     out: Path,
     resume: bool,
     jobs: int | None,
@@ -289,7 +295,7 @@ def _campaign(
     from asperity.cli.report import to_json
     from asperity.measurement.campaign import run_campaign
 
-    rows_of = FileRows(source, options)
+    rows_of = FileRows(source, question)
     with bar("files") as update:
         done = run_campaign(
             recordings,
@@ -303,7 +309,7 @@ def _campaign(
     if as_json:
         numbers = {"files": done.files, "rows": done.rows, "failed": done.failed}
         click.echo(to_json({**numbers, "out": str(out)}))
-    if done.sliding and options.modulated is None:
+    if done.sliding and question.modulated is None:
         click.echo(
             f"asperity: {done.sliding} of {done.files} files have a constant load: their velocity "
             "steps and holds are in the table, as with --no-modulation",
@@ -346,39 +352,9 @@ def _catalogue(result: Any, path: Path) -> None:
     write_catalogue(result, path)
 
 
-def _machine(settings: tuple[str, ...]) -> Machine:
-    from asperity.measurement.stick_slip.measure import Machine
-    from asperity.parameters.arguments import number
-
-    kinds = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "force"}
-    fields = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "load"}
-    numbers = {}
-    for name, text in settings_of(settings).items():
-        if name not in kinds:
-            raise InputError(
-                f"--set must name one of {', '.join(kinds)}, got '{name}'; write it like "
-                '--set "K=168 N/m"'
-            )
-        numbers[fields[name]] = number(text, f"--set {name}", kinds[name], "positive")
-    return Machine(**numbers)
-
-
-def _frequency(text: str, exact: bool) -> float | None:
-    from asperity.units import to_si
-
-    if text != "auto":
-        return to_si(text, "frequency", "--frequency")
-    if exact:
-        raise InputError(
-            "--exact-frequency must go with --frequency, got 'auto'; give the frequency or leave "
-            "the option out"
-        )
-    return None
-
-
 def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
     from asperity._version import __version__
-    from asperity.cli.measure.text import modulated_text, sliding_text, stick_slip_text
+    from asperity.cli.measurement_text import modulated_text, sliding_text, stick_slip_text
     from asperity.cli.report import to_json
     from asperity.measurement.record import modulated_record, sliding_record
     from asperity.measurement.stick_slip.catalogue import stick_slip_record
