@@ -292,12 +292,13 @@ def step_response(
     velocity_before: ArrayLike | str,
     velocity: ArrayLike | str,
     stiffness: ArrayLike | str | None = None,
+    settling: bool = True,
 ) -> VelocityStepResponse:
     """Slide steadily and step the drive's velocity, for any law and any stiffness.
 
     Parameters
     ----------
-    slider, stiffness
+    slider, stiffness, settling
         As of `hold_response`.
     velocity_before, velocity : array or str
         Of the drive (m/s), positive and different.
@@ -314,6 +315,7 @@ def step_response(
     slider = _slider(slider, stiffness)
     first = obeying(velocity_before, "step_response.velocity_before", "velocity", "positive")
     V = obeying(velocity, "step_response.velocity", "velocity", "positive")
+    follow = switch(settling, "step_response.settling")
     (flat, first, V), shape = _flat((slider, first, V), "step_response")
     if np.any(first == V):
         raise InputError(
@@ -323,7 +325,7 @@ def step_response(
 
     def run(slider: Slider, V: jax.Array, first: jax.Array, runaway: jax.Array) -> tuple:
         found, extremum = step(slider, first, V)
-        return found, settle(slider, V, extremum, runaway)
+        return found, settle(slider, V, extremum, runaway) if follow else None
 
     runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
     found, after = _in_shapes(run, flat, V, first, runaway)
