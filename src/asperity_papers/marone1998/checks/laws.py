@@ -13,7 +13,7 @@ Numbers = dict[str, float]
 
 
 def _rate(law: object, v: float, log_age: float) -> float:
-    """d ln(theta)/dt (1/s) of a law of the library."""
+    """D ln(theta)/dt (1/s) of a law of the library."""
     (rate,) = law.state_rate(v, v, (np.array(log_age),), 1.0)  # type: ignore[attr-defined]
     return float(rate)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from asperity.experiment import VelocityStepResponse, step_response
 from asperity import Slider, transient
+from asperity.experiment import VelocityStepResponse, step_response
 from asperity.ledger import check
 from asperity.loads import Programme, Slide
 from asperity.theory import memory

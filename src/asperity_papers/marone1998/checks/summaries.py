@@ -104,7 +104,7 @@ def dilation_too_small(laboratory: Laboratory) -> Numbers:
 
 @check("half-of-the-year")
 def half_of_the_year(laboratory: Laboratory) -> Numbers:
-    """u = alpha ln(1 + s t): s that makes half of a year's slip occur in 14 d, by its root."""
+    """U = alpha ln(1 + s t): s that makes half of a year's slip occur in 14 d, by its root."""
     days = laboratory.numbers.half_year_afterslip / _DAY
     # 2 ln(1 + 14 s) = ln(1 + 365 s) is quadratic: 1 + 28 s + 196 s^2 = 1 + 365 s.
     rate = (365 - 2 * days) / days**2
@@ -153,7 +153,7 @@ def slip_falls_with_depth(laboratory: Laboratory) -> Numbers:
 
 @check("afterslip-relation")
 def afterslip_relation(laboratory: Laboratory) -> Numbers:
-    """alpha and beta of the printed relation, fitted to the curve of Figure 16b."""
+    """Alpha and beta of the printed relation, fitted to the curve of Figure 16b."""
     scan = scans()["figure_16b"]
     t, u = np.array(scan["slip"]).T
     after = u[1:] - u[0]
