@@ -18,8 +18,8 @@ _BASE = {"_jax", "_lazy", "_version", "errors", "outputs", "parameters", "units"
 _EQUATIONS = _BASE | {"laws", "loads", "slider"}
 _SOLVERS = {"algebra", "theory", "orbit", "branches", "transients"}
 _SIGNALS = {"recording", "lock_in", "measurement", "tribometer"}
-_RESULTS = _EQUATIONS | _SOLVERS | _SIGNALS | {"air", "materials"}
-_STUDIES = {"experiment", "protocol", "study"}
+_RESULTS = _EQUATIONS | _SOLVERS | _SIGNALS | {"air", "materials", "questions"}
+_STUDIES = {"experiment", "protocol", "samples", "study"}
 
 #: The rooms, and what each may import besides itself: the one place where the order is written.
 MAY_IMPORT: dict[str, set[str]] = {
@@ -30,24 +30,26 @@ MAY_IMPORT: dict[str, set[str]] = {
     "units": {"errors"},
     "outputs": {"errors", "_version"},  # files of any content
     "parameters": {"errors", "units"},  # knows no laws: it reads the fields that they declare
+    "questions": _BASE,  # knows nothing of how they are answered
     "algebra": {"_jax"},
     "laws": _BASE,  # knows no springs, no loads, no numbers of any paper
     "loads": _BASE,  # knows no laws
     "air": _BASE,  # knows no friction
-    "materials": _BASE | {"laws"},  # knows no solvers
+    "materials": _BASE | {"laws", "questions"},  # knows no solvers
     "slider": _BASE | {"laws", "loads", "algebra"},  # knows no solvers
     "theory": _EQUATIONS | {"algebra"},
     "transients": _EQUATIONS | {"algebra"},
     "orbit": _EQUATIONS | {"algebra", "theory", "transients"},  # knows no instruments, no files
     "branches": _EQUATIONS | {"algebra", "theory", "orbit"},
-    "recording": _BASE,  # knows no laws, no solvers
+    "recording": _BASE | {"questions"},  # knows no laws, no solvers
     "lock_in": _BASE | {"recording"},
-    "measurement": _BASE | {"recording", "lock_in", "outputs"},
+    "measurement": _BASE | {"questions", "recording", "lock_in"},
     "tribometer": _BASE | {"recording"},  # is handed a trajectory
-    "inference": _EQUATIONS | _SIGNALS | {"materials", "orbit"},
+    "inference": _EQUATIONS | _SIGNALS | {"materials", "orbit", "questions"},
     "experiment": _RESULTS,
     "operating_point": _EQUATIONS | {"algebra", "materials", "orbit"},  # numbers by name
     "protocol": _RESULTS | {"experiment", "operating_point"},
+    "samples": _BASE | {"operating_point", "protocol", "recording"},
     "study": _RESULTS | {"operating_point", "protocol", "inference"},  # varies all of these
     "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material

@@ -1,27 +1,58 @@
-"""Draw the picture of the README again, small: ``python docs/images/make.py``.
+"""Draw the pictures of the README and the tutorials again: ``python docs/images/make.py``.
 
-It is Figure 11 of the report that ``asperity reproduce`` writes.
+Figure 11 is that of the report that ``asperity reproduce`` writes.
 """
 
 from pathlib import Path
 
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
 from PIL import Image
 
+import asperity as asp
 from asperity.figures.style import style
 from asperity_papers.bureau2000.figures import draw
 from asperity_papers.bureau2000.harmonics import figure_11
 from asperity_papers.bureau2000.machine import Machine
 
-TARGET = Path(__file__).with_name("figure-11.png")
+FOLDER = Path(__file__).parent
+
+
+def vibration() -> Figure:
+    """Drop of the mean friction against amplitude and frequency (docs/tutorials/vibration.md)."""
+    pmma = asp.materials.load("bureau2000")
+    slider = asp.Slider(pmma.law("elasto-plastic"), spring="0.5 N/um", mass=pmma.M, load=pmma.W0)
+    velocities = {1e-6: "1 µm/s", 1e-5: "10 µm/s", 1e-4: "100 µm/s"}
+    epsilon, frequency = np.linspace(0.0, 0.4, 41), np.geomspace(0.05, 1000.0, 61)
+    figure, (left, right) = plt.subplots(
+        1, 2, figsize=(6.4, 2.6), sharey=True, layout="constrained"
+    )
+    for velocity, label in velocities.items():
+        r = asp.periodic_response(slider, velocity=velocity, epsilon=epsilon, frequency=120.0)
+        left.plot(100 * epsilon, -100 * r.delta_mu / r.mu_ss, label=label)
+        r = asp.periodic_response(slider, velocity=velocity, epsilon=0.24, frequency=frequency)
+        right.plot(frequency, -100 * r.delta_mu / r.mu_ss, label=label)
+    left.set(xlabel="modulation of the load (%), at 120 Hz", ylabel="friction falls by (%)")
+    right.set(xlabel="frequency (Hz), at 24 %", xscale="log")
+    left.legend(title="sliding at")
+    return figure
+
+
+def save(figure: Figure, name: str) -> None:
+    """Write a PNG with a palette of 64 colours: a third of the size, and no visible loss."""
+    target = FOLDER / name
+    figure.savefig(target, dpi=150, metadata={"Software": None})
+    with Image.open(target) as picture:
+        small = picture.convert("RGB").quantize(64, dither=Image.Dither.NONE)
+    small.save(target, optimize=True)
 
 
 def main() -> None:
-    """Write the PNG with a palette of 64 colours: a third of the size, and no visible loss."""
+    """Write all of them."""
     with style():
-        draw(figure_11(Machine())).savefig(TARGET, dpi=150, metadata={"Software": None})
-    with Image.open(TARGET) as picture:
-        small = picture.convert("RGB").quantize(64, dither=Image.Dither.NONE)
-    small.save(TARGET, optimize=True)
+        save(draw(figure_11(Machine())), "figure-11.png")
+        save(vibration(), "vibration.png")
 
 
 if __name__ == "__main__":

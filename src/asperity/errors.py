@@ -1,19 +1,118 @@
 """The error that a user's input can cause.
 
 Every message is a single sentence of the form
-``<object>.<field> must <rule>, got <value> <unit>; <what to do>``.
+``<object>.<field> must <rule>, got <value> <unit>; <what to do>``. The four parts are data: Python,
+the command line and the page each write them with their own name of the field (`naming`).
 A solve that fails is not an error: it is reported in the result.
 """
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable, Sequence
-from typing import ClassVar
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import ClassVar, NamedTuple
+
+
+class Argument(NamedTuple):
+    """An argument of the library, which is an option or a field elsewhere.
+
+    As a text it has the words of the current door: ``columns['W']`` or ``columns={'W': 'Fn'}`` in
+    Python, ``--load`` or ``--load Fn`` on the command line.
+
+    Attributes
+    ----------
+    name : str
+    key : str
+        Of an argument that is a mapping.
+    value : str
+        To be given; empty where the argument alone is named.
+    """
+
+    name: str
+    key: str = ""
+    value: str = ""
+
+    def __str__(self) -> str:
+        return _words.get()(self)
+
+    def __format__(self, spec: str) -> str:
+        return format(str(self), spec)
+
+
+def in_python(argument: Argument) -> str:
+    """The words of the library."""
+    name, key, value = argument
+    if not value:
+        if key and "." in name:  # a method
+            return f"{name}('{key}')"
+        return f"{name}['{key}']" if key else name
+    shown = value if value.isdigit() or value == "..." else f"'{value}'"
+    return f"{name}={{'{key}': {shown}}}" if key else f"{name}={shown}"
+
+
+Words = Callable[[Argument], str]
+
+_words: ContextVar[Words] = ContextVar("words", default=in_python)
+
+
+@contextmanager
+def naming(words: Words) -> Iterator[None]:
+    """Let sentences name arguments in the words of a door.
+
+    Parameters
+    ----------
+    words : callable
+        From an `Argument` to a text.
+    """
+    token = _words.set(words)
+    try:
+        yield
+    finally:
+        _words.reset(token)
 
 
 class InputError(ValueError):
-    """Input that cannot be used; the message names field, rule, value and the way out."""
+    """Input that cannot be used; the message names field, rule, value and the way out.
+
+    Parameters
+    ----------
+    field : str or Argument
+        What is wrong; the whole sentence where nothing follows.
+    rule : str
+        What follows "must".
+    got : str
+        The value in words.
+    advice : str
+        What to do.
+    """
+
+    def __init__(
+        self, field: str | Argument = "", rule: str = "", got: object = "", advice: str = ""
+    ) -> None:
+        super().__init__(field, rule, got, advice)
+        self.field = field if isinstance(field, Argument) else Argument(field)
+        self.rule, self.got, self.advice = rule, str(got), advice
+
+    def __str__(self) -> str:
+        if not self.rule:
+            return self.field.name
+        got = f", got {self.got}" if self.got else ""
+        advice = f"; {self.advice}" if self.advice else ""
+        return f"{self.field} must {self.rule}{got}{advice}"
+
+    def about(self, field: str | Argument) -> InputError:
+        """The same mistake of another field; a whole sentence stays as it is."""
+        if not self.rule:
+            return self
+        return type(self)(field, self.rule, self.got, self.advice)
+
+    def noting(self, addition: str) -> InputError:
+        """The same mistake with an addition at its end."""
+        if not self.rule:
+            return type(self)(f"{self}{addition}")
+        return type(self)(self.field, self.rule, self.got, self.advice + addition)
 
 
 class ConstantLoadError(InputError):
@@ -25,29 +124,33 @@ class MistakesError(InputError):
 
     Parameters
     ----------
-    mistakes : sequence of str
+    mistakes : sequence of str or InputError
         One sentence each.
     source : str
         The file, if there is one.
-
-    Attributes
-    ----------
-    mistakes : tuple of str
     """
 
     #: What has the mistakes, for the message.
-    subject: ClassVar[str]
+    subject: ClassVar[str] = "input"
 
-    def __init__(self, mistakes: Sequence[str], source: str = "") -> None:
-        self.mistakes = tuple(mistakes)
-        where = f" (in '{source}')" if source else ""
-        if len(self.mistakes) == 1:
-            super().__init__(f"{self.mistakes[0]}{where}")
-            return
-        numbered = "; ".join(f"({i}) {m}" for i, m in enumerate(self.mistakes, start=1))
-        super().__init__(
-            f"{self.subject} must be free of mistakes, got {len(self.mistakes)}{where}: {numbered}"
-        )
+    def __init__(self, mistakes: Sequence[str | InputError], source: str = "") -> None:
+        super().__init__(self.subject)
+        self.errors = tuple(m if isinstance(m, InputError) else InputError(m) for m in mistakes)
+        self.source = source
+        # Which a copy in another process is made of.
+        self.args = (self.errors, source)
+
+    @property
+    def mistakes(self) -> tuple[str, ...]:
+        """A sentence for each."""
+        return tuple(map(str, self.errors))
+
+    def __str__(self) -> str:
+        where = f" (in '{self.source}')" if self.source else ""
+        if len(self.errors) == 1:
+            return f"{self.errors[0]}{where}"
+        numbered = "; ".join(f"({i}) {m}" for i, m in enumerate(self.errors, start=1))
+        return f"{self.subject} must be free of mistakes, got {len(self.errors)}{where}: {numbered}"
 
 
 def closest(name: str, known: Iterable[str]) -> str:

@@ -182,7 +182,7 @@ def test_a_constant_load_is_noticed(asperity, tmp_path, load, seed) -> None:
     assert len(record(chosen)["steps"]) == 1
     assert (noticed.stdout, noticed.exit_code) == (chosen.stdout, chosen.exit_code)
     extra = noticed.stderr.removesuffix(chosen.stderr)
-    assert extra.startswith("asperity: read as with --no-modulation, since ")
+    assert extra.endswith(": velocity steps and holds are read, not a modulation.\n")
     assert extra.count("\n") == 1
     assert asp.measure(path).steps == asp.measure(path, modulated=False).steps
     # What the user says of it is not set aside.
@@ -366,4 +366,4 @@ def test_an_ambiguous_column_is_chosen_by_an_option(asperity, tmp_path) -> None:
     result = asperity("measure", path, "--no-modulation")
     assert result.exit_code == 2
     assert '--force "shear force 1"' in result.stderr
-    assert "--force must name one column, got several" in result.stderr
+    assert "--force must name one channel, got several, " in result.stderr

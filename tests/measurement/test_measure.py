@@ -311,7 +311,7 @@ def test_the_lock_in_itself_takes_numbers_only(truth, samples, which, refine) ->
         ({"harmonics": 9}, "harmonics must lie below half the sampling rate"),
         ({"harmonics": 0}, "harmonics must be at least 1"),
         ({"force": "W"}, "force must be another channel"),
-        ({"load": "nothing"}, "channel must name a channel"),
+        ({"load": "nothing"}, "must name a channel, got none like 'nothing'"),
         ({"window": (12.0, 12.017)}, "must hold at least|at least one period"),
     ],
 )

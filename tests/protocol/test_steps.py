@@ -93,7 +93,7 @@ def test_a_line_that_repeats() -> None:
 def test_a_repetition_that_is_none(text, message) -> None:
     planned, mistakes = plan([text], HERE)
     assert len(mistakes) == 1
-    assert message in mistakes[0]
+    assert message in str(mistakes[0])
     assert planned == []
 
 

@@ -36,7 +36,8 @@ from asperity.app.security import (
     too_slow,
 )
 from asperity.app.uploads import Uploads
-from asperity.errors import InputError
+from asperity.app.words import in_labels
+from asperity.errors import InputError, naming
 from asperity.outputs.json import to_json
 
 STATIC = Path(__file__).parent / "static"
@@ -202,7 +203,8 @@ def _refusing(handle: Callable[[Request], Any], limit: int) -> Callable[[Request
         try:
             response: Response = await handle(request)
         except InputError as error:
-            return sentence(400, str(error))
+            with naming(in_labels):
+                return sentence(400, str(error))
         except Superseded:
             return sentence(409, "a newer request took the place of this one")
         except Busy:

@@ -17,7 +17,7 @@ from starlette.requests import Request
 
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError
-from asperity.parameters.mistakes import worded
+from asperity.questions.record import mistakes_in
 
 
 class Question(BaseModel):
@@ -137,8 +137,7 @@ async def asked(request: Request, kind: type[Question]) -> Any:
     try:
         return kind.model_validate(value)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise InputError(worded(first, "request", shown=_shown)[0]) from None
+        raise mistakes_in(error, kind, "request", shown=_shown)[0] from None
     except RecursionError:
         raise InputError("request.body must not be nested so deep, got more; send less") from None
 

@@ -49,10 +49,6 @@ class LocatedBifurcation(NamedTuple):
     after: int
 
 
-class _UnsolvedError(Exception):
-    """Newton's method failed between two solved points."""
-
-
 def bifurcations_between(
     follower: BranchFollower, start: BranchOrbit, length: float, end: BranchOrbit
 ) -> Iterator[LocatedBifurcation]:
@@ -61,14 +57,15 @@ def bifurcations_between(
     turned = start.direction * end.direction < 0
     if turned:
         index = min(before, after) if before != after else 0
-        critical_orbit = _root(follower, start, length, _direction)
-        if critical_orbit is not None:
-            yield LocatedBifurcation("fold", critical_orbit, index, before, after)
+        crossing = follower.crossing(start, length, _direction)
+        if crossing is not None:
+            yield LocatedBifurcation("fold", crossing[0], index, before, after)
     index, last = min(before, after), max(before, after)
     while index < last:
-        critical_orbit = _root(follower, start, length, _log_modulus(index))
-        if critical_orbit is None:
+        crossing = follower.crossing(start, length, _log_modulus(index))
+        if crossing is None:
             return
+        critical_orbit, _ = crossing
         kind = kind_of(critical_orbit.logs[index])
         if kind == "branch point" and turned:
             index += 1  # the multiplier of the fold itself
@@ -98,32 +95,6 @@ def _direction(branch_orbit: BranchOrbit) -> float:
 
 def _log_modulus(index: int) -> Callable[[BranchOrbit], float]:
     return lambda branch_orbit: float(branch_orbit.logs[index].real)
-
-
-def _root(
-    follower: BranchFollower,
-    start: BranchOrbit,
-    length: float,
-    function: Callable[[BranchOrbit], float],
-) -> BranchOrbit | None:
-    """The orbit between 0 and `length` at which `function` vanishes."""
-    # Loading SciPy's optimisation would slow the start of a process that continues nothing.
-    from scipy.optimize import brentq
-
-    seen: dict[float, BranchOrbit] = {}
-
-    def value(distance: float) -> float:
-        branch_orbit, _ = follower.step(start.point, distance)
-        if branch_orbit is None:
-            raise _UnsolvedError
-        seen[distance] = branch_orbit
-        return function(branch_orbit)
-
-    try:
-        root = brentq(value, 0.0, length, xtol=1e-13, rtol=1e-14)
-    except (_UnsolvedError, ValueError):
-        return None
-    return seen[root] if root in seen else follower.step(start.point, root)[0]
 
 
 def polished(

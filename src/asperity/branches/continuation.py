@@ -19,7 +19,7 @@ from asperity.branches.parameters import (
     start_of,
     starting_orbit,
 )
-from asperity.branches.steps import BranchFollower, BranchOrbit, follow_branch
+from asperity.branches.steps import BranchFollower, BranchOrbit, ParameterBranch
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.parameters.arguments import counted, function, whole_number
@@ -60,24 +60,17 @@ class BranchRecorder:
         self.located: list[tuple[LocatedBifurcation, int]] = []
 
     def follow_branch(self, most_steps: int) -> str:
-        """Walk until the branch leaves the span; returns a key of the results."""
-        why = follow_branch(
-            self.follower,
-            self.branch_orbits[0],
-            most_steps=most_steps,
-            first_step=1e-3,
-            ended=lambda branch_orbit: not 0 <= branch_orbit.t <= 1,
-            visit=self.visit,
-        )
-        if why != "ended":
-            return why
-        return "end" if self.branch_orbits[-1].t >= 0.5 else "start"
+        """Follow the branch until it leaves the span; returns a key of the results."""
+        return ParameterBranch(
+            self.follower, self.branch_orbits[0], self.visit, most_steps
+        ).follow()
 
     def visit(self, here: BranchOrbit, length: float, there: BranchOrbit) -> None:
         """Record a step of the branch, the last one cut at the end of the span."""
         if not 0 <= there.t <= 1:
             edge = 1.0 if there.t > 1 else 0.0
-            there, length = self.follower.reaching(here, length, edge) or (there, length)
+            reached = self.follower.crossing(here, length, lambda orbit: orbit.t - edge)
+            there, length = reached or (there, length)
         at = len(self.branch_orbits) - 1
         self.located += [
             (located, at) for located in bifurcations_between(self.follower, here, length, there)

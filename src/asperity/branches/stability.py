@@ -8,7 +8,8 @@ doublings and Neimark-Sacker points are located like those of any branch.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -18,6 +19,15 @@ from jax.typing import ArrayLike
 from numpy.typing import NDArray
 
 from asperity._version import __version__
+from asperity.algebra.continuation import (
+    STEPS,
+    STUCK,
+    Attempt,
+    Curves,
+    Indices,
+    StepControl,
+    follow,
+)
 from asperity.branches.bifurcation import Kind, bifurcations_between, criterion, kind_of, root_near
 from asperity.branches.continuation import INTERVALS
 from asperity.branches.parameters import (
@@ -30,7 +40,7 @@ from asperity.branches.parameters import (
     start_of,
     starting_orbit,
 )
-from asperity.branches.steps import BranchFollower, BranchOrbit, follow_branch
+from asperity.branches.steps import BranchFollower, BranchOrbit, ParameterBranch
 from asperity.errors import InputError
 from asperity.loads import Modulation
 from asperity.parameters.arguments import counted, function, whole_number
@@ -43,19 +53,16 @@ if TYPE_CHECKING:
 
 Float = NDArray[np.float64]
 
-#: Steps along a boundary, in parts of the span: first, longest, shortest.
-_FIRST, _LONGEST, _SHORTEST = 0.005, 0.02, 1e-4
-_GROWTH, _SHRINKAGE = 1.4, 0.4
-#: Largest turn of a boundary (rad) and distance from the predicted point, in steps.
-_SHARPEST_TURN, _FARTHEST = 0.25, 0.3
+#: First step along a boundary, in parts of the span.
+_FIRST = 0.005
 _MOST_STEPS = 2000
 
 _ENDS = {
     "edge": "the boundary leaves the rectangle",
     "closed": "the boundary closes on itself",
     "kind": "the bifurcation becomes one of another kind",
-    "lost": "no step along the boundary is short enough",
-    "steps": f"the boundary was followed for {_MOST_STEPS} steps",
+    STUCK: "no step along the boundary is short enough",
+    STEPS: f"the boundary was followed for {_MOST_STEPS} steps",
 }
 
 
@@ -111,63 +118,99 @@ def trace_boundary(
     report: Callable[[], None] = lambda: None,
 ) -> TracedBoundary:
     """Follow a boundary from `first` in both directions."""
-    forward, why_forward = _half(plane, kind, first, 1.0, report)
-    if why_forward == "closed":
-        return TracedBoundary(kind, [first, *forward], (_ENDS["closed"],) * 2)
-    backward, why_backward = _half(plane, kind, first, -1.0, report)
+    halves = []
+    for sense in (1.0, -1.0):
+        half = BoundaryHalf(plane, kind, first, report)
+        halves.append((half.points, half.follow(sense)))
+        if halves[0][1] == "closed":
+            return TracedBoundary(kind, [first, *half.points], (_ENDS["closed"],) * 2)
+    (forward, why_forward), (backward, why_backward) = halves
     points = [*backward[::-1], first, *forward]
     return TracedBoundary(kind, points, (_ENDS[why_backward], _ENDS[why_forward]))
 
 
-def _half(
-    plane: ParameterPlane,
-    kind: Kind,
-    first: BoundaryPoint,
-    sense: float,
-    report: Callable[[], None],
-) -> tuple[list[BoundaryPoint], str]:
-    """From `first` in one direction, and why it ends there."""
-    direction = _first_direction(plane, kind, first)
-    if direction is None:
-        return [], "lost"
-    direction, step = sense * direction, _FIRST
-    points: list[BoundaryPoint] = []
-    here = first
-    for _ in range(_MOST_STEPS):
-        there, why = _next(plane, kind, here, direction, step)
-        while there is None and step > _SHORTEST:
-            step *= _SHRINKAGE
-            there, why = _next(plane, kind, here, direction, step)
-        if there is None:
-            return points, why
-        report()
-        moved = there.at - here.at
-        direction = moved / np.linalg.norm(moved)
-        points.append(there)
+class BoundaryHalf(Curves):
+    """A boundary from one of its points in one direction.
+
+    Parameters
+    ----------
+    plane : ParameterPlane
+    kind : str
+    first : BoundaryPoint
+    report : callable
+        Called after each step.
+
+    Attributes
+    ----------
+    points : list of BoundaryPoint
+        After the first.
+    """
+
+    control = StepControl(
+        longest=0.02,
+        growth=1.4,
+        easy=0,
+        hard=0,
+        sharpest_turn=math.cos(0.25),
+        farthest=0.3,
+        most_failures=6,
+    )
+
+    def __init__(
+        self,
+        plane: ParameterPlane,
+        kind: Kind,
+        first: BoundaryPoint,
+        report: Callable[[], None],
+    ) -> None:
+        self.plane, self.kind, self.report = plane, kind, report
+        self.first = self.here = first
+        self.direction = np.zeros(2)
+        self.points: list[BoundaryPoint] = []
+        self._other_kind = False
+
+    def follow(self, sense: float) -> str:
+        """Follow the boundary forwards or backwards; a key of the ends."""
+        direction = _first_direction(self.plane, self.kind, self.first)
+        if direction is None:
+            return STUCK
+        self.direction = sense * direction
+        (why,) = follow(self, np.array([_FIRST]), most=_MOST_STEPS)
+        return "kind" if why == STUCK and self._other_kind else why
+
+    def attempts(
+        self, rows: Indices, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Indices, Attempt]]:
+        """The point of the boundary across its direction, a step ahead."""
+        step = float(length[0])
+        guess = self.here.at + step * self.direction
+        across = _across(self.direction)
+        there = critical_point(self.plane, self.kind, self.here.branch_orbit, guess, across)
+        turn, miss, self._other_kind = 1.0, 0.0, False
+        if there is not None:
+            moved = there.at - self.here.at
+            turn = float(moved @ self.direction / np.linalg.norm(moved))
+            miss = float(np.linalg.norm(there.at - guess) / step)
+            self._other_kind = not _critical_kind(self.kind, there.branch_orbit)
+        good = None if self._other_kind else there
+        yield rows, Attempt.of_one(good, step, turn=turn, miss=miss)
+
+    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+        """Keep the point; a boundary ends at the edge of the rectangle and where it closes."""
+        self.report()
+        before, there = self.here, attempt.next
+        moved = there.at - before.at
+        self.direction = moved / np.linalg.norm(moved)
+        self.here = there
         if np.any(there.at < 0) or np.any(there.at > 1):
-            edge = _on_edge(plane, kind, here, there)
-            return [*points[:-1], *([edge] if edge else [])], "edge"
-        if len(points) > 5 and np.linalg.norm(there.at - first.at) < step:
-            return [*points, first], "closed"
-        here, step = there, min(step * _GROWTH, _LONGEST)
-    return points, "steps"
-
-
-def _next(
-    plane: ParameterPlane, kind: Kind, here: BoundaryPoint, direction: Float, step: float
-) -> tuple[BoundaryPoint | None, str]:
-    """The point of the boundary across `direction`, a step ahead."""
-    guess = here.at + step * direction
-    there = critical_point(plane, kind, here.branch_orbit, guess, _across(direction))
-    if there is None:
-        return None, "lost"
-    moved = there.at - here.at
-    turn = np.arccos(np.clip(moved @ direction / np.linalg.norm(moved), -1, 1))
-    if turn > _SHARPEST_TURN or np.linalg.norm(there.at - guess) > _FARTHEST * step:
-        return None, "lost"
-    if not _critical_kind(kind, there.branch_orbit):
-        return None, "kind"
-    return there, ""
+            edge = _on_edge(self.plane, self.kind, before, there)
+            self.points += [edge] if edge else []
+            return ["edge"]
+        self.points.append(there)
+        if len(self.points) > 5 and np.linalg.norm(there.at - self.first.at) < attempt.length[0]:
+            self.points.append(self.first)
+            return ["closed"]
+        return [""]
 
 
 def critical_point(
@@ -454,14 +497,7 @@ def _crossings(
                     (bifurcation.kind, BoundaryPoint(at + branch_orbit.t * direction, branch_orbit))
                 )
 
-    follow_branch(
-        follower,
-        start,
-        most_steps=_SCAN_STEPS,
-        first_step=1e-3,
-        ended=lambda branch_orbit: not 0 <= branch_orbit.t <= 1,
-        visit=visit,
-    )
+    ParameterBranch(follower, start, visit, _SCAN_STEPS).follow()
     return points
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from asperity._jax import spare_mappings
+from asperity.algebra.continuation import STEPS, Attempt, Curves, Indices, StepControl, follow
 from asperity.orbit.floquet import log_multipliers
 from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.mesh.newton import Change
@@ -28,14 +29,8 @@ Float = NDArray[np.float64]
 #: A step counts when Newton's method has converged to this: its error is about the square.
 _CONVERGED = 1e-6
 _NEWTON_STEPS = 10
-#: Cosine of the turn of the tangent below which a step may have left its branch.
-_SHARPEST_TURN = 0.7
-_GROWTH, _SHRINKAGE = 1.5, 0.4
-_EASY, _HARD = 4, 6
-_SHORTEST = 1e-7
-#: Longest step, in units of the exponent of the slip rate and of the whole span together, and the
-#: largest part of the span in it.
-_LONGEST, _LARGEST_PART = 0.25, 0.04
+#: First step, and the largest part of the span in any.
+_FIRST, _LARGEST_PART = 1e-3, 0.04
 
 
 class BranchOrbit(NamedTuple):
@@ -97,23 +92,28 @@ class BranchFollower(NamedTuple):
             point,
         )
 
-    def reaching(
-        self, here: BranchOrbit, length: float, t: float
+    def crossing(
+        self, start: BranchOrbit, length: float, function: Callable[[BranchOrbit], float]
     ) -> tuple[BranchOrbit, float] | None:
-        """The orbit at the coordinate `t` passed within `length` of `here`, and its distance."""
+        """The orbit within `length` of `start` at which a function vanishes, and its distance."""
         # Loading SciPy's optimisation would slow the start of a process that continues nothing.
         from scipy.optimize import brentq
 
-        def beyond(distance: float) -> float:
-            branch_orbit, _ = self.step(here.point, distance)
-            return np.nan if branch_orbit is None else branch_orbit.t - t
+        seen: dict[float, BranchOrbit] = {}
+
+        def value(distance: float) -> float:
+            branch_orbit, _ = self.step(start.point, distance)
+            if branch_orbit is None:
+                raise _UnsolvedError
+            seen[distance] = branch_orbit
+            return function(branch_orbit)
 
         try:
-            distance = float(brentq(beyond, 0.0, length, xtol=1e-14, rtol=1e-14))
-        except ValueError:
+            root = float(brentq(value, 0.0, length, xtol=1e-14, rtol=1e-14))
+        except (_UnsolvedError, ValueError):
             return None
-        branch_orbit, _ = self.step(here.point, distance)
-        return None if branch_orbit is None else (branch_orbit, distance)
+        orbit = seen[root] if root in seen else self.step(start.point, root)[0]
+        return None if orbit is None else (orbit, root)
 
     def begin(self, orbit: Orbit, t: float, intervals: int) -> BranchOrbit | None:
         """An orbit at `t` on a mesh of `intervals`, in the direction of rising t."""
@@ -147,51 +147,63 @@ class BranchFollower(NamedTuple):
         return self.step(point._replace(orbit=orbit, tangent=tangent), 0.0)[0]
 
 
-def follow_branch(
-    follower: BranchFollower,
-    start: BranchOrbit,
-    *,
-    most_steps: int,
-    first_step: float,
-    ended: Callable[[BranchOrbit], bool],
-    visit: Callable[[BranchOrbit, float, BranchOrbit], None],
-) -> str:
-    """Follow a branch until `ended`, calling `visit` for each step.
+class _UnsolvedError(Exception):
+    """Newton's method failed between two solved points."""
+
+
+class ParameterBranch(Curves):
+    """A branch along a line of parameters, followed until it leaves the span.
 
     Parameters
     ----------
     follower : BranchFollower
     start : BranchOrbit
-    most_steps : int
-    first_step : float
-    ended : callable
-        Whether a branch_orbit lies beyond the end.
     visit : callable
-        Called with a branch_orbit, the length of the step from it, and the next branch_orbit.
-
-    Returns
-    -------
-    str
-        "ended", "steps" where there were `most_steps`, or "stuck" where no step is short enough.
+        Called with an orbit, the length of the step from it, and the next orbit.
+    most_steps : int
     """
-    here, length = start, first_step
-    for _ in range(most_steps):
-        part = abs(float(here.point.tangent.t[0]))
-        length = min(length, _LONGEST, _LARGEST_PART / max(part, 1e-12))
-        while True:
-            there, step = follower.step(here.point, length)
-            if there is not None and step.turn[0] > _SHARPEST_TURN:
-                break
-            length *= _SHRINKAGE
-            if length < _SHORTEST:
-                return "stuck"
-        visit(here, length, there)
-        if ended(there):
-            return "ended"
-        here = there
-        iterations = int(step.iterations[0])
-        if iterations <= _EASY:
-            length *= _GROWTH
-        elif iterations > _HARD:
-            length *= _SHRINKAGE
-    return "steps"
+
+    control = StepControl(
+        longest=0.25,  # in units of the exponent of the slip rate and of the whole span together
+        growth=1.5,
+        easy=4,
+        hard=6,
+        sharpest_turn=0.7,
+        farthest=np.inf,
+        most_failures=16,
+    )
+
+    def __init__(
+        self,
+        follower: BranchFollower,
+        start: BranchOrbit,
+        visit: Callable[[BranchOrbit, float, BranchOrbit], None],
+        most_steps: int,
+    ) -> None:
+        self.follower, self.here, self.visit, self.left = follower, start, visit, most_steps
+
+    def follow(self) -> str:
+        """Follow the branch; why it ends: "end", "start", "steps" or "stuck"."""
+        (why,) = follow(self, np.array([_FIRST]))
+        return why
+
+    def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
+        """No longer than a part of the span."""
+        return np.minimum(length, _LARGEST_PART / np.maximum(abs(self.here.direction), 1e-12))
+
+    def attempts(
+        self, rows: Indices, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Indices, Attempt]]:
+        """One step of the arclength."""
+        there, step = self.follower.step(self.here.point, float(length[0]))
+        iterations, turn = float(step.iterations[0]), float(step.turn[0])
+        yield rows, Attempt.of_one(there, float(length[0]), iterations=iterations, turn=turn)
+
+    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+        """Visit the new orbit; the branch ends outside the span."""
+        there = attempt.next
+        self.visit(self.here, float(attempt.length[0]), there)
+        self.here, self.left = there, self.left - 1
+        if not 0 <= there.t <= 1:
+            return ["end" if there.t >= 0.5 else "start"]
+        return ["" if self.left else STEPS]

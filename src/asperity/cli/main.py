@@ -42,6 +42,7 @@ Examples:
         "reproduce": "asperity.cli.reproduce",
         "response": "asperity.cli.response",
         "run": "asperity.cli.run",
+        "samples": "asperity.cli.samples",
         "serve": "asperity.cli.serve",
         "sweep": "asperity.cli.sweep.command",
     },

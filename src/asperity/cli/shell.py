@@ -12,7 +12,8 @@ from typing import Any, NoReturn
 import click
 
 from asperity.cli.interrupt import INTERRUPTED, MESSAGE, ending_at_once
-from asperity.errors import InputError, closest, printable
+from asperity.cli.words import in_options
+from asperity.errors import InputError, closest, naming, printable
 
 _BAD_INPUT = 2
 
@@ -59,10 +60,13 @@ class Shell(click.Group):
         Click's own standalone mode is not used: its messages take several lines.
         """
         try:
-            with ending_at_once(), _warnings_as_sentences():
-                code = super().main(args, prog_name, complete_var, standalone_mode=False, **extra)
-        except InputError as error:
-            code = _print_error(str(error), _BAD_INPUT)
+            with ending_at_once(), _warnings_as_sentences(), naming(in_options):
+                try:
+                    code = super().main(
+                        args, prog_name, complete_var, standalone_mode=False, **extra
+                    )
+                except InputError as error:
+                    code = _print_error(str(error), _BAD_INPUT)
         except click.Abort as abort:
             code = _print_error(str(abort.__cause__ or "") or MESSAGE, INTERRUPTED)
         except click.ClickException as error:

@@ -12,10 +12,13 @@ from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, RICE_
 
 if TYPE_CHECKING:
     from asperity.protocol import RunOutline
+    from asperity.transients import Trajectory
 
 #: Events that are marked; more of them than fit are counted instead.
 _MARKED = {"slip start": LINKER_DIETERICH, "steady": GREY}
 _MOST_MARKS = 60
+#: Stretches of a trajectory whose extremes are drawn: more than a figure has pixels.
+_STRETCHES = 2000
 
 
 def draw_run(run: RunOutline) -> Figure:
@@ -44,6 +47,28 @@ def draw_run(run: RunOutline) -> Figure:
         axis.text(0.015, 0.94, f"({letter})", transform=axis.transAxes, va="top", fontsize=10)
     velocity.set_xlim(run.time[0], run.time[-1])
     return figure
+
+
+def draw_trajectory(trajectory: Trajectory) -> Figure:
+    """Load, spring force, and velocity of the slider over time.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+    """
+    from asperity.protocol import RunOutline
+
+    starts = np.unique(np.linspace(0, trajectory.time.size, _STRETCHES, endpoint=False, dtype=int))
+    columns = {name: getattr(trajectory, name) for name in ("load", "force", "velocity")}
+    outline = RunOutline(
+        time=trajectory.time[starts],
+        low={name: np.minimum.reduceat(values, starts) for name, values in columns.items()},
+        high={name: np.maximum.reduceat(values, starts) for name, values in columns.items()},
+        events=[(event.time, event.kind) for event in trajectory.events],
+        title="",
+        law=trajectory.motion.slider.law.name,
+    )
+    return draw_run(outline)
 
 
 def _draw_band(axis: Axes, run: RunOutline, name: str, color: str, scale: float) -> None:

@@ -87,9 +87,7 @@ def lock_in(
     degree = _degree(detrend)
     _check(time, load, force, harmonics, degree)
     if frequency is None and not refine:
-        raise InputError(
-            "lock_in.frequency must be given with refine=False, got None; give it in Hz"
-        )
+        raise InputError("lock_in.frequency", "be given with refine=False", "None", "give it in Hz")
     if refine:
         line = strongest_line(time, load, between=around(frequency))
         require_modulated(line, load)
@@ -196,26 +194,28 @@ def _white(blocks: BlockSums, residual: NDArray[np.complex128]) -> Array:
 def _degree(detrend: str) -> int:
     if detrend not in DRIFTS:
         raise InputError(
-            f"lock_in.detrend must be none, linear or quadratic, got '{detrend}'; choose one"
+            "lock_in.detrend", "be none, linear or quadratic", f"'{detrend}'", "choose one"
         )
     return DRIFTS[detrend]
 
 
 def _check(time: Array, load: Array, force: Array, harmonics: int, degree: int) -> None:
     if harmonics < 1:
-        raise InputError(
-            f"lock_in.harmonics must be at least 1, got {harmonics}; ask for 1 or more"
-        )
+        raise InputError("lock_in.harmonics", "be at least 1", harmonics, "ask for 1 or more")
     if not time.size == load.size == force.size:
         raise InputError(
-            f"lock_in.time, load and force must have one length, got {time.size}, {load.size} and "
-            f"{force.size}; cut them to the same samples"
+            "lock_in.time, load and force",
+            "have one length",
+            f"{time.size}, {load.size} and {force.size}",
+            "cut them to the same samples",
         )
     least = 2 * (degree + 1 + 2 * harmonics) + 2
     if time.size < least:
         raise InputError(
-            f"lock_in.time must hold at least {least} samples for {harmonics} harmonics, got "
-            f"{time.size}; give a longer window or fewer harmonics"
+            "lock_in.time",
+            f"hold at least {least} samples for {harmonics} harmonics",
+            time.size,
+            "give a longer window or fewer harmonics",
         )
 
 
@@ -223,8 +223,10 @@ def _check_finite(blocks: BlockSums) -> BlockSums:
     """Refuse samples that are not finite: their sums are not either."""
     if not np.isfinite(blocks.moments).all():
         raise InputError(
-            "lock_in.load and force must be finite, got values that are not; leave out "
-            "their samples, as asperity.measurement.measure does"
+            "lock_in.load and force",
+            "be finite",
+            "values that are not",
+            "leave out their samples, as asperity.measurement.measure does",
         )
     return blocks
 
@@ -232,8 +234,10 @@ def _check_finite(blocks: BlockSums) -> BlockSums:
 def _check_clock(time: Array) -> None:
     if not (time[1:] > time[:-1]).all():
         raise InputError(
-            "lock_in.time must rise from sample to sample, got equal or decreasing times; sort "
-            "or cut the recording"
+            "lock_in.time",
+            "rise from sample to sample",
+            "equal or decreasing times",
+            "sort or cut the recording",
         )
 
 
@@ -243,13 +247,17 @@ def _check_resolved(time: Array, frequency: float, harmonics: int) -> None:
     rate = 1 / float(np.median(np.diff(time[: 1 << 14])))
     if not frequency > 0 or frequency * span < 1:
         raise InputError(
-            f"lock_in.frequency must have at least one period in the window, got {frequency:.6g} "
-            f"Hz in {span:.6g} s; give a longer window or another frequency"
+            "lock_in.frequency",
+            "have at least one period in the window",
+            f"{frequency:.6g} Hz in {span:.6g} s",
+            "give a longer window or another frequency",
         )
     if 2 * harmonics * frequency >= rate:
         raise InputError(
-            f"lock_in.harmonics must lie below half the sampling rate, got {harmonics} harmonics "
-            f"of {frequency:.6g} Hz at {rate:.6g} samples per second; ask for fewer"
+            "lock_in.harmonics",
+            "lie below half the sampling rate",
+            f"{harmonics} harmonics of {frequency:.6g} Hz at {rate:.6g} samples per second",
+            "ask for fewer",
         )
 
 

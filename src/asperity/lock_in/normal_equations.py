@@ -178,8 +178,10 @@ def inverted(normal: Array) -> Array:
         inverse = np.full_like(equal, np.nan)
     if not np.isfinite(inverse).all():
         raise InputError(
-            "lock_in.time must resolve all harmonics and drift terms, got samples that do not; "
-            "give a longer window or ask for fewer harmonics"
+            "lock_in.time",
+            "resolve all harmonics and drift terms",
+            "samples that do not",
+            "give a longer window or ask for fewer harmonics",
         )
     return inverse * scale * scale[:, None]
 

@@ -274,8 +274,7 @@ def reading_of(
     mean_load, mean_force = average @ beta[:first]
     if not mean_load:
         raise InputError(
-            "lock_in.load must have a mean to be relative to, got 0; give the load and not its "
-            "change"
+            "lock_in.load", "have a mean to be relative to", "0", "give the load and not its change"
         )
     # Phase of W/W0: a load that is recorded as negative has a positive amplitude too.
     phase = float(np.angle(phasors[0, 0] / mean_load))

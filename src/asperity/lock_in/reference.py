@@ -70,8 +70,10 @@ def strongest_line(
     step, thinned = _evenly(time, values, _SPECTRUM)
     if not np.isfinite([step, thinned.sum()]).all():
         raise InputError(
-            "lock_in.load must be finite, got values that are not; leave out their samples, as "
-            "asperity.measurement.measure does"
+            "lock_in.load",
+            "be finite",
+            "values that are not",
+            "leave out their samples, as asperity.measurement.measure does",
         )
     spectra = [_spectrum(step, thinned)]
     if time.size > _SPECTRUM:
@@ -101,8 +103,10 @@ def require_modulated(line: SpectralLine, load: Array) -> None:
     """
     if not line.amplitude > 1e-13 * abs(float(load[0])):
         raise ConstantLoadError(
-            f"lock_in.load must be modulated, got a constant of {float(load[0]):.6g}; name another "
-            "column, or measure without modulation"
+            "lock_in.load",
+            "be modulated",
+            f"a constant of {float(load[0]):.6g}",
+            "name another column, or measure without modulation",
         )
 
 

@@ -10,13 +10,9 @@ from os import PathLike, fspath
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from asperity.errors import InputError, closest
-from asperity.materials.number import Number
 from asperity.materials.record import Material
 from asperity.parameters.arguments import file_path
-from asperity.parameters.mistakes import worded
 from asperity.parameters.toml_file import parsed_toml, toml_content
 
 
@@ -37,7 +33,7 @@ def load_material(name: str | PathLike[str]) -> Material:
                 "the path of a material file"
             )
         file, content = toml_content(text, "material.file")
-        return _material(content, file.stem, text)
+        return Material.of_content({"name": file.stem, **content}, text)
     try:
         resource = packaged()[text]
     except KeyError:
@@ -46,15 +42,4 @@ def load_material(name: str | PathLike[str]) -> Material:
             f"{closest(text, packaged())}"
         ) from None
     content = parsed_toml(resource.read_text(encoding="utf-8"), "material.file", f"'{text}'")
-    return _material(content, text, text)
-
-
-def _material(content: dict[str, Any], name: str, shown: str) -> Material:
-    try:
-        return Material.model_validate({"name": name} | content)
-    except ValidationError as error:
-        # The first mistake, and how many more there are.
-        mistakes = error.errors(include_url=False)
-        sentence = worded(mistakes[0], "material", {"": Material, "numbers": Number})[0]
-        count = f", the first of {len(mistakes)} mistakes" if len(mistakes) > 1 else ""
-        raise InputError(f"{sentence} (in '{shown}'{count})") from None
+    return Material.of_content({"name": text, **content}, text)

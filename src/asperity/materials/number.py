@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from asperity.errors import InputError, closest
+from asperity.questions.record import Record
 from asperity.units import KINDS, to_si
 
 Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
-class Number(BaseModel):
+class Number(Record):
     """One number of a paper.
 
     Attributes
@@ -31,8 +32,6 @@ class Number(BaseModel):
         Section, equation or figure.
     note : str
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     value: Finite | None = None
     uncertainty: Annotated[Finite, Field(ge=0)] | None = None

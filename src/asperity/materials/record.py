@@ -10,19 +10,20 @@ import keyword
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict, field_validator
+from pydantic import field_validator
 
 from asperity.errors import InputError, closest
 from asperity.materials.number import Number
 from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters, obeying
 from asperity.parameters.arguments import shown
+from asperity.questions.record import Question
 from asperity.units import to_si
 
 if TYPE_CHECKING:
     from asperity.laws import Law
 
 
-class Material(BaseModel):
+class Material(Question):
     """The numbers of one paper.
 
     ``material.K`` is a value in SI, ``material["K"]`` the `Number` with its unit, uncertainty,
@@ -34,7 +35,7 @@ class Material(BaseModel):
     numbers : mapping of str to Number
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    subject = "material"
 
     name: str
     title: str

@@ -126,7 +126,7 @@ def modulated_or_sliding(
     measurement : Measurement or SlidingMeasurement
         Or what else `modulated` returns.
     reason : str
-        Why it was not read as modulated; empty if it was.
+        What the recording is, where it was not read as modulated; else empty.
 
     Raises
     ------
@@ -146,7 +146,8 @@ def modulated_or_sliding(
         raise (error if constant and plain else reason) from None
     if not (plain or measurement.steps or measurement.holds):
         raise reason
-    return measurement, str(reason)
+    what = "The normal load is constant" if constant else "No channel is the normal load"
+    return measurement, f"{what}: velocity steps and holds are read, not a modulation."
 
 
 def _recorded(trace: Trace, name: str) -> bool:

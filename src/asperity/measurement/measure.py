@@ -37,7 +37,7 @@ from asperity.measurement.window import (
     under_the_same_load,
     whole_periods,
 )
-from asperity.parameters.parameter import Displayed, SummaryLine
+from asperity.parameters.parameter import Drawn, SummaryLine
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
@@ -58,7 +58,7 @@ _PIECES, _PIECE, _FEWEST_PERIODS = 32, 1 << 15, 8.0
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Measurement(Displayed):
+class Measurement(Drawn):
     """A reading of one modulated stretch, what was around it, and what is to be thought of it.
 
     Attributes
@@ -81,6 +81,8 @@ class Measurement(Displayed):
     chosen_by : {"program", "user"}
         Who chose the window.
     """
+
+    _drawn_by = "asperity.figures.recording:draw_modulated"
 
     reading: LockInReading
     before: MeanLevel | None
@@ -231,16 +233,18 @@ def _prepared(
 ) -> _ModulatedRecording:
     if detrend not in DRIFTS:
         raise InputError(
-            f"measure.detrend must be none, linear or quadratic, got '{detrend}'; choose one"
+            "measure.detrend", "be none, linear or quadratic", f"'{detrend}'", "choose one"
         )
     samples = usable(trace, load, force)
     line = modulation_line(samples.time, samples.load, frequency)
     require_modulated(line, samples.load)
     if frequency is None and line.amplitude < _LINE * line.background:
         raise ConstantLoadError(
-            f"measure.load must be modulated, got its strongest line, at {line.frequency:.4g} Hz, "
-            f"at {line.amplitude / line.background:.2g} times its surroundings; give the frequency "
-            "if you know it, or measure without modulation"
+            "measure.load",
+            "be modulated",
+            f"a constant load, whose strongest line, at {line.frequency:.4g} Hz, is "
+            f"{line.amplitude / line.background:.2g} times its surroundings",
+            "give the frequency if you know it, or measure without modulation",
         )
     start = frequency if frequency is not None and not refine else line.frequency
     return _ModulatedRecording(samples, _parts(samples, line, start), start, refine)
@@ -409,8 +413,10 @@ def _given(time: Array, window: tuple[float, float]) -> tuple[int, int]:
     stop = int(np.searchsorted(time, end, side="right"))
     if not start < end or stop - int(first) < 16:
         raise InputError(
-            f"measure.window must enclose at least 16 samples, got {start:g} s to {end:g} s; the "
-            f"recording runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+            "measure.window",
+            "enclose at least 16 samples",
+            f"{start:g} s to {end:g} s",
+            f"the recording runs from {time[0]:.10g} s to {time[-1]:.10g} s",
         )
     return int(first), stop
 

@@ -12,10 +12,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
-from asperity.recording.checks import check, spikes
+from asperity.errors import Argument, InputError
+from asperity.recording.defects.check import check
+from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.rows import rows_to_avoid, usable_rows
 from asperity.recording.finding import Finding
-from asperity.recording.rounded_time import even_times
 
 if TYPE_CHECKING:
     from asperity.recording.trace import Channel, Trace
@@ -27,8 +28,7 @@ Array = NDArray[np.float64]
 #: or zero is more.
 _CONTRADICTS = 0.1
 
-#: A step of this many median steps is a gap.
-_GAP = 1.5
+_NONE: NDArray[np.intp] = np.empty(0, dtype=np.intp)
 
 #: Largest size of a value, and one over the smallest of a channel's largest: fits take squares of
 #: squares of ratios, which doubles must hold.
@@ -129,10 +129,13 @@ def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Arr
         return
     names = [next(n for n, c in trace.channels.items() if c is used) for used in (shear, recorded)]
     raise InputError(
-        f"measure.force must agree with the recorded friction, got {made:.4g} for the median of "
-        f"F/W with '{names[0]}' and {written:.4g} for that of '{names[1]}'; choose one, like "
-        f"columns={{'F': '{names[0]}'}} or columns={{'friction': '{names[1]}'}}, or correct the "
-        "unit of the force or the load"
+        "measure.force",
+        "agree with the recorded friction",
+        f"{made:.4g} for the median of "
+        f"F/W with '{names[0]}' and {written:.4g} for that of '{names[1]}'",
+        "choose one, like "
+        f"{Argument('columns', 'F', names[0])} or {Argument('columns', 'friction', names[1])}, or "
+        "correct the unit of the force or the load",
     )
 
 
@@ -239,14 +242,18 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     F, name = _force(trace, force, W)
     if W.kind != F.kind:
         raise InputError(
-            f"measure.force must have the dimension of the load, got {_dimension_text(F)} for "
-            f"'{force}' and {_dimension_text(W)} for '{load}'; name the units when reading"
+            "measure.force",
+            "have the dimension of the load",
+            f"{_dimension_text(F)} for '{force}' and {_dimension_text(W)} for '{load}'",
+            "name the units when reading",
         )
     names = (_name(trace, W), name)
     if names[0] == names[1]:
         raise InputError(
-            f"measure.force must be another channel than the load, got '{names[0]}' for both; name "
-            "the one that is the shear force"
+            "measure.force",
+            "be another channel than the load",
+            f"'{names[0]}' for both",
+            "name the one that is the shear force",
         )
     two = replace(trace, channels={names[0]: W, names[1]: F}, findings=())
     findings = about_channels(trace, names)
@@ -259,15 +266,18 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     names_found = {finding.name for finding in findings}
     keep = None
     if names_found & {"nan", "infinite", "backward time", "repeated time"}:
-        keep = _kept(time, values)
+        keep = usable_rows(time, values)
         time, values = time[keep], (values[0][keep], values[1][keep])
     if time.size < 16:
         raise InputError(
-            f"measure.trace must hold at least 16 usable samples, got {time.size}; give a longer "
-            "recording or window"
+            "measure.trace",
+            "hold at least 16 usable samples",
+            time.size,
+            "give a longer recording or window",
         )
     require_computable(time=time - time[0], **dict(zip(names, values, strict=True)))
-    defects = _defects(time, values, names_found, keep)
+    seen = {"gap", "spike", "saturation"} & names_found
+    defects = rows_to_avoid(time, values, keep) if seen or keep is not None else _NONE
     dropped = len(trace) - time.size
     return Samples(time, *values, W.unit, names, defects, findings, dropped, unread, two)
 
@@ -289,9 +299,10 @@ def require_computable(**channels: Array) -> None:
         largest = float(np.abs(values).max(initial=0.0))
         if largest and not 1 / _LARGEST < largest < _LARGEST:
             raise InputError(
-                f"measure.trace must hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size, "
-                f"got {largest:.4g} as the largest of '{name}'; correct its unit, or cut damaged "
-                "rows out with a window"
+                "measure.trace",
+                f"hold values from {1 / _LARGEST:g} to {_LARGEST:g} in size",
+                f"{largest:.4g} as the largest of '{name}'",
+                "correct its unit, or cut damaged rows out with a window",
             )
 
 
@@ -326,37 +337,6 @@ def about_channels(trace: Trace, names: tuple[str, ...]) -> tuple[Finding, ...]:
         for f in trace.findings
         if not any(f.where == name or f.where.startswith(f"{name}, ") for name in others)
     )
-
-
-def _kept(time: Array, values: tuple[Array, Array]) -> NDArray[np.bool_]:
-    finite = np.isfinite(time) & np.isfinite(values[0]) & np.isfinite(values[1])
-    latest = np.maximum.accumulate(np.where(finite, time, -np.inf))
-    finite[1:] &= time[1:] > latest[:-1]
-    return finite
-
-
-def _defects(
-    time: Array,
-    values: tuple[Array, Array],
-    names_found: set[str],
-    keep: NDArray[np.bool_] | None,
-) -> NDArray[np.intp]:
-    defects = [np.empty(0, dtype=np.intp)]
-    if keep is not None:
-        rows = np.flatnonzero(keep)
-        defects.append(np.flatnonzero(np.diff(rows) > 1) + 1)
-    if "gap" in names_found:
-        steps = np.diff(time)
-        defects.append(np.flatnonzero(steps > _GAP * np.median(steps)) + 1)
-    if "spike" in names_found:
-        defects += [spikes(channel) for channel in values]
-    if "saturation" in names_found:
-        for channel in values:
-            for extreme in (channel.max(), channel.min()):
-                at = channel == extreme
-                # A single largest value is none: saturation stands still.
-                defects.append(np.flatnonzero(at[1:] & at[:-1]) + 1)
-    return np.unique(np.concatenate(defects))
 
 
 def _name(trace: Trace, channel: Channel) -> str:

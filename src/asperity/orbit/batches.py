@@ -21,8 +21,9 @@ Indices = NDArray[np.intp]
 #: Points in a block of the fast method; no power of two, at which arrays share cache lines.
 FAST_BLOCK = 240
 
-#: Points in a chunk of orbits on meshes, for up to three states and for more.
-_MESH_CHUNKS = (24, 8)
+#: Points in a chunk of orbits on meshes, for up to three states and for more: a few points that
+#: need a finer mesh than the others take a smaller chunk.
+_MESH_CHUNKS = ((24, 8), (8,))
 
 
 def points_of(tree: Any) -> int:
@@ -45,37 +46,44 @@ def put(tree: Any, index: Indices, values: Any) -> None:
 
 
 def run_chunks(
-    function: Callable[..., Any], inputs: tuple[Any, ...], index: Indices, chunk: int
+    function: Callable[..., Any],
+    inputs: tuple[Any, ...],
+    index: Indices,
+    chunk: int | tuple[int, ...],
 ) -> Iterator[tuple[Indices, Any]]:
     """Apply `function` to the points `index` of `inputs`.
 
     Parameters
     ----------
     function : callable
-        Takes pytrees with `chunk` points along the last axis of every array, returns another.
+        Takes pytrees with as many points as a chunk has along the last axis of every array,
+        returns another.
     inputs : tuple of pytrees of NumPy arrays
         Its arguments.
     index : array of int
         The points to work on.
-    chunk : int
-        Points per call; the last chunk is filled up with copies of its last point.
+    chunk : int or tuple of int
+        Points per call. Of several numbers, falling, the last chunk has the smallest that holds
+        what is left; it is filled up with copies of its last point.
 
     Yields
     ------
     indices, outputs
         As NumPy arrays without the filling.
     """
+    sizes = (chunk,) if isinstance(chunk, int) else chunk
 
     def work(part: Indices) -> tuple[Indices, Any]:
-        filled = np.concatenate([part, np.full(chunk - len(part), part[-1])])
+        size = min(size for size in sizes if size >= len(part))
+        filled = np.concatenate([part, np.full(size - len(part), part[-1])])
         outputs = function(*take(inputs, filled))
         return part, jax.tree.map(lambda a: np.asarray(a)[..., : len(part)], outputs)
 
-    for start in range(0, len(index), chunk):
+    for start in range(0, len(index), sizes[0]):
         spare_mappings()
-        yield work(index[start : start + chunk])
+        yield work(index[start : start + sizes[0]])
 
 
-def mesh_chunk(size: int) -> int:
+def mesh_chunk(size: int) -> tuple[int, ...]:
     """Points in a call that works on orbits with `size` states on meshes."""
     return _MESH_CHUNKS[size > 3]

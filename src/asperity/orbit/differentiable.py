@@ -8,7 +8,7 @@ rule at the orbit, whichever method solved for it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import partial
 from typing import Any, Literal
 
@@ -138,8 +138,9 @@ class ResponseFunction:
         known: KnownOrbits | None = None,
         *,
         every: bool = False,
+        names: Collection[str] | None = None,
     ) -> tuple[ResponseValues, dict[str, ResponseValues]]:
-        """Response, and its derivative to every parameter at every point.
+        """Response, and its derivatives to the parameters at every point.
 
         Parameters
         ----------
@@ -149,6 +150,9 @@ class ResponseFunction:
         every : bool
             Whether the answer is of use only where every point has a response, as to a fit. The
             search may then end at the first point without an orbit, and leaves out derivatives.
+        names : collection of str, optional
+            Parameters that derivatives are wanted to; all by default. Each takes time where orbits
+            are searched for.
 
         Returns
         -------
@@ -171,11 +175,12 @@ class ResponseFunction:
             outcome = np.asarray(whole.outcome)[: points or 1]
             table = np.array(table)
             if not every or (outcome == Outcome.CONVERGED).all():
-                _add_searched_derivatives(table, padded, searched, part)
+                _add_searched_derivatives(table, padded, searched, part, names)
         values = _cut(whole, points)
         cut = table[:, 0] if points is None else table[:, :points]
-        names = self._program.equations.names
-        return values, {n: _derivative(c, values) for n, c in zip(names, cut, strict=True)}
+        columns = zip(self._program.equations.names, cut, strict=True)
+        wanted = self._program.equations.names if names is None else names
+        return values, {n: _derivative(c, values) for n, c in columns if n in wanted}
 
     def _require_fitting(self, known: KnownOrbits | None, points: int, *, traced: bool) -> None:
         """Refuse known orbits that this call cannot begin with."""
@@ -423,13 +428,14 @@ def _add_searched_derivatives(
     parameters: Parameters,
     searched: SearchedOrbits | None,
     program: Program,
+    names: Collection[str] | None,
 ) -> None:
     """Write derivatives at the orbits of the search into a table as of `_differentiate`."""
     values = {n: np.asarray(v) for n, v in parameters.items()}
-    for index, orbits in searched.parts if searched else []:
+    for index, orbits in searched.by_mesh() if searched else []:
         part = {n: v[index] for n, v in values.items()}
         table[:, index] = derivatives_of(
-            program.equations, part, orbits, multipliers=program.multipliers
+            program.equations, part, orbits, multipliers=program.multipliers, names=names
         )
 
 

@@ -18,7 +18,7 @@ from asperity.orbit.solution import Solution
 from asperity.parameters import DRIVE, OUTPUTS, Parameter
 from asperity.parameters.arguments import shown
 from asperity.parameters.parameter import (
-    Displayed,
+    Drawn,
     SummaryLine,
     count_text,
     number_line,
@@ -57,7 +57,7 @@ _VARIABLES = (
 
 
 @dataclass(frozen=True, repr=False)
-class PeriodicResponse(Displayed):
+class PeriodicResponse(Drawn):
     """Periodic response at one or many operating points.
 
     Convention: w(t) = 1 + eps cos(wt) and F/W0 = mean_friction + sum mu_n cos(n wt + phase_n), with
@@ -102,6 +102,8 @@ class PeriodicResponse(Displayed):
     slider, velocity, epsilon, frequency
         The operating point, in SI; epsilon is the amplitude of the load's first harmonic.
     """
+
+    _drawn_by = "asperity.figures.response:draw_response"
 
     mean_friction: Float
     mu_ss: Float

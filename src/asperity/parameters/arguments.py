@@ -55,8 +55,10 @@ def whole_number(value: Any, label: str, least: int = 0) -> int:
     if whole and least <= value <= _MOST:
         return int(value)
     raise InputError(
-        f"{label} must be a whole number of at least {least} and at most {_MOST:,}, got "
-        f"{shown(value)}; give one such as {max(least, 8)}"
+        label,
+        f"be a whole number of at least {least} and at most {_MOST:,}",
+        shown(value),
+        f"give one such as {max(least, 8)}",
     )
 
 
@@ -71,8 +73,10 @@ def switch(value: Any, label: str) -> bool:
     if isinstance(value, bool | np.bool_):
         return bool(value)
     raise InputError(
-        f"{label} must be True or False, got {shown(value)}; for points of both kinds call the "
-        "function once for each"
+        label,
+        "be True or False",
+        shown(value),
+        "for points of both kinds call the function once for each",
     )
 
 
@@ -86,7 +90,7 @@ def number(value: Any, label: str, kind: str, rule: str = "finite") -> float:
     """
     checked = obeying(value, label, kind, rule)
     if np.size(checked) != 1 or np.ndim(checked) > 1:
-        raise InputError(f"{label} must be one number, got {shown(checked)}; give a single value")
+        raise InputError(label, "be one number", shown(checked), "give a single value")
     return float(np.ravel(checked)[0])
 
 
@@ -102,7 +106,7 @@ def instance(value: Any, kinds: type[T] | tuple[type[T], ...], label: str, advic
         return value
     names = [k.__name__ for k in (kinds if isinstance(kinds, tuple) else (kinds,))]
     wanted = f"{'an' if names[0][0] in 'AEIOU' else 'a'} {' or '.join(names)}"
-    raise InputError(f"{label} must be {wanted}, got {shown(value)}; {advice}")
+    raise InputError(label, f"be {wanted}", shown(value), advice)
 
 
 def one_of(value: Any, known: Iterable[str], label: str) -> str:
@@ -117,7 +121,7 @@ def one_of(value: Any, known: Iterable[str], label: str) -> str:
     if isinstance(value, str) and value in known:
         return value
     advice = closest(value, known) if isinstance(value, str) else f"choose {' or '.join(known)}"
-    raise InputError(f"{label} must be one of {', '.join(known)}, got {shown(value)}; {advice}")
+    raise InputError(label, f"be one of {', '.join(known)}", shown(value), advice)
 
 
 def some_of(value: Any, known: Sequence[str], label: str) -> tuple[str, ...]:
@@ -131,8 +135,10 @@ def some_of(value: Any, known: Sequence[str], label: str) -> tuple[str, ...]:
     if isinstance(value, list | tuple) and value:
         return tuple(one_of(item, known, label) for item in value)
     raise InputError(
-        f"{label} must be a tuple of some of {', '.join(known)}, got {shown(value)}; "
-        "leave it out for all"
+        label,
+        f"be a tuple of some of {', '.join(known)}",
+        shown(value),
+        "leave it out for all",
     )
 
 
@@ -146,7 +152,7 @@ def pair(value: Any, label: str) -> tuple[Any, Any]:
     """
     if isinstance(value, list | tuple | np.ndarray) and len(value) == 2:
         return value[0], value[1]
-    raise InputError(f"{label} must be two values, got {shown(value)}; give (start, end)")
+    raise InputError(label, "be two values", shown(value), "give (start, end)")
 
 
 def function(value: Any, label: str) -> Callable[..., Any] | None:
@@ -159,7 +165,7 @@ def function(value: Any, label: str) -> Callable[..., Any] | None:
     """
     if value is None or callable(value):
         return value
-    raise InputError(f"{label} must be a function, got {shown(value)}; leave it out for none")
+    raise InputError(label, "be a function", shown(value), "leave it out for none")
 
 
 def counted(progress: Callable[[int, int], None] | None, total: int) -> Callable[[int], None]:
@@ -215,4 +221,4 @@ def file_path(value: Any, label: str) -> Path:
         value = text
     short = isinstance(value, str | bytes) and len(value) < 60
     what = repr(value) if short else shown(value)
-    raise InputError(f"{label} must be the path of a file, got {what}; give it as a text")
+    raise InputError(label, "be the path of a file", what, "give it as a text")

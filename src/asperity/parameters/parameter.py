@@ -9,14 +9,18 @@ from __future__ import annotations
 import html
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from importlib import import_module
 from types import MappingProxyType
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
 from asperity.errors import InputError
 from asperity.units import KINDS, format_si, to_radians, to_si
 from asperity.units.convert import is_traced
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -93,7 +97,7 @@ def obeying(value: Any, label: str, kind: str, rule: str) -> Any:
     if not np.all(RULES[rule].holds(array)):
         bad = array[~RULES[rule].holds(array)]
         got = f"{bad.flat[0]:g} {KINDS[kind].si}".rstrip()
-        raise InputError(f"{label} must {RULES[rule].words}, got {got}; {RULES[rule].advice}")
+        raise InputError(label, RULES[rule].words, got, RULES[rule].advice)
     return array
 
 
@@ -278,6 +282,29 @@ class Displayed:
             for line in lines
         )
         return f"<table><caption>{html.escape(title)}</caption><tbody>{rows}</tbody></table>"
+
+
+class Drawn(Displayed):
+    """An object that shows itself as a picture too."""
+
+    #: ``module:function`` that draws it. A text: pictures import what they draw, not the other way
+    #: round.
+    _drawn_by: ClassVar[str]
+
+    def plot(self) -> Figure:
+        """The object as a Matplotlib figure, to be changed, shown, or written by its ``savefig``.
+
+        Raises
+        ------
+        InputError
+            If an object of this shape has no picture.
+        """
+        # A notebook shows figures once this is imported.
+        import_module("matplotlib.pyplot")
+        module, name = self._drawn_by.split(":")
+        with import_module("asperity.figures.style").style():
+            figure: Figure = getattr(import_module(module), name)(self)
+        return figure
 
 
 def parameter_line(parameter: Parameter, value: Any) -> SummaryLine:

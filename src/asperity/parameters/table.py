@@ -304,8 +304,10 @@ def law_parameters(law: Any) -> Mapping[str, Parameter]:
         name = plain_name(declared.name)
         if name in EXPERIMENT:
             raise InputError(
-                f"law.{name} must have a name that is free, got '{name}', which is the "
-                f"{EXPERIMENT[name].meaning}; rename the field of {law.__name__}"
+                f"law.{name}",
+                "have a name that is free",
+                f"'{name}', which is the {EXPERIMENT[name].meaning}",
+                f"rename the field of {law.__name__}",
             )
         parameter = declared.metadata.get("parameter")
         # A field without declaration is a pure number.
@@ -358,9 +360,7 @@ def known_name(name: str, known: Mapping[str, Parameter], label: str = "paramete
     """
     canonical = canonical_name(name, known)
     if canonical is None:
-        raise InputError(
-            f"{label} must be a known name, got {shown(name)}; {suggestion(name, known)}"
-        )
+        raise InputError(label, "be a known name", shown(name), suggestion(name, known))
     return canonical
 
 

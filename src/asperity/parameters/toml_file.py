@@ -67,12 +67,12 @@ def toml_content(path: str | os.PathLike[str], label: str) -> tuple[Path, dict[s
         text = file_content(file).decode("utf-8-sig")
     except FileNotFoundError:
         raise InputError(
-            f"{label} must be a file, got '{path}'; there is none, correct the path"
+            label, "be a file", f"'{path}'", "there is none, correct the path"
         ) from None
     except (OSError, UnicodeDecodeError) as error:
         why = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
         raise InputError(
-            f"{label} must be a readable TOML file, got '{path}' ({why}); give another"
+            label, "be a readable TOML file", f"'{path}' ({why})", "give another"
         ) from None
     return file, parsed_toml(text.replace("\r\n", "\n"), label, f"'{path}'")
 
@@ -95,8 +95,10 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
         64 bits, which TOML does not promise to keep.
     """
     deep = InputError(
-        f"{label} must have at most {_DEEPEST} tables and lists in each other, got more in "
-        f"{source}; write fewer"
+        label,
+        f"have at most {_DEEPEST} tables and lists in each other",
+        f"more in {source}",
+        "write fewer",
     )
     if _LONG_KEY.search(text):
         raise deep
@@ -105,7 +107,7 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
     except tomllib.TOMLDecodeError as error:
         what = printable(" ".join(str(error).split()))
         raise InputError(
-            f"{label} must be valid TOML, got {source} ({what}); correct that line"
+            label, "be valid TOML", f"{source} ({what})", "correct that line"
         ) from None
     except RecursionError:
         raise deep from None
@@ -125,6 +127,8 @@ def parsed_toml(text: str, label: str, source: str = "a text") -> dict[str, Any]
 
 def _too_large(label: str, source: str) -> InputError:
     return InputError(
-        f"{label} must have integers of at most 64 bits, got a larger one in {source}; write it "
-        "as a decimal number"
+        label,
+        "have integers of at most 64 bits",
+        f"a larger one in {source}",
+        "write it as a decimal number",
     )

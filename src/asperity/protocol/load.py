@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from asperity.laws import registered
 from asperity.operating_point import known_parameters
-from asperity.parameters.arguments import shown
 from asperity.parameters.toml_file import toml_content
 from asperity.protocol.protocol import Protocol, ProtocolError
-from asperity.units import KINDS
+from asperity.questions.record import without_unit
 
 #: Kinds of the quantities in the tables of a file, where each carries its unit.
 _KINDS = {
@@ -52,37 +51,23 @@ def protocol_of(content: Mapping[str, Any], source: str = "") -> Protocol:
     ProtocolError
         As `load_protocol`.
     """
-    mistakes = list(_without_unit(content))
+    mistakes = without_unit(_numbers(content))
     try:
         protocol = Protocol(**content)
     except ProtocolError as error:
-        raise ProtocolError((*mistakes, *error.mistakes), source) from None
+        raise ProtocolError((*mistakes, *error.errors), source) from None
     if mistakes:
         raise ProtocolError(mistakes, source)
     return protocol
 
 
-def _law(content: Mapping[str, Any]) -> str | None:
-    """Name of the law, if the file gives one that is known."""
-    name = content.get("law")
-    return name if isinstance(name, str) and name in registered() else None
-
-
-def _without_unit(content: Mapping[str, Any]) -> list[str]:
-    """Numbers without the unit that a file must give."""
-    kinds = {
-        **_KINDS,
-        "parameters": {n: q.kind for n, q in known_parameters(_law(content)).items()},
-    }
-    mistakes = []
+def _numbers(content: Mapping[str, Any]) -> Iterator[tuple[str, str, Any]]:
+    """Place, kind and value of the quantities of a file."""
+    law = content.get("law")
+    known = known_parameters(law if isinstance(law, str) and law in registered() else None)
+    kinds = {**_KINDS, "parameters": {name: p.kind for name, p in known.items()}}
     for table, names in kinds.items():
         values = content.get(table)
         for name, value in values.items() if isinstance(values, Mapping) else ():
-            unit = KINDS[names[name]].si if name in names else ""
-            if unit and isinstance(value, int | float) and not isinstance(value, bool):
-                example = KINDS[names[name]].example
-                mistakes.append(
-                    f"{table}.{name} must carry a unit, got {shown(value)}; "
-                    f"write it like '{example}'"
-                )
-    return mistakes
+            if name in names:
+                yield f"{table}.{name}", names[name], value

@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Self
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    PositiveInt,
-    PrivateAttr,
-    ValidationError,
-    model_validator,
-)
+from pydantic import PositiveInt, PrivateAttr, ValidationError, WrapValidator, model_validator
 
 from asperity import materials
 from asperity.errors import InputError, MistakesError, closest
@@ -25,9 +18,9 @@ from asperity.loads import Programme, ProgrammeStep
 from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.operating_point import SourcedNumber, sourced_numbers
 from asperity.parameters import MACHINE, canonical_name, law_parameters
-from asperity.parameters.mistakes import shown, worded
 from asperity.protocol.recording import RecordingSetup, setup_of
 from asperity.protocol.steps import PlannedStep, check_levels, plan
+from asperity.questions.record import Question, Record, shown
 from asperity.slider import Slider
 from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, transient
@@ -40,8 +33,6 @@ Given = float | str
 
 #: Segments whose values are listed one by one, so that two protocols can be compared.
 _COMPARED = 100
-
-_STRICT = ConfigDict(frozen=True, extra="forbid", arbitrary_types_allowed=True)
 
 
 def numbers_of(
@@ -107,7 +98,32 @@ class ProtocolError(MistakesError):
     subject = "protocol"
 
 
-class Repeat(BaseModel):
+def _each_step_once(steps: Any, fill: Callable[[Any], Any]) -> Any:
+    """The steps; a wrong one is one mistake, which pydantic reports for each kind of step."""
+    try:
+        return fill(steps)
+    except ValidationError as error:
+        wrong = {m["loc"][0]: m for m in reversed(error.errors()) if m["loc"]}
+        if not wrong:
+            raise
+        raise ProtocolError(
+            [_wrong_step(number, wrong[number]) for number in sorted(wrong)]
+        ) from None
+
+
+def _wrong_step(number: Any, reported: Any) -> InputError:
+    raised = reported.get("ctx", {}).get("error")
+    if isinstance(raised, InputError):
+        return raised
+    return InputError(
+        f"step {number + 1}",
+        "be a text, or a table of repeat and steps",
+        shown(reported["input"]),
+        "write it like 'hold 10 s' or { repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }",
+    )
+
+
+class Repeat(Record):
     """Steps done several times, one round after the other.
 
     Attributes
@@ -117,13 +133,11 @@ class Repeat(BaseModel):
     steps : tuple of str, ProgrammeStep or Repeat
     """
 
-    model_config = _STRICT
-
     repeat: PositiveInt
     steps: tuple[str | Repeat | ProgrammeStep, ...]
 
 
-class ProtocolStart(BaseModel):
+class ProtocolStart(Record):
     """Load, velocity and states before the first step.
 
     Attributes
@@ -137,14 +151,12 @@ class ProtocolStart(BaseModel):
         `asperity.transients.transient`.
     """
 
-    model_config = _STRICT
-
     velocity: Given
     load: Given | None = None
     states: tuple[float, ...] | None = None
 
 
-class SolverSettings(BaseModel):
+class SolverSettings(Record):
     """How the motion is integrated and written.
 
     Attributes
@@ -161,8 +173,6 @@ class SolverSettings(BaseModel):
         Number of steps at which the integration stops and says so.
     """
 
-    model_config = _STRICT
-
     inertia: bool = False
     sampling: Given | None = None
     rtol: float = 1e-9
@@ -170,7 +180,7 @@ class SolverSettings(BaseModel):
     most_steps: float = MOST_STEPS
 
 
-class Protocol(BaseModel):
+class Protocol(Question):
     """An experiment: what slides, how it begins, and the steps.
 
     Attributes
@@ -197,10 +207,11 @@ class Protocol(BaseModel):
         An `InputError` with all mistakes: steps by their place, counted from 1.
     """
 
-    model_config = _STRICT
+    subject = "protocol"
+    mistakes_error = ProtocolError
 
     law: str
-    steps: tuple[str | Repeat | ProgrammeStep, ...]
+    steps: Annotated[tuple[str | Repeat | ProgrammeStep, ...], WrapValidator(_each_step_once)]
     start: ProtocolStart
     material: str = ""
     parameters: Mapping[str, Given] = {}
@@ -212,17 +223,6 @@ class Protocol(BaseModel):
     _planned: list[PlannedStep] = PrivateAttr(default_factory=list)
     _numbers: dict[str, SourcedNumber] = PrivateAttr(default_factory=dict)
 
-    def __init__(self, /, **fields: Any) -> None:
-        try:
-            super().__init__(**fields)
-        except ValidationError as error:
-            raise ProtocolError(_sentences(error)) from None
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A protocol with some fields replaced, checked as any other."""
-        fields = {name: getattr(self, name) for name in type(self).model_fields}
-        return type(self)(**{**fields, **(update or {})})
-
     @model_validator(mode="after")
     def _free_of_mistakes(self) -> Protocol:
         planned, mistakes = plan(self.steps, self.folder)
@@ -231,13 +231,13 @@ class Protocol(BaseModel):
             self._numbers.update(self._found_numbers())
             level = self._level()
         except InputError as error:
-            mistakes.append(str(error))
+            mistakes.append(error)
         else:
             mistakes += check_levels(planned, level)
         try:
             _ = self.setup
         except InputError as error:
-            mistakes.append(str(error))
+            mistakes.append(error)
         if mistakes:
             raise ProtocolError(mistakes)
         # What concerns the programme as a whole, such as steps that take no time.
@@ -338,31 +338,3 @@ class Protocol(BaseModel):
             **segments,
             "programme": digest.hexdigest(),
         }
-
-
-def _sentences(error: ValidationError) -> list[str]:
-    """The mistakes that pydantic has found, a wrong step once."""
-    models: dict[str, type[BaseModel]] = {
-        "": Protocol,
-        "start": ProtocolStart,
-        "solver": SolverSettings,
-    }
-    sentences: list[str] = []
-    steps: set[Any] = set()
-    for mistake in error.errors(include_url=False):
-        place = mistake["loc"]
-        of_step = place[:1] == ("steps",) and len(place) > 1
-        # pydantic reports a wrong step once for each kind of step.
-        if of_step and place[1] in steps:
-            continue
-        if of_step:
-            steps.add(place[1])
-        if of_step and "error" not in mistake.get("ctx", {}):
-            sentences.append(
-                f"step {int(place[1]) + 1} must be a text, or a table of repeat and steps, got "
-                f"{shown(mistake['input'])}; write it like 'hold 10 s' or "
-                "{ repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }"
-            )
-        else:
-            sentences += worded(mistake, "protocol", models)
-    return sentences

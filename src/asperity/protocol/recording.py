@@ -88,13 +88,13 @@ def setup_of(
     settings = dict(table)
     seed, described = settings.pop("seed", 0), settings.pop("sensors", {})
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise InputError(
-            f"tribometer.seed must be a whole number from 0, got {shown(seed)}; correct it"
-        )
+        raise InputError("tribometer.seed", "be a whole number from 0", shown(seed), "correct it")
     if not isinstance(described, Mapping) or not described:
         raise InputError(
-            "tribometer.sensors must have a table for each channel, got none; write it like "
-            "[tribometer.sensors.'shear force'] with type = 'spring gauge' below it"
+            "tribometer.sensors",
+            "have a table for each channel",
+            "none",
+            "write it like [tribometer.sensors.'shear force'] with type = 'spring gauge' below it",
         )
     recorder = _made(Recorder, settings, "tribometer")
     sensors, exposed = {}, {}
@@ -143,22 +143,24 @@ def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
     options = dict(fields) if isinstance(fields, Mapping) else {}
     name = options.pop("type", None)
     if not isinstance(name, str) or name not in SENSORS:
-        raise InputError(
-            f"{place}.type must be a sensor, got {shown(name)}; {closest(str(name), SENSORS)}"
-        )
+        raise InputError(f"{place}.type", "be a sensor", shown(name), closest(str(name), SENSORS))
     made, measurable = SENSORS[name]
     chosen = options.pop("measures", None)
     measured = measurable[0] if chosen is None else chosen
     if measured not in measurable:
         raise InputError(
-            f"{place}.measures must be something that a {name} can measure, got {shown(measured)}; "
-            f"choose {' or '.join(map(repr, measurable))}"
+            f"{place}.measures",
+            f"be something that a {name} can measure",
+            shown(measured),
+            f"choose {' or '.join(map(repr, measurable))}",
         )
     claimed = next((_CLAIMS[r] for r in _CLAIMS if candidates(r, {channel: None})), measured)
     if chosen is None and claimed != measured:
         raise InputError(
-            f"{place}.measures must be given for a {name} in a channel of this name, got nothing; "
-            f"it measures the {measured} unless it says measures = '{claimed}'"
+            f"{place}.measures",
+            f"be given for a {name} in a channel of this name",
+            "nothing",
+            f"it measures the {measured} unless it says measures = '{claimed}'",
         )
     return _made(made, options, place), _SIGNALS[measured]
 
@@ -168,26 +170,28 @@ def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
     for name in fields:
         if name not in known:
             advice = closest(name, known)
-            raise InputError(
-                f"{place}.{name} must be a known field, got {shown(fields[name])}; {advice}"
-            )
+            raise InputError(f"{place}.{name}", "be a known field", shown(fields[name]), advice)
         if isinstance(fields[name], list) or (
             isinstance(fields[name], Mapping) and name != "ranges"
         ):
             raise InputError(
-                f"{place}.{name} must be one value, got {shown(fields[name])}; give a number or a "
-                "text with its unit"
+                f"{place}.{name}",
+                "be one value",
+                shown(fields[name]),
+                "give a number or a text with its unit",
             )
     for name, field in known.items():
         needed = field.default is field.default_factory is dataclasses.MISSING
         if needed and name not in fields:
-            raise InputError(f"{place}.{name} must be given, got nothing; add it")
+            raise InputError(f"{place}.{name}", "be given", "nothing", "add it")
     try:
         return kind(**fields)
     except TypeError:
         raise InputError(
-            f"{place} must hold numbers and texts with units, got {dict(fields)}; correct the one "
-            "that is neither"
+            place,
+            "hold numbers and texts with units",
+            f"{dict(fields)}",
+            "correct the one that is neither",
         ) from None
 
 
@@ -200,6 +204,8 @@ def _check_sampling(
     if rate is None or rate < wanted:
         shown = "none" if rate is None else f"{rate:g} Hz"
         raise InputError(
-            f"solver.sampling must be at least {wanted:g} Hz for the tribometer, its rate and "
-            f"twice its bandwidths, got {shown}; give four times its rate if you can"
+            "solver.sampling",
+            f"be at least {wanted:g} Hz for the tribometer, its rate and twice its bandwidths",
+            shown,
+            "give four times its rate if you can",
         )

@@ -74,8 +74,10 @@ def append(path: Path, block: xarray.Dataset, done: Mapping[str, int]) -> None:
     except OSError as error:
         why = error.strerror or "it is damaged"
         raise InputError(
-            f"out must be a file that can be written, got '{path}' ({why}); choose a folder that "
-            "exists, is writable and has room"
+            "out",
+            "be a file that can be written",
+            f"'{path}' ({why})",
+            "choose a folder that exists, is writable and has room",
         ) from None
 
 

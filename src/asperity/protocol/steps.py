@@ -31,7 +31,7 @@ from asperity.loads import (
 from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.parameters.arguments import shown
 from asperity.recording import read
-from asperity.recording.rounded_time import even_times
+from asperity.recording.defects.rounded_time import even_times
 from asperity.units import to_si
 
 #: What a recording can prescribe: the role of its channel, and the kind that it must be of.
@@ -77,15 +77,16 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
     for name in names:
         if name not in _CHANNELS:
             raise InputError(
-                f"follow must name what is followed, got '{name}'; {closest(name, _CHANNELS)}"
+                "follow", "name what is followed", f"'{name}'", closest(name, _CHANNELS)
             )
     path = Path(file.strip("\"'"))
     trace = read(path if path.is_absolute() else folder / path)
     for finding in trace.findings:
         if finding.name in _UNUSABLE:
             raise InputError(
-                f"follow must take a recording without '{finding.name}', got '{path.name}': "
-                f"{finding.sentence} Cut it to a part that is whole"
+                "follow",
+                f"take a recording without '{finding.name}'",
+                f"'{path.name}': {finding.sentence} Cut it to a part that is whole",
             )
     values: dict[str, np.ndarray] = {}
     for name in names:
@@ -93,9 +94,10 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
         channel = trace.channel(role)
         if channel.kind != kind:
             raise InputError(
-                f"follow must take the {name} from a channel of its unit, got "
-                f"'{channel.recorded_name}' in '{channel.recorded_unit}' of '{path.name}'; "
-                "write the unit into its heading, as in 'load (N)' or 'velocity (um/s)'"
+                "follow",
+                f"take the {name} from a channel of its unit",
+                f"'{channel.recorded_name}' in '{channel.recorded_unit}' of '{path.name}'",
+                "write the unit into its heading, as in 'load (N)' or 'velocity (um/s)'",
             )
         values[name] = channel.values
     finite = np.isfinite(trace.time)
@@ -104,8 +106,10 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
     if not finite.all():
         row = int(np.argmin(finite))
         raise InputError(
-            f"follow must have a number in every row, got none in row {row} of '{path.name}'; "
-            "cut or fill the recording first"
+            "follow",
+            "have a number in every row",
+            f"none in row {row} of '{path.name}'",
+            "cut or fill the recording first",
         )
     return Follow(even_times(trace.time), values.get("load"), values.get("velocity"))
 
@@ -223,7 +227,7 @@ def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
             parts = {key: value for key, value in match.groupdict().items() if value is not None}
             return form.build(_quantities(parts, name, line, form.example), folder)
     examples = " or ".join(f"'{form.example}'" for form in forms)
-    raise InputError(f"{name} must be a whole step, got '{line}'; write it like {examples}")
+    raise InputError(name, "be a whole step", f"'{line}'", f"write it like {examples}")
 
 
 def _meant(line: str, name: str) -> list[StepForm]:
@@ -264,7 +268,7 @@ def _quantities(
         try:
             quantities[key] = to_si(text, _KINDS[key], f"{name}.{key}", require_unit=True)
         except InputError as error:
-            raise InputError(f"{error}, as in '{example}' (in '{line}')") from None
+            raise error.noting(f", as in '{example}' (in '{line}')") from None
     return quantities
 
 
@@ -277,7 +281,7 @@ class PlannedStep:
     step: ProgrammeStep
 
 
-def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[str]]:
+def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[InputError]]:
     """All steps in their order, repetitions written out, and the mistakes in them.
 
     Parameters
@@ -286,11 +290,11 @@ def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[st
     folder : Path
         Where files that lines name lie.
     """
-    mistakes: list[str] = []
+    mistakes: list[InputError] = []
     return _planned(steps, "step ", folder, mistakes), mistakes
 
 
-def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iterator[str]:
+def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iterator[InputError]:
     """Mistakes in the values of the steps, each at the load and velocity before it."""
     reported: set[str] = set()
     for one in planned:
@@ -298,17 +302,19 @@ def check_levels(planned: Sequence[PlannedStep], level: LoadAndVelocity) -> Iter
             _, level = one.step.lay_out(level, one.place)
             if isinstance(one.step, StepLoad) and not level.load > 0:
                 raise InputError(
-                    f"{one.place}.load must be positive, got {level.load:g} N; give a load above "
-                    "zero, without which there is no contact"
+                    f"{one.place}.load",
+                    "be positive",
+                    f"{level.load:g} N",
+                    "give a load above zero, without which there is no contact",
                 )
         except InputError as error:
             if one.place not in reported:
                 reported.add(one.place)
-                yield f"{error} (in '{one.text}')"
+                yield error.noting(f" (in '{one.text}')")
 
 
 def _planned(
-    steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[str]
+    steps: Sequence[Any], prefix: str, folder: Path, mistakes: list[InputError]
 ) -> list[PlannedStep]:
     planned: list[PlannedStep] = []
     for number, step in enumerate(steps, start=1):
@@ -316,11 +322,11 @@ def _planned(
         try:
             planned += _one(step, place, folder, mistakes)
         except InputError as error:
-            mistakes.append(str(error))
+            mistakes.append(error)
     return planned
 
 
-def _one(step: Any, place: str, folder: Path, mistakes: list[str]) -> list[PlannedStep]:
+def _one(step: Any, place: str, folder: Path, mistakes: list[InputError]) -> list[PlannedStep]:
     if isinstance(step, ProgrammeStep):
         return [PlannedStep(place, repr(step), step)]
     if isinstance(step, str):
@@ -333,8 +339,10 @@ def _one(step: Any, place: str, folder: Path, mistakes: list[str]) -> list[Plann
     block = _planned(inner, f"{place}.", folder, mistakes)
     if times * len(block) > MOST:
         raise InputError(
-            f"{place} must come to at most {MOST} steps, got {shown(times)} times {len(block)}; "
-            "repeat it less often"
+            place,
+            f"come to at most {MOST} steps",
+            f"{shown(times)} times {len(block)}",
+            "repeat it less often",
         )
     return block * times
 
@@ -344,13 +352,18 @@ def _repetition(line: str, place: str) -> tuple[int, list[str]]:
     inner = [part.strip() for part in match["steps"].split(";")] if match else []
     if match is None or not match["times"].isdecimal() or _count(match["times"]) < 1:
         raise InputError(
-            f"{place} must say how often what is repeated, got '{line}'; write it like "
-            f"'{REPEAT_EXAMPLE}'"
+            place,
+            "say how often what is repeated",
+            f"'{line}'",
+            f"write it like '{REPEAT_EXAMPLE}'",
         )
     if any(part.lower().startswith("repeat") for part in inner):
         raise InputError(
-            f"{place} must not repeat within a line that repeats, got '{line}'; write the outer "
-            "one as a table, like { repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }"
+            place,
+            "not repeat within a line that repeats",
+            f"'{line}'",
+            "write the outer "
+            "one as a table, like { repeat = 3, steps = ['hold 10 s', 'slide for 60 s'] }",
         )
     # A line may end in a semicolon.
     return _count(match["times"]), [part for i, part in enumerate(inner) if part or i == 0]

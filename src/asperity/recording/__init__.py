@@ -1,6 +1,6 @@
 """Signals as a laboratory has them: a `Trace` of channels over time, read, checked and measured."""
 
-from asperity.recording.checks import check
+from asperity.recording.defects.check import check
 from asperity.recording.derived import derive
 from asperity.recording.finding import Finding
 from asperity.recording.readers import read

@@ -44,7 +44,7 @@ def stress_to_force(
     size = to_si(area, "area", "stress_to_force.area")
     if size <= 0:
         raise InputError(
-            f"stress_to_force.area must be positive, got {size:g} m^2; give the contact area"
+            "stress_to_force.area", "be positive", f"{size:g} m^2", "give the contact area"
         )
     wanted = [k for k, c in trace.channels.items() if c.kind == "pressure"]
     if channels is not None:
@@ -61,8 +61,10 @@ def _pressure(trace: Trace, name: str) -> str:
     channel = trace.channel(name)
     if channel.kind != "pressure":
         raise InputError(
-            f"stress_to_force.channels must be pressures, got '{name}' in '{channel.unit}'; leave "
-            "it out"
+            "stress_to_force.channels",
+            "be pressures",
+            f"'{name}' in '{channel.unit}'",
+            "leave it out",
         )
     return next(key for key, c in trace.channels.items() if c is channel)
 

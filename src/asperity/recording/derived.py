@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.recording.checks import CHECKED, check
+from asperity.recording.defects.check import CHECKED, check
 from asperity.recording.expressions import Evaluated, Names, Quantity, evaluate
 from asperity.recording.finding import Finding
 from asperity.recording.roles import ROLES, role_of

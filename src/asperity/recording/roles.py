@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from asperity.errors import InputError, closest
+from asperity.errors import Argument, InputError, closest
 
 
 @dataclass(frozen=True)
@@ -190,11 +190,14 @@ def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str
         return fitting[0]
     if fitting:
         raise InputError(
-            f"Trace.channel must name one channel, got '{name}', which can be "
-            f"{' or '.join(map(repr, fitting))}; choose when reading, like "
-            f"columns={{'{role or name}': '{fitting[0]}'}}"
+            Argument("Trace.channel", role or name),
+            "name one channel",
+            f"several, {' or '.join(map(repr, fitting))}",
+            f"choose when reading, like {Argument('columns', role or name, fitting[0])}",
         )
     raise InputError(
-        f"Trace.channel must name a channel, got '{name}'; "
-        + (closest(name, kinds) if kinds else "the trace has none")
+        Argument("Trace.channel", role or name),
+        "name a channel",
+        f"none like '{name}'",
+        closest(name, kinds) if kinds else "the recording has none",
     )

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import InputError, listed
+from asperity.errors import Argument, InputError, listed
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
-from asperity.recording.checks import CHECKED, check, even_rate
+from asperity.recording.defects.check import CHECKED, check, even_rate
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.roles import find_channel
 from asperity.units import from_si, to_si
@@ -52,8 +52,8 @@ class Channel:
         if self.kind is None:
             raise InputError(
                 f"Channel.unit must be known to be converted, got '{self.recorded_unit}' for "
-                f"'{self.recorded_name}'; name it when reading, like units={{"
-                f"'{self.recorded_name}': 'N'}}"
+                f"'{self.recorded_name}'; name it when reading, like "
+                f"{Argument('units', self.recorded_name, 'N')}"
             )
         return np.asarray(from_si(self.values, unit, self.kind))
 
@@ -89,8 +89,10 @@ class Trace(Displayed):
         for name, channel in self.channels.items():
             if channel.values.size != self.time.size:
                 raise InputError(
-                    f"Trace.channels must be as long as time, got {channel.values.size} values "
-                    f"of '{name}' for {self.time.size} times; cut them to the same length"
+                    "Trace.channels",
+                    "be as long as time",
+                    f"{channel.values.size} values of '{name}' for {self.time.size} times",
+                    "cut them to the same length",
                 )
 
     def __len__(self) -> int:
@@ -157,8 +159,10 @@ class Trace(Displayed):
             inside &= self.time < to_si(end, "time", "slice.end")
         if not inside.any():
             raise InputError(
-                f"slice.start and slice.end must enclose samples, got {start} to {end}; "
-                f"{_extent(self.time)}"
+                "slice.start and slice.end",
+                "enclose samples",
+                f"{start} to {end}",
+                f"{_extent(self.time)}",
             )
         cut = {k: replace(c, values=c.values[inside]) for k, c in self.channels.items()}
         kept = tuple(f for f in self.findings if f.name not in CHECKED)

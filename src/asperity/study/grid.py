@@ -11,6 +11,7 @@ import math
 import os
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,13 +20,12 @@ from numpy.typing import NDArray
 from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters, canonical_name
 from asperity.parameters.arguments import shown
-from asperity.parameters.toml_file import toml_content
+from asperity.questions.record import without_unit
 from asperity.study.axes import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
 from asperity.study.plan import PlanError, SweepPlan
 from asperity.study.points import RATIOS, Points
 from asperity.study.record import known_names, laws_named, plan_record
 from asperity.study.solve import SOLVES
-from asperity.units import KINDS
 
 
 def load_plan(path: str | os.PathLike[str]) -> SweepPlan:
@@ -42,30 +42,17 @@ def load_plan(path: str | os.PathLike[str]) -> SweepPlan:
     PlanError
         An `InputError` with all mistakes.
     """
-    file, content = toml_content(path, "plan")
-    try:
-        plan = SweepPlan(**{"folder": file.parent, **content})
-    except PlanError as error:
-        raise PlanError(error.mistakes, str(path)) from None
-    mistakes = _without_unit(plan)
+    plan = SweepPlan.from_file(path, folder=Path(path).parent)
+    # Mistakes in the laws are reported with all others of the plan.
+    known = known_names(laws_named(plan, []), plan.solve)
+    mistakes = without_unit(
+        (place, known[name].kind, value)
+        for place, written, value in _numbers(plan)
+        if (name := canonical_name(written, known)) is not None
+    )
     if mistakes:
         raise PlanError(mistakes, str(path))
     return plan
-
-
-def _without_unit(plan: SweepPlan) -> list[str]:
-    """Sentences about bare numbers where a unit is needed: a file says what it means."""
-    # Mistakes in the laws are reported with all others of the plan.
-    known = known_names(laws_named(plan, []), plan.solve)
-    mistakes = []
-    for place, written, value in _numbers(plan):
-        name = canonical_name(written, known)
-        unit = known[name].unit if name in known else ""
-        bare = isinstance(value, int | float) and not isinstance(value, bool)
-        if unit and bare and math.isfinite(value):
-            example = KINDS[known[str(name)].kind].example
-            mistakes.append(f"{place} must carry a unit, got {value!r}; write it like '{example}'")
-    return list(dict.fromkeys(mistakes))
 
 
 def _numbers(plan: SweepPlan) -> Iterator[tuple[str, str, Any]]:

@@ -4,25 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
-from pydantic import (
-    BaseModel,
-    ConfigDict,
-    Field,
-    PositiveInt,
-    ValidationError,
-    field_validator,
-    model_validator,
-)
+from pydantic import Field, PositiveInt, field_validator, model_validator
 
-from asperity.errors import InputError, MistakesError, closest
-from asperity.parameters.arguments import shown
-
-#: A number in SI, a text with its unit, or a switch.
-Given = bool | float | str
-
-_STRICT = ConfigDict(frozen=True, extra="forbid", populate_by_name=True)
+from asperity.errors import InputError, MistakesError
+from asperity.questions.record import Given, Question, Record
 
 
 class PlanError(MistakesError):
@@ -31,7 +18,7 @@ class PlanError(MistakesError):
     subject = "plan"
 
 
-class AxisTable(BaseModel):
+class AxisTable(Record):
     """An axis as a plan writes it: exactly one of five forms.
 
     Attributes
@@ -49,8 +36,6 @@ class AxisTable(BaseModel):
     over : mapping of str to mapping
         For each drawn number ``from``, ``to`` and ``spacing``, or ``mean`` and ``std``.
     """
-
-    model_config = _STRICT
 
     from_: Given | None = Field(default=None, alias="from")
     to: Given | None = None
@@ -89,7 +74,7 @@ class AxisTable(BaseModel):
         return self
 
 
-class ThresholdTable(BaseModel):
+class ThresholdTable(Record):
     """How thresholds of stiffness are looked for.
 
     Attributes
@@ -100,13 +85,11 @@ class ThresholdTable(BaseModel):
         Stiffnesses looked at before the search, at equal ratios.
     """
 
-    model_config = _STRICT
-
     between: tuple[float, float] = (0.3, 4.0)
     scan: PositiveInt = 24
 
 
-class NumberTable(BaseModel):
+class NumberTable(Record):
     """A number read from a transient.
 
     Attributes
@@ -120,15 +103,13 @@ class NumberTable(BaseModel):
         Times between which it is taken (s), written ``from``; the whole transient by default.
     """
 
-    model_config = _STRICT
-
     of: str
     take: str
     from_: float | str | None = Field(default=None, alias="from")
     to: float | str | None = None
 
 
-class TransientTable(BaseModel):
+class TransientTable(Record):
     """A transient, and the numbers that are read from it.
 
     Attributes
@@ -142,8 +123,6 @@ class TransientTable(BaseModel):
     most_steps : float
     """
 
-    model_config = _STRICT
-
     steps: tuple[str, ...]
     numbers: Mapping[str, NumberTable]
     sampling: float | str
@@ -151,7 +130,7 @@ class TransientTable(BaseModel):
     most_steps: float = 2e6
 
 
-class PriorTable(BaseModel):
+class PriorTable(Record):
     """A normal prior of a free parameter.
 
     Attributes
@@ -159,13 +138,11 @@ class PriorTable(BaseModel):
     mean, std : float or str
     """
 
-    model_config = _STRICT
-
     mean: float | str
     std: float | str
 
 
-class FitTable(BaseModel):
+class FitTable(Record):
     """A fit at every point.
 
     Attributes
@@ -182,8 +159,6 @@ class FitTable(BaseModel):
         Starts that are drawn besides the first one, and their seed.
     """
 
-    model_config = _STRICT
-
     free: tuple[str, ...]
     data: tuple[str, ...] | None = None
     prior: str | Mapping[str, PriorTable] | None = None
@@ -197,7 +172,7 @@ class FitTable(BaseModel):
         return (value,) if isinstance(value, str) else value
 
 
-class SweepPlan(BaseModel):
+class SweepPlan(Question):
     """What a sweep computes.
 
     Attributes
@@ -229,7 +204,8 @@ class SweepPlan(BaseModel):
         An `InputError` with all mistakes.
     """
 
-    model_config = _STRICT
+    subject = "plan"
+    mistakes_error = PlanError
 
     axes: Mapping[str, AxisTable]
     law: str = ""
@@ -244,19 +220,6 @@ class SweepPlan(BaseModel):
     fit: FitTable | None = None
     title: str = ""
     folder: Path = Path()
-
-    def __init__(self, /, **fields: Any) -> None:
-        models: dict[str, type[BaseModel]] = {
-            "": SweepPlan,
-            "axes": AxisTable,
-            "threshold": ThresholdTable,
-            "transient": TransientTable,
-            "fit": FitTable,
-        }
-        try:
-            super().__init__(**fields)
-        except ValidationError as error:
-            raise PlanError(_sentences(error, models)) from None
 
     @property
     def columns(self) -> dict[str, tuple[Any, ...]]:
@@ -279,37 +242,3 @@ class SweepPlan(BaseModel):
     def laws(self) -> list[str]:
         """Laws as the plan writes them, in their order."""
         return [str(law) for law in (self.law, *self.columns.get("law", ())) if law]
-
-    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """A plan with some fields replaced, checked as any other."""
-        fields = {name: getattr(self, name) for name in type(self).model_fields}
-        return type(self)(**{**fields, **(update or {})})
-
-
-def _sentences(error: ValidationError, models: Mapping[str, type[BaseModel]]) -> list[str]:
-    """The mistakes that pydantic reports, as ``<field> must <rule>, got <value>; <what to do>``.
-
-    Parameters
-    ----------
-    error : ValidationError
-    models : mapping of str to type of BaseModel
-        Model of each table by its name, that of the plan under ``""``.
-    """
-    return [_sentence(mistake, models) for mistake in error.errors(include_url=False)]
-
-
-def _sentence(mistake: Any, models: Mapping[str, type[BaseModel]]) -> str:
-    raised = mistake.get("ctx", {}).get("error")
-    if isinstance(raised, InputError):
-        return str(raised)
-    place = mistake["loc"]
-    field = ".".join(map(str, place)) or "plan"
-    if mistake["type"] == "extra_forbidden":
-        model = models[str(place[0]) if len(place) > 1 else ""]
-        known = [f.alias or name for name, f in model.model_fields.items()]
-        advice = closest(str(place[-1]), known)
-        return f"{field} must be a known field, got {shown(mistake['input'])}; {advice}"
-    if mistake["type"] == "missing":
-        return f"{field} must be given, got nothing; add it"
-    rule = " ".join(mistake["msg"].split()).removeprefix("Input should be ")
-    return f"{field} must be {rule}, got {shown(mistake['input'])}; correct the value"

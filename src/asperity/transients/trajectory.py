@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.loads.programme.programme import BREAK
-from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
+from asperity.parameters.parameter import Drawn, SummaryLine, count_text, number_line
 from asperity.slider import Motion
 from asperity.slider.named import values_as_text
 from asperity.transients.events import Event, Termination
@@ -205,7 +205,7 @@ def row_bytes(law_states: int) -> int:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Trajectory(Displayed):
+class Trajectory(Drawn):
     """Motion of a slider under a programme, or a block of it.
 
     Attributes
@@ -236,6 +236,8 @@ class Trajectory(Displayed):
     provenance : dict
         Version, law, parameters with units, programme, equations and tolerances.
     """
+
+    _drawn_by = "asperity.figures.trajectory:draw_trajectory"
 
     time: Float
     force: Float

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.errors import InputError
-from asperity.recording.checks import check
-from asperity.recording.sampling import even_rate
+from asperity.recording.defects.check import check
+from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
 from asperity.tribometer.sensors import Accelerometer, Given, Sensor, between, filtered, low_pass
 from asperity.units import KINDS, to_si

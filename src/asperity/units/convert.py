@@ -68,9 +68,7 @@ def to_si(value: Any, kind: str, name: str, *, require_unit: bool = False) -> An
     if isinstance(value, int) and not abs(value) < 10**308:
         raise _beyond_doubles(name, "an integer of more than 308 figures", spec)
     if require_unit and spec.si:
-        raise InputError(
-            f"{name} must carry a unit, got {_shown(value)}; write it like '{spec.example}'"
-        )
+        raise InputError(name, "carry a unit", _shown(value), f"write it like '{spec.example}'")
     return _number_to_si(value, spec, name)
 
 
@@ -149,8 +147,10 @@ def _stacked(rows: list[Any], name: str) -> Any:
         return np.array(rows, dtype=float)
     except ValueError:
         raise InputError(
-            f"{name} must be a rectangular array, got rows of different lengths; "
-            "give every row the same length"
+            name,
+            "be a rectangular array",
+            "rows of different lengths",
+            "give every row the same length",
         ) from None
 
 
@@ -158,8 +158,10 @@ def _number_to_si(value: Any, spec: Kind, name: str) -> Any:
     array = np.asarray(value)
     if array.dtype.kind not in "iuf":
         raise InputError(
-            f"{name} must be {spec.noun}, got {_shown(value)}; "
-            f"give a number in SI or a text like '{spec.example}'"
+            name,
+            f"be {spec.noun}",
+            _shown(value),
+            f"give a number in SI or a text like '{spec.example}'",
         )
     bad = array[~np.isfinite(array)]
     if bad.size:
@@ -179,13 +181,15 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
     match = _NUMBER.fullmatch(text)
     if match is None:
         raise InputError(
-            f"{name} must be a finite number{' with a unit' if spec.si else ''}, "
-            f"got '{shortened(text)}'; write it like '{spec.example}'"
+            name,
+            f"be a finite number{' with a unit' if spec.si else ''}",
+            f"'{shortened(text)}'",
+            f"write it like '{spec.example}'",
         )
     digits, unit = Decimal(match[1]), normalised(match[3])
     if spec.si and not unit:
         raise InputError(
-            f"{name} must carry a unit, got '{shortened(text)}'; write it like '{spec.example}'"
+            name, "carry a unit", f"'{shortened(text)}'", f"write it like '{spec.example}'"
         )
     factor = unit_factor(unit, kind, name, shortened(text))
     power = _power_of_ten(match[2] or "0")
@@ -206,8 +210,10 @@ def _power_of_ten(text: str) -> int:
 
 def _beyond_doubles(name: str, text: str, spec: Kind) -> InputError:
     return InputError(
-        f"{name} must lie within the range of double precision, got '{shortened(text)}'; "
-        f"write it like '{spec.example}'"
+        name,
+        "lie within the range of double precision",
+        f"'{shortened(text)}'",
+        f"write it like '{spec.example}'",
     )
 
 
@@ -241,7 +247,6 @@ def to_radians(value: Any, name: str) -> Any:
         angle = math.nan
     if not math.isfinite(angle):
         raise InputError(
-            f"{name} must be an angle in rad or deg, got '{shortened(value)}'; write it "
-            "like '5 deg'"
+            name, "be an angle in rad or deg", f"'{shortened(value)}'", "write it like '5 deg'"
         )
     return angle

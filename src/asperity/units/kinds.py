@@ -102,5 +102,5 @@ def kind_of(kind: str) -> Kind:
         return KINDS[kind]
     except KeyError:
         raise InputError(
-            f"units.kind must be a kind of quantity, got '{kind}'; {closest(kind, KINDS)}"
+            "units.kind", "be a kind of quantity", f"'{kind}'", closest(kind, KINDS)
         ) from None

@@ -62,10 +62,8 @@ def unit_factor(unit: str, kind: str, name: str, text: str) -> Decimal:
     except _UnitError as refused:
         spec = KINDS[kind]
         expected = f"{spec.noun} ({spec.si})" if spec.si else spec.noun
-        raise InputError(
-            f"{name} must be {expected}, got '{text}'{refused}; "
-            + (refused.advice or f"write it like '{spec.example}'")
-        ) from None
+        advice = refused.advice or f"write it like '{spec.example}'"
+        raise InputError(name, f"be {expected}", f"'{text}'{refused}", advice) from None
 
 
 class _UnitError(Exception):
@@ -156,10 +154,10 @@ def base_units(unit: str) -> tuple[float, Dimension]:
         shifted = registry.Quantity(Decimal(0), parsed).to(base).magnitude != 0
     # pint's parser takes some texts that are no units of anything.
     except (_UnitError, ArithmeticError, AttributeError, TypeError, ValueError):
-        raise InputError(f"unit must be a unit, got '{unit}'; write it like 'N/V'") from None
+        raise InputError("unit", "be a unit", f"'{unit}'", "write it like 'N/V'") from None
     if shifted:
         raise InputError(
-            f"unit must have its zero where nothing is, got '{unit}'; convert it to kelvin first"
+            "unit", "have its zero where nothing is", f"'{unit}'", "convert it to kelvin first"
         )
     return float(factor), dimension_of({str(k): float(v) for k, v in base._units.items()})
 

@@ -1,15 +1,12 @@
 """Recordings: read and measured in a process of its own, with limits.
 
 This module imports what it needs late and nothing else: it is loaded anew for every file.
-
-Sentences of the library name the page's fields in place of arguments.
 """
 
 from __future__ import annotations
 
 import csv
 import json
-import re
 import shlex
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -22,76 +19,13 @@ from pydantic import Field
 
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Question
-from asperity.errors import InputError, printable
+from asperity.app.words import in_labels
+from asperity.errors import InputError, naming, printable
 from asperity.parameters import OUTPUTS
 from asperity.recording.roles import ROLES, candidates
 
 if TYPE_CHECKING:
     from asperity.measurement.sliding.measure import SlidingMeasurement
-
-
-#: What begins a sentence, and what the page calls it.
-_SUBJECTS = {
-    "measure.window": "Window",
-    "measure.detrend": "Drift",
-    "measure.load": "Normal load",
-    "measure.force": "Shear force",
-    "measure.steps": "Velocity steps",
-    "measure.holds": "Holds",
-    "measure.frequency": "Frequency",
-    "measure.trace": "The recording",
-    "lock_in.detrend": "Drift",
-    "lock_in.harmonics": "Harmonics",
-    "lock_in.frequency": "Frequency",
-    "lock_in.load and force": "Normal load and shear force",
-    "lock_in.load": "Normal load",
-    "lock_in.time": "Time column",
-    "read.rate": "Sampling rate",
-    "read.group": "Group",
-    "read.format": "The format",
-    "read.delimiter": "Delimiter",
-    "read.decimal": "Decimal mark",
-    "read.columns": "Role",
-    "read.units": "Unit",
-    "stress_to_force.area": "Area",
-    "recording.path": "The recording",
-    "slice.start and slice.end": "Window",
-}
-_ROLES = {
-    "time": "Time column", "W": "Normal load", "F": "Shear force", "velocity": "Velocity",
-    "displacement": "Displacement", "friction": "Friction",
-}  # fmt: skip
-
-
-def in_page_words(sentence: str) -> str:
-    """A sentence of the library with fields of the page in place of arguments."""
-    for name, field in _SUBJECTS.items():
-        if sentence.startswith(f"{name} "):
-            sentence = field + sentence[len(name) :]
-            break
-    sentence = re.sub(
-        r"^Trace\.channel must name (a|one) channel, got '(\w+)'",
-        lambda match: (
-            f"{_role(match[2])} must be {match[1]} channel, got "
-            f"{'none' if match[1] == 'a' else 'several'} with that role"
-        ),
-        sentence,
-    )
-    sentence = re.sub(r"^columns\['(\w+)'\]", lambda match: _role(match[1]), sentence)
-    sentence = re.sub(r"^units\['([^']*)'\]", r"Unit of \1", sentence)
-    sentence = re.sub(r"^Trace\.channel\b", "Role", sentence)
-    sentence = re.sub(
-        r"columns=\{'(\w+)': (?:'([^']*)'|(\d+))\}",
-        lambda match: f"{_role(match[1])}: {match[2] or match[3]}",
-        sentence,
-    )
-    sentence = re.sub(r"units=\{'([^']*)': '([^']*)'\}", r"Unit of \1: \2", sentence)
-    sentence = re.sub(r"units=\{'([^']*)': \.\.\.\}", r"Unit of \1", sentence)
-    return re.sub(r"\brate='([^']*)'", r"Sampling rate: \1", sentence)
-
-
-def _role(name: str) -> str:
-    return _ROLES.get(name, f"Role {name}")
 
 
 #: Address space (bytes) and processor time (s) of a process that reads a recording.
@@ -180,12 +114,13 @@ def measure(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[st
 
 @contextmanager
 def named(path: Path, name: str) -> Iterator[None]:
-    """Sentences with the name that people know in place of the server's, in the page's words."""
-    try:
-        yield
-    except InputError as error:
-        text = in_page_words(str(error)).replace(str(path), name).replace(path.name, name)
-        raise InputError(printable(text, 900)) from None
+    """Sentences with the name that people know in place of the server's."""
+    with naming(in_labels):
+        try:
+            yield
+        except InputError as error:
+            text = str(error).replace(str(path), name).replace(path.name, name)
+            raise InputError(printable(text, 900)) from None
 
 
 def read_source(path: Path, source: Mapping[str, Any]) -> Any:

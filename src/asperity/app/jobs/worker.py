@@ -21,7 +21,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import IO, Any
 
-from asperity.errors import InputError
+from asperity.app.words import in_labels
+from asperity.errors import InputError, naming
 from asperity.outputs.json import to_json
 
 try:
@@ -144,9 +145,11 @@ def _answer(request: dict[str, Any], channel: IO[str], cancelled: threading.Even
 
     try:
         set_limits(request.get("limits") or {})
-        send(result=_function(request["job"])(request["argument"], report), done=True)
-    except InputError as error:
-        send(error=str(error), done=True)
+        with naming(in_labels):
+            try:
+                send(result=_function(request["job"])(request["argument"], report), done=True)
+            except InputError as error:
+                send(error=str(error), done=True)
     except Cancelled:
         send(error="cancelled", cancelled=True, done=True)
     except MemoryError:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.measure.command import span_of, times_of
-from asperity.cli.measure.source import RecordingSource, naming_options
+from asperity.cli.measure.source import RecordingSource
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
@@ -123,8 +123,7 @@ class FitData:
                     f"{'the whole recording' if whole else f'{begin:g} to {end:g} s'}; give a "
                     "window without it: its samples would count twice"
                 )
-        with naming_options():
-            result = inference.measured_stiffness(self.source.read(paths[0]), (low, high))
+        result = inference.measured_stiffness(self.source.read(paths[0]), (low, high))
         return {**priors, "K": result.prior}
 
     def read(
@@ -152,16 +151,15 @@ class FitData:
             if table:
                 result.append(inference.read_table(path, at))
                 continue
-            with naming_options():
-                result.append(
-                    inference.recorded_run(
-                        self.source.read(path),
-                        name=path.stem,
-                        window=None if self.window is None else span_of(self.window, "--window"),
-                        steps=None if self.steps is None else times_of(self.steps, "--steps"),
-                        velocities=None if self.velocities is None else _speeds(self.velocities),
-                    )
+            result.append(
+                inference.recorded_run(
+                    self.source.read(path),
+                    name=path.stem,
+                    window=None if self.window is None else span_of(self.window, "--window"),
+                    steps=None if self.steps is None else times_of(self.steps, "--steps"),
+                    velocities=None if self.velocities is None else _speeds(self.velocities),
                 )
+            )
         return result
 
     def fit_windows(
@@ -196,10 +194,9 @@ class FitData:
             reading["velocities"] = _speeds(self.velocities)
         automatic = windows.strip() == "auto"
         spans = None if automatic else [span_of(w, "--windows") for w in windows.split(",")]
-        with naming_options():
-            return inference.fit_windows(
-                self.source.read(paths[0]), law, free, spans, reading=reading, **options
-            )
+        return inference.fit_windows(
+            self.source.read(paths[0]), law, free, spans, reading=reading, **options
+        )
 
 
 def is_table(path: Path) -> bool:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.measure.reading import FileRows, ReadingOptions
-from asperity.cli.measure.source import RecordingSource, in_options, naming_options, source_options
+from asperity.cli.measure.source import RecordingSource, source_options
 from asperity.cli.options import json_option
 from asperity.errors import InputError
 
@@ -220,12 +220,10 @@ def measure(
         return _amplitudes(recording, source, options, as_json)
     if plot is not None:
         _check_picture(plot, recording)
-    with naming_options():
-        trace = source.read(recording)
-        result, reason = options.measure(trace)
-    if reason:
-        why = in_options(reason).partition(";")[0]
-        click.echo(f"asperity: read as with --no-modulation, since {why}", err=True)
+    trace = source.read(recording)
+    result, why = options.measure(trace)
+    if why:
+        click.echo(f"asperity: {why}", err=True)
     _print(result, recording, trace.provenance, as_json)
     if plot is not None:
         _plot(result, plot)
@@ -239,9 +237,7 @@ def _amplitudes(
     from asperity.cli.report import to_json
     from asperity.measurement.campaign import modulated_rows
 
-    with naming_options():
-        rows = modulated_rows(recording, options.amplitudes(source.read(recording)))
-    rows = [row | {"reason": in_options(row["reason"])} for row in rows]
+    rows = modulated_rows(recording, options.amplitudes(source.read(recording)))
     if as_json:
         click.echo(to_json({"recording": str(recording), "amplitudes": rows}))
     else:

@@ -7,8 +7,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from asperity.cli.measure.source import RecordingSource, in_options, naming_options
-from asperity.errors import InputError
+from asperity.cli.measure.source import RecordingSource
+from asperity.cli.words import in_options
+from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -126,18 +127,17 @@ class FileRows:
         """Rows of a file; one row with the reason if it cannot be measured."""
         from asperity.measurement.campaign import failed_row, modulated_rows, sliding_rows
 
-        try:
-            with naming_options():
+        with naming(in_options):
+            try:
                 trace = self.source.read(path)
                 result, _ = self.options.either(trace, lambda: self.options.amplitudes(trace))
                 several = isinstance(result, list)
-                rows = modulated_rows(path, result) if several else sliding_rows(path, result)
-        except InputError as error:
-            return [failed_row(path, 1, str(error))]
-        except Exception as error:  # one damaged file must not cost the others
-            reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
-            return [failed_row(path, 1, f"the recording could not be measured ({reason})")]
-        return [row | {"reason": in_options(row["reason"])} for row in rows]
+                return modulated_rows(path, result) if several else sliding_rows(path, result)
+            except InputError as error:
+                return [failed_row(path, 1, str(error))]
+            except Exception as error:  # one damaged file must not cost the others
+                reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+                return [failed_row(path, 1, f"the recording could not be measured ({reason})")]
 
     def inputs(self) -> dict[str, Any]:
         """All that rows depend on besides the files, as JSON values.

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from asperity.cli.measure.source import in_options
 from asperity.cli.report import aligned
 
 if TYPE_CHECKING:
@@ -277,7 +276,7 @@ def _quality(checks: Iterable[Check]) -> list[str]:
         gravest = worst(same)
         check = next(c for c in same if c.verdict == gravest)
         more = f" (and {len(same) - 1} more)" if len(same) > 1 else ""
-        rows.append((check.verdict, name, f"{check.number:.3g}", in_options(check.sentence) + more))
+        rows.append((check.verdict, name, f"{check.number:.3g}", check.sentence + more))
     return ["quality", aligned(rows, "  ")]
 
 

@@ -25,7 +25,7 @@ from asperity.inference.fitting.inputs import (
     start_values,
 )
 from asperity.inference.fitting.minima import extends, minima_of
-from asperity.inference.fitting.own_noise import Found, under_drift, with_noise, without_bad_samples
+from asperity.inference.fitting.own_noise import under_drift, with_noise
 from asperity.inference.fitting.plausibility import (
     contradicted_sharing,
     contradicted_stiffness,
@@ -50,7 +50,7 @@ from asperity.inference.runs.assembly import (
 )
 from asperity.inference.runs.blocks import coarser, reduced
 from asperity.inference.runs.reading import GAIN
-from asperity.inference.runs.run import RecordedRun, run_of
+from asperity.inference.runs.run import RecordedRun, run_of, with_jumps
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
@@ -170,18 +170,13 @@ def fit(
     searched = compared(coarse) if (coarse := coarser(recordings)) else objective
     special = [f.values for f in simpler if f.converged and extends(chosen, f.objective.law)]
 
-    def search() -> Found:
-        minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
-        if not minima or not recordings:
-            return minima, True
+    minima = minima_of(searched, seed, steps.minimised, drawn=starts, simpler=special)
+    agreed = True
+    if minima and recordings:
         # Under white noise a drift passes for slow evolution, and the true minimum may be none.
         drifting = under_drift(searched) if options.order != 0 else None
         besides = minima_of(drifting, seed, drawn=starts) if drifting else []
-        return with_noise(objective, minima, drifting, besides)
-
-    minima, agreed = (
-        search() if searched is not objective else without_bad_samples(objective, search)
-    )
+        minima, agreed = with_noise(objective, minima, drifting, besides)
     if not minima or not math.isfinite(minima[0][1]):
         return failed_fit(objective)
     if recordings:
@@ -223,8 +218,7 @@ class _Steps:
         self._parameters, self._done, self._total = parameters, 0, parameters
 
     def minimised(self, done: int, total: int) -> None:
-        # A search that is repeated without bad samples counts on from where the first has ended.
-        self._done, self._total = max(self._done, done), total + self._parameters
+        self._done, self._total = done, total + self._parameters
         self._report(self._done, self._total)
 
     def described(self, parameters: int) -> None:
@@ -256,7 +250,7 @@ def listed_data(
     ready = [d if isinstance(d, LockInTable) else run_of(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate
-    return [d if isinstance(d, LockInTable) else reduced(d, rate) for d in ready]
+    return [d if isinstance(d, LockInTable) else with_jumps(reduced(d, rate)) for d in ready]
 
 
 def _objective(

@@ -90,7 +90,7 @@ def start_values(
     for name, value in (start or {}).items():
         if name not in free and not (name.startswith("K") and runs):
             raise InputError(
-                f"start must be of free parameters, got '{name}'; free it or leave it out"
+                "start", "be of free parameters", f"'{name}'", "free it or leave it out"
             )
         # A stiffness is read with the run that it belongs to.
         known[name] = value if name.startswith("K") else float(_checked(law, name, value))
@@ -114,15 +114,13 @@ def of_the_table(
     elsewhere = prior is not None and prior.unit not in ("", "N/m")
     if (over is not None or elsewhere) and not (load.size == 1 and math.isfinite(load[0])):
         raise InputError(
-            "K over the load must come with one fixed W0, got several or none; give K in N/m"
+            "K over the load", "come with one fixed W0", "several or none", "give K in N/m"
         )
     if text is not None:
         start["K"] = MACHINE["K"].check(text, "start.K") if over is None else over * float(load[0])
     if prior is not None and elsewhere:
         if prior.unit != "1/m":
-            raise InputError(
-                f"prior of K must be in N/m or 1/m for a table, got {prior.unit}; convert it"
-            )
+            raise InputError("prior of K", "be in N/m or 1/m for a table", prior.unit, "convert it")
         W0 = float(load[0])
         priors["K"] = Prior(prior.mean * W0, prior.sd * W0, prior.source)
     return start, priors
@@ -161,16 +159,20 @@ def fixed_values(
     given = {n: v for n, v in (fixed or {}).items() if not (n == "K" and table is None)}
     for name in given:
         if name in free:
-            raise InputError(f"{name} must be free or fixed, got both; leave one out")
+            raise InputError(name, "be free or fixed", "both", "leave one out")
         if name in MODULATION:
             raise InputError(
-                f"fixed must be parameters of a harmonic load, got '{name}'; leave it out: fits "
-                "take no other load"
+                "fixed",
+                "be parameters of a harmonic load",
+                f"'{name}'",
+                "leave it out: fits take no other load",
             )
         if name not in known and name != "eps_ratio":
             raise InputError(
-                f"fixed must be parameters of {law.name}, got '{name}'; leave it out or choose "
-                "another law"
+                "fixed",
+                f"be parameters of {law.name}",
+                f"'{name}'",
+                "leave it out or choose another law",
             )
     result: dict[str, Any] = {}
     missing = []
@@ -192,14 +194,18 @@ def fixed_values(
             missing.append(name)
     if missing:
         raise MissingNumberError(
-            f"{law.name} must have all its numbers, got none for {', '.join(missing)}; free or fix "
-            "them, add columns, or name a material"
+            law.name,
+            "have all its numbers",
+            f"none for {', '.join(missing)}",
+            "free or fix them, add columns, or name a material",
         )
     if over_load(given.get("K")) is not None:
         if "W0" not in result:
             raise InputError(
-                f"K over the load must come with a fixed W0, got '{given['K']}' and W0 free; give "
-                "K as a stiffness, or fix W0"
+                "K over the load",
+                "come with a fixed W0",
+                f"'{given['K']}' and W0 free",
+                "give K as a stiffness, or fix W0",
             )
         result["K"] = result["K"] * result["W0"]
     if "eps_ratio" not in free:
@@ -207,7 +213,7 @@ def fixed_values(
         largest = ratio * float(np.max(points.get("epsilon", 0.0)))
         if largest >= 1:
             raise InputError(
-                f"eps_ratio times epsilon must be below 1, got {largest:g}; contact would be lost"
+                "eps_ratio times epsilon", "be below 1", f"{largest:g}", "contact would be lost"
             )
     return result
 
@@ -229,12 +235,12 @@ def require_free(
     """
     if not free and not bare:
         raise InputError(
-            f"free must name a parameter of {law.name}, got none; free one, such as A or eps_ratio"
+            "free", f"name a parameter of {law.name}", "none", "free one, such as A or eps_ratio"
         )
     for name in priors:
         if name not in free:
             raise InputError(
-                f"prior must be of free parameters, got '{name}'; free it or leave the prior out"
+                "prior", "be of free parameters", f"'{name}'", "free it or leave the prior out"
             )
 
 
@@ -264,8 +270,10 @@ def require_motion(
         if name in free and not motion[option]:
             switch = f"--{option.replace('_', '-')} ({option}=True in Python)"
             raise InputError(
-                f"{label} must be parameters that count, got '{name}', which has no influence "
-                f"without {word}; add {f'{option} = true' if plan else switch} or fix {name}"
+                label,
+                "be parameters that count",
+                f"'{name}', which has no influence without {word}",
+                f"add {f'{option} = true' if plan else switch} or fix {name}",
             )
 
 
@@ -283,6 +291,8 @@ def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
     needed = sum(1 for u in unknowns if u.prior is None)
     if count < max(needed + (needed > 1), 1):
         raise InputError(
-            f"{table.name} must hold more data than free parameters, got {count} for "
-            f"{len(unknowns)} ({', '.join(u.name for u in unknowns)}); free fewer or measure more"
+            table.name,
+            "hold more data than free parameters",
+            f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})",
+            "free fewer or measure more",
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from typing import NamedTuple
@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from asperity.inference.fitting.minima import distinct
 from asperity.inference.objective import Minimum, Objective
 from asperity.inference.runs.term import NoiseState, RunTerm
-from asperity.inference.runs.wrong_samples import largest_by_chance
 
 Float = NDArray[np.float64]
 #: Minima, best first, and whether noise and parameters agree at the best.
@@ -72,21 +71,6 @@ def with_noise(
                 term.restore_noise(state)
             ends.append(_with_own_noise(objective, noisy, u))
     best = min(ends, key=lambda end: end.deviance)
-    if _taken_off(best.states) > _taken_off(first):
-        # Minima were looked for with these samples, which may have led to a wrong one, and its
-        # misfit then passes for noise.
-        for term, state, begun in zip(noisy, best.states, first, strict=True):
-            term.restore_noise(state._replace(models=begun.models))
-        objective.forget()
-        ends.append(_with_own_noise(objective, noisy, objective.minimise(best.u)[0]))
-        best = min(ends, key=lambda end: end.deviance)
-        # What a minimum on the way was far off from may be right beside this one.
-        for term, state in zip(noisy, first, strict=True):
-            term.restore_noise(state)
-        anew = _with_own_noise(objective, noisy, best.u)
-        if anew.deviance < best.deviance:
-            ends = [anew if end is best else end for end in ends]
-            best = anew
     for term, state in zip(noisy, best.states, strict=True):
         term.restore_noise(state)
     objective.forget()
@@ -96,36 +80,6 @@ def with_noise(
         if end is not best and math.isfinite(end.deviance):
             result.append(Minimum(end.u, chi2 + end.deviance - best.deviance))
     return result, best.agreed
-
-
-def without_bad_samples(objective: Objective, search: Callable[[], Found]) -> Found:
-    """What a search finds without samples at changes of the drive that no motion leads to.
-
-    There the law itself may be off by a sample, which must not hide its misfit, so that samples are
-    not left out as those elsewhere are. The stiffness says which are wrong, and must itself be
-    fitted without them.
-    """
-    noisy = objective.terms_of(RunTerm)
-    alone = [term.alone_at_changes() for term in noisy]
-    if not any(alone):
-        return search()
-    first = [term.noise_state() for term in noisy]
-
-    def left_out(samples: Sequence[Sequence[int]]) -> Found:
-        for term, state, some in zip(noisy, first, samples, strict=True):
-            term.restore_noise(state)
-            term.leave_out(some)
-        objective.forget()
-        return search()
-
-    minima, agreed = left_out([list(samples) for samples in alone])
-    wrong: list[list[int]] = [[] for _ in noisy]
-    if minima and not any(term.law_fails_after_changes for term in noisy):
-        values = objective.named(minima[0][0])
-        wrong = [t.beyond_any_motion(a, values) for t, a in zip(noisy, alone, strict=True)]
-    if [*map(len, wrong)] == [*map(len, alone)]:
-        return minima, agreed
-    return left_out(wrong)
 
 
 def _apart(objective: Objective, minima: list[Minimum]) -> list[Float]:
@@ -138,17 +92,11 @@ def _apart(objective: Objective, minima: list[Minimum]) -> list[Float]:
     return kept
 
 
-def _taken_off(states: Sequence[NoiseState]) -> int:
-    """Samples and jumps of the level that are left out."""
-    return sum(len(state.outliers) + len(state.jumps) for state in states)
-
-
 class _End(NamedTuple):
     """A minimum under its own noise."""
 
     u: Float
-    #: Twice the negative logarithm of likelihood and priors, twice the parameters of the noise, and
-    #: what chance may gain by samples and jumps that are chosen among all.
+    #: Twice the negative logarithm of likelihood and priors, and twice the parameters of the noise.
     deviance: float
     states: list[NoiseState]
     agreed: bool
@@ -174,6 +122,4 @@ def _with_own_noise(objective: Objective, noisy: list[RunTerm], u: Float) -> _En
     deviance = -2 * objective.log_likelihood(u) + float(priors @ priors)
     deviance += 2 * sum(term.profiled for term in noisy)
     states = [term.noise_state() for term in noisy]
-    # The largest of all samples' departures lowers chi-squared by so much where there is none.
-    deviance += _taken_off(states) * largest_by_chance(objective.residuals(u)[0].size) ** 2
     return _End(u, deviance, states, agreed)

@@ -21,14 +21,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.signal import welch
-from scipy.stats import chi2, norm
+from scipy.stats import chi2
 
 from asperity.errors import InputError
-from asperity.inference.runs.noise import fitted
 from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
-from asperity.inference.runs.wrong_samples import CLEARLY, standing_out
+from asperity.recording.defects.lines import find_lines, take_off
 from asperity.units import to_si
 
 Float = NDArray[np.float64]
@@ -46,16 +43,9 @@ _AFTER = (1, 2, 4, 8, 16, 32)
 _CHANCE, _LEFT_OUT, _LEVELS = 1e-4, 0.02, 64
 #: A block whose samples do not cover it, by this share, is left out.
 _GAP = 0.05
-#: Lines: resolution of the spectrum (Hz), least frequency (Hz), height over the spectrum about it,
-#: spectral values that are compared, how many lines, and periods in a piece that is fitted.
-_RESOLUTION, _LOWEST, _HEIGHT, _ABOUT, _LINES, _PERIODS = 0.1, 5.0, 8.0, 101, 12, 100
-#: Pieces of the drive during a period of a line, at most: it may be the modulation otherwise.
-_PIECES_PER_PERIOD = 0.1
-#: A sample is far off if it is farther from what so many on either side say than chance makes any
-#: of all, but for this probability; how noise goes on is learnt from so many samples.
-_BESIDE, _SPIKE, _LEARNT = 16, 1e-4, 50_000
-#: Largest share of samples that are left out.
-_MOST_SPIKES = 1e-3
+#: Least frequency of a line (Hz), and pieces of the drive during a period of it, at most: it may be
+#: the modulation otherwise.
+_LOWEST, _PIECES_PER_PERIOD = 5.0, 0.1
 
 
 def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
@@ -89,10 +79,7 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
         _require_blocks(run, length)
         if all(q == 1 for q in _counts(run, length)):
             return run
-    # A sample that is far off has every frequency: it would be taken for lines.
-    clean, wrong = _without_wrong_at_changes(run)
-    clean, lines = _without_lines(clean)
-    clean, spikes = _without_spikes(clean)
+    clean, lines = _without_lines(run)
     doubts = list(run.doubts)
     if length is None:
         length, complete = _needed(clean)
@@ -105,11 +92,7 @@ def reduced(run: RecordedRun, rate: Any = None) -> RecordedRun:
     short = averaged(clean, length)
     if short.blocks is None:
         return run  # every sample is needed
-    return replace(
-        short,
-        doubts=tuple(doubts),
-        blocks=replace(short.blocks, lines=lines, spikes=wrong + spikes),
-    )
+    return replace(short, doubts=tuple(doubts), blocks=replace(short.blocks, lines=lines))
 
 
 def _require_blocks(run: RecordedRun, length: float) -> None:
@@ -274,91 +257,6 @@ def _within(run: RecordedRun, length: float) -> float:
     return best
 
 
-def _without_spikes(run: RecordedRun) -> tuple[RecordedRun, int]:
-    """The recording with what the others say of samples that are far off alone, and their number.
-
-    The noise of neighbouring samples is an autoregression here, of a stretch of the recording.
-    """
-    friction = run.friction.copy()
-    changes = run.drive.edges[1:-1]
-    count = 0
-    for a, b in run.stretches:
-        if b - a <= 2 * _BESIDE:
-            continue
-        x = friction[a:b] - np.median(friction[a:b])
-        near = np.searchsorted(run.time[a:b], changes)[:, None] + np.arange(-_BESIDE, _BESIDE + 1)
-        near = np.clip(near, 0, b - a - 1)
-        far, off = _far_off_alone(x, x, near)
-        if len(far):
-            # The largest were noise to the autoregression, which expects no smooth friction then.
-            learnt = x.copy()
-            learnt[far] -= off
-            far, off = _far_off_alone(x, learnt, near)
-        if len(far) <= _MOST_SPIKES * x.size:
-            friction[a + far] -= off
-            count += len(far)
-    return (replace(run, friction=friction) if count else run), count
-
-
-def _without_wrong_at_changes(run: RecordedRun) -> tuple[RecordedRun, int]:
-    """The recording with means of their neighbours for wrong samples at changes of the drive.
-
-    Those are wrong that no motion leads to and back. How fast the spring can be pulled is not known
-    yet; but no two neighbours elsewhere, after other changes of the drive too, are half as far
-    apart.
-    """
-    friction = run.friction.copy()
-    count = 0
-    for a, b in run.stretches:
-        x = friction[a:b]
-        if x.size <= 2 * _BESIDE:
-            continue
-        first = np.searchsorted(run.time[a:b], run.drive.edges[1:-1])
-        alone = standing_out(x, first.tolist(), _BESIDE)
-        steps = np.abs(np.diff(x))
-        for k, apart in alone.items():
-            # Peaks that one sample holds stand after several changes, and each speaks for others.
-            before, after = steps[: max(k - 2 * _BESIDE, 0)], steps[k + 2 * _BESIDE :]
-            farthest = max(before.max(initial=0.0), after.max(initial=0.0))
-            if apart > CLEARLY * farthest:
-                x[k] = 0.5 * (x[k - 1] + x[k + 1])
-                count += 1
-    return (replace(run, friction=friction) if count else run), count
-
-
-def _far_off_alone(
-    x: Float, learnt: Float, never: NDArray[np.intp]
-) -> tuple[NDArray[np.intp], Float]:
-    """Samples that are far off alone, and by how much.
-
-    Parameters
-    ----------
-    x : array
-        About zero.
-    learnt : array
-        What the noise is learnt from.
-    never : array of int
-        Samples that count as right.
-    """
-    model = fitted([learnt[:_LEARNT]], order=_BESIDE)
-    apart = model.departures_of_single_samples(model.whiten(x[:, None])[:, 0])
-    scatter = 1.4826 * float(np.median(np.abs(apart)))
-    judged = np.ones(x.size, bool)
-    judged[never] = False
-    limit = float(norm.isf(_SPIKE / (2 * x.size))) * scatter
-    far = np.flatnonzero(judged & (np.abs(apart) > limit))
-    # Beside a sample that is far off, others seem to be.
-    largest = [k for k in far.tolist() if np.abs(apart[_about(k)]).max() <= abs(apart[k])]
-    weights = np.concatenate([[1.0], model.coefficients[-1]])
-    size = model.innovation / math.sqrt(float(weights @ weights))
-    alone = np.array(largest, np.intp)
-    return alone, size * apart[alone]
-
-
-def _about(k: int) -> slice:
-    return slice(max(k - _BESIDE, 0), k + _BESIDE + 1)
-
-
 def _without_lines(run: RecordedRun) -> tuple[RecordedRun, tuple[float, ...]]:
     """The recording without lines of the mains and the like, and their frequencies (Hz)."""
     pieces = np.sort(np.diff(run.drive.edges))
@@ -367,52 +265,7 @@ def _without_lines(run: RecordedRun) -> tuple[RecordedRun, tuple[float, ...]]:
     friction = run.friction.copy()
     taken: list[float] = []
     for (a, b), step in zip(run.stretches, _intervals(run), strict=True):
-        for hertz in _lines(friction[a:b], step, lowest):
-            _take_off(friction[a:b], hertz * step)
+        for hertz in find_lines(friction[a:b], step, lowest):
+            take_off(friction[a:b], hertz * step)
             taken.append(hertz)
     return (replace(run, friction=friction) if taken else run), tuple(sorted(taken))
-
-
-def _lines(x: Float, step: float, lowest: float) -> list[float]:
-    """Frequencies (Hz) at which the spectrum stands high above what is about them."""
-    size = min(2 ** round(math.log2(1 / (_RESOLUTION * step))), x.size // 4)
-    if size < 4 * _ABOUT:
-        return []
-    frequency, power = welch(x, 1 / step, nperseg=size, detrend="linear")
-    height = power / np.maximum(median_filter(power, _ABOUT), 1e-300)
-    height[frequency < lowest] = 0.0
-    result: list[float] = []
-    for k in np.argsort(-height):
-        if height[k] < _HEIGHT or len(result) >= _LINES:
-            break
-        beside = power[k - 1 : k + 2]
-        if (
-            beside.size < 3
-            or beside.argmax() != 1
-            or any(abs(frequency[k] - f) < 1 for f in result)
-        ):
-            continue
-        low, top, high = np.log(beside)
-        result.append(
-            float(frequency[k] + frequency[1] * (low - high) / 2 / (low - 2 * top + high))
-        )
-    return result
-
-
-def _take_off(x: Float, turns: float) -> None:
-    """Take a line of so many turns a sample off, in place and in pieces of 100 periods.
-
-    Its amplitude and phase are linear over each piece: mains wander. They are those of what means
-    over a period leave: a step of friction has every frequency, a kink of it little of them.
-    """
-    m = min(math.ceil(_PERIODS / turns), x.size)
-    k = np.arange(m)
-    u = 2 * k / m - 1
-    wave = np.exp(2j * np.pi * turns * k)
-    columns = np.stack([wave.real, wave.imag, u * wave.real, u * wave.imag], axis=1)
-    inverse = np.linalg.pinv(columns)
-    quick = x - uniform_filter1d(x, round(1 / turns))
-    whole = x.size // m * m
-    rest = (quick[-m:] @ inverse.T) @ columns.T
-    x[:whole].reshape(-1, m)[:] -= (quick[:whole].reshape(-1, m) @ inverse.T) @ columns.T
-    x[whole:] -= rest[m - (x.size - whole) :]

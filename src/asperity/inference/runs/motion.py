@@ -20,10 +20,11 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
-from asperity.inference.runs.noise import Whitening, innovations
+from asperity.inference.runs.noise import innovations
 from asperity.inference.runs.reading import GAIN, Reading
 from asperity.inference.runs.steps import Curve, integrated, law_fields, numbers, with_values
 from asperity.laws import Law
+from asperity.recording.defects.autoregression import Whitening
 from asperity.slider import Slider
 from asperity.slider.motion import Motion
 from asperity.slider.problem import equation_of_motion

@@ -18,12 +18,16 @@ from scipy.stats import norm
 from asperity.errors import InputError
 from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.velocities import constant_velocities
-from asperity.measurement.samples import compressive, load_channel, shear_channel
+from asperity.measurement.samples import compressive
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
+from asperity.recording.defects.jumps import find_jumps
+from asperity.recording.defects.levels import coarsely_rounded, saturated
+from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.sampling import gap_rows, rate_stretches
+from asperity.recording.defects.spikes import away_from_changes, spikes, without
 from asperity.recording.readers import read
-from asperity.recording.rounded_time import even_times
 
 Float = NDArray[np.float64]
 
@@ -40,14 +44,15 @@ LONGEST = 20_000
 #: Of longer ones: parts into which the load between its quick
 #: changes is averaged, and the chance of a sample that noise puts beyond the limit.
 _LOAD_BLOCKS, _LOAD_BY_CHANCE = 4_000, 1e-3
-#: Equal samples in a row at an extreme that may be a clipped gauge, and the chance below which
-#: they are.
-_CLIPPED, _BY_CHANCE = 3, 1e-3
-#: Samples of a stretch of one sampling rate, at least, and the change of the interval that ends it.
-_SHORTEST, _OTHER_RATE = 16, 1.5
-#: Friction above this is a mistake of units. Rounding is coarse where this share of neighbours is
-#: equal and the other differences are whole multiples of one step, to this share of it.
-_LARGEST_FRICTION, _MOSTLY_EQUAL, _WHOLE = 5.0, 0.5, 0.02
+#: Friction above this is a mistake of units.
+_LARGEST_FRICTION = 5.0
+#: Changes of the load are few if there are so many samples to each.
+_FEW_CHANGES = 100
+#: Share of the segments beside a change of the drive, and samples about it, in which friction is
+#: too quick for a jump to be told.
+_NEAR_CHANGE, _SAMPLES_NEAR_CHANGE = 0.05, 20
+#: Share of samples that may be spikes: noise with more of them is not normal.
+_MOST_SPIKES = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,15 +69,12 @@ class Blocks:
         Samples of the recording.
     lines : tuple of float
         Lines (Hz) that were taken off the friction before.
-    spikes : int
-        Samples that were left out of their blocks as farther off than noise can be.
     """
 
     edges: Float
     samples: tuple[int, ...]
     recorded: int
     lines: tuple[float, ...] = ()
-    spikes: int = 0
 
     @property
     def sentence(self) -> str:
@@ -88,9 +90,6 @@ class Blocks:
             said += (
                 f", after lines at {', '.join(f'{f:.4g}' for f in self.lines)} Hz were taken off"
             )
-        if self.spikes:
-            those = "samples that were" if self.spikes > 1 else "sample that was"
-            said += f", without {self.spikes} {those} farther off than noise can be"
         return said
 
 
@@ -126,6 +125,12 @@ class RecordedRun:
         First sample and the one after the last of each stretch of one sampling rate.
     doubts : tuple of str
         Sentences on what about the drive is open.
+    spikes : tuple of float
+        Times (s) of single samples that were wrong: `friction` has the line between their
+        neighbours there.
+    jumps : tuple of float, or None
+        Times (s) from which on the level of the gauge is another one; None where they have not been
+        looked for.
     blocks : Blocks or None
         None where `friction` is that of single samples.
     """
@@ -145,6 +150,8 @@ class RecordedRun:
     load_varies: bool
     stretches: tuple[tuple[int, int], ...]
     doubts: tuple[str, ...]
+    spikes: tuple[float, ...] = ()
+    jumps: tuple[float, ...] | None = None
     blocks: Blocks | None = None
 
     @property
@@ -215,8 +222,14 @@ def recorded_run(
         np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
     )
     doubts += [finding.sentence for finding in signals.signs]
-    doubts += clipped(trace, load, force, window)
-    doubts += strange_friction(friction)
+    doubts += friction_doubts(friction)
+    wrong = away_from_changes(friction, spikes(friction), _first_after_changes(times, drive, cuts))
+    if wrong.size > _MOST_SPIKES * friction.size:
+        doubts.append(
+            f"{wrong.size} samples of friction stand out of their neighbours: the noise is not "
+            "normal, and intervals may not hold"
+        )
+        wrong = wrong[:0]
     if signals.left_out:
         doubts.append(
             f"{signals.left_out} samples are left out, where a value is no number or time does not "
@@ -225,7 +238,7 @@ def recorded_run(
     return RecordedRun(
         name=shown,
         time=times,
-        friction=friction,
+        friction=without(friction, wrong),
         slip=slip,
         drive=drive,
         cuts=tuple(cuts),
@@ -236,8 +249,9 @@ def recorded_run(
         W0=W,
         load_unit=unit,
         load_varies=varies,
-        stretches=_stretches(times),
+        stretches=rate_stretches(times),
         doubts=tuple(doubts),
+        spikes=tuple(times[wrong].tolist()),
     )
 
 
@@ -252,75 +266,34 @@ def _cut_uncertainty(time: Float, cuts: Sequence[Cut]) -> tuple[float, ...]:
     return tuple(uncertain)
 
 
-def clipped(trace: Trace, load: str, force: str, window: tuple[float, float] | None) -> list[str]:
-    """A sentence on a gauge at the end of its range: too many equal samples in a row there.
-
-    Parameters
-    ----------
-    trace : Trace
-    load, force : str
-    window : (float, float), optional
-
-    Notes
-    -----
-    How many are too many follows from how often neighbours are equal elsewhere, which they are in
-    a recording of coarse resolution. A recording that begins or ends at its extreme is at rest.
-    """
-    values = shear_channel(trace, force, load_channel(trace, load))[0].values
-    low, high = window or (-np.inf, np.inf)
-    use = (trace.time >= low) & (trace.time <= high) & np.isfinite(values)
-    time, y = trace.time[use], values[use]
-    said = []
-    for extreme, end in ((y.max(), "highest"), (y.min(), "lowest")):
-        at = np.concatenate([[False], y == extreme, [False]])
-        begins, ends = (np.flatnonzero(at[1:] & ~at[:-1]), np.flatnonzero(at[:-1] & ~at[1:]))
-        inside = (begins > 0) & (ends < y.size)
-        if not inside.any():
-            continue
-        begins, ends = begins[inside], ends[inside]
-        longest = int(np.argmax(ends - begins))
-        count = int(ends[longest] - begins[longest])
-        equal = np.diff(y) == 0
-        others = int(equal.sum()) - int(np.sum(ends - begins - 1))
-        share = (others + 1) / (equal.size - int(np.sum(ends - begins - 1)) + 1)
-        if count >= _CLIPPED and y.size * share ** (count - 1) < _BY_CHANCE:
-            said.append(
-                f"{count} samples in a row from {time[begins[longest]]:.6g} s on are at the "
-                f"{end} value, {extreme:.6g}: the gauge seems to be at the end of its range, and a "
-                "fit to clipped friction is wrong; give a window without"
-            )
-    return said
-
-
-def strange_friction(friction: Float) -> list[str]:
-    """Sentences on friction of no usual size, and on friction whose digits are too coarse.
+def friction_doubts(friction: Float) -> list[str]:
+    """Sentences on friction that is cut off, rounded too coarsely, or of no usual size.
 
     Parameters
     ----------
     friction : array, shape (n,)
-
-    Notes
-    -----
-    Rounding is noise like other noise as long as there is some before it (Widrow, 1956): if most
-    neighbours are equal there is not, and the rounding follows the signal.
     """
     said = []
+    for level in saturated(friction):
+        # A recording that begins or ends at its extreme is at rest.
+        if level.rows[0] > 0 and level.rows[-1] < friction.size - 1:
+            said.append(
+                f"{level.rows.size} samples are at the {level.side} friction, {level.value:.6g}: "
+                "the gauge seems to be at the end of its range, and a fit to clipped friction is "
+                "wrong; give a window without"
+            )
     usual = float(np.median(np.abs(friction)))
     if usual > _LARGEST_FRICTION:
         said.append(
             f"friction is {usual:.4g} as a rule, more than contacts have: correct the units of "
             "force and load, or the column"
         )
-    steps = np.abs(np.diff(friction))
-    moved = steps[steps > 1e-9 * max(usual, 1e-300)]
-    digits = moved / moved.min() if moved.size else moved
-    whole = float(np.abs(digits - np.round(digits)).max(initial=0.0)) < _WHOLE
-    if moved.size and whole and moved.size < (1 - _MOSTLY_EQUAL) * steps.size:
+    rounded = coarsely_rounded(friction)
+    if rounded is not None:
         said.append(
-            f"{1 - moved.size / steps.size:.0%} of the values of friction repeat the one before, "
-            f"and others differ from it by {np.median(moved):.2g}: it was rounded more coarsely "
-            "than its noise, which may bend parameters by more than the intervals say; record or "
-            "write more digits"
+            f"{rounded[0]:.0%} of the values of friction repeat the one before, and others differ "
+            f"from it by {rounded[1]:.2g}: it was rounded more coarsely than its noise, which may "
+            "bend parameters by more than the intervals say; record or write more digits"
         )
     return said
 
@@ -507,26 +480,46 @@ def _drive(
     return Drive(edges, pull, np.zeros_like(pull), at_edges[:-1], slope), cuts
 
 
-def _stretches(times: Float) -> tuple[tuple[int, int], ...]:
-    """Stretches of one sampling rate."""
-    from scipy.ndimage import median_filter
+def _first_after_changes(time: Float, drive: Drive, cuts: Sequence[int]) -> list[int]:
+    """First samples after changes of the velocity, and of the load where they are few."""
+    inner = drive.edges[1:-1]
+    few = inner.size * _FEW_CHANGES <= time.size
+    edges = inner if few else drive.edges[list(cuts)]
+    return [int(k) for k in np.searchsorted(time, edges)]
 
-    steps = np.log(median_filter(np.diff(times), 7, mode="nearest"))
-    bounds = [0]
-    level, begin, reach = steps[0], 0, 64
-    while begin < steps.size:
-        # The next other interval, looked for in growing parts.
-        other = np.abs(steps[begin : begin + reach] - level) > np.log(_OTHER_RATE)
-        if not other.any():
-            begin, reach = begin + reach, 4 * reach
-            continue
-        begin, reach = begin + int(np.argmax(other)), 64
-        if begin - bounds[-1] >= _SHORTEST:
-            bounds.append(begin)
-        level = steps[begin]
-    if times.size - bounds[-1] < _SHORTEST and len(bounds) > 1:
-        bounds.pop()
-    return tuple(zip(bounds, [*bounds[1:], times.size], strict=True))
+
+def first_after_changes(run: RecordedRun) -> list[int]:
+    """First samples after changes of the velocity, and of the load where they are few."""
+    return _first_after_changes(run.time, run.drive, run.cuts)
+
+
+def with_jumps(run: RecordedRun) -> RecordedRun:
+    """The run with the times at which its level jumps by itself; as it is where they are known.
+
+    Beside a change of the drive, where friction itself is quick, and next to gaps none is looked
+    for.
+    """
+    if run.jumps is not None:
+        return run
+    time, edges = run.time, run.drive.edges
+    apart = []
+    for before, at, after in zip(edges[:-2], edges[1:-1], edges[2:], strict=True):
+        near = [at - _NEAR_CHANGE * (at - before), at + _NEAR_CHANGE * (after - at)]
+        first, last = np.searchsorted(time, near)
+        apart.append((int(first) - _SAMPLES_NEAR_CHANGE, int(last) + _SAMPLES_NEAR_CHANGE))
+    gaps = {*gap_rows(time).tolist(), *(a for a, _ in run.stretches[1:])}
+    bounds = [0, *(edge for gap in sorted(gaps) for edge in (gap, gap)), time.size]
+    stretches = []
+    for a, b in zip(bounds[::2], bounds[1::2], strict=True):
+        begin = a
+        for first, last in apart:
+            if last <= begin or first >= b:
+                continue
+            stretches.append((begin, max(first, begin)))
+            begin = min(max(last, begin), b)
+        stretches.append((begin, b))
+    jumps = find_jumps(run.friction, stretches)
+    return replace(run, jumps=tuple(sorted(float(time[jump.sample]) for jump in jumps)))
 
 
 def run_of(data: Any) -> RecordedRun:

@@ -13,30 +13,20 @@ from numpy.typing import NDArray
 
 from asperity.inference.objective import Residuals
 from asperity.inference.runs.drive import filled_up
-from asperity.inference.runs.misfit import departures_of_jumps, misfit_after_changes
+from asperity.inference.runs.misfit import misfit_after_changes
 from asperity.inference.runs.motion import RunArrays, RunLikelihood, RunMotion
 from asperity.inference.runs.noise import (
-    Autoregression,
     added_by_noise,
-    fitted,
     innovations,
     strongest_peak,
     whiteness,
 )
-from asperity.inference.runs.reading import GAIN, reading_at
-from asperity.inference.runs.run import RecordedRun
-from asperity.inference.runs.wrong_samples import (
-    AT_CHANGE,
-    MOST,
-    alone_at_changes,
-    beyond_any_motion,
-    far_off_alone,
-    first_after_changes,
-    largest_by_chance,
-)
+from asperity.inference.runs.reading import reading_at
+from asperity.inference.runs.run import RecordedRun, first_after_changes
 from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law
 from asperity.parameters import Parameter, law_parameters
+from asperity.recording.defects.autoregression import Autoregression, fitted
 
 Float = NDArray[np.float64]
 
@@ -50,14 +40,11 @@ _SLOW = 0.999
 _NOISE_STEPS, _SEEN = 3, 1e-10
 #: Times of velocity changes are known to this many sampling intervals.
 _CUT_INTERVALS = 2.0
-#: Jumps of the level that are removed at most, and samples about a change and share of the segments
-#: beside it in which none is looked for.
-_JUMPS, _NEAR_CHANGE, _SHARE_NEAR_CHANGE = 5, 20, 0.05
 #: Below this probability innovations after the changes are too large for the law.
 _LAW_FAILS = 1e-4
 #: Motions that are remembered.
 _REMEMBERED = 128
-#: Outliers that a warning names.
+#: Spikes that a warning names.
 _NAMED = 5
 
 
@@ -68,8 +55,6 @@ class NoiseState(NamedTuple):
     columns: Float
     whiteness: float
     lines: tuple[float, ...]
-    outliers: tuple[int, ...]
-    jumps: tuple[int, ...]
     after_changes: tuple[float, float]
 
 
@@ -140,8 +125,6 @@ class RunTerm:
         self._columns = _linear_columns(run, linear)
         self._whiteness = math.nan
         self._lines: list[float] = []
-        self._outliers: list[int] = []
-        self._jumps: list[int] = []
         self._after_changes = (1.0, 1.0)
         # Of starts, shared by copies that differ in their noise.
         self._differences: dict[tuple[float, ...], Float | None] = {}
@@ -171,8 +154,8 @@ class RunTerm:
                 sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
             "lines_removed": list(self._lines),
-            "outliers": [float(self.run.time[k]) for k in sorted(self._outliers)],
-            "jumps": [float(self.run.time[k]) for k in sorted(self._jumps)],
+            "outliers": list(self.run.spikes),
+            "jumps": list(self.run.jumps or ()),
             "whiteness_p": self._whiteness,
             "standard_deviation": [math.sqrt(m.variance) for m in self.models],
         }
@@ -184,8 +167,6 @@ class RunTerm:
             self._columns,
             self._whiteness,
             tuple(self._lines),
-            tuple(self._outliers),
-            tuple(self._jumps),
             self._after_changes,
         )
 
@@ -193,8 +174,7 @@ class RunTerm:
         """Take the noise back to an earlier state."""
         self.models, self._columns = list(state.models), state.columns
         self._whiteness, self._after_changes = state.whiteness, state.after_changes
-        self._lines, self._outliers = list(state.lines), list(state.outliers)
-        self._jumps = list(state.jumps)
+        self._lines = list(state.lines)
         self._prepare()
 
     def expect_slow_noise(self) -> None:
@@ -300,16 +280,12 @@ class RunTerm:
         raw = self.departures(values)
         if raw is None:
             return False
-        # After fewer steps the noise is not yet known well enough to judge what is none.
-        earlier = list(self._jumps)
         while True:
             for _ in range(_NOISE_STEPS):
                 self._estimate_noise(*raw)
-            if self._forget_jump(earlier, *raw):
-                continue
             left = raw[0] + self._columns @ self._coefficients(raw[0])
             white = self._whitened(left[:, None])[:, 0]
-            if not self._take_something_off(white, raw[1]):
+            if self._order == 0 or not self._add_line(white):
                 break
         innovations = [white[a:b] for a, b in self.run.stretches]
         self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
@@ -337,124 +313,10 @@ class RunTerm:
         ]
         self._prepare()
 
-    def _take_something_off(self, white: Float, jacobian: Float) -> bool:
-        """Take a jump, wrong samples or a line off the residual, if it has any."""
-        if self._add_jump(white, jacobian):
-            return True
-        wrong = far_off_alone(self.run, self.models, white, self._outliers)
-        self.leave_out(wrong)
-        return bool(wrong) or (self._order != 0 and self._add_line(white))
-
-    def leave_out(self, samples: Sequence[int]) -> None:
-        """Leave out samples, by a linear nuisance for each."""
-        if not samples:
-            return
-        columns = np.zeros((self.run.time.size, len(samples)))
-        columns[samples, np.arange(len(samples))] = 1.0
-        self._columns = np.column_stack([self._columns, columns])
-        self._outliers = [*self._outliers, *samples]
-        self._prepare()
-
-    def alone_at_changes(self) -> dict[int, float]:
-        """Samples beside changes of the drive that are wrong, or peaks that one sample holds."""
-        return alone_at_changes(self.run)
-
-    def beyond_any_motion(
-        self, samples: Mapping[int, float], values: Mapping[str, float]
-    ) -> list[int]:
-        """Those of the samples that no motion leads to.
-
-        Parameters
-        ----------
-        samples : mapping of int to float
-            As `alone_at_changes` returns them.
-        values : mapping of str to float
-            Free parameters and nuisances of the fit, in SI.
-        """
-        given = dict(self.fixed)
-        for name, value in values.items():
-            inner = self.inner(name)
-            if inner is not None:
-                given[inner] = value
-        return beyond_any_motion(self.run, samples, given.get(GAIN, 1.0) * given["K"])
-
     @property
     def law_fails_after_changes(self) -> bool:
         """Whether innovations after changes of the drive are too large for the law."""
         return self._after_changes[0] < _LAW_FAILS
-
-    @property
-    def jumps(self) -> tuple[float, ...]:
-        """Times (s) of jumps of the level that were removed, from the first sample on."""
-        return tuple(float(self.run.time[k]) for k in sorted(self._jumps))
-
-    def _add_jump(self, white: Float, jacobian: Float) -> bool:
-        """Remove the largest jump of the gauge's offset, if there is one.
-
-        Beside a change of the drive, where the friction itself jumps, none is looked for.
-        """
-        if len(self._jumps) >= _JUMPS or self._order == 0:
-            return False
-        curves = self._whitened(jacobian[:, np.any(jacobian, axis=0)])
-        joined = np.column_stack([curves, self._white_columns])
-        fitted_curves = np.linalg.qr(joined / np.sqrt(np.einsum("ij,ij->j", joined, joined)))[0]
-        largest, best = largest_by_chance(white.size), -1
-        time, edges = self.run.time, self.run.drive.edges
-        for model, (a, b) in zip(self.models, self.run.stretches, strict=True):
-            apart = np.abs(departures_of_jumps(model, white[a:b], fitted_curves[a:b]))
-            alone = np.abs(model.departures_of_single_samples(white[a:b]))
-            apart[apart <= alone] = 0.0
-            # The first sample and one beside a change of the sampling rate have no level before.
-            apart[: AT_CHANGE + 1] = apart[-AT_CHANGE:] = 0.0
-            for before, at, after in zip(edges[:-2], edges[1:-1], edges[2:], strict=True):
-                first, last = np.searchsorted(
-                    time,
-                    [
-                        at - _SHARE_NEAR_CHANGE * (at - before),
-                        at + _SHARE_NEAR_CHANGE * (after - at),
-                    ],
-                )
-                apart[max(first - _NEAR_CHANGE - a, 0) : max(last + _NEAR_CHANGE - a, 0)] = 0.0
-            for k in self._jumps:
-                apart[max(k - a - 1, 0) : max(k - a + 2, 0)] = 0.0
-            k = int(np.argmax(apart))
-            if apart[k] > largest:
-                largest, best = float(apart[k]), k + a
-        if best < 0:
-            return False
-        step = (np.arange(white.size) >= best).astype(float)
-        self._columns = np.column_stack([self._columns, step])
-        self._jumps.append(best)
-        # The noise that was estimated with the jump in it is far too slow to begin from.
-        self.models = [self._first_noise(a, b) for a, b in self.run.stretches]
-        self._prepare()
-        return True
-
-    def _forget_jump(self, earlier: list[int], difference: Float, jacobian: Float) -> bool:
-        """Forget one of the jumps of other values that chance allows here: it was a misfit there.
-
-        Each is judged once, and is none of the earlier ones any more.
-        """
-        if not earlier:
-            return False
-        curves = np.column_stack([jacobian[:, np.any(jacobian, axis=0)], self._columns])
-        white = self._whitened(np.column_stack([curves, difference]))
-        white, target = white[:, :-1], white[:, -1]
-        size = np.sqrt(np.einsum("ij,ij->j", white, white))
-        inverse = np.linalg.pinv((white / size).T @ (white / size), hermitian=True)
-        away = inverse @ ((white / size).T @ target) / np.sqrt(np.diag(inverse))
-        first = curves.shape[1] - self._columns.shape[1]
-        limit = largest_by_chance(target.size)
-        while earlier:
-            k = earlier.pop()
-            step = np.arange(target.size) >= k
-            column = int(np.flatnonzero((self._columns == step[:, None]).all(0))[0])
-            if abs(away[first + column]) < limit:
-                self._columns = np.delete(self._columns, column, axis=1)
-                self._jumps.remove(k)
-                self._prepare()
-                return True
-        return False
 
     def _add_line(self, white: Float) -> bool:
         """Remove the strongest line that the innovations hold, if there is one."""
@@ -522,10 +384,10 @@ class RunTerm:
                 f"{self.name} has {effective:.3g} independent samples only, its noise is so slow; "
                 "a longer window would help"
             )
-        if self._outliers:
-            said.append(self._said_of_outliers())
-        if self._jumps:
-            times = ", ".join(f"{t:.6g}" for t in self.jumps)
+        if self.run.spikes:
+            said.append(self._said_of_spikes())
+        if self.run.jumps:
+            times = ", ".join(f"{t:.6g}" for t in self.run.jumps)
             said.append(
                 f"{self.name} jumps by itself at {times} s after the first sample, as a gauge does "
                 "that slips or is moved: its level there is fitted; look at the recording, or give "
@@ -542,20 +404,14 @@ class RunTerm:
         said += [f"{self.name}: {doubt}" for doubt in self.run.doubts]
         return said
 
-    def _said_of_outliers(self) -> str:
-        times = [f"{self.run.time[k]:.6g}" for k in sorted(self._outliers)]
-        count = len(times)
-        shown = ", ".join(times[:_NAMED]) + (", ..." if count > _NAMED else "")
-        many = count >= int(MOST * self.run.time.size)
-        those, were = (f"{count} samples", "were") if count > 1 else ("a sample", "was")
+    def _said_of_spikes(self) -> str:
+        times = [f"{time:.6g}" for time in self.run.spikes]
+        shown = ", ".join(times[:_NAMED]) + (", ..." if len(times) > _NAMED else "")
+        those = f"{len(times)} samples" if len(times) > 1 else "a sample"
         return (
-            f"{those} of {self.name} {were} left out as farther off than noise can be, at {shown} "
-            "s after the first sample"
-            + (
-                "; there are more, so that the noise is not normal and intervals may not hold"
-                if many
-                else ""
-            )
+            f"{those} of {self.name}, at {shown} s after the first sample, "
+            f"{'stand' if len(times) > 1 else 'stands'} out of both neighbours as no motion does, "
+            "and the line between these was read instead"
         )
 
     def inner(self, name: str) -> str | None:
@@ -593,7 +449,16 @@ def _linear_columns(run: RecordedRun, names: Sequence[str]) -> Float:
         "bend": run.slip * (run.slip - run.slip[-1]),
         "drift": run.time,
     }
-    return np.stack([known[n] for n in names], axis=1) if names else np.zeros((run.time.size, 0))
+    columns = [known[n] for n in names] + [_behind(run, at) for at in run.jumps or ()]
+    return np.stack(columns, axis=1) if columns else np.zeros((run.time.size, 0))
+
+
+def _behind(run: RecordedRun, at: float) -> Float:
+    """Share of each sample, or block, that lies at a time or behind it."""
+    if run.blocks is None:
+        return np.asarray(run.time >= at, float)
+    begin, end = run.blocks.edges.T
+    return np.asarray(np.clip((end - at) / (end - begin), 0.0, 1.0))
 
 
 def cut_delays(run: RecordedRun, suffix: str) -> tuple[tuple[Unknown, ...], dict[str, str]]:

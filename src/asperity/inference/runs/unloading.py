@@ -14,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.inference.runs.noise import fitted
 from asperity.inference.unknowns import Prior
 from asperity.measurement.samples import compressive
 from asperity.measurement.sliding.segments import displacement_noise
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
+from asperity.recording.defects.autoregression import fitted
+from asperity.recording.defects.rounded_time import even_times
 from asperity.recording.readers import read
-from asperity.recording.rounded_time import even_times
 
 Float = NDArray[np.float64]
 

@@ -278,7 +278,8 @@ class Forward:
         function = self._whole if search else self._quick
         given = parameters_at(self.fixed, free, function)
         known = self._nearest(free) if search else None
-        values, slopes = function.value_and_jacobian(given, known, every=every)
+        wanted = ["epsilon" if n == "eps_ratio" else n for n in free]
+        values, slopes = function.value_and_jacobian(given, known, every=every, names=wanted)
         if known is not None and all_converged(np.asarray(values.outcome)):
             self._visited.append((dict(free), known))
             del self._visited[: -self._most_visited]

@@ -20,7 +20,7 @@ from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.sliding.velocity_steps import VelocityStep, read_step
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, worst
-from asperity.parameters.parameter import Displayed, SummaryLine
+from asperity.parameters.parameter import Drawn, SummaryLine
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -77,7 +77,7 @@ class SlidingSegment:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class SlidingMeasurement(Displayed):
+class SlidingMeasurement(Drawn):
     """What a recording without modulation says.
 
     Attributes
@@ -108,6 +108,8 @@ class SlidingMeasurement(Displayed):
         Findings about channels that were not read.
     checks : tuple of Check
     """
+
+    _drawn_by = "asperity.figures.recording:draw_sliding"
 
     friction: MeanLevel
     load: MeanLevel | None
@@ -184,7 +186,7 @@ def measure_sliding(
     """
     if detrend not in DRIFTS:
         raise InputError(
-            f"measure.detrend must be none, linear or quadratic, got '{detrend}'; choose one"
+            "measure.detrend", "be none, linear or quadratic", f"'{detrend}'", "choose one"
         )
     signals = sliding_signals(trace, load, force, window)
     time, friction = signals.time, signals.friction
@@ -239,21 +241,27 @@ def _given_cuts(
     for what, (start, end) in (("holds", hold) for hold in holds or ()):
         if not start < end:
             raise InputError(
-                f"measure.{what} must end after they begin, got {start:g} s to {end:g} s; write "
-                "them like 100:110"
+                f"measure.{what}",
+                "end after they begin",
+                f"{start:g} s to {end:g} s",
+                "write them like 100:110",
             )
     for at in cuts:
         if not time[0] < at < time[-1]:
             raise InputError(
-                f"measure.{'steps' if steps else 'holds'} must lie inside the recording, got "
-                f"{at:.10g} s; it runs from {time[0]:.10g} s to {time[-1]:.10g} s"
+                f"measure.{'steps' if steps else 'holds'}",
+                "lie inside the recording",
+                f"{at:.10g} s",
+                f"it runs from {time[0]:.10g} s to {time[-1]:.10g} s",
             )
     samples = [0, *np.searchsorted(time, cuts).tolist(), time.size]
     for (a, b), at in zip(pairwise(samples), [*cuts, time[-1]], strict=True):
         if b - a < 4:
             raise InputError(
-                f"measure.{'steps' if steps else 'holds'} must have at least 4 samples between "
-                f"them, got {b - a} before {at:.10g} s; leave one out"
+                f"measure.{'steps' if steps else 'holds'}",
+                "have at least 4 samples between them",
+                f"{b - a} before {at:.10g} s",
+                "leave one out",
             )
     return cuts
 

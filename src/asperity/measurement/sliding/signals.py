@@ -17,8 +17,9 @@ from asperity.measurement.samples import (
     require_computable,
     shear_channel,
 )
+from asperity.recording.defects.rounded_time import even_times
+from asperity.recording.defects.rows import usable_rows
 from asperity.recording.roles import candidates, words
-from asperity.recording.rounded_time import even_times
 
 if TYPE_CHECKING:
     from asperity.recording.finding import Finding
@@ -101,11 +102,7 @@ def sliding_signals(
     names = tuple(key for key, c in trace.channels.items() if any(c is used for used in read))
     name = "" if moved is None else moved.recorded_name or names[-1]
     time = even_times(trace.time)
-    use = np.isfinite(time) & np.isfinite(friction)
-    if motion is not None:
-        use &= np.isfinite(motion)
-    latest = np.maximum.accumulate(np.where(use, time, -np.inf))
-    use[1:] &= time[1:] > latest[:-1]
+    use = usable_rows(time, [friction] if motion is None else [friction, motion])
     outside = np.zeros(time.size, bool)
     if window is not None:
         outside = (time < window[0]) | (time > window[1])
@@ -113,8 +110,10 @@ def sliding_signals(
     left_out = int((~use & ~outside).sum())
     if use.sum() < _FEWEST:
         raise InputError(
-            f"measure.trace must hold at least {_FEWEST} usable samples, got {int(use.sum())}; "
-            "give a longer recording or window"
+            "measure.trace",
+            f"hold at least {_FEWEST} usable samples",
+            f"{int(use.sum())}",
+            "give a longer recording or window",
         )
     time, friction = time[use], friction[use]
     slip = None
@@ -148,8 +147,10 @@ def sliding_signals(
 def _check_window(window: tuple[float, float], trace: Trace) -> None:
     if not window[0] < window[1]:
         raise InputError(
-            f"measure.window must end after it begins, got {window[0]:g} s to {window[1]:g} s; the "
-            f"recording runs from {trace.time[0]:.10g} s to {trace.time[-1]:.10g} s"
+            "measure.window",
+            "end after it begins",
+            f"{window[0]:g} s to {window[1]:g} s",
+            f"the recording runs from {trace.time[0]:.10g} s to {trace.time[-1]:.10g} s",
         )
 
 
@@ -172,8 +173,10 @@ def _friction(
             return F.values, borne, unit, read, turned
         if W.kind != F.kind:
             raise InputError(
-                f"measure.force must have the dimension of the load, got '{F.unit}' for '{force}' "
-                f"and '{unit}' for '{load}'; name the units when reading"
+                "measure.force",
+                "have the dimension of the load",
+                f"'{F.unit}' for '{force}' and '{unit}' for '{load}'",
+                "name the units when reading",
             )
         borne, shear, turned = compressive(W.values, F.values)
         known = np.isfinite(borne) & (borne != 0)

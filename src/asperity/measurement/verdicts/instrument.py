@@ -18,6 +18,7 @@ from asperity.lock_in.reading import LockInReading
 from asperity.measurement.samples import Samples
 from asperity.measurement.verdicts.verdict import Check, judged
 from asperity.measurement.window import LoadInterval
+from asperity.recording.defects.levels import held_length, lost_to_zero
 
 Array = NDArray[np.float64]
 
@@ -34,13 +35,6 @@ LIMITS: dict[str, tuple[float, float]] = {
 }
 
 _PIECE = 1 << 16
-#: A held channel repeats a tenth of its samples at least and jumps by several steps between.
-_REPEATED, _STEPS = 0.1, 4.0
-#: Share of the runs of equal samples that have the usual length, and what irregular holding needs.
-_REGULAR, _OFTEN, _FAR = 0.9, 0.3, 10.0
-#: Zeros count where the channel is usually this many scatters away from zero.
-_AWAY = 5.0
-
 #: Mains frequencies (Hz), how many harmonics of them count, and how far a network wanders (Hz).
 _MAINS, _MAINS_HARMONICS, _WANDER = (50.0, 60.0), 4, 0.2
 #: A line is seen where it is so many times its scatter.
@@ -81,7 +75,7 @@ def held_samples(reading: LockInReading, load: Array, force: Array) -> Check:
     number, sentence = 0.0, "no channel repeats its samples"
     rate = (reading.samples - 1) / (reading.end - reading.start)
     for name, values in (("load", load), ("force", force)):
-        length = _held_length(values[:_PIECE])
+        length = held_length(values[:_PIECE])
         if length is None:
             continue
         lag = np.pi * reading.frequency * (length - 1) / rate
@@ -94,37 +88,15 @@ def held_samples(reading: LockInReading, load: Array, force: Array) -> Check:
     return judged("held samples", number, LIMITS["held samples"], sentence)
 
 
-def _held_length(values: Array) -> float | None:
-    """Mean number of equal samples in a run; None where the resolution explains them."""
-    steps = np.abs(np.diff(values))
-    moving = steps[steps > 0]
-    repeated = 1 - moving.size / max(steps.size, 1)
-    if repeated < _REPEATED or moving.size < 16:
-        return None
-    jump = float(np.median(moving)) / float(moving.min())
-    at = np.flatnonzero(steps > 0)
-    runs = np.diff(at)
-    length = float(runs.mean())
-    regular = float(np.mean((runs >= np.floor(length)) & (runs <= np.ceil(length))))
-    if jump > _STEPS and regular > _REGULAR:
-        return length
-    return length if jump > _FAR and repeated > _OFTEN else None
-
-
 def dropouts(load: Array, force: Array) -> Check:
     """Whether a channel falls to exactly zero where it is far from zero otherwise."""
     number, sentence = 0.0, "no channel drops to zero"
     for name, values in (("load", load), ("force", force)):
-        zeros = values == 0
-        count = int(np.count_nonzero(zeros))
-        if not count or count == values.size:
+        lost = lost_to_zero(values)
+        if lost is None or lost[0] / values.size <= number:
             continue
-        others = values[~zeros]
-        middle = float(np.median(others))
-        scatter = float(np.median(np.abs(others - middle)))
-        if abs(middle) <= _AWAY * scatter or zeros.mean() <= number:
-            continue
-        number = float(zeros.mean())
+        count, middle = lost
+        number = count / values.size
         sentence = (
             f"{count} of {values.size} samples of the {name} are exactly zero, where {middle:.4g} "
             "is usual: the signal was lost there"

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
@@ -75,6 +76,20 @@ class SearchedOrbits(NamedTuple):
         if len(index):
             self.outcome[index] = Outcome.CONVERGED
             self.parts.append((index, orbits))
+
+    def by_mesh(self) -> list[tuple[Indices, MeshOrbits]]:
+        """The parts, those on meshes of as many intervals together."""
+        sizes: dict[int, list[tuple[Indices, MeshOrbits]]] = {}
+        for part in self.parts:
+            sizes.setdefault(len(part[1].orbit.mesh), []).append(part)
+        return [joined(parts) for parts in sizes.values()]
+
+
+def joined(parts: list[tuple[Indices, MeshOrbits]]) -> tuple[Indices, MeshOrbits]:
+    """Parts on meshes of as many intervals as one."""
+    index = np.concatenate([index for index, _ in parts])
+    several = [orbits for _, orbits in parts]
+    return index, jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *several)
 
 
 Float = NDArray[np.float64]

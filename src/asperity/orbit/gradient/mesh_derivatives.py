@@ -1,7 +1,7 @@
 """Derivatives of orbits on meshes by the implicit function theorem, without knowing the law.
 
 With D the collocation equations of an orbit Y for parameters p, D(p, Y) = 0, its derivative is
--D_Y^-1 D_p: the linear equations of a Newton step with another right-hand side. What a law has to
+-D_Y^-1 D_p: the linear equations of a Newton step, for all parameters at once. What a law has to
 give is in `asperity.slider.pointwise`.
 
 The derivative of a multiplier m with the right eigenvector v and the left one w of the monodromy
@@ -11,22 +11,25 @@ maps T_i.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 
+from asperity._jax import jit_large
+from asperity.algebra.cyclic import solve_cyclic
 from asperity.algebra.small_systems import scaled_product
 from asperity.orbit.gradient.parametrised import ParametrisedProblem
 from asperity.orbit.mesh.equations import (
-    CondensedEquations,
     collocated,
     condensed_jacobian,
-    parameter_slopes,
     transfer_maps,
 )
 from asperity.orbit.mesh.mesh import Orbit
-from asperity.orbit.mesh.newton import Plane, newton_step
 from asperity.orbit.mesh.reading import quadrature
 from asperity.slider.pointwise import curvature_along, slopes_along
 from asperity.slider.problem import Problem
@@ -34,8 +37,8 @@ from asperity.slider.problem import Problem
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Right-hand sides that are condensed together, whatever their number.
-_SIDES = 16
+#: Right-hand sides that are solved together, whatever their number.
+_SIDES = 8
 #: Largest relative difference of multipliers on the mesh from the known ones.
 _MULTIPLIER_GAP = 1e-5
 
@@ -46,8 +49,9 @@ def orbit_derivatives(
     orbit: Orbit,
     harmonics: int,
     logs: Complex | None = None,
+    names: Collection[str] | None = None,
 ) -> Float:
-    """Derivatives of mean, harmonics and multipliers to every parameter.
+    """Derivatives of mean, harmonics and multipliers to the parameters.
 
     Parameters
     ----------
@@ -60,6 +64,8 @@ def orbit_derivatives(
     logs : complex array, shape (size, points), optional
         Logarithms of the multipliers, whose derivatives are wanted too. They are NaN where the mesh
         does not resolve them.
+    names : collection of str, optional
+        Parameters that derivatives are wanted to; all by default. The others are zero.
 
     Returns
     -------
@@ -68,31 +74,80 @@ def orbit_derivatives(
         logarithms of the multipliers.
     """
     with np.errstate(all="ignore"):
-        directions = equations.directions(problem)
+        directions = {
+            name: direction
+            for name, direction in equations.directions(problem).items()
+            if names is None or name in names
+        }
+        table = np.zeros((len(equations.names), len(problem.system.V), _columns(harmonics, logs)))
+        if not directions:
+            return table
         values = collocated(problem, orbit)
-        changes = _orbit_changes(problem, orbit, values, directions)
-        columns = [_force_columns(problem, orbit, directions, changes, harmonics)]
+        sides, forces = _slopes(problem, orbit, directions.values())
+        changes = _orbit_changes(orbit, values, sides)
+        forces = forces + _force_of_states(problem, orbit, changes)
+        columns = [_force_columns(orbit, forces, harmonics)]
         if logs is not None:
             columns += _multiplier_columns(problem, orbit, values, directions, changes, logs)
         part = np.concatenate(columns, axis=-1)
-    table = np.zeros((len(equations.names), *part.shape[1:]))
     table[[name in directions for name in equations.names]] = part
     return table
 
 
-def _orbit_changes(
-    problem: Problem, orbit: Orbit, values: Any, directions: dict[str, Problem]
-) -> Float:
+def _columns(harmonics: int, logs: Complex | None) -> int:
+    return 1 + 2 * harmonics + (0 if logs is None else 2 * len(logs))
+
+
+def _slopes(problem: Problem, orbit: Orbit, directions: Iterable[Problem]) -> tuple[Float, Float]:
+    """Changes of rates (size, STAGES, directions, ...) and F/W0 (directions, STAGES, ...).
+
+    With the parameters, at fixed states.
+    """
+    theta, states = orbit.stage_phases, orbit.stage_states
+    still = np.zeros_like(states)
+    rates, forces = zip(
+        *(slopes_along(problem, d, theta, states, still) for d in directions), strict=True
+    )
+    return np.stack(rates, axis=2), np.stack(forces)
+
+
+def _force_of_states(problem: Problem, orbit: Orbit, changes: Float) -> Float:
+    """Changes of F/W0 with those of the states, (directions, STAGES, ...)."""
+    theta, states = orbit.stage_phases, orbit.stage_states
+    none = jax.tree.map(np.zeros_like, problem)
+    return sum(
+        slopes_along(problem, none, theta, states, _unit(i, states))[1] * changes[:, i]
+        for i in range(len(states))
+    )
+
+
+@jit_large
+def _solved(
+    response: Array, constant: Array, widths: Array, coefficients: tuple[Array, Array]
+) -> Array:
+    """Changes of the states at the collocation points, (sides, size, STAGES, ...)."""
+    a, b = coefficients
+    gain = widths * jnp.einsum("k,nksmb->nsmb", b, constant)
+    nodes = solve_cyclic(transfer_maps(response, widths, b), gain)
+    bent = jnp.einsum("nkcmb,csmb->nksmb", response, nodes) + constant
+    return jnp.moveaxis(nodes[:, None] + widths * jnp.einsum("jk,nksmb->njsmb", a, bent), 2, 0)
+
+
+def _orbit_changes(orbit: Orbit, values: Any, sides: Float) -> Float:
     """Changes of the states at the collocation points, (directions, size, STAGES, ...)."""
-    sides = np.stack([parameter_slopes(problem, d, orbit) for d in directions.values()], axis=2)
     response, constant = _condensed(values.jacobian, sides, orbit)
-    plane = Plane.of_fixed_parameters(orbit)
-    changes = []
-    for k in range(sides.shape[2]):
-        part = CondensedEquations(values, response, constant[:, :, k : k + 1])
-        change = newton_step(problem.system, part, orbit, plane, closed=False).change
-        changes.append(change.nodes[:, None] + orbit.widths * orbit.stage_sums(change.slopes))
-    return np.stack(changes)
+    coefficients = np.asarray(orbit.scheme.a), np.asarray(orbit.scheme.b)
+    parts = []
+    for start in range(0, sides.shape[2], _SIDES):
+        some = _filled(constant[:, :, start : start + _SIDES])
+        parts.append(np.asarray(_solved(response, some, orbit.widths, coefficients)))
+    return np.concatenate(parts)[: sides.shape[2]]
+
+
+def _filled(sides: Float) -> Float:
+    """Right-hand sides filled up with zeros to as many as are solved together."""
+    missing = _SIDES - sides.shape[2]
+    return np.pad(sides, [(0, 0), (0, 0), (0, missing), *[(0, 0)] * (sides.ndim - 3)])
 
 
 def _condensed(jacobian: Float, sides: Float, orbit: Orbit) -> tuple[Float, Float]:
@@ -100,32 +155,22 @@ def _condensed(jacobian: Float, sides: Float, orbit: Orbit) -> tuple[Float, Floa
     count = sides.shape[2]
     constants = []
     for start in range(0, count, _SIDES):
-        part = np.zeros((*sides.shape[:2], _SIDES, *sides.shape[3:]))
-        some = sides[:, :, start : start + _SIDES]
-        part[:, :, : some.shape[2]] = some
+        part = _filled(sides[:, :, start : start + _SIDES])
         response, constant = condensed_jacobian(jacobian, part, orbit)
-        constants.append(constant[:, :, : some.shape[2]])
-    return response, np.concatenate(constants, axis=2)
+        constants.append(constant)
+    return response, np.concatenate(constants, axis=2)[:, :, :count]
 
 
-def _force_columns(
-    problem: Problem,
-    orbit: Orbit,
-    directions: dict[str, Problem],
-    changes: Float,
-    harmonics: int,
-) -> Float:
-    """Changes of mean and harmonics, (directions, points, 1 + 2 harmonics)."""
-    theta, states = orbit.stage_phases, orbit.stage_states
-    weights = quadrature(orbit) / (2 * np.pi)
-    turn = np.exp(-1j * theta)
-    turns = np.cumprod(np.broadcast_to(turn, (harmonics, *turn.shape)), axis=0)
-    rows = []
-    for direction, change in zip(directions.values(), changes, strict=True):
-        _, force = slopes_along(problem, direction, theta, states, change)
-        phasors = 2 * (turns * (weights * force)).sum((1, 2))
-        rows.append(np.vstack([(weights * force).sum((0, 1)), phasors.real, phasors.imag]).T)
-    return np.stack(rows)
+def _force_columns(orbit: Orbit, forces: Float, harmonics: int) -> Float:
+    """Changes of mean and harmonics with those of F/W0, (directions, points, 1 + 2 harmonics)."""
+    weighted = quadrature(orbit) / (2 * np.pi) * forces
+    turn = np.exp(-1j * orbit.stage_phases)
+    phasors, turns = [], np.ones_like(turn)
+    for _ in range(harmonics):
+        turns = turns * turn
+        phasors.append(2 * np.einsum("kmb,dkmb->db", turns, weighted))
+    parts = [weighted.sum((1, 2)), *(c.real for c in phasors), *(c.imag for c in phasors)]
+    return np.stack(parts, axis=-1)
 
 
 def _multiplier_columns(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from functools import partial
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from asperity.orbit.batches import mesh_chunk, take
+from asperity.orbit.batches import mesh_chunk, run_chunks
 from asperity.orbit.floquet import sorted_logs
 from asperity.orbit.gradient.known import MeshOrbits
 from asperity.orbit.gradient.mesh_derivatives import orbit_derivatives
@@ -22,7 +23,9 @@ from asperity.orbit.gradient.parametrised import (
     ResponseValues,
 )
 from asperity.orbit.gradient.search import search_orbits
+from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.outcome import Outcome
+from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
 
@@ -50,23 +53,20 @@ def derivatives_of(
     orbits: MeshOrbits,
     *,
     multipliers: bool,
+    names: Collection[str] | None = None,
 ) -> Float:
     """`orbit_derivatives` at the points of `parameters`, in chunks of a fixed size."""
     problem = jax.tree.map(np.asarray, equations.problem(parameters))
-    points, chunk = len(orbits.mean_friction), mesh_chunk(problem.system.size)
     logs = sorted_multipliers(orbits) if multipliers else None
-    tables = []
-    for start in range(0, points, chunk):
-        part = np.minimum(np.arange(start, start + chunk), points - 1)
-        table = orbit_derivatives(
-            equations,
-            take(problem, part),
-            take(orbits.orbit, part),
-            len(orbits.harmonics),
-            None if logs is None else logs[:, part],
-        )
-        tables.append(table[:, : points - start])
-    return np.concatenate(tables, axis=1)
+    everyone = np.arange(len(orbits.mean_friction))
+    count = len(orbits.harmonics)
+
+    def table(problem: Problem, orbit: Orbit, logs: Any) -> Float:
+        return np.moveaxis(orbit_derivatives(equations, problem, orbit, count, logs, names), 1, -1)
+
+    inputs, chunk = (problem, orbits.orbit, logs), mesh_chunk(problem.system.size)
+    parts = [part for _, part in run_chunks(table, inputs, everyone, chunk)]
+    return np.moveaxis(np.concatenate(parts, axis=-1), -1, 1)
 
 
 def searched_values(parameters: Parameters, wanted: Array, program: Program) -> ResponseValues:

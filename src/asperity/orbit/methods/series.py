@@ -104,7 +104,7 @@ def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool
     scheme, size = scheme_for(problem.system), problem.system.size
     orbit = Orbit.empty(scheme, size, INTERVALS, points)
     resolved = np.zeros(points, bool)
-    chunk = mesh_chunk(size)
+    chunk, *_ = mesh_chunk(size)
     for start in range(0, points, chunk):
         rows = np.arange(start, min(start + chunk, points))
         # The last chunk is filled up so that one program serves all; the filling is not solved.

@@ -8,9 +8,9 @@ from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from asperity.errors import InputError, closest, listed, printable
+from asperity.errors import Argument, InputError, closest, listed, printable
 from asperity.parameters.arguments import shown
-from asperity.recording.checks import check
+from asperity.recording.defects.check import check
 from asperity.recording.finding import Finding, with_cause
 from asperity.recording.readers.clock import settle_time
 from asperity.recording.readers.raw import refuse_truncated
@@ -128,8 +128,8 @@ def _chosen_roles(
     for key, wanted in columns.items():
         role = role_of(key)
         if role is None:
-            raise InputError(f"columns must name roles, got '{key}'; {closest(key, ROLES)}")
-        roles[role] = _name_of(wanted, names, labels, f"columns['{key}']")
+            raise InputError("columns", "name roles", f"'{key}'", closest(key, ROLES))
+        roles[role] = _name_of(wanted, names, labels, Argument("columns", key))
     return roles
 
 
@@ -140,12 +140,16 @@ def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
         fitting = ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
         if kind is not None and kind not in fitting:
             raise InputError(
-                f"columns['{role}'] must be a {' or '.join(sorted(fitting))}, got '{name}', a "
-                f"{kind}; choose another column, or correct its unit with units={{'{name}': ...}}"
+                Argument("columns", role),
+                f"be a {' or '.join(sorted(fitting))}",
+                f"'{name}', a {kind}",
+                f"choose another column, or correct its unit with {Argument('units', name, '...')}",
             )
 
 
-def _name_of(wanted: str | int, names: list[str], labels: Mapping[str, str], field: str) -> str:
+def _name_of(
+    wanted: str | int, names: list[str], labels: Mapping[str, str], field: Argument
+) -> str:
     if isinstance(wanted, int):
         if not -len(names) <= wanted < len(names):
             raise InputError(
@@ -160,7 +164,7 @@ def _name_of(wanted: str | int, names: list[str], labels: Mapping[str, str], fie
     same = [n for n in names if n.lower() == wanted.lower()]
     if len(same) == 1:
         return same[0]
-    raise InputError(f"{field} must be a column, got '{wanted}'; {closest(wanted, names)}")
+    raise InputError(field, "be a column", f"'{wanted}'", closest(wanted, names))
 
 
 def _by_name(
@@ -177,9 +181,11 @@ def _by_name(
             name = roles[str(role)]
         elif role and key not in labels:
             fitting = candidates(role, dict.fromkeys(names))
-            name = fitting[0] if len(fitting) == 1 else _name_of(key, names, labels, "units")
+            name = (
+                fitting[0] if len(fitting) == 1 else _name_of(key, names, labels, Argument("units"))
+            )
         else:
-            name = _name_of(key, names, labels, "units")
+            name = _name_of(key, names, labels, Argument("units"))
         by_name[name] = text
     return by_name
 
@@ -248,7 +254,8 @@ def _unknown(channels: Mapping[str, Channel]) -> list[Finding]:
                 if c.recorded_unit
                 else f"The file states no unit of '{name}'"
             )
-            + f"; its values are as recorded, until units={{'{name}': ...}} says what they are.",
+            + "; its values are as recorded, until "
+            f"{Argument('units', name, '...')} says what they are.",
         )
         for name, c in channels.items()
         if c.kind is None

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import InputError, listed
+from asperity.errors import Argument, InputError, listed
 from asperity.recording.finding import Finding
 from asperity.recording.readers.units import Unit, in_si
 from asperity.recording.roles import candidates, words
@@ -69,7 +69,7 @@ def settle_time(
         hertz = to_si(rate, "frequency", "read.rate")
         if hertz <= 0:
             raise InputError(
-                f"read.rate must be positive, got {hertz:g} Hz; give a rate like '10 kHz'"
+                "read.rate", "be positive", f"{hertz:g} Hz", "give a rate like '10 kHz'"
             )
         return Clock(np.asarray(np.arange(rows) / hertz), f"rate of {hertz:.10g} Hz, as asked")
     if "time" in roles:
@@ -79,8 +79,10 @@ def settle_time(
     fitting = exact if len(exact) == 1 else candidates("time", kinds)
     if len(fitting) > 1:
         raise InputError(
-            f"columns['time'] must be chosen, got {' and '.join(map(repr, fitting))}, which both "
-            f"can be it; choose one, like columns={{'time': '{fitting[0]}'}}"
+            Argument("columns", "time"),
+            "be chosen",
+            f"{' and '.join(map(repr, fitting))}, which both can be it",
+            f"choose one, like {Argument('columns', 'time', fitting[0])}",
         )
     if fitting:
         return _from_column(fitting[0], values, units)
@@ -100,9 +102,11 @@ def _from_first_column(
     rises = numbers.dtype.kind in "iuf" and numbers.size > 1 and bool(np.all(np.diff(numbers) > 0))
     if not (bare and rises and len(values) > 1):
         raise InputError(
-            f"columns['time'] must be a column, got none among {listed(map(repr, values))} that "
-            "is named like time; say which it is, like columns={'time': "
-            f"'{first}'}}, or give the sampling rate, like rate='10 kHz'"
+            Argument("columns", "time"),
+            "be a column",
+            f"none among {listed(map(repr, values))} that is named like time",
+            f"say which it is, like {Argument('columns', 'time', first)}, or give the sampling "
+            f"rate, like {Argument('rate', value='10 kHz')}",
         )
     clock = _from_column(first, values, units)
     assumed = Finding(
@@ -111,7 +115,7 @@ def _from_first_column(
         len(values),
         first,
         "The file names no columns; the first, which only rises, was taken for time; say "
-        "columns={'time': 0} to confirm, and name the units.",
+        f"{Argument('columns', 'time', '0')} to confirm, and name the units.",
     )
     return Clock(clock.time, clock.source, first, [assumed, *clock.findings])
 
@@ -128,7 +132,7 @@ def _from_column(name: str, values: Mapping[str, NDArray[Any]], units: Mapping[s
             1.0,
             name,
             f"The file states no unit of '{name}' that is known; seconds were assumed, until "
-            f"units={{'{name}': ...}} says otherwise.",
+            f"{Argument('units', name, '...')} says otherwise.",
         )
         return Clock(np.asarray(raw, dtype=np.float64), f"column '{name}'", name, [assumed])
     return Clock(in_si(raw, unit), f"column '{name}'", name)
@@ -139,8 +143,10 @@ def _from_dates(name: str, raw: NDArray[Any]) -> Clock:
     stamps = _elapsed(raw)
     if stamps is None:
         raise InputError(
-            f"columns['time'] must hold numbers, dates or hours:minutes:seconds, got "
-            f"'{raw[0]}' in '{name}'; choose another column, or give rate='10 kHz'"
+            Argument("columns", "time"),
+            "hold numbers, dates or hours:minutes:seconds",
+            f"'{raw[0]}' in '{name}'",
+            f"choose another column, or give {Argument('rate', value='10 kHz')}",
         )
     return Clock(stamps[0], f"column '{name}', since {stamps[1]}", name)
 

@@ -40,8 +40,10 @@ def reader_points() -> dict[str, EntryPoint]:
     points = {point.name: point for point in entry_points(group=GROUP)}
     for name in sorted(set(points) & set(FORMATS)):
         raise InputError(
-            f"read.format must have a name of its own, got '{name}' of '{points[name].value}', "
-            "which asperity reads itself; rename the entry point"
+            "read.format",
+            "have a name of its own",
+            f"'{name}' of '{points[name].value}', which asperity reads itself",
+            "rename the entry point",
         )
     return points
 
@@ -59,20 +61,24 @@ def reader_named(name: str) -> Any:
     points = reader_points()
     if name not in points:
         known = closest(name, [*FORMATS, *points])
-        raise InputError(f"read.format must be a format, got '{name}'; {known}")
+        raise InputError("read.format", "be a format", f"'{name}'", known)
     try:
         reader = points[name].load()
     # Another package's code: whatever it raises, the user hears of it in a sentence.
     except Exception as error:
         raise InputError(
-            f"read.format must be a reader that can be loaded, got '{name}' of "
-            f"'{points[name].value}' ({error}); correct or remove that package"
+            "read.format",
+            "be a reader that can be loaded",
+            f"'{name}' of '{points[name].value}' ({error})",
+            "correct or remove that package",
         ) from None
     for wanted in ("is_format", "read"):
         if not callable(getattr(reader, wanted, None)):
             raise InputError(
-                f"read.format must be a reader with {wanted}(path), got '{name}' of "
-                f"'{points[name].value}' without; add the function"
+                "read.format",
+                f"be a reader with {wanted}(path)",
+                f"'{name}' of '{points[name].value}' without",
+                "add the function",
             )
     return reader
 
@@ -97,8 +103,10 @@ def format_of(path: Path) -> str:
         if reader_named(name).is_format(path):
             return name
     raise InputError(
-        f"recording.path must be CSV or other text, HDF5, MATLAB, TDMS or LOOK, got '{path.name}', "
-        "which looks like none of them; name it with format= if it is one"
+        "recording.path",
+        "be CSV or other text, HDF5, MATLAB, TDMS or LOOK",
+        f"'{path.name}', which looks like none of them",
+        "name it with format= if it is one",
     )
 
 
@@ -131,8 +139,10 @@ def raw_recording(
     for option, value in options.items():
         if value is not None and option not in taken:
             raise InputError(
-                f"read.{option} must be left out for format '{name}', got '{value}'; its reader "
-                "takes none"
+                f"read.{option}",
+                f"be left out for format '{name}'",
+                f"'{value}'",
+                "its reader takes none",
             )
     layout = {k: v if v is not None else defaults.get(k) for k, v in options.items() if k in taken}
     try:
@@ -141,19 +151,23 @@ def raw_recording(
         raise
     except MemoryError:
         raise InputError(
-            f"recording.path must fit into memory, got '{path.name}', which holds more; cut it"
+            "recording.path", "fit into memory", f"'{path.name}', which holds more", "cut it"
         ) from None
     # Libraries raise whatever the damage makes of the data: type, value, memory, zlib errors.
     except Exception as error:
         raise InputError(
-            f"recording.path must be a whole file of format '{name}', got '{path.name}', which may "
-            f"be cut or damaged: its reader could not read it ({type(error).__name__}: {error}); "
-            "copy it again from where it was recorded"
+            "recording.path",
+            f"be a whole file of format '{name}'",
+            f"'{path.name}', which may "
+            f"be cut or damaged: its reader could not read it ({type(error).__name__}: {error})",
+            "copy it again from where it was recorded",
         ) from None
     if not isinstance(recorded, RawRecording):
         raise InputError(
-            f"read.format must be a reader that returns a RawRecording, got "
-            f"{type(recorded).__name__} of '{name}'; correct the reader"
+            "read.format",
+            "be a reader that returns a RawRecording",
+            f"{type(recorded).__name__} of '{name}'",
+            "correct the reader",
         )
     recorded.provenance.setdefault("format", name)
     return recorded

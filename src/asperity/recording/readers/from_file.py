@@ -122,11 +122,13 @@ def read(
 
 def _with_content(file: Path) -> Path:
     if not file.is_file():
-        raise InputError(f"recording.path must be a file, got '{file}'; check the name")
+        raise InputError("recording.path", "be a file", f"'{file}'", "check the name")
     if file.stat().st_size == 0:
         raise InputError(
-            f"recording.path must hold a recording, got '{file.name}', which is empty; copy it "
-            "again from where it was recorded"
+            "recording.path",
+            "hold a recording",
+            f"'{file.name}', which is empty",
+            "copy it again from where it was recorded",
         )
     return file
 

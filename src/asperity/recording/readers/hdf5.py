@@ -77,8 +77,10 @@ def _refuse_links_out(file: Any, path: Path) -> None:
 
 def _elsewhere(path: Path, name: str) -> InputError:
     return InputError(
-        f"recording.path must hold its data itself, got '{path.name}', whose {name!r} lies in "
-        "another file; copy the data into one file"
+        "recording.path",
+        "hold its data itself",
+        f"'{path.name}', whose {name!r} lies in another file",
+        "copy the data into one file",
     )
 
 

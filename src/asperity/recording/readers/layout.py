@@ -417,8 +417,10 @@ def layout_of(
     (score, width), way = max(scored, key=lambda s: s[0])
     if not sample or score < 0.5:
         raise InputError(
-            f"recording.path must hold a table of numbers, got '{path.name}' without one that is "
-            "understood; say delimiter= and decimal=, or give a recording"
+            "recording.path",
+            "hold a table of numbers",
+            f"'{path.name}' without one that is understood",
+            "say delimiter= and decimal=, or give a recording",
         )
     rows = [cells_of(text, way[0]) for text in sample]
     rows = [row for row in rows if len(row) == width]
@@ -456,7 +458,7 @@ def _count_rows(cells: Sequence[str]) -> bool:
 
 def _ways(delimiter: str | None, decimal: str | None) -> list[tuple[str | None, str]]:
     if decimal not in (None, ".", ","):
-        raise InputError(f"read.decimal must be '.' or ',', got '{decimal}'; give one of them")
+        raise InputError("read.decimal", "be '.' or ','", f"'{decimal}'", "give one of them")
     wanted = (
         None if delimiter in (" ", "blank", "whitespace") else _NAMED.get(str(delimiter), delimiter)
     )
@@ -469,8 +471,10 @@ def _ways(delimiter: str | None, decimal: str | None) -> list[tuple[str | None, 
         ways = [(wanted, decimal or ".")]
     if not ways:
         raise InputError(
-            f"read.delimiter must be one character or 'blank', got {delimiter!r}; leave it out to "
-            "have it found"
+            "read.delimiter",
+            "be one character or 'blank'",
+            f"{delimiter!r}",
+            "leave it out to have it found",
         )
     return ways
 

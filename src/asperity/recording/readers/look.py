@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from asperity.errors import Argument
 from asperity.recording.finding import Finding
 from asperity.recording.readers.raw import (
     RawColumn,
@@ -248,7 +249,7 @@ def _in_seconds(columns: list[RawColumn], period: float) -> tuple[list[RawColumn
                 column.label,
                 f"'{column.label}' counts samples, and the header states a period of {period:.9g} "
                 f"s; times are the count times this period. If the column is in seconds after all, "
-                "read with rate='1 Hz'.",
+                f"read with {Argument('rate', value='1 Hz')}.",
             )
         )
     return made, findings

@@ -136,8 +136,10 @@ def truncated(path: Path, number: float, where: str, sentence: str, sure: bool =
 def refuse_truncated(path: Path, why: str) -> InputError:
     """The error for a file of which nothing can be used."""
     return InputError(
-        f"recording.path must be a whole file, got '{path.name}', {why}; copy it again from where "
-        "it was recorded"
+        "recording.path",
+        "be a whole file",
+        f"'{path.name}', {why}",
+        "copy it again from where it was recorded",
     )
 
 
@@ -288,15 +290,19 @@ def one_table(
         filled = {wanted: filled[wanted]}
     if not filled:
         raise InputError(
-            f"recording.path must hold columns of numbers, got '{path.name}' with none; give a "
-            "recording"
+            "recording.path",
+            "hold columns of numbers",
+            f"'{path.name}' with none",
+            "give a recording",
         )
     longest = {name: max(c.values.size for c in columns) for name, columns in filled.items()}
     if len(set(longest.values())) > 1:
         listed = ", ".join(f"{name!r} ({rows} rows)" for name, rows in longest.items())
         raise InputError(
-            f"read.group must be chosen in a file of several recordings, got none for {listed}; "
-            f"choose one, like group='{max(longest, key=longest.__getitem__)}'"
+            "read.group",
+            "be chosen in a file of several recordings",
+            f"none for {listed}",
+            f"choose one, like group='{max(longest, key=longest.__getitem__)}'",
         )
     rows = max(longest.values())
     kept = [c for columns in filled.values() for c in columns if c.values.size == rows]

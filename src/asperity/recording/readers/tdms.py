@@ -47,8 +47,10 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
         import nptdms
     except ImportError:
         raise InputError(
-            f"recording.path must be in a format that can be read here, got '{path.name}', which "
-            "is TDMS; install npTDMS, as 'pip install asperity[lab]' does"
+            "recording.path",
+            "be in a format that can be read here",
+            f"'{path.name}', which is TDMS",
+            "install npTDMS, as 'pip install asperity[lab]' does",
         ) from None
     missing = _missing(path)
     with _quiet(nptdms):
@@ -138,8 +140,10 @@ def _clock(properties: list[Any], path: Path) -> tuple[float, float | None]:
     if len(steps) > 1:
         listed = " and ".join(f"{s:g} s" for s in sorted(steps))
         raise InputError(
-            f"read.group must be chosen where channels differ in interval, got {listed} in "
-            f"'{path.name}'; choose a group, or give rate= to override them"
+            "read.group",
+            "be chosen where channels differ in interval",
+            f"{listed} in '{path.name}'",
+            "choose a group, or give rate= to override them",
         )
     starts = [float(p.get("wf_start_offset", 0.0)) for p in properties if "wf_increment" in p]
     return starts[0], steps.pop()

@@ -64,14 +64,18 @@ def is_format(path: Path) -> bool:
     for mark, kind in _ARCHIVES.items():
         if head.startswith(mark):
             raise InputError(
-                f"recording.path must be the recording itself, got '{path.name}', {kind}; unpack "
-                "it, or save the sheet as CSV"
+                "recording.path",
+                "be the recording itself",
+                f"'{path.name}', {kind}",
+                "unpack it, or save the sheet as CSV",
             )
     if kind := _document(head):
         # A table would be looked for in it at length.
         raise InputError(
-            f"recording.path must hold a table of numbers, got '{path.name}', which is {kind}; "
-            "save it as CSV, or add a reader for it"
+            "recording.path",
+            "hold a table of numbers",
+            f"'{path.name}', which is {kind}",
+            "save it as CSV, or add a reader for it",
         )
     return head.startswith(_GZIP) or _is_text(head)
 
@@ -138,13 +142,17 @@ def _unpacked(path: Path) -> bytes:
         text = packed.read(LARGEST + 1)
     if len(text) > LARGEST:
         raise InputError(
-            f"recording.path must unpack to at most {LARGEST // 1024**2} MB, got '{path.name}', "
-            "which goes on; unpack it, and see what it holds"
+            "recording.path",
+            f"unpack to at most {LARGEST // 1024**2} MB",
+            f"'{path.name}', which goes on",
+            "unpack it, and see what it holds",
         )
     if not _is_text(text[: 1 << 12]):
         raise InputError(
-            f"recording.path must hold a text if it is packed, got '{path.name}' with something "
-            "else; unpack it"
+            "recording.path",
+            "hold a text if it is packed",
+            f"'{path.name}' with something else",
+            "unpack it",
         )
     return text
 
@@ -173,8 +181,10 @@ def _load(
     frame, findings = _parse(file, layout, ending.stop, path)
     if not len(frame):
         raise InputError(
-            f"recording.path must hold rows of numbers, got '{path.name}' with a heading only; "
-            "give a recording"
+            "recording.path",
+            "hold rows of numbers",
+            f"'{path.name}' with a heading only",
+            "give a recording",
         )
     frame, left_out = _without_text_rows(frame, layout.width)
     findings += left_out
@@ -270,8 +280,11 @@ def _parsed_with_texts(parsed: Callable[..., pd.DataFrame], path: Path) -> pd.Da
         return parsed(low_memory=False)
     except (pd.errors.ParserError, pd.errors.EmptyDataError):
         raise InputError(
-            f"recording.path must hold a table that can be parsed, got '{path.name}', in which a "
-            "quote is opened and never closed, or a row goes on without end; correct the file"
+            "recording.path",
+            "hold a table that can be parsed",
+            f"'{path.name}', in which a "
+            "quote is opened and never closed, or a row goes on without end",
+            "correct the file",
         ) from None
 
 

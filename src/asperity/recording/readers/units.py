@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.recording.roles import ROLES, candidates
 from asperity.units import KINDS
 from asperity.units.convert import shortened
@@ -165,8 +165,11 @@ def required(text: str, name: str) -> Unit:
     unit = understood(match[2] if match else text)
     if unit is None:
         raise InputError(
-            f"units['{name}'] must be a unit, got '{text}'; write it like 'N', 'MPa', 'um', '-' "
-            "for a pure number, or '12.5 N' for what one recorded unit is"
+            Argument("units", name),
+            "be a unit",
+            f"'{text}'",
+            "write it like 'N', 'MPa', 'um', '-' "
+            "for a pure number, or '12.5 N' for what one recorded unit is",
         )
     if match is None:
         return unit
@@ -176,8 +179,10 @@ def required(text: str, name: str) -> Unit:
         factor = Decimal(0)
     if not _SMALLEST < abs(factor) < 1 / _SMALLEST:
         raise InputError(
-            f"units['{name}'] must be a size between {_SMALLEST:.0e} and {1 / _SMALLEST:.0e} in "
-            f"SI, got '{shortened(text)}'; give what one recorded unit is, like '12.5 N'"
+            Argument("units", name),
+            f"be a size between {_SMALLEST:.0e} and {1 / _SMALLEST:.0e} in SI",
+            f"'{shortened(text)}'",
+            "give what one recorded unit is, like '12.5 N'",
         )
     return Unit(unit.kind, factor)
 

@@ -129,7 +129,7 @@ def _integrate(
     lines = [line.format_map(_WithUnits(named)) for line in settings["steps"]]
     steps, mistakes = planned_steps(lines, Path())
     if mistakes:
-        raise InputError("; ".join(mistakes))
+        raise InputError("; ".join(map(str, mistakes)))
     programme = Programme(*(one.step for one in steps), load=values["W0"], velocity=values["V"])
     trajectory = transient(
         slider_from(get_law(law), values),
@@ -203,4 +203,4 @@ def _check_steps(plan: SweepPlan, table: TransientTable) -> None:
     examples = _WithUnits(dict.fromkeys(known, 0.5))
     _, mistakes = planned_steps([line.format_map(examples) for line in table.steps], plan.folder)
     if mistakes:
-        raise InputError("; ".join(mistakes))
+        raise InputError("; ".join(map(str, mistakes)))

@@ -6,6 +6,7 @@ or the reason why a branch ends before.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -13,6 +14,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.algebra.continuation import Attempt, Curves, StepControl, follow
 from asperity.orbit.batches import Indices, put, run_chunks, take
 from asperity.orbit.mesh.mesh import Orbit, scheme_for
 from asperity.orbit.mesh.newton import Change
@@ -63,16 +65,11 @@ _AHEAD = 0.5
 #: A branch this far back from a fold, as a share of the amplitude, is on its way back.
 _BACK = 1e-3
 _NEWTON_STEPS = 10
-#: Distance from the prediction, in steps, above which a step is not trusted.
-_MISS = 0.8
 #: Distance that the moving of the mesh may account for: shorter steps would miss by as much.
 _NOISE = 0.15
 _FIRST = 0.02
-#: Longest step in the space of states, phase and share, and its change by what Newton needed.
-_LONGEST, _GROWTH, _SHRINKAGE = 3.0, 2.0, 0.4
-_EASY, _HARD = 4, 7
-#: Failures after which a step starts anew along the tangent, and after which the branch is left.
-_RESTART, _GIVE_UP = 4, 10
+#: Failures after which a step starts anew along the tangent.
+_RESTART = 4
 #: Exponent from which pulses grow steadily if they do, its rise over which the share is watched,
 #: and how many times farther the share may get than where that leads.
 _RUNNING, _RISE, _CAUTION = 5.0, 0.3, 2.0
@@ -147,11 +144,11 @@ def follow_from_steady_sliding(problem: Problem, index: Indices, mesh: BranchMes
 
     Always from the beginning: a coarser mesh resolves a branch poorly long before it is lost.
     """
-    line = amplitude_line(problem)
-    pair = _steady_pair(line, len(problem.system.V), index, mesh.intervals)
-    progress = BranchProgress.from_steady(len(problem.system.V))
-    _follow(line, pair, progress, index, mesh.most_steps)
-    orbit, share = pair.point.orbit, pair.point.t
+    line, points = amplitude_line(problem), len(problem.system.V)
+    branches = SteadyBranches(line, _steady_pair(line, points, index, mesh.intervals))
+    follow(branches, np.full(points, _FIRST), rows=index, most=mesh.most_steps)
+    progress, point = branches.progress, branches.pair.point
+    orbit, share = point.orbit, point.t
     known = (progress.fold, progress.farthest, progress.fastest, progress.limit)
     result = SteadyBranch(orbit, share, *known, np.zeros_like(share))
     left = index[~result.definite[index]]
@@ -167,7 +164,7 @@ def follow_from_steady_sliding(problem: Problem, index: Indices, mesh: BranchMes
 
 
 class BranchProgress(NamedTuple):
-    """What is known of each branch so far, and how to go on.
+    """What is known of each branch so far.
 
     Attributes
     ----------
@@ -175,10 +172,6 @@ class BranchProgress(NamedTuple):
         As in `SteadyBranch`.
     watched_share, watched_exponent : array, shape (points,)
         Share and exponent from which the present rise of the exponent is counted.
-    last, ratio : array, shape (points,)
-        Length of the last step, and of the next one in parts of it.
-    failures : int array, shape (points,)
-        Failed steps since the last good one.
     """
 
     fold: Float
@@ -187,9 +180,6 @@ class BranchProgress(NamedTuple):
     limit: Float
     watched_share: Float
     watched_exponent: Float
-    last: Float
-    ratio: Float
-    failures: NDArray[np.int_]
 
     @classmethod
     def from_steady(cls, points: int) -> BranchProgress:
@@ -205,9 +195,6 @@ class BranchProgress(NamedTuple):
             limit=full(np.inf),
             watched_share=full(0.0),
             watched_exponent=full(0.0),
-            last=full(_FIRST),
-            ratio=full(1.0),
-            failures=np.zeros(points, int),
         )
 
     def continues(self, share: Float) -> NDArray[np.bool_]:
@@ -251,55 +238,78 @@ def _steady_pair(line: ParameterLine, points: int, index: Indices, intervals: in
     return pair
 
 
-def _follow(
-    line: ParameterLine, pair: PointPair, progress: BranchProgress, index: Indices, most_steps: int
-) -> None:
-    """Follow the points `index` in place, each with its own steps."""
-    advance = partial(moving_step, max_steps=_NEWTON_STEPS)
-    for _ in range(most_steps):
-        at = index[(progress.continues(pair.point.t) & (progress.failures < _GIVE_UP))[index]]
-        if not len(at):
-            break
-        progress.ratio[:] = _towards_the_end(pair, progress.ratio, progress.failures)
-        for part, step in run_chunks(advance, (line, pair, progress.ratio), at, CHUNK):
-            near = (step.miss < _MISS) | (step.miss * step.length < _NOISE)
-            good = np.isfinite(step.error) & near
-            kept, chosen = part[good], np.flatnonzero(good)
-            turned = pair.point.tangent.t[kept] * step.next.point.tangent.t[chosen] < 0
-            extremum = np.where(turned, _extremum(pair, step, kept, chosen), np.nan)
-            progress.fold[kept] = np.fmax(progress.fold[kept], extremum)
-            put(pair, kept, take(step.next, chosen))
-            share = pair.point.t[kept]
-            progress.farthest[kept] = np.maximum(progress.farthest[kept], share)
-            progress.last[kept], progress.fastest[kept] = step.length[chosen], step.fastest[chosen]
-            progress.watch(kept, share)
-            progress.failures[part] = np.where(good, 0, progress.failures[part] + 1)
-            progress.ratio[part] = _next_ratio(
-                progress.ratio[part], good, step.iterations, step.length
-            )
-        stuck = at[progress.failures[at] >= _RESTART]
-        lengths = progress.last * 0.1 * _SHRINKAGE ** (progress.failures - float(_RESTART))
-        for part, fresh in run_chunks(straight, (pair.point, lengths), stuck, CHUNK):
-            put(pair, part, fresh)
-        progress.ratio[stuck] = 1.0
+class SteadyBranches(Curves):
+    """Branches from steady sliding in the amplitude, predicted from their last two points.
 
+    Attributes
+    ----------
+    line : ParameterLine
+    pair : PointPair
+        The last two points of each branch.
+    span : array, shape (points,)
+        Distance between these two.
+    progress : BranchProgress
+    """
 
-def _towards_the_end(pair: PointPair, ratio: Float, failures: NDArray[np.int_]) -> Float:
-    """Steps that are not predicted to pass the requested amplitude; back where one passed it."""
-    last, left = pair.point.t - pair.t_before, 1 - pair.point.t
-    near = (last != 0) & (np.abs(left) < _NEAR)
-    near |= (last > 0) & ((ratio * last > left) | (left < 0))
-    secant = left / np.where(near, last, 1.0)
-    # A step that has just failed is not tried again.
-    longest = np.where(failures > 0, np.abs(ratio), 2.0)
-    return np.where(near, np.clip(secant, -np.minimum(longest, 1.0), longest), ratio)
+    control = StepControl(
+        longest=3.0,  # in the space of states, phase and share
+        growth=2.0,
+        easy=4,
+        hard=7,
+        sharpest_turn=0.3,
+        farthest=0.8,
+        most_failures=10,
+    )
 
+    def __init__(self, line: ParameterLine, pair: PointPair) -> None:
+        """At steady sliding."""
+        self.line, self.pair = line, pair
+        self.span = np.full(len(pair.t_before), _FIRST)
+        self.progress = BranchProgress.from_steady(len(pair.t_before))
 
-def _next_ratio(ratio: Float, good: NDArray[np.bool_], iterations: Float, length: Float) -> Float:
-    """Next step over the last one."""
-    change = np.where(iterations <= _EASY, _GROWTH, np.where(iterations <= _HARD, 1.0, 0.7))
-    longest = _LONGEST / np.maximum(length, 1e-9)
-    return np.where(good, np.minimum(change, longest), ratio * _SHRINKAGE)
+    def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
+        """Not predicted to pass the requested amplitude; back where a step has passed it.
+
+        After several failures along the secant, along the tangent.
+        """
+        stuck = np.flatnonzero((failures >= _RESTART) & (failures < self.control.most_failures))
+        self.span[stuck] = length[stuck] = np.abs(length[stuck])
+        for part, fresh in run_chunks(straight, (self.pair.point, length), stuck, CHUNK):
+            put(self.pair, part, fresh)
+        t, ratio = self.pair.point.t, length / self.span
+        last, left = t - self.pair.t_before, 1 - t
+        near = (last != 0) & (np.abs(left) < _NEAR)
+        near |= (last > 0) & ((ratio * last > left) | (left < 0))
+        secant = left / np.where(near, last, 1.0)
+        # A step that has just failed is not tried again.
+        longest = np.where(failures > 0, np.abs(ratio), 2.0)
+        aimed = np.clip(secant, -np.minimum(longest, 1.0), longest)
+        return np.where(near, aimed, ratio) * self.span
+
+    def attempts(
+        self, rows: Indices, length: Float, failures: NDArray[np.int_]
+    ) -> Iterator[tuple[Indices, Attempt]]:
+        """Steps on the moving mesh."""
+        advance = partial(moving_step, max_steps=_NEWTON_STEPS)
+        inputs = (self.line, self.pair, length / self.span)
+        for part, step in run_chunks(advance, inputs, rows, CHUNK):
+            miss = np.where(step.miss * step.length < _NOISE, 0.0, step.miss)
+            converged = np.isfinite(step.error)
+            yield part, Attempt(step, converged, step.iterations, step.turn, miss, step.length)
+
+    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+        """Note folds, shares and exponents; a branch ends where it arrives or runs away."""
+        step, progress = attempt.next, self.progress
+        turned = self.pair.point.tangent.t[rows] * step.next.point.tangent.t[chosen] < 0
+        extremum = np.where(turned, _extremum(self.pair, step, rows, chosen), np.nan)
+        progress.fold[rows] = np.fmax(progress.fold[rows], extremum)
+        put(self.pair, rows, take(step.next, chosen))
+        self.span[rows] = step.length[chosen]
+        share = self.pair.point.t
+        progress.farthest[rows] = np.maximum(progress.farthest[rows], share[rows])
+        progress.fastest[rows] = step.fastest[chosen]
+        progress.watch(rows, share[rows])
+        return ["" if goes_on else "ended" for goes_on in progress.continues(share)[rows]]
 
 
 def _extremum(pair: PointPair, step: MovingMeshStep, rows: Indices, chosen: Indices) -> Float:

@@ -29,8 +29,6 @@ Float = NDArray[np.float64]
 
 #: Change at which Newton's method ends and a step is accepted: the error is about its square.
 ACCEPTED = 1e-5
-#: Cosine of the turn of the tangent below which the direction of the branch is not known.
-_SHARPEST_TURN = 0.3
 #: Narrowest an interval may be predicted, in parts of what it is.
 _NARROWEST = 0.3
 
@@ -51,6 +49,8 @@ class MovingMeshStep(NamedTuple):
     next : PointPair
     error, iterations : array, shape (points,)
         As in `ArclengthStep`.
+    turn : array, shape (points,)
+        Cosine of the angle between the tangents before and after.
     miss : array, shape (points,)
         Distance of the new point from the predicted one, in steps.
     length : array, shape (points,)
@@ -62,6 +62,7 @@ class MovingMeshStep(NamedTuple):
     next: PointPair
     error: Float
     iterations: Float
+    turn: Float
     miss: Float
     length: Float
     fastest: Float
@@ -134,8 +135,8 @@ def moving_step(
         backward = (tangent.t * t_slope > 0) & (forward < 0)
         miss = _distance(units, orbit, t, guess, t_guess) / step
         length = _distance(units, there, t, point.orbit, point.t)
-        fine = usable(there, turn.cosine) & (turn.cosine > _SHARPEST_TURN) & ~backward
+        fine = usable(there, turn.cosine) & ~backward
         error = np.where(fine & (result.error <= ACCEPTED), result.error, np.inf)
         fastest = turn.values.log_slip.max((0, 1))
     following = PointPair(point.orbit, point.t, turn.point)
-    return MovingMeshStep(following, error, result.steps, miss, length, fastest)
+    return MovingMeshStep(following, error, result.steps, turn.cosine, miss, length, fastest)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from asperity.recording.defects.rounded_time import RoundedGrid, rounded_grid
 from asperity.recording.finding import Finding
-from asperity.recording.rounded_time import RoundedGrid, rounded_grid
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -23,6 +24,8 @@ _OUTSIDE = 6.0
 #: Steps on each side of a gap that say what is usual there.
 _SIDE = 24
 _CHUNK = 100_000
+#: Samples of a stretch of one sampling rate, at least, and the change of the interval that ends it.
+_SHORTEST, _OTHER_RATE = 16, 1.5
 
 
 def even_rate(time: Array) -> float | None:
@@ -119,6 +122,45 @@ def _backward_and_repeated(steps: Array, time: Array, rows: NDArray[np.intp]) ->
             )
         )
     return findings
+
+
+def gap_rows(time: Array) -> NDArray[np.intp]:
+    """Samples that follow a gap, in rising order.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Seconds, finite and rising.
+    """
+    return _gaps(np.diff(time), time)[0] + 1
+
+
+def rate_stretches(time: Array) -> tuple[tuple[int, int], ...]:
+    """First sample and the one after the last of each stretch of one sampling rate.
+
+    Parameters
+    ----------
+    time : ndarray, shape (n,)
+        Seconds, finite and rising.
+    """
+    from scipy.ndimage import median_filter
+
+    steps = np.log(median_filter(np.diff(time), 7, mode="nearest"))
+    bounds = [0]
+    level, begin, reach = steps[0], 0, 64
+    while begin < steps.size:
+        # The next other interval, looked for in growing parts.
+        other = np.abs(steps[begin : begin + reach] - level) > np.log(_OTHER_RATE)
+        if not other.any():
+            begin, reach = begin + reach, 4 * reach
+            continue
+        begin, reach = begin + int(np.argmax(other)), 64
+        if begin - bounds[-1] >= _SHORTEST:
+            bounds.append(begin)
+        level = steps[begin]
+    if time.size - bounds[-1] < _SHORTEST and len(bounds) > 1:
+        bounds.pop()
+    return tuple(pairwise([*bounds, time.size]))
 
 
 def _gaps(steps: Array, time: Array) -> tuple[NDArray[np.intp], Array]:

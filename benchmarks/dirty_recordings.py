@@ -1,0 +1,220 @@
+"""Fits to recordings with defects: how many answers are right, flagged, or wrong without a word.
+
+    python -m benchmarks.dirty_recordings [--sets 50] [--kind spikes] [--out rows.jsonl]
+
+The recordings are those of `benchmarks.coverage` with one kind of defect each, of a size drawn over
+a decade or more. An answer is wrong where a parameter is more than four standard errors off the
+truth, and flagged where the fit warns of anything, or refuses.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time as clock
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.signal import lfilter
+
+from asperity.errors import InputError
+from asperity.inference import fit, recorded_run
+from asperity.recording import Channel, Trace
+from benchmarks.coverage import CASES, LOAD, LOAD_NOISE, NOISE, Case, coloured, friction
+
+Float = np.ndarray
+#: Standard errors off the truth from which on an answer is wrong.
+WRONG = 4.0
+
+
+def _sizes(random: np.random.Generator, low: float, high: float, n: int) -> Float:
+    size = np.exp(random.uniform(np.log(low), np.log(high), n))
+    return np.asarray(NOISE * size * random.choice([-1.0, 1.0], n))
+
+
+def spikes(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """One to ten single samples, 4 to 100 times the noise off."""
+    at = random.choice(x.size, random.integers(1, 11), replace=False)
+    x[at] += _sizes(random, 4, 100, at.size)
+    return x
+
+
+def spike_at_change(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """One sample within five of a change of the drive, 4 to 100 times the noise off."""
+    changes = [*case.changes, *(t for t, _ in case.loads if t > 0)]
+    at = int(np.searchsorted(time, random.choice(changes))) + random.integers(-5, 6)
+    x[at] += _sizes(random, 4, 100, 1)[0]
+    return x
+
+
+def jump(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """A jump of the level by 1 to 30 times the noise."""
+    x[random.integers(20, x.size - 20) :] += _sizes(random, 1, 30, 1)[0]
+    return x
+
+
+def hum(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """A line of 0.5 to 10 times the noise at 0.05 to 0.45 of the sampling rate, wandering."""
+    hertz = case.rate * random.uniform(0.05, 0.45)
+    phase = np.cumsum(2 * np.pi * hertz / case.rate + 1e-3 * random.normal(size=x.size))
+    return x + abs(_sizes(random, 0.5, 10, 1)[0]) * np.cos(phase + 6.3 * random.random())
+
+
+def clipped(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """Friction at the end of its range, above or below, for 5 to 50 % of its height."""
+    low, high = x.min(), x.max()
+    share = random.uniform(0.05, 0.5) * (high - low)
+    return (
+        np.clip(x, low + share, None) if random.random() < 0.5 else np.clip(x, None, high - share)
+    )
+
+
+def slow(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """Noise of half its size besides, with a correlation of 10 to 300 samples."""
+    a = np.exp(-1 / np.exp(random.uniform(np.log(10), np.log(300))))
+    begun = lfilter([1.0], [1.0, -a], random.normal(size=x.size + 2000) * np.sqrt(1 - a * a))
+    return np.asarray(x + 0.5 * NOISE * begun[2000:])
+
+
+def heavy(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """White noise with tails: Student's t of three degrees of freedom."""
+    return np.asarray(x + 0.6 * NOISE * random.standard_t(3, x.size))
+
+
+def burst(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """Noise three to ten times as large in 2 to 10 % of the recording."""
+    n = int(random.uniform(0.02, 0.1) * x.size)
+    at = random.integers(0, x.size - n)
+    x[at : at + n] += random.uniform(3, 10) * NOISE * random.normal(size=n)
+    return x
+
+
+def missing(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """Up to five stretches of 1 to 30 samples that are no numbers."""
+    for _ in range(random.integers(1, 6)):
+        at = random.integers(20, x.size - 50)
+        x[at : at + random.integers(1, 31)] = np.nan
+    return x
+
+
+def clean(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """No defect."""
+    return x
+
+
+KINDS: dict[str, Callable[[np.random.Generator, Case, Float, Float], Float]] = {
+    f.__name__: f
+    for f in (
+        clean,
+        slow,
+        spikes,
+        spike_at_change,
+        jump,
+        hum,
+        clipped,
+        heavy,
+        burst,
+        missing,
+    )
+}
+
+
+def trace_of(kind: str, case: Case, exact: Float, seed: int) -> Trace:
+    """A recording with a defect."""
+    random = np.random.default_rng([seed, len(kind), ord(kind[-1])])
+    time = np.arange(exact.size) / case.rate
+    noisy = KINDS[kind](random, case, time, exact + coloured(random, time.size, case.rate))
+    edges = np.array([0.0, *case.changes, case.end])
+    moved = np.cumsum(np.array(case.velocities) * np.diff(edges))
+    path = np.interp(time, edges, np.concatenate([[0.0], moved]))
+    load = LOAD * case.load(time)
+    if len(case.loads) > 1:
+        load += LOAD_NOISE * LOAD * random.normal(size=time.size)
+    moving = path + 2e-8 * random.normal(size=time.size)
+    return Trace(
+        time,
+        {
+            "friction": Channel(noisy, "dimensionless", "", "friction", ""),
+            "displacement": Channel(moving, "length", "m", "displacement", "m"),
+            "normal_stress": Channel(load, "pressure", "Pa", "ns", "Pa"),
+        },
+    )
+
+
+def answer(kind: str, name: str, case: Case, exact: Float, seed: int) -> dict[str, Any]:
+    """What a fit to one recording says."""
+    row: dict[str, Any] = {"kind": kind, "case": name, "seed": seed}
+    true = case.true
+    begun = clock.process_time()
+    try:
+        run = recorded_run(trace_of(kind, case, exact, seed), name="run")
+        free = [n for n in true if n != "K"]
+        result = fit(run, case.law, free, start=true, starts=1)
+    except InputError as error:
+        return {**row, "refused": str(error)}
+    row["seconds"] = clock.process_time() - begun
+    if not result.converged:
+        return {**row, "refused": "not converged"}
+    parameters = {n: result.parameters[n] for n in true}
+    away = {}
+    for n, p in parameters.items():
+        low, high = p.interval_95
+        side = (high - p.value if true[n] > p.value else p.value - low) / 1.96
+        away[n] = float((p.value - true[n]) / max(side, 1e-300))
+    row["away"] = away
+    row["covered"] = {
+        n: bool(p.interval_95[0] <= true[n] <= p.interval_95[1]) for n, p in parameters.items()
+    }
+    row["se"] = {n: float(p.se / true[n]) for n, p in parameters.items()}
+    row["warnings"] = list(result.warnings)
+    row["noise"] = {k: v for k, v in result.objective.terms[0].noise.items() if k != "samples"}
+    return row
+
+
+def line_of(kind: str, rows: list[dict[str, Any]]) -> str:
+    """A row of the table."""
+    refused = sum("refused" in r for r in rows)
+    done = [r for r in rows if "refused" not in r]
+    flagged = [bool(r["warnings"]) for r in done]
+    wrong = [max(map(abs, r["away"].values())) > WRONG for r in done]
+    silent = sum(w and not f for w, f in zip(wrong, flagged, strict=True))
+    ok = [r for r, f in zip(done, flagged, strict=True) if not f]
+
+    def cover(these: list[dict[str, Any]]) -> str:
+        inside = [v for r in these for v in r["covered"].values()]
+        return f"{100 * np.mean(inside):.1f}" if inside else ""
+
+    cells = (len(rows), refused, sum(flagged), sum(wrong), silent, cover(done), cover(ok))
+    return f"| {kind} | " + " | ".join(map(str, cells)) + " |"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.dirty_recordings")
+    parser.add_argument("--sets", type=int, default=50, help="recordings of a kind")
+    parser.add_argument("--kind", choices=list(KINDS), action="append")
+    parser.add_argument("--case", choices=list(CASES), action="append")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--out", type=Path, help="file for a line of JSON for each recording")
+    chosen = parser.parse_args()
+    names = chosen.case or list(CASES)
+    cases = {name: replace(CASES[name]) for name in names}
+    exact = {n: friction(c, np.arange(int(c.end * c.rate)) / c.rate) for n, c in cases.items()}
+    print("| kind | recordings | refused | flagged | wrong | wrong, no word | 95 % | of those ok |")
+    print("|---|---|---|---|---|---|---|---|")
+    for kind in chosen.kind or list(KINDS):
+        rows = []
+        for k in range(chosen.sets):
+            name = names[k % len(names)]
+            rows.append(answer(kind, name, cases[name], exact[name], chosen.seed + k))
+            if chosen.out:
+                with chosen.out.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps(rows[-1]) + "\n")
+        print(line_of(kind, rows), flush=True)
+
+
+if __name__ == "__main__":
+    main()

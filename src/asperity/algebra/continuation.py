@@ -1,0 +1,189 @@
+"""Predictor-corrector continuation: one driver for every curve of solutions that is followed.
+
+From a point of a curve the next one is predicted at a distance along it and corrected. A step
+counts if the corrector has converged, the curve turns little and the corrected point lies near the
+predicted one; else it is tried again, shorter. What is solved, and where a curve ends, is up to the
+curves: branches of orbits in a parameter or in the amplitude, boundaries in the plane of two.
+
+Source: E. L. Allgower and K. Georg, Introduction to Numerical Continuation Methods (2003),
+chapters 2 and 6.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+#: Factors on the length of a step that has failed, and after one that was hard to correct.
+_SHRINKAGE, _SLOWDOWN = 0.4, 0.7
+#: Why a curve is left where it has not ended.
+STUCK, STEPS = "stuck", "steps"
+
+
+class StepControl(NamedTuple):
+    """Which steps count, and how long the next ones are.
+
+    Attributes
+    ----------
+    longest : float
+        Longest step.
+    growth : float
+        Factor on the length after a step that was easy to correct.
+    easy, hard : int
+        Iterations of the corrector up to which a step is easy, and above which it is hard.
+    sharpest_turn : float
+        Cosine of the turn of the tangent below which a step may have left its curve.
+    farthest : float
+        Distance from the predicted point, in steps, above which it may.
+    most_failures : int
+        Failures in a row after which a curve is left.
+    """
+
+    longest: float
+    growth: float
+    easy: int
+    hard: int
+    sharpest_turn: float
+    farthest: float
+    most_failures: int
+
+
+class Attempt(NamedTuple):
+    """Steps that were tried from the present points of some curves, one entry a curve.
+
+    Attributes
+    ----------
+    next : object
+        The new points, for `Curves.accept`.
+    converged : bool array, shape (curves,)
+    iterations : array, shape (curves,)
+        Of the corrector.
+    turn : array, shape (curves,)
+        Cosine of the angle between the tangents before and after.
+    miss : array, shape (curves,)
+        Distance of the corrected point from the predicted one, in steps.
+    length : array, shape (curves,)
+        Distance covered.
+    """
+
+    next: Any
+    converged: NDArray[np.bool_]
+    iterations: Float
+    turn: Float
+    miss: Float
+    length: Float
+
+    @classmethod
+    def of_one(
+        cls,
+        point: Any,
+        length: float,
+        *,
+        iterations: float = 0,
+        turn: float = 1.0,
+        miss: float = 0.0,
+    ) -> Attempt:
+        """Of one curve; `point` is None where the corrector failed."""
+        numbers = (np.array([float(x)]) for x in (iterations, turn, miss, length))
+        return cls(point, np.array([point is not None]), *numbers)
+
+
+class Curves(ABC):
+    """Curves that are followed together, each with steps of its own length.
+
+    Attributes
+    ----------
+    control : StepControl
+    """
+
+    control: StepControl
+
+    def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
+        """Lengths of the next steps in place of those proposed; negative ones lead back.
+
+        Parameters
+        ----------
+        length : array, shape (curves,)
+        failures : int array, shape (curves,)
+            In a row, so far.
+        """
+        return length
+
+    @abstractmethod
+    def attempts(
+        self, rows: Indices, length: Float, failures: NDArray[np.int_]
+    ) -> Iterable[tuple[Indices, Attempt]]:
+        """Try a step on each of the curves `rows`, in any number of parts.
+
+        `length` and `failures` are of all curves.
+        """
+
+    @abstractmethod
+    def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
+        """Move the curves `rows` to the entries `chosen` of an attempt.
+
+        Returns
+        -------
+        list of str
+            Why each curve ends there; empty where it goes on.
+        """
+
+
+def follow(
+    curves: Curves, length: Float, *, rows: Indices | None = None, most: int | None = None
+) -> list[str]:
+    """Follow curves until each has ended.
+
+    Parameters
+    ----------
+    curves : Curves
+        At the beginnings of the curves; `accept` moves them.
+    length : array, shape (curves,)
+        Of the first steps.
+    rows : array of int, optional
+        Curves that are followed; all by default.
+    most : int, optional
+        Steps that are tried on each, failed ones included.
+
+    Returns
+    -------
+    list of str
+        Why each curve ends: what `accept` says, `STUCK` where no step is short enough, or `STEPS`
+        where `most` were tried. Empty for curves that are not followed.
+    """
+    control, length = curves.control, np.array(length, float)
+    failures = np.zeros(length.size, int)
+    why = [""] * length.size
+    going = np.arange(length.size) if rows is None else rows
+    tried = 0
+    while len(going) and (most is None or tried < most):
+        tried += 1
+        length = curves.aimed(np.minimum(length, control.longest), failures)
+        for part, attempt in curves.attempts(going, length, failures):
+            near = (attempt.turn > control.sharpest_turn) & (attempt.miss < control.farthest)
+            good = attempt.converged & near
+            chosen = np.flatnonzero(good)
+            kept = part[chosen]
+            ends = curves.accept(kept, chosen, attempt) if len(kept) else []
+            for row, end in zip(kept, ends, strict=True):
+                why[row] = end
+            failures[part] = np.where(good, 0, failures[part] + 1)
+            factor = np.where(
+                attempt.iterations <= control.easy,
+                control.growth,
+                np.where(attempt.iterations <= control.hard, 1.0, _SLOWDOWN),
+            )
+            length[part] = np.where(good, factor * attempt.length, _SHRINKAGE * length[part])
+        for row in going[failures[going] >= control.most_failures]:
+            why[row] = STUCK
+        going = np.array([row for row in going if not why[row]], int)
+    for row in going:
+        why[row] = STEPS
+    return why

@@ -1,0 +1,140 @@
+"""A periodic response as a picture: one cycle of a point, or curves over what varies."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from asperity.errors import InputError
+from asperity.figures.map import axis_unit, label
+from asperity.figures.style import ELASTO_PLASTIC, GREY, RICE_RUINA, new_figure
+from asperity.units import format_si
+
+if TYPE_CHECKING:
+    import xarray
+
+    from asperity.orbit import PeriodicResponse
+
+#: Curves that can be told apart in one panel.
+_MOST_CURVES = 8
+
+
+def draw_response(response: PeriodicResponse) -> Figure:
+    """One cycle of a single point; mean and harmonics over the last axis of several.
+
+    Parameters
+    ----------
+    response : PeriodicResponse
+        Of one point, or with one or two axes. A point that failed leaves a gap, an unstable orbit
+        has an open mark.
+
+    Raises
+    ------
+    InputError
+        If there are more than two axes, or more curves than can be told apart.
+    """
+    if response.mean_friction.size == 1:
+        return _cycle(response)
+    data = response.to_dataset().squeeze()
+    count = int(np.prod([data.sizes[d] for d in data.mean_friction.dims[:-1]]))
+    if data.mean_friction.ndim > 2 or count > _MOST_CURVES:
+        shape = "x".join(map(str, response.mean_friction.shape))
+        raise InputError(
+            f"plot must be asked of one point, a row of points or up to {_MOST_CURVES} rows, got "
+            f"{shape} points; draw grids with asperity.map"
+        )
+    return _curves(data, response.slider.law.name)
+
+
+def _cycle(response: PeriodicResponse) -> Figure:
+    """Load and force over a period, and the harmonics of the force."""
+    figure = new_figure(6.4, 2.9)
+    time, spectrum = figure.subplots(1, 2, width_ratios=(1.6, 1.0))
+    theta = np.linspace(0.0, 2 * np.pi, 513)
+    harmonics, mean = response.harmonics.reshape(-1), float(response.mean_friction.item())
+    order = np.arange(1, harmonics.size + 1)
+    force = mean + (harmonics * np.exp(1j * theta[:, None] * order)).real.sum(axis=1)
+    if response.waveform.shape[-1]:
+        theta = np.append(response.theta, 2 * np.pi)
+        force = response.waveform[0].reshape(-1)
+        force = np.append(force, force[0])
+    time.plot(theta / (2 * np.pi), force, color=ELASTO_PLASTIC)
+    steady = float(np.asarray(response.mu_ss).item())
+    time.axhline(mean, color=ELASTO_PLASTIC, linewidth=0.7, linestyle="dashed")
+    time.text(0.5, mean, "mean", va="bottom", ha="center", fontsize="small", color=ELASTO_PLASTIC)
+    time.set(xlabel="time (periods of the load)", ylabel="$F/W_0$")
+    time.margins(y=0.2)
+    load = time.twinx()
+    load.plot(theta / (2 * np.pi), response.load.at(theta).w, color=GREY, linestyle="dotted")
+    load.set_ylabel("$W/W_0$ (dotted)", color=GREY)
+    spectrum.bar(order, np.abs(harmonics), width=0.6, color=RICE_RUINA)
+    spectrum.set(xlabel="harmonic", ylabel="amplitude of $F/W_0$", yscale="log", xticks=order)
+    spectrum.minorticks_off()
+    point = ", ".join(
+        f"{name} {format_si(float(np.asarray(value).item()), kind)}"
+        for name, value, kind in (
+            ("V", response.velocity, "velocity"),
+            ("ε", response.epsilon, "dimensionless"),
+            ("f", response.frequency, "frequency"),
+        )
+    )
+    state = "stable" if response.stable.item() else str(response.result.item())
+    if response.converged.item() and not response.stable.item():
+        state = "unstable"
+    figure.suptitle(
+        f"{response.slider.law.name}: {point}; {state}, "
+        f"mean {mean:.4g}, without modulation {steady:.4g}",
+        fontsize="small",
+    )
+    return figure
+
+
+def _curves(data: xarray.Dataset, law: str) -> Figure:
+    """Mean, first and second harmonic over the last axis, a curve for each row of the first."""
+    figure = new_figure(6.4, 2.7)
+    panels = figure.subplots(1, 3)
+    along = str(data.mean_friction.dims[-1])
+    side = data[along] if along in data.coords else None
+    unit = (1.0, "") if side is None else axis_unit(side)
+    x = np.arange(data.sizes[along]) if side is None else side.values / unit[0]
+    rows = data if data.mean_friction.ndim == 2 else data.expand_dims("row")
+    across = str(rows.mean_friction.dims[0])
+    for panel, (name, text) in zip(
+        panels,
+        (
+            ("mean_friction", "mean of $F/W_0$"),
+            ("mu1", r"$\mu_1$"),
+            ("mu2", r"$\mu_2$"),
+        ),
+        strict=True,
+    ):
+        for i in range(rows.sizes[across]):
+            row = rows.isel({across: i})
+            _curve(panel, x, row[name].values, row.stable.values, _row_label(row, across))
+        panel.set(xlabel=along if side is None else label(side, unit), ylabel=text)
+        if x.min() > 0 and x.max() > 30 * x.min():
+            panel.set_xscale("log")
+        panel.margins(y=0.08)
+    if rows.sizes[across] > 1:
+        panels[0].legend(fontsize="small")
+    if not rows.stable.values.all():
+        panels[2].plot([], [], "o", color=GREY, fillstyle="none", markersize=3, label="unstable")
+        panels[2].legend(handles=panels[2].get_lines()[-1:], fontsize="small")
+    figure.suptitle(law, fontsize="small")
+    return figure
+
+
+def _curve(panel: Axes, x: Any, y: Any, stable: Any, text: str) -> None:
+    (line,) = panel.plot(x, y, label=text)
+    open_ = ~stable & np.isfinite(y)
+    panel.plot(x[open_], y[open_], "o", color=line.get_color(), fillstyle="none", markersize=3)
+
+
+def _row_label(row: xarray.Dataset, across: str) -> str:
+    if across not in row.coords:
+        return ""
+    scale, unit = axis_unit(row[across])
+    return f"{across} {float(row[across]) / scale:.4g} {unit}".rstrip()

@@ -1,0 +1,1 @@
+"""Stick-slip: events of slip, what the recording is, healing."""

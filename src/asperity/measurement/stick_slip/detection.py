@@ -1,0 +1,253 @@
+"""Where the force falls: peaks and troughs that noise does not make, at every width of averages."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.measurement.stick_slip.noise import Noise
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: Means over an eighth of a cycle still show its peak and its trough; what lasts for less than a
+#: thirty-second of it is noise.
+_PER_CYCLE, _PER_CYCLE_OF_NOISE = 8, 32
+#: Rises on each side of which the loading slope next to an event is the usual one.
+_NEAR = 10
+#: Share of the rises that last longer than the falls next to them in symmetrical noise: a half. An
+#: excess of so many standard deviations is loading and slip.
+_ASYMMETRY = 3.0
+
+
+def turning_points(values: Array, height: float) -> Index:
+    """Alternating maxima and minima between which the values rise and fall by `height` or more.
+
+    Parameters
+    ----------
+    values : array, (n,)
+    height : float
+
+    Returns
+    -------
+    int array
+        Positions in rising order, first and last point included where they are extreme.
+
+    Notes
+    -----
+    The smallest rise or fall goes first, with both its ends, until all are `height` or more:
+    extremes of persistence `height`. Every pass removes all that are smaller than their neighbours.
+    """
+    changing = np.flatnonzero(np.diff(values)) + 1
+    at = np.concatenate([[0], changing]).astype(np.intp)
+    kept = values[at]
+    bend = np.ones(at.size, bool)
+    bend[1:-1] = np.sign(kept[1:-1] - kept[:-2]) != np.sign(kept[2:] - kept[1:-1])
+    at = at[bend]
+    while at.size > 1:
+        size = np.abs(np.diff(values[at]))
+        before = np.concatenate([[np.inf], size[:-1]])
+        after = np.concatenate([size[1:], [np.inf]])
+        small = np.flatnonzero((size < height) & (size <= before) & (size < after))
+        if not small.size:
+            # Equal neighbours at the right end.
+            if size[-1] < height:
+                at = at[:-1]
+                continue
+            if size[0] < height:
+                at = at[1:]
+                continue
+            break
+        gone = np.zeros(at.size, bool)
+        # A small change at an end is no turn of what lies inside.
+        gone[small[small > 0]] = True
+        gone[small[small < size.size - 1] + 1] = True
+        gone[0] |= small[0] == 0
+        gone[-1] |= small[-1] == size.size - 1
+        at = at[~gone]
+    return at
+
+
+@dataclass(frozen=True)
+class Falls:
+    """Falls of the force, in rising order.
+
+    Attributes
+    ----------
+    peak, trough : int array, (k,)
+        Samples.
+    scatter : array, (m,)
+        Standard deviation of means over 2^j samples.
+    thresholds : array, (m,)
+        Smallest fall between such means that is no noise.
+    """
+
+    peak: Index
+    trough: Index
+    scatter: Array
+    thresholds: Array
+
+    def __len__(self) -> int:
+        return self.peak.size
+
+
+def find_falls(force: Array, noise: Noise) -> Falls:
+    """Every fall of the force that is loading's opposite, and no noise.
+
+    Parameters
+    ----------
+    force : array, (n,)
+        Evenly sampled, without impulses.
+    noise : Noise
+
+    Notes
+    -----
+    Noise that lasts as long as a cycle cannot be told from cycles. The shortest width of means is
+    sought whose falls are a cycle of eight widths or more apart and follow on longer rises; means
+    up to an eighth of that cycle are then searched together. Of falls that overlap at different
+    widths those of the width that tells most of them apart are kept.
+    """
+    most = noise.octaves.size - 1
+    empty = np.empty(0, dtype=np.intp)
+    for octave in range(most + 1):
+        scatter = noise.of_means(octave, octave)
+        peak, trough = _at_width(force, octave, scatter[octave], noise, 0.0)
+        if not _loads_and_slips(peak, trough):
+            continue
+        cycle = _cycle(peak, trough, force.size)
+        if cycle < _PER_CYCLE << octave:
+            continue
+        return _at_all_widths(force, noise, octave, (peak, trough))
+    scatter = noise.of_means(most, most)
+    return Falls(empty, empty, scatter, _thresholds(noise, scatter))
+
+
+def _thresholds(noise: Noise, scatter: Array) -> Array:
+    return np.array([noise.threshold(s, 1 << k) for k, s in enumerate(scatter)])
+
+
+def _cycle(peak: Index, trough: Index, samples: int) -> float:
+    """Median number of samples from peak to peak; of one event the shorter rise next to it."""
+    if peak.size > 1:
+        return float(np.median(np.diff(peak)))
+    return float(min(peak[0], samples - trough[0]))
+
+
+def _loads_and_slips(peak: Index, trough: Index) -> bool:
+    """Whether rises last longer than the falls that follow, significantly."""
+    if not peak.size:
+        return False
+    fall = trough - peak
+    rise = peak - np.concatenate([[0], trough[:-1]])
+    longer = int((rise > fall).sum())
+    # A single event has a rise on each side.
+    if peak.size < _ASYMMETRY**2:
+        return bool(np.median(rise) > 4 * np.median(fall))
+    return longer - peak.size / 2 > _ASYMMETRY * np.sqrt(peak.size) / 2
+
+
+def _means(force: Array, octave: int) -> tuple[Array, int]:
+    """Means over 2^octave samples, and the samples from one to the next."""
+    width = 1 << octave
+    hop = max(1, width // 4)
+    total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
+    starts = np.arange(0, force.size - width + 1, hop)
+    return (total[starts + width] - total[starts]) / width, hop
+
+
+def _at_width(
+    force: Array, octave: int, scatter: float, noise: Noise, tilt: float
+) -> tuple[Index, Index]:
+    """Peaks and troughs of means, without those at the ends of the recording.
+
+    `tilt` is the rate of fall, per sample, below which the slider counts as sticking.
+    """
+    means, hop = _means(force, octave)
+    if tilt:
+        means = means + tilt * hop * np.arange(means.size)
+    at = turning_points(means, noise.threshold(scatter, 1 << octave))
+    if at.size < 2:
+        return at[:0], at[:0]
+    falling = np.flatnonzero(np.diff(means[at]) < 0)
+    peak, trough = at[falling], at[falling + 1]
+    inside = (peak > 0) & (trough < means.size - 1)
+    centre = ((1 << octave) - 1) // 2
+    return peak[inside] * hop + centre, trough[inside] * hop + centre
+
+
+def _at_all_widths(force: Array, noise: Noise, octave: int, first: tuple[Index, Index]) -> Falls:
+    """Falls at all widths up to an eighth of a cycle, which is longer the fewer falls are false."""
+    most, longest, (peak, trough) = noise.octaves.size - 1, -1, first
+    while True:
+        cycle = _cycle(peak, trough, force.size)
+        wider = min(max(octave, _octave(cycle / _PER_CYCLE)), most)
+        if wider <= longest:
+            break
+        longest = wider
+        scatter = noise.of_means(longest, max(octave, _octave(cycle / _PER_CYCLE_OF_NOISE)))
+        sets = [
+            _at_width(force, k, scatter[k], noise, tilt)
+            for tilt in (0.0, _tilt(force, peak, trough))
+            for k in range(longest + 1)
+        ]
+        if not any(p.size for p, _ in sets):
+            peak = trough = np.empty(0, dtype=np.intp)
+            break
+        peak, trough = _without_ringing(force, *_most_resolved(sets))
+    return Falls(peak, trough, scatter, _thresholds(noise, scatter))
+
+
+def _octave(samples: float) -> int:
+    return int(np.log2(max(samples, 1.0)))
+
+
+def _tilt(force: Array, peak: Index, trough: Index) -> float:
+    """Rate of fall between those of loading and of slip, per sample.
+
+    The geometric mean of both: a pause in a fall is as far from loading as from slip.
+    """
+    fall = float(np.median((force[peak] - force[trough]) / (trough - peak)))
+    if peak.size < 2:
+        return 0.0
+    rise = float(np.median((force[peak[1:]] - force[trough[:-1]]) / (peak[1:] - trough[:-1])))
+    return max(np.sqrt(max(rise * fall, 0.0)) - rise, 0.0)
+
+
+def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
+    """Of overlapping falls, those of the set that has most of them."""
+    peak = np.concatenate([p for p, _ in sets])
+    trough = np.concatenate([t for _, t in sets])
+    origin = np.repeat(np.arange(len(sets)), [p.size for p, _ in sets])
+    order = np.argsort(peak, kind="stable")
+    peak, trough, origin = peak[order], trough[order], origin[order]
+    latest = np.maximum.accumulate(trough)
+    cluster = np.cumsum(np.concatenate([[True], peak[1:] >= latest[:-1]])) - 1
+    counts = np.zeros((cluster[-1] + 1, len(sets)), int)
+    np.add.at(counts, (cluster, origin), 1)
+    best = counts.argmax(1)
+    kept = origin == best[cluster]
+    return peak[kept], trough[kept]
+
+
+def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, Index]:
+    """Join falls between which the force rises faster than the spring can load.
+
+    The slider does not move backwards: a rise twice as fast as the loading around it, in the mean
+    weighted by duration, is the instrument's.
+    """
+    if peak.size < 3:
+        return peak, trough
+    length = np.maximum(peak[1:] - trough[:-1], 1).astype(float)
+    rate = (force[peak[1:]] - force[trough[:-1]]) / length
+    near = np.arange(rate.size)[:, None] + np.arange(-_NEAR, _NEAR + 1)
+    inside = (near >= 0) & (near < rate.size)
+    near = np.clip(near, 0, rate.size - 1)
+    rates, weights = rate[near], np.where(inside, length[near], 0.0)
+    order = np.argsort(rates, axis=1)
+    weights = np.take_along_axis(weights, order, 1).cumsum(1)
+    middle = (weights >= weights[:, -1:] / 2).argmax(1)
+    usual = np.take_along_axis(rates, order, 1)[np.arange(rate.size), middle]
+    apart = rate <= 2 * usual
+    return peak[np.concatenate([[True], apart])], trough[np.concatenate([apart, [True]])]

@@ -1,0 +1,329 @@
+"""Slip events of a stick-slip recording: onset, end, forces, drop, creep, each with uncertainty.
+
+Next to each fall the force is a straight line up to the onset, half a cosine down to the end, and
+a straight line again: a slider that slips at constant friction falls so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.measurement.stick_slip.detection import Falls
+
+Array = NDArray[np.float64]
+Index = NDArray[np.intp]
+
+#: A line long enough that noise moves its end by this share of the drop; longer ones bend.
+_PRECISION = 0.01
+_SHORTEST = 6
+#: Bins of the slip, and candidates of onset and end on each zoom of the search.
+_BINS = 32
+_CANDIDATES = 8
+_ZOOMS = 4
+#: Events that are searched together: their arrays fit the memory.
+_TOGETHER = 256
+#: A drop of fewer standard uncertainties is none.
+_CONFIRMED = 3.0
+#: Standard uncertainty of an onset or end of half a cosine of d samples and drop D in white noise
+#: s: this times sqrt(d) s/D samples (inverse of Fisher's information of both).
+_TIMING = 2.65
+
+
+@dataclass(frozen=True, eq=False)
+class SlipEvents:
+    """Slip events, an entry each, in rising order. Forces are in the unit of the signal.
+
+    Attributes
+    ----------
+    onset, end : array, (k,)
+        Times (s) at which the force begins and ceases to fall.
+    timing_uncertainty : array, (k,)
+        Of either (s).
+    force_before, force_after : array, (k,)
+        At onset and end.
+    drop, drop_uncertainty : array, (k,)
+        force_before - force_after.
+    slip_duration : array, (k,)
+        end - onset (s).
+    stick_duration, recurrence : array, (k,)
+        From the end, and from the onset, of the event before to the onset (s); NaN of the first.
+    loading_slope, slope_uncertainty : array, (k,)
+        Of the first half of the stick before the event (1/s times the unit); NaN of the first.
+    creep, creep_uncertainty : array, (k,)
+        What the force at onset lacks to the line of that slope; NaN of the first.
+    fall_rate : array, (k,)
+        Steepest fall of the force over a quarter of the slip (1/s times the unit).
+    resolved : bool array, (k,)
+        Whether the slip lasts for two samples or longer; durations and rates of others are bounds.
+    """
+
+    onset: Array
+    end: Array
+    timing_uncertainty: Array
+    force_before: Array
+    force_after: Array
+    drop: Array
+    drop_uncertainty: Array
+    slip_duration: Array
+    stick_duration: Array
+    recurrence: Array
+    loading_slope: Array
+    slope_uncertainty: Array
+    creep: Array
+    creep_uncertainty: Array
+    fall_rate: Array
+    resolved: NDArray[np.bool_]
+
+    def __len__(self) -> int:
+        return self.onset.size
+
+
+class _Sums:
+    """Sums over samples from which a straight line through any run of them follows.
+
+    Times and forces of each event's cell are counted from its middle, so that squares of long
+    recordings lose no digits.
+    """
+
+    def __init__(self, force: Array, edges: Index, origin: Index) -> None:
+        cell = np.clip(np.searchsorted(edges, np.arange(force.size), side="right") - 1, 0, None)
+        cell = np.minimum(cell, origin.size - 1)
+        t = np.arange(force.size) - origin[cell].astype(float)
+        y = force - force[origin][cell]
+        self.origin, self.level = origin.astype(float), force[origin]
+        self.t, self.tt, self.y, self.ty, self.yy = (
+            np.concatenate([[0.0], np.cumsum(v)]) for v in (t, t * t, y, t * y, y * y)
+        )
+
+    def line(self, first: Index, stop: Index) -> tuple[Array, Array, Array, Array]:
+        """Level and slope at the origin of the cell, sum of squared residuals, mean of t.
+
+        `first` and `stop` bound runs inside one cell each.
+        """
+        n = (stop - first).astype(float)
+        t, tt, y, ty, yy = (s[stop] - s[first] for s in (self.t, self.tt, self.y, self.ty, self.yy))
+        n = np.maximum(n, 1.0)
+        power = np.maximum(tt - t * t / n, 1e-9)
+        slope = (ty - t * y / n) / power
+        rest = yy - y * y / n - slope * (ty - t * y / n)
+        return (y - slope * t) / n, slope, np.maximum(rest, 0.0), t / n
+
+
+def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
+    """Measure every fall.
+
+    Parameters
+    ----------
+    time : array, (n,)
+        Seconds.
+    force : array, (n,)
+        Without impulses.
+    falls : Falls
+    """
+    while len(falls):
+        events = _read(time, force, falls)
+        # What a line before and a line after do not confirm is a bend in the loading.
+        least = np.maximum(falls.thresholds.min(), _CONFIRMED * events.drop_uncertainty)
+        real = events.drop > least
+        if real.all():
+            return events
+        falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
+    none: dict[str, Any] = {f.name: np.empty(0) for f in fields(SlipEvents)}
+    return SlipEvents(**none)
+
+
+def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
+    peak, trough = falls.peak, falls.trough
+    k, n = peak.size, force.size
+    before = np.concatenate([[0], trough[:-1]])
+    # Cells end in the middle of the sticks.
+    edges = np.concatenate(
+        [[(before[0] + peak[0]) // 2], (trough[:-1] + peak[1:]) // 2, [(trough[-1] + n) // 2]]
+    ).astype(np.intp)
+    sums = _Sums(force, edges[:-1], peak)
+    drop = np.maximum(force[peak] - force[trough], falls.thresholds.min())
+    length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
+    length = np.minimum(length, n).astype(np.intp) + (trough - peak)
+    first = np.maximum(edges[:-1], peak - length)
+    stop = np.minimum(edges[1:], trough + length)
+    onset, end, squares = np.empty(k), np.empty(k), np.empty(k)
+    for part in np.array_split(np.arange(k), -(-k // _TOGETHER)):
+        onset[part], end[part], squares[part] = _onset_and_end(
+            sums, part, peak[part], trough[part], first[part], stop[part]
+        )
+    # The usual residual, as correlated as the noise that detection has seen.
+    scatter = falls.scatter * np.sqrt(np.median(squares)) / falls.scatter[0]
+    return _measured(time, force, scatter, sums, (onset, end), first, stop)
+
+
+def _onset_and_end(
+    sums: _Sums, part: Index, peak: Index, trough: Index, first: Index, stop: Index
+) -> tuple[Array, Array, Array]:
+    """Onset and end by least squares, on grids that zoom in, and the mean square of residuals."""
+    length = (trough - peak).astype(float)
+    middle = (peak + trough) / 2
+    earliest = np.minimum(np.maximum(first + 3.0, peak - length), peak - 1.0)
+    latest = np.maximum(np.minimum(stop - 3.0, trough + length), trough + 1.0)
+    span_on = [earliest, np.minimum(middle + length / 4, trough - 0.5)]
+    span_end = [np.maximum(middle - length / 4, peak + 0.5), latest]
+    grid = np.linspace(0.0, 1.0, _CANDIDATES)
+    rows = np.arange(peak.size)
+    at = sums.origin[part][:, None]
+    for _ in range(_ZOOMS):
+        on = span_on[0][:, None] + (span_on[1] - span_on[0])[:, None] * grid
+        off = span_end[0][:, None] + (span_end[1] - span_end[0])[:, None] * grid
+        until = np.maximum(np.floor(on).astype(np.intp) + 1, first[:, None] + 2)
+        since = np.minimum(np.ceil(off).astype(np.intp), stop[:, None] - 2)
+        left = sums.line(np.broadcast_to(first[:, None], on.shape), until)
+        right = sums.line(since, np.broadcast_to(stop[:, None], off.shape))
+        high = left[0] + left[1] * (on - at)
+        low = right[0] + right[1] * (off - at)
+        # The slip as sums over bins, from the earliest onset to the latest end.
+        edges = np.linspace(span_on[0], span_end[1] + 1.0, _BINS + 1, axis=1)
+        edges = np.clip(np.rint(edges).astype(np.intp), first[:, None], stop[:, None])
+        centre = (edges[:, 1:] + edges[:, :-1] - 1) / 2
+        count = np.maximum(edges[:, 1:] - edges[:, :-1], 1)
+        mean = (sums.y[edges[:, 1:]] - sums.y[edges[:, :-1]]) / count
+        pair = np.s_[:, :, None, None], np.s_[:, None, :, None]
+        begin, stops = until[pair[0]], since[pair[1]]
+        weight = np.minimum(edges[:, None, None, 1:], stops)
+        weight = np.maximum(weight - np.maximum(edges[:, None, None, :-1], begin), 0)
+        length_here = np.maximum(off[pair[1]] - on[pair[0]], 0.25)
+        u = np.clip((centre[:, None, None, :] - on[pair[0]]) / length_here, 0.0, 1.0)
+        model = low[pair[1]] + _half_cosine(u) * (high[pair[0]] - low[pair[1]])
+        misfit = (weight * model * (model - 2 * mean[:, None, None, :])).sum(-1)
+        squares = sums.yy[since][:, None, :] - sums.yy[until][:, :, None]
+        misfit += np.where(since[:, None, :] > until[:, :, None], squares, 0.0)
+        misfit += left[2][:, :, None] + right[2][:, None, :]
+        misfit[off[:, None, :] <= on[:, :, None]] = np.inf
+        best = misfit.reshape(peak.size, -1).argmin(1)
+        i, j = np.unravel_index(best, (_CANDIDATES, _CANDIDATES))
+        onset, end = on[rows, i], off[rows, j]
+        for span, here in ((span_on, onset), (span_end, end)):
+            reach = (span[1] - span[0]) / (_CANDIDATES - 1)
+            span[:] = [np.maximum(here - reach, span[0]), np.minimum(here + reach, span[1])]
+    freedom = np.maximum(stop - first - 6, 1)
+    return onset, end, np.maximum(misfit.min((1, 2)), 0.0) / freedom
+
+
+def _half_cosine(u: Array) -> Array:
+    """(1 + cos(pi u))/2 from 0 to 1 to 1e-4: a polynomial takes a fifth of the time."""
+    x = np.pi * (u - 0.5)
+    square = x * x
+    return np.asarray(0.5 - 0.5 * x * (1 - square / 6 * (1 - square / 20 * (1 - square / 42))))
+
+
+def _measured(
+    time: Array,
+    force: Array,
+    scatter: Array,
+    sums: _Sums,
+    slips: tuple[Array, Array],
+    first: Index,
+    stop: Index,
+) -> SlipEvents:
+    onset, end = slips
+    n, k = force.size, onset.size
+    step = float(time[-1] - time[0]) / (n - 1)
+    samples = np.arange(n, dtype=float)
+    until = np.clip(np.floor(onset).astype(np.intp) + 1, first + 2, None)
+    since = np.clip(np.ceil(end).astype(np.intp), None, stop - 2)
+    left, right = sums.line(first, until), sums.line(since, stop)
+    high = left[0] + left[1] * (onset - sums.origin) + sums.level
+    low = right[0] + right[1] * (end - sums.origin) + sums.level
+    drop = high - low
+    # The end of a line is twice as uncertain as its mean.
+    doubt = 2 * np.hypot(_of_mean(scatter, until - first), _of_mean(scatter, stop - since))
+    duration = end - onset
+    timing = np.hypot(
+        _TIMING * np.sqrt(np.maximum(duration, 1.0)) * scatter[0] / np.maximum(drop, 1e-300),
+        1 / np.sqrt(12.0),
+    )
+    rates = np.hypot(left[1], right[1])
+    doubt = np.hypot(doubt, rates * timing)
+    # Sticks: from the end of one event to the onset of the next.
+    stick = np.full(k, np.nan)
+    stick[1:] = onset[1:] - end[:-1]
+    slope, slope_doubt, creep, creep_doubt = (np.full(k, np.nan) for _ in range(4))
+    if k > 1:
+        a = np.ceil(end[:-1]).astype(np.intp)
+        b = np.maximum(((end[:-1] + onset[1:]) / 2).astype(np.intp), a + 2)
+        b = np.minimum(b, n)
+        centre, mean, slope[1:] = _lines(force, a, b)
+        count = (b - a).astype(float)
+        mean_doubt = _of_mean(scatter, b - a)
+        # The slope of n samples has a variance of 12/n^2 of that of their mean.
+        slope_doubt[1:] = np.sqrt(12.0) * mean_doubt / count
+        reach = onset[1:] - centre
+        creep[1:] = mean + slope[1:] * reach - high[1:]
+        creep_doubt[1:] = np.sqrt(
+            mean_doubt**2
+            + (slope_doubt[1:] * reach) ** 2
+            + (2 * _of_mean(scatter, until - first)[1:]) ** 2
+        )
+    recurrence = np.concatenate([[np.nan], np.diff(onset)])
+    return SlipEvents(
+        onset=np.interp(onset, samples, time),
+        end=np.interp(end, samples, time),
+        timing_uncertainty=timing * step,
+        force_before=high,
+        force_after=low,
+        drop=drop,
+        drop_uncertainty=doubt,
+        slip_duration=duration * step,
+        stick_duration=stick * step,
+        recurrence=recurrence * step,
+        loading_slope=slope / step,
+        slope_uncertainty=slope_doubt / step,
+        creep=creep,
+        creep_uncertainty=creep_doubt,
+        fall_rate=_steepest(force, onset, end, drop) / step,
+        resolved=duration >= 2.0,
+    )
+
+
+def _lines(force: Array, first: Index, stop: Index) -> tuple[Array, Array, Array]:
+    """Centre, mean and slope of the samples in runs that do not overlap, in rising order."""
+    count = (stop - first).astype(float)
+    bounds = np.column_stack([first, np.minimum(stop, force.size - 1)]).ravel()
+    centre = (first + stop - 1) / 2
+    owner = np.searchsorted(first, np.arange(force.size), side="right") - 1
+    owner = np.clip(owner, 0, first.size - 1)
+    t, y = np.arange(force.size) - centre[owner], force - force[first][owner]
+    mean = np.add.reduceat(y, bounds)[::2] / count
+    slope = np.add.reduceat(t * y, bounds)[::2] / (count * (count**2 - 1) / 12)
+    return centre, mean + force[first], slope
+
+
+def _of_mean(scatter: Array, samples: Index) -> Array:
+    """Scatter of the mean over so many samples, between and beyond the widths that are known."""
+    known = np.arange(scatter.size)
+    octave = np.log2(np.maximum(samples, 1))
+    inside = np.exp(np.interp(octave, known, np.log(scatter)))
+    return np.asarray(inside * 2.0 ** (-np.maximum(octave - known[-1], 0.0) / 2))
+
+
+def _steepest(force: Array, onset: Array, end: Array, drop: Array) -> Array:
+    """Largest fall per sample over a quarter of the slip; of an unresolved slip its drop."""
+    total = np.concatenate([[0.0], np.cumsum(force)])
+    duration = np.maximum(end - onset, 1.0)
+    width = np.maximum(duration / 4, 1.0)
+    places = onset[:, None] + duration[:, None] * np.linspace(0.0, 1.0, 9)
+    reach = np.broadcast_to(width[:, None] / 2, places.shape)
+
+    def mean(low: Array, high: Array) -> Array:
+        return (_at(total, high) - _at(total, low)) / (high - low)
+
+    # Means over the halves before and after a place lie half a width apart.
+    rate = (mean(places - reach, places) - mean(places, places + reach)) / reach
+    return np.where(end - onset < 2.0, drop, rate.max(1))
+
+
+def _at(values: Array, places: Array) -> Array:
+    places = np.clip(places + 0.5, 0, values.size - 1)
+    low = np.minimum(places.astype(np.intp), values.size - 2)
+    return np.asarray(values[low] + (places - low) * (values[low + 1] - values[low]))

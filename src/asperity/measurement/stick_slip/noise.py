@@ -1,0 +1,156 @@
+"""Noise of a force that loads and drops: impulses, and the scatter of averages of every length.
+
+The force is taken to be straight lines between fast drops, in Gaussian noise that may be
+correlated, with impulses of one or two samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from scipy.special import ndtri
+
+Array = NDArray[np.float64]
+
+#: Median filter whose output two neighbouring impulses leave as it is.
+_FILTER = 5
+#: Quantile of second differences that gives their scatter: up to two thirds of the blocks may hold
+#: a slip or a peak. And the quantile of a normal deviate.
+_QUANTILE = 0.25
+_NORMAL = float(ndtri(0.5 + _QUANTILE / 2))
+#: Blocks that give a scatter, and its relative standard error times the root of their number.
+_FEWEST_BLOCKS = 32
+_QUANTILE_ERROR = 1.8
+#: Probability of a false event in a recording of Gaussian noise.
+FALSE_ALARM = 0.01
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Scatter of means over 1, 2, 4, ... samples.
+
+    Attributes
+    ----------
+    octaves : array, (m,)
+        Standard deviation of the part of the noise that means over 2^k samples keep and means over
+        2^(k+1) samples remove, in the unit of the force.
+    samples : int
+        Of the recording.
+    """
+
+    octaves: Array
+    samples: int
+
+    def of_means(self, longest: int, noisy: int) -> Array:
+        """Standard deviation of means over 1, 2, 4, ... 2^longest samples.
+
+        Parameters
+        ----------
+        longest : int
+        noisy : int
+            k of the longest means, over 2^k samples, whose octave holds noise alone: those of
+            longer ones hold the motion too.
+
+        Returns
+        -------
+        array, (longest + 1,)
+        """
+        noisy = min(noisy, longest)
+        power = self.octaves[: noisy + 1] ** 2
+        # White noise beyond the last octave has as much power as the last octave.
+        scatter = np.sqrt(np.cumsum(power[::-1])[::-1] + power[-1])
+        beyond = np.sqrt(2.0) * self.octaves[noisy + 1 : longest + 1]
+        # Longer means of a noise scatter less.
+        return np.asarray(np.minimum.accumulate(np.concatenate([scatter, beyond])))
+
+    def threshold(self, scatter: float, width: int) -> float:
+        """Fall between two means that noise exceeds anywhere with probability `FALSE_ALARM`.
+
+        Parameters
+        ----------
+        scatter : float
+            Standard deviation of a mean.
+        width : int
+            Samples of a mean.
+
+        Notes
+        -----
+        Union bound over all pairs of the 2 n/width overlapping means.
+        """
+        means = 2.0 * self.samples / width
+        return float(np.sqrt(2.0) * scatter * -ndtri(FALSE_ALARM / means**2))
+
+
+def estimate(force: Array) -> Noise:
+    """Noise from second differences of block means, in which straight loading cancels.
+
+    Parameters
+    ----------
+    force : array, (n,)
+        Without impulses, evenly sampled.
+    """
+    # Numbers below this are rounding.
+    floor = 4 * np.finfo(float).eps * float(np.abs(force).max(initial=0.0))
+    octaves: list[float] = []
+    means = force
+    while means.size >= _FEWEST_BLOCKS or not octaves:
+        bends = np.abs(means[2:] - 2 * means[1:-1] + means[:-2])
+        # The variance of the bend of white means is six times theirs; half of a mean's variance is
+        # in its octave.
+        scatter = float(np.quantile(bends, _QUANTILE)) / _NORMAL / np.sqrt(6.0)
+        # Two standard errors more: a threshold from a scatter that came out small is none.
+        scatter *= 1 + 2 * _QUANTILE_ERROR / np.sqrt(bends.size)
+        octaves.append(max(scatter / np.sqrt(2.0), floor))
+        pairs = means.size // 2
+        means = (means[: 2 * pairs : 2] + means[1 : 2 * pairs : 2]) / 2
+    return Noise(np.array(octaves), force.size)
+
+
+def without_impulses(force: Array) -> tuple[Array, NDArray[np.intp]]:
+    """The force with impulses of one or two samples replaced by the median around them.
+
+    Parameters
+    ----------
+    force : array, (n,)
+        Evenly sampled.
+
+    Returns
+    -------
+    clean : array, (n,)
+    impulses : int array
+        Samples that were replaced, in rising order.
+
+    Notes
+    -----
+    An impulse stands out of the median of five samples, and of the lines that the medians before
+    and behind it make: the sharp peak of a cycle lies on one of these. About one sample of a
+    recording without impulses is replaced.
+    """
+    middle = median_filter(force, _FILTER, mode="nearest")
+    away = force - middle
+    scatter = float(np.quantile(np.abs(np.diff(force, 2)), 0.5)) / (0.6745 * np.sqrt(6.0))
+    # Steps of the recorder: rounding noise has no quantile of zero.
+    scatter = max(scatter, _resolution(force) / np.sqrt(12.0))
+    limit = -ndtri(0.5 / force.size) * scatter * np.sqrt(1.3)
+    at = np.flatnonzero(np.abs(away) > limit)
+    for step in (-3, 3):
+        near = np.clip(at + step, 0, force.size - 1)
+        far = np.clip(at + 2 * step, 0, force.size - 1)
+        out = force[at] - (2 * middle[near] - middle[far])
+        at = at[(np.abs(out) > limit) & (out * away[at] > 0)]
+    clean = force.copy()
+    clean[at] = middle[at]
+    return clean, at
+
+
+def _resolution(force: Array) -> float:
+    """Smallest usual step between neighbouring samples that differ; zero for a fine recorder."""
+    steps = np.abs(np.diff(force[: 1 << 16]))
+    moving = steps[steps > 0]
+    # A recorder whose steps are seen stands still in many samples.
+    if moving.size > 0.95 * steps.size or not moving.size:
+        return 0.0
+    return float(np.quantile(moving, 0.05))

@@ -1,0 +1,310 @@
+"""What every question is made of: a frozen record, its types, and sentences about mistakes in it.
+
+Keywords of Python, options of the command line, TOML files and the JSON of the page fill the same
+record. A quantity is a number in SI or a text with its unit; in a file it must carry its unit.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
+
+import numpy as np
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+)
+
+from asperity.errors import InputError, MistakesError, closest
+from asperity.parameters.arguments import number
+from asperity.parameters.arguments import shown as shown_value
+from asperity.parameters.toml_file import toml_content
+from asperity.units import KINDS, to_si
+
+T = TypeVar("T")
+
+#: A number in SI, a text with its unit, or a switch.
+Given = bool | float | str
+#: Characters of a part of a field's place.
+_LONGEST = 60
+#: What pydantic puts behind the place of a field that may be of several types.
+_TYPES = frozenset({"bool", "float", "int", "str", "nullable"})
+
+_units_required: ContextVar[bool] = ContextVar("units_required", default=False)
+
+
+class Record(BaseModel):
+    """A part of a question: frozen, and without fields of other names."""
+
+    model_config = ConfigDict(
+        frozen=True, extra="forbid", populate_by_name=True, arbitrary_types_allowed=True
+    )
+
+
+class Question(Record):
+    """A question; all mistakes in one `MistakesError`.
+
+    Attributes
+    ----------
+    subject : str
+        What messages call it where no field is named.
+    prefix : str
+        What they put before the name of a field.
+    mistakes_error : type of MistakesError
+    """
+
+    subject: ClassVar[str] = "question"
+    prefix: ClassVar[str] = ""
+    mistakes_error: ClassVar[type[MistakesError]] = MistakesError
+
+    def __init__(self, /, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            raise self.mistakes_error(self.mistakes_in(error)) from None
+
+    @classmethod
+    def mistakes_in(cls, error: ValidationError) -> list[InputError]:
+        """The mistakes that pydantic reports."""
+        return mistakes_in(error, cls, cls.subject, prefix=cls.prefix)
+
+    @classmethod
+    def from_file(cls, path: str | os.PathLike[str], **fields: Any) -> Self:
+        """Read a question from a TOML file, in which every quantity carries its unit.
+
+        Parameters
+        ----------
+        path : str or path
+        **fields
+            Fields that the file may leave out.
+
+        Raises
+        ------
+        InputError
+            If the file cannot be read or is not TOML.
+        MistakesError
+            An `InputError` with all mistakes.
+        """
+        _, content = toml_content(path, cls.subject)
+        return cls.of_content({**fields, **content}, str(path))
+
+    @classmethod
+    def of_content(cls, content: Mapping[str, Any], source: str = "") -> Self:
+        """The question that the content of a file asks, with the rules of a file."""
+        with units_required():
+            try:
+                return cls(**content)
+            except MistakesError as error:
+                raise cls.mistakes_error(error.errors, source) from None
+
+    def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
+        """A question with some fields replaced, checked as any other."""
+        fields = {name: getattr(self, name) for name in type(self).model_fields}
+        return type(self)(**{**fields, **(update or {})})
+
+
+@contextmanager
+def units_required() -> Iterator[None]:
+    """Refuse numbers in the place of quantities, as files do."""
+    token = _units_required.set(True)
+    try:
+        yield
+    finally:
+        _units_required.reset(token)
+
+
+def require_unit(value: Any, kind: str, field: str = "") -> Any:
+    """A quantity as it is given, which in a file carries its unit.
+
+    Raises
+    ------
+    InputError
+        For a bare number in a file.
+    """
+    if _units_required.get():
+        for mistake in without_unit([(field, kind, value)]):
+            raise mistake
+    return value
+
+
+def without_unit(numbers: Iterable[tuple[str, str, Any]]) -> list[InputError]:
+    """Mistakes about bare numbers where a unit is needed: a file says what it means.
+
+    Parameters
+    ----------
+    numbers : iterable of (str, str, object)
+        Place, kind of quantity and value of each.
+    """
+    mistakes: dict[str, InputError] = {}
+    for place, kind, value in numbers:
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        if number and np.isfinite(value) and KINDS[kind].si:
+            advice = f"write it like '{KINDS[kind].example}'"
+            mistake = InputError(place, "carry a unit", shown(value), advice)
+            mistakes.setdefault(str(mistake), mistake)
+    return list(mistakes.values())
+
+
+def quantity(kind: str, rule: str = "finite") -> Any:
+    """The type of a quantity: a float in SI, from a number in SI or a text with its unit.
+
+    Parameters
+    ----------
+    kind : str
+        A key of `asperity.units.KINDS`.
+    rule : str
+        A key of `asperity.parameters.RULES`.
+    """
+    spec = KINDS[kind]
+
+    def in_si(value: Any, info: ValidationInfo) -> float:
+        return number(require_unit(value, kind), "", kind, rule)
+
+    schema = {
+        "type": ["number", "string"],
+        "description": f"{spec.noun}: a number in SI ({spec.si or '1'}), or a text with its unit",
+        "examples": [spec.example],
+    }
+    return Annotated[float, BeforeValidator(in_si), WithJsonSchema(schema)]
+
+
+def _one_or_several(value: Any) -> Any:
+    if isinstance(value, str):
+        return tuple(part.strip() for part in value.split(",") if part.strip())
+    return value
+
+
+#: Names; a text has commas between them.
+Names = Annotated[tuple[str, ...], BeforeValidator(_one_or_several)]
+
+
+def _seconds(value: Any) -> float:
+    """A time; a text without a unit is in seconds."""
+    if isinstance(value, str) and not value.strip()[-1:].isalpha():
+        value = f"{value} s"
+    return float(to_si(value, "time", ""))
+
+
+def _ends(value: Any) -> Any:
+    """Both ends of a span; one that is left open in a text is infinite."""
+    if not isinstance(value, str):
+        if isinstance(value, list | tuple | np.ndarray) and len(value) == 2:
+            return tuple(value)
+        raise InputError("", "be two times", shown(value), "give (start, end)")
+    start, colon, end = (part.strip() for part in value.partition(":"))
+    if not colon:
+        raise InputError("", "be START:END", f"'{value}'", "write it like 10:60")
+    return start or -np.inf, end or np.inf
+
+
+def _end_of_a_span(value: Any) -> float:
+    return value if value in (-np.inf, np.inf) else _seconds(value)
+
+
+Seconds = Annotated[float, BeforeValidator(_seconds)]
+#: Start and end of a stretch of time (s), or a text such as ``"10:60"``.
+Span = Annotated[
+    tuple[
+        Annotated[float, BeforeValidator(_end_of_a_span)],
+        Annotated[float, BeforeValidator(_end_of_a_span)],
+    ],
+    BeforeValidator(_ends),
+]
+
+
+def shown(value: Any) -> str:
+    """A value of a record in a few words for a message."""
+    if isinstance(value, Mapping):
+        return f"a table of {len(value)} fields"
+    return shown_value(value)
+
+
+def mistakes_in(
+    error: ValidationError,
+    model: type[BaseModel],
+    subject: str,
+    *,
+    prefix: str = "",
+    shown: Callable[[Any], str] = shown,
+) -> list[InputError]:
+    """The mistakes that pydantic reports, each once.
+
+    Parameters
+    ----------
+    error : ValidationError
+    model : type of BaseModel
+        What was to be filled, to suggest names of fields.
+    subject : str
+        What is mistaken where no field is named, such as ``"protocol"``.
+    prefix : str
+        What stands before the place of a field.
+    shown : callable
+        Words for a value.
+    """
+    mistakes: dict[str, InputError] = {}
+    for reported in error.errors(include_url=False):
+        for mistake in _mistakes(reported, model, subject, prefix, shown):
+            mistakes.setdefault(str(mistake), mistake)
+    return list(mistakes.values())
+
+
+def _mistakes(
+    reported: Mapping[str, Any],
+    model: type[BaseModel],
+    subject: str,
+    prefix: str,
+    shown: Callable[[Any], str],
+) -> tuple[InputError, ...]:
+    raised = reported.get("ctx", {}).get("error")
+    if isinstance(raised, MistakesError):
+        return raised.errors
+    place = [str(part)[:_LONGEST] for part in reported["loc"]]
+    while len(place) > 1 and place[-1] in _TYPES:
+        place.pop()
+    field = prefix + ".".join(place) if place else subject
+    if isinstance(raised, InputError):
+        # Types of values do not know where they are used.
+        return (raised if raised.field.name else raised.about(field),)
+    if raised is not None:
+        # Raised by a validator of the record, which leaves only the field to be named.
+        return (InputError(f"{field} must {raised}"),)
+    if reported["type"] == "missing":
+        return (InputError(field, "be given", "nothing", "add it"),)
+    value = shown(reported["input"])
+    if reported["type"] == "extra_forbidden":
+        known = _fields_at(model, reported["loc"][:-1])
+        advice = closest(place[-1], known) if known else "leave it out"
+        return (InputError(field, "be a known field", value, advice),)
+    rule = " ".join(reported["msg"].split()).removeprefix("Input should be ")
+    return (InputError(field, f"be {rule}", value, "correct the value"),)
+
+
+def _fields_at(model: type[BaseModel], place: tuple[Any, ...]) -> list[str]:
+    """Names of the fields of the table at a place."""
+    at: Any = model
+    for part in place:
+        fields = at.model_fields if _is_model(at) else {}
+        kind = next((f.annotation for n, f in fields.items() if part in (n, f.alias)), at)
+        at = next(iter(_models_in(kind)), None)
+        if at is None:
+            return []
+    return [f.alias or name for name, f in at.model_fields.items()]
+
+
+def _is_model(kind: Any) -> bool:
+    return isinstance(kind, type) and issubclass(kind, BaseModel)
+
+
+def _models_in(kind: Any) -> Iterator[type[BaseModel]]:
+    """Models within a type such as ``Mapping[str, Model] | None``."""
+    if _is_model(kind):
+        yield kind
+    for part in getattr(kind, "__args__", ()):
+        yield from _models_in(part)

@@ -1,0 +1,128 @@
+"""How a recording is read, and what is measured in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, model_validator
+
+from asperity.errors import InputError
+from asperity.questions.record import Question, Seconds, Span, quantity
+
+Column = str | int
+
+
+class ReadingRecipe(Question):
+    """How recordings are read: arguments of `asperity.read`, as a reduction file has them.
+
+    Attributes
+    ----------
+    title : str
+    columns : dict of str to str or int
+        Columns by role.
+    units : dict of str to str
+        Units by column.
+    channels : dict of str to str
+        Expressions of derived channels, in their order.
+    rate : float or str, optional
+        Samples per second.
+    group, delimiter, decimal, format : str, optional
+        As of `asperity.read`.
+    """
+
+    subject = "recipe"
+    prefix = "recipe."
+
+    title: str = ""
+    columns: dict[str, Column] = Field(default_factory=dict)
+    units: dict[str, str] = Field(default_factory=dict)
+    channels: dict[str, str] = Field(default_factory=dict)
+    rate: float | str | None = None
+    group: str | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    format: str | None = None
+
+
+class Source(ReadingRecipe):
+    """How one recording is read.
+
+    Attributes
+    ----------
+    recipe : Path, optional
+        A reduction file, whose fields stand where this record leaves them open.
+    area : str or float, optional
+        Contact area, which makes stresses forces.
+    """
+
+    subject = "read"
+    prefix = "read."
+
+    recipe: Path | None = None
+    area: float | str | None = None
+
+    @property
+    def arguments(self) -> dict[str, Any]:
+        """Keyword arguments of `asperity.read`; only those that say something."""
+        named = self.model_dump(exclude={"title", "area"})
+        return {name: value for name, value in named.items() if value not in (None, {}, "")}
+
+
+class Measurement(Question):
+    """What is measured in a recording.
+
+    Attributes
+    ----------
+    modulated : bool, optional
+        Whether the load is; by default velocity steps and holds are read where it is constant.
+    load, force : str
+        Channels, by name or role.
+    frequency : float or str, optional
+        Where the modulation is looked for (Hz); found by default.
+    exact_frequency : bool
+        Whether the frequency is taken as it is, not fitted.
+    harmonics : int
+    window : (float, float), optional
+        First and last time (s); chosen by default.
+    whole_periods : bool
+        Whether the window is cut to whole periods.
+    detrend : {"none", "linear", "quadratic"}
+    steps : tuple of float, optional
+        Times (s) of the velocity steps of a recording without modulation.
+    holds : tuple of (float, float), optional
+        Begin and end (s) of its holds.
+    """
+
+    subject = "measure"
+    prefix = "measure."
+
+    modulated: bool | None = None
+    load: str = "W"
+    force: str = "F"
+    frequency: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
+    exact_frequency: bool = False
+    harmonics: Annotated[int, Field(ge=1, le=64)] = 4
+    window: Span | None = None
+    whole_periods: bool = False
+    detrend: Literal["none", "linear", "quadratic"] = "linear"
+    steps: tuple[Seconds, ...] | None = None
+    holds: tuple[Span, ...] | None = None
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Measurement:
+        if self.exact_frequency and self.frequency is None:
+            raise InputError(
+                "exact_frequency",
+                "go with a frequency",
+                "none",
+                "give the frequency or leave it out",
+            )
+        if self.modulated is not False and (self.steps or self.holds):
+            raise InputError(
+                "steps and holds",
+                "go with modulated=False",
+                "them without",
+                "leave them out or say so",
+            )
+        return self

@@ -1,0 +1,146 @@
+"""Is a recording whole? Sampling, missing values, saturation: looked at, and never repaired."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from asperity.recording.defects.levels import saturated
+from asperity.recording.defects.sampling import check_sampling, even_rate
+from asperity.recording.defects.spikes import spikes
+from asperity.recording.finding import Finding
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from asperity.recording.trace import Trace
+
+    Array = NDArray[np.float64]
+
+__all__ = ["CHECKED", "check", "even_rate"]
+
+#: Names of the findings that `check` can make; a reader makes others.
+CHECKED = frozenset(
+    {
+        "backward time",
+        "constant",
+        "gap",
+        "infinite",
+        "nan",
+        "repeated time",
+        "rounded time",
+        "saturation",
+        "spike",
+        "uneven sampling",
+    }
+)
+
+
+def check(trace: Trace) -> tuple[Finding, ...]:
+    """Look for everything that can make a reading of `trace` wrong.
+
+    Parameters
+    ----------
+    trace : Trace
+        Any recording; it stays as it is.
+
+    Returns
+    -------
+    tuple of Finding
+        ``"backward time"``, ``"repeated time"``, ``"rounded time"``, ``"gap"``,
+        ``"uneven sampling"``, ``"nan"``, ``"infinite"``, ``"constant"``, ``"spike"`` and
+        ``"saturation"``; at most one of a name for time and for each channel. Empty when nothing
+        was found.
+
+    Notes
+    -----
+    A gap is a step of time longer than 1.5 times the median of the 24 steps before it, and of
+    those after it, and outside their scatter: a change of the sampling rate is uneven, and no gap.
+    Saturation is a crowd of samples at exactly the largest or smallest value, or a few in a row
+    there where no two samples are equal by chance. A spike stands out of
+    the samples on both sides of it by ten usual differences, for three samples at most.
+    """
+    # Sums and differences of a damaged file may overflow, which is no news here.
+    with np.errstate(over="ignore", invalid="ignore"):
+        findings = [*_missing(trace.time, trace.time, "time"), *check_sampling(trace.time)]
+        for name, channel in trace.channels.items():
+            findings += _missing(channel.values, trace.time, name)
+            findings += _saturation(channel.values, trace.time, name)
+            findings += _spikes(channel.values, trace.time, name)
+    return tuple(findings)
+
+
+def _missing(values: Array, time: Array, name: str) -> list[Finding]:
+    # A sum is finite when all terms are, and costs one pass without a copy; when it is not, look.
+    if np.isfinite(values.sum()):
+        return []
+    findings = []
+    for slug, bad in (("nan", np.isnan(values)), ("infinite", np.isinf(values))):
+        count = int(bad.sum())
+        if not count:
+            continue
+        first = int(np.argmax(bad))
+        what = "not a number" if slug == "nan" else "infinite"
+        findings.append(
+            Finding(
+                slug,
+                "error" if count == values.size or name == "time" else "warning",
+                count,
+                f"{name}, row {first}, t = {time[first]:.10g} s",
+                f"{count} of {values.size} values of '{name}' are {what}, the first in row "
+                f"{first}.",
+            )
+        )
+    return findings
+
+
+def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
+    """Findings ``"saturation"`` for the top and the bottom, or ``"constant"``."""
+    finite = values if np.isfinite(values.sum()) else values[np.isfinite(values)]
+    if finite.size < 2:
+        return []
+    if finite.min() == finite.max():
+        return [
+            Finding(
+                "constant",
+                "note",
+                float(finite[0]),
+                f"{name}, row 0, t = {time[0]:.10g} s",
+                f"'{name}' has one and the same value in the whole recording.",
+            )
+        ]
+    return [
+        Finding(
+            "saturation",
+            "warning",
+            level.rows.size / values.size,
+            f"{name}, row {level.rows[0]}, t = {time[level.rows[0]]:.10g} s",
+            f"{level.rows.size} of {values.size} samples of '{name}' stand at exactly its "
+            f"{level.side} value, {level.value:.6g}, and at most {level.usual} at any value next "
+            "to it: saturated, or held there by a command.",
+        )
+        for level in saturated(values)
+    ]
+
+
+def _spikes(values: Array, time: Array, name: str) -> list[Finding]:
+    """Finding ``"spike"``, for samples that stand out of both sides of themselves.
+
+    A step, a slip event or a change of the amplitude has a new level on one side, and is none.
+    """
+    at = np.array(spikes(values), dtype=np.intp)
+    if not at.size:
+        return []
+    first = int(at[0])
+    usual = np.nanmedian(values[max(0, first - 100) : first + 100])
+    return [
+        Finding(
+            "spike",
+            "warning",
+            at.size,
+            f"{name}, row {first}, t = {time[first]:.10g} s",
+            f"{at.size} of {values.size} samples of '{name}' jump out and back, the first, "
+            f"{values[first]:.6g} where {usual:.6g} is usual, in row {first}.",
+        )
+    ]

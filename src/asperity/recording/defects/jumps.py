@@ -1,0 +1,102 @@
+"""Jumps of a signal's level that nothing explains: a gauge that slips, is moved, or changes range.
+
+A jump is one large step among the steps from sample to sample, and its neighbours are as usual. The
+steps are an autoregression, which follows what is slow, be it drift, motion or noise of any length:
+a level that wanders by itself is no jump, whatever its size. A jump's size is estimated by
+generalised least squares, and a jump is one whose size over its standard error is beyond what noise
+makes anywhere in one recording of a thousand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import norm
+
+from asperity.recording.defects.autoregression import Autoregression, fitted
+
+Float = NDArray[np.float64]
+
+#: Probability of a jump that is noise, anywhere in a recording.
+CHANCE = 1e-3
+#: Jumps that are looked for, at most.
+_MOST = 5
+#: Samples at the ends of a stretch that show no level on one side of them.
+_EDGE = 6
+#: Samples of a stretch, at least.
+_SHORTEST = 64
+
+
+class Jump(NamedTuple):
+    """A jump of the level.
+
+    Attributes
+    ----------
+    sample : int
+        The first one behind it.
+    size : float
+    departure : float
+        Size over its standard error.
+    """
+
+    sample: int
+    size: float
+    departure: float
+
+
+def find_jumps(
+    values: Float, stretches: Sequence[tuple[int, int]], chance: float = CHANCE
+) -> list[Jump]:
+    """Jumps of the level within stretches, the largest departure first.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        Evenly sampled and finite within each stretch.
+    stretches : sequence of (int, int)
+        First sample and the one after the last of each stretch in which nothing is known that would
+        move the level. Short ones are passed over.
+    chance : float
+        Probability that any of the jumps is noise.
+
+    Notes
+    -----
+    The look-elsewhere correction is that of Bonferroni over all samples. With an impulse at t the
+    steps d have innovations that are the autoregression's weights from t on, and the estimate of
+    the impulse over its error is their correlation with the innovations (the innovational form of
+    the additive outlier of Fox, J. R. Stat. Soc. B 34, 350, 1972).
+    """
+    steps = [np.diff(values[a:b]) for a, b in stretches]
+    places = [a + 1 for a, _ in stretches]
+    used = [k for k, d in enumerate(steps) if d.size >= _SHORTEST]
+    if not used:
+        return []
+    limit = float(norm.isf(chance / (2 * sum(steps[k].size for k in used))))
+    result: list[Jump] = []
+    while len(result) < _MOST:
+        model = fitted([steps[k] - np.mean(steps[k]) for k in used])
+        best = Jump(-1, 0.0, limit)
+        for k in used:
+            size, departure = _impulses(model, steps[k] - np.mean(steps[k]))
+            departure[:_EDGE] = departure[departure.size - _EDGE :] = 0.0
+            at = int(np.argmax(np.abs(departure)))
+            if abs(departure[at]) > abs(best.departure):
+                best = Jump(places[k] + at, float(size[at]), float(departure[at]))
+                where = k, at
+        if best.sample < 0:
+            break
+        k, at = where
+        steps[k][at] -= best.size
+        result.append(best)
+    return result
+
+
+def _impulses(model: Autoregression, steps: Float) -> tuple[Float, Float]:
+    """Size of an impulse at each sample, and the same over its standard error."""
+    departure = model.departures_of_single_samples(model.whiten(steps[:, None])[:, 0])
+    weights = np.concatenate([[1.0], model.coefficients[-1]])
+    error = model.innovation / np.sqrt(float(weights @ weights))
+    return error * departure, departure

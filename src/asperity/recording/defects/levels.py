@@ -1,0 +1,157 @@
+"""Values that repeat: a channel at the end of its range, rounded, held, or lost to zero."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: Values next to the extreme that say how crowded a level is without saturation.
+_LEVELS = 3
+#: The extreme of a smooth signal that is quantised holds at most 2.4 times the samples of the next
+#: level where it is a parabola, and 5.3 times where it is as flat as a fourth power.
+_CROWDED = 8
+_FEWEST = 5
+#: Equal samples in a row that chance does not make where the values next to them occur once.
+_IN_A_ROW = 3
+#: Rounding is coarse where this share of neighbours is equal and the other differences are whole
+#: multiples of one step, to this share of it.
+_MOSTLY_EQUAL, _WHOLE = 0.5, 0.02
+#: A held channel repeats a tenth of its samples at least and jumps by several steps between.
+_REPEATED, _STEPS = 0.1, 4.0
+#: Share of the runs of equal samples that have the usual length, and what irregular holding needs.
+_REGULAR, _OFTEN, _FAR = 0.9, 0.3, 10.0
+#: Zeros count where the channel is usually this many scatters away from zero.
+_AWAY = 5.0
+
+
+class Saturated(NamedTuple):
+    """An extreme at which a channel is cut off, or held by a command.
+
+    Attributes
+    ----------
+    side : {"largest", "smallest"}
+    value : float
+    rows : array of int
+        Samples at it, in rising order.
+    usual : int
+        Samples at the fullest of the values next to it.
+    """
+
+    side: str
+    value: float
+    rows: NDArray[np.intp]
+    usual: int
+
+
+def saturated(values: Array) -> list[Saturated]:
+    """Extremes that hold more samples than a signal leaves there.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+        NaN where unknown. A channel of three values or fewer, such as a switch, has no flat top.
+    """
+    finite = values if np.isfinite(values.sum()) else values[np.isfinite(values)]
+    result: list[Saturated] = []
+    if finite.size < 2 or finite.min() == finite.max():
+        return result
+    for side, extreme in (("largest", float(finite.max())), ("smallest", float(finite.min()))):
+        at_extreme = values == extreme
+        count = int(np.count_nonzero(at_extreme))
+        # The usual case, and the cheap one.
+        if count < _IN_A_ROW or not (at_extreme[1:] & at_extreme[:-1]).any():
+            continue
+        usual = _most_at_a_level(finite, extreme, side)
+        if usual is None:
+            continue
+        rows = np.flatnonzero(at_extreme)
+        crowded = count >= _FEWEST and count > _CROWDED * usual
+        later = rows[_IN_A_ROW - 1 :]
+        in_a_row = bool(np.any(later - rows[: later.size] == _IN_A_ROW - 1))
+        if crowded or (usual == 1 and in_a_row):
+            result.append(Saturated(side, extreme, rows, usual))
+    return result
+
+
+def _most_at_a_level(values: Array, extreme: float, side: str) -> int | None:
+    """Samples at the fullest of the values next to the extreme; None if there are too few."""
+    left, most = values, 0
+    level = extreme
+    for _ in range(_LEVELS):
+        left = left[left < level] if side == "largest" else left[left > level]
+        if not left.size:
+            return None
+        level = left.max() if side == "largest" else left.min()
+        most = max(most, int(np.count_nonzero(left == level)))
+    return most
+
+
+def coarsely_rounded(values: Array) -> tuple[float, float] | None:
+    """Share of values that repeat the one before, and the usual step of the others.
+
+    None where values were not rounded, or no more coarsely than their noise.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+
+    Notes
+    -----
+    Rounding is noise like other noise as long as there is some before it (Widrow, 1956): if most
+    neighbours are equal there is not, and the rounding follows the signal.
+    """
+    steps = np.abs(np.diff(values))
+    moved = steps[steps > 1e-9 * max(float(np.median(np.abs(values))), 1e-300)]
+    if not moved.size or moved.size >= (1 - _MOSTLY_EQUAL) * steps.size:
+        return None
+    digits = moved / moved.min()
+    if float(np.abs(digits - np.round(digits)).max()) >= _WHOLE:
+        return None
+    return 1 - moved.size / steps.size, float(np.median(moved))
+
+
+def held_length(values: Array) -> float | None:
+    """Mean number of equal samples in a row, as of a converter that is slower than the recorder.
+
+    None where the resolution explains them.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+    """
+    steps = np.abs(np.diff(values))
+    moving = steps[steps > 0]
+    repeated = 1 - moving.size / max(steps.size, 1)
+    if repeated < _REPEATED or moving.size < 16:
+        return None
+    jump = float(np.median(moving)) / float(moving.min())
+    at = np.flatnonzero(steps > 0)
+    runs = np.diff(at)
+    length = float(runs.mean())
+    regular = float(np.mean((runs >= np.floor(length)) & (runs <= np.ceil(length))))
+    if jump > _STEPS and regular > _REGULAR:
+        return length
+    return length if jump > _FAR and repeated > _OFTEN else None
+
+
+def lost_to_zero(values: Array) -> tuple[int, float] | None:
+    """Samples that are exactly zero where the channel is far from zero, and its usual value.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+    """
+    zeros = values == 0
+    count = int(np.count_nonzero(zeros))
+    if not count or count == values.size:
+        return None
+    others = values[~zeros]
+    middle = float(np.median(others))
+    scatter = float(np.median(np.abs(others - middle)))
+    return (count, middle) if abs(middle) > _AWAY * scatter else None

@@ -1,0 +1,141 @@
+"""Single samples that are wrong by themselves: spikes of electronics, misreadings.
+
+A spike stands out of the samples on both sides of it, for three samples at most; a step, a slip
+event or a change of an amplitude has a new level on one side, and is none. Where the drive of a
+recording changes, friction itself may have a peak that one sample holds: there a spike is farther
+off than any two neighbours of the recording are apart elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    Array = NDArray[np.float64]
+
+#: A spike stands out of both samples so far before and behind it. Next neighbours see it beside a
+#: fast modulation; those farther off see spikes that last longer than a sample.
+_APART = (1, 3)
+#: How far it stands out, in usual differences of samples so far apart. White noise of 1e8 samples
+#: reaches seven, a sine 1.6.
+_OUT = 10.0
+#: Samples that share one usual difference: small enough for the second cache.
+_CHUNK = 1 << 14
+#: Differences on each side of a spike that must be small too.
+_SIDE = 16
+#: A chunk's usual difference is taken from every so many of them.
+_EVERY = 8
+#: Samples on either side of a change of the drive at which a peak is no spike by itself; samples
+#: on either side of it that say nothing on the differences elsewhere; and how many times as far off
+#: as those a spike is there.
+_AT_CHANGE, _BESIDE, _CLEARLY = 5, 32, 2.0
+
+
+def spikes(values: Array) -> NDArray[np.intp]:
+    """Samples that are spikes, in rising order."""
+    parts = [np.empty(0, dtype=np.intp)]
+    most = max(_APART)
+    # What overflows or is missing is news of another check.
+    with np.errstate(over="ignore", invalid="ignore"):
+        for start in range(0, max(values.size - 2 * most, 0), _CHUNK):
+            piece = values[start : start + _CHUNK + 2 * most]
+            parts += [_standing_out(piece, apart) + start for apart in _APART]
+    return np.unique(np.concatenate(parts))
+
+
+def _standing_out(piece: Array, apart: int) -> NDArray[np.intp]:
+    steps = piece[apart:] - piece[:-apart]
+    limit = _OUT * _usual(steps)
+    if not limit > 0:
+        return np.empty(0, dtype=np.intp)
+    up, down = steps > limit, steps < -limit
+    if not (up.any() and down.any()):
+        return np.empty(0, dtype=np.intp)
+    # Out on one side and back on the other: a step has a new level there.
+    at = np.flatnonzero((up[:-apart] & down[apart:]) | (down[:-apart] & up[apart:])) + apart
+    return at[np.isfinite(piece[at]) & _locally(np.abs(steps), at, apart)]
+
+
+def _locally(sizes: Array, at: NDArray[np.intp], apart: int) -> NDArray[np.bool_]:
+    """Whether spikes stand out of what is usual on each side, as where a modulation begins."""
+    jump = np.minimum(sizes[at - apart], sizes[at])
+    out = np.ones(at.size, dtype=bool)
+    # The steps of the spike itself end where it is one step away.
+    for side in (np.arange(-_SIDE, 0) - 2 * apart + 1, np.arange(_SIDE) + apart):
+        for part in np.array_split(np.arange(at.size), at.size // _CHUNK + 1):
+            near = at[part, None] + side
+            inside = (near >= 0) & (near < sizes.size)
+            near_sizes = np.where(inside, sizes[np.clip(near, 0, sizes.size - 1)], 0.0)
+            out[part] &= jump[part] > _OUT * np.median(near_sizes, axis=1)
+    return out
+
+
+def _usual(steps: Array) -> float:
+    """The usual size of a difference, which a few spikes hardly change."""
+    size = np.abs(steps[::_EVERY])
+    size = size[np.isfinite(size)]
+    if not size.size:
+        return 0.0
+    usual = float(np.median(size))
+    if usual:
+        return usual
+    # A coarse recorder stands still most of the time: its single steps are usual too.
+    every = np.abs(steps[np.isfinite(steps)])
+    moving = every[every > 0]
+    return float(np.median(moving)) if moving.size > 0.02 * every.size else _smallest(moving)
+
+
+def _smallest(moving: Array) -> float:
+    return float(moving.min()) if moving.size else 0.0
+
+
+def away_from_changes(
+    values: Array, rows: NDArray[np.intp], changes: Sequence[int]
+) -> NDArray[np.intp]:
+    """Spikes without the peaks that friction itself may have at changes of the drive.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+    rows : array of int
+        Spikes, in rising order.
+    changes : sequence of int
+        First samples after changes of the drive.
+    """
+    edges = np.sort(np.asarray(changes, np.intp))
+    if not edges.size or not rows.size:
+        return rows
+    at = np.searchsorted(edges, rows)
+    nearest = np.minimum(
+        np.abs(rows - edges[np.minimum(at, edges.size - 1)]),
+        np.abs(rows - edges[np.maximum(at - 1, 0)]),
+    )
+    near = nearest <= _AT_CHANGE
+    kept = list(rows[~near])
+    steps = np.abs(np.diff(without(values, rows[~near])))
+    for k in rows[near]:
+        elsewhere = np.concatenate([steps[: max(k - _BESIDE, 0)], steps[k + _BESIDE :]])
+        if min(steps[k - 1], steps[k]) > _CLEARLY * elsewhere.max(initial=0.0):
+            kept.append(k)
+    return np.sort(np.array(kept, np.intp))
+
+
+def without(values: Array, rows: NDArray[np.intp]) -> Array:
+    """Values with lines between the neighbours in place of some samples.
+
+    Parameters
+    ----------
+    values : array, shape (n,)
+    rows : array of int
+    """
+    good = np.ones(values.size, bool)
+    good[rows] = False
+    at = np.flatnonzero(good)
+    result = values.copy()
+    result[rows] = np.interp(rows, at, values[at])
+    return result

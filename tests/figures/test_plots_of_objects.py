@@ -1,0 +1,64 @@
+"""`.plot()` draws the numbers of the object, and what failed or is unstable is seen."""
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.errors import InputError
+from asperity.loads import Hold, Programme, Slide
+
+PMMA = asp.materials.load("bureau2000")
+SLIDER = asp.Slider(PMMA.law("rice-ruina"), spring="0.2 N/um", load=PMMA.W0)
+
+
+def test_curves_are_the_numbers_of_the_response_and_unstable_points_are_open() -> None:
+    response = asp.periodic_response(
+        SLIDER, velocity=np.array([[1e-6], [1e-5]]), epsilon=[0.01, 0.1, 0.24], frequency=120.0
+    )
+    assert not response.stable.all()
+    mean, mu1, mu2 = response.plot().axes
+    for panel, name in ((mean, "mean_friction"), (mu1, "mu1"), (mu2, "mu2")):
+        lines = panel.get_lines()
+        for i in range(2):
+            np.testing.assert_allclose(lines[2 * i].get_ydata(), getattr(response, name)[i])
+            np.testing.assert_allclose(
+                lines[2 * i + 1].get_xdata(), response.epsilon[~response.stable[i]]
+            )
+
+
+def test_a_point_that_failed_is_a_gap() -> None:
+    response = asp.periodic_response(
+        SLIDER, velocity="1 um/s", epsilon=[0.1, 0.9999, 0.24], frequency=120.0
+    )
+    assert list(response.converged) == [True, False, True]
+    assert np.isnan(response.plot().axes[0].get_lines()[0].get_ydata()[1])
+
+
+def test_a_single_point_is_a_cycle_of_the_harmonic_sum() -> None:
+    response = asp.periodic_response(SLIDER, velocity="1 um/s", epsilon=0.24, frequency=120.0)
+    line = response.plot().axes[0].get_lines()[0]
+    turns, force = line.get_xdata(), line.get_ydata()
+    expected = response.mean_friction + sum(
+        abs(c) * np.cos(2 * np.pi * n * turns + np.angle(c))
+        for n, c in enumerate(response.harmonics, 1)
+    )
+    np.testing.assert_allclose(force, expected, rtol=1e-12)
+
+
+def test_more_curves_than_can_be_told_apart_are_refused() -> None:
+    response = asp.periodic_response(
+        SLIDER, velocity=np.geomspace(1e-6, 1e-5, 9)[:, None], epsilon=[0.1, 0.2], frequency=120.0
+    )
+    with pytest.raises(InputError, match="up to 8 rows, got 9x2 points; draw grids with asperity"):
+        response.plot()
+
+
+def test_a_trajectory_keeps_its_extremes_however_many_rows_it_has() -> None:
+    programme = Programme(Slide("1 s"), Hold("1 s"), Slide("1 s"), load="7 N", velocity="10 um/s")
+    run = asp.transient(
+        asp.Slider(SLIDER.law, spring="0.5 N/um", load=PMMA.W0), programme, sampling="10 kHz"
+    )
+    assert run.time.size > 10_000
+    force = run.plot().axes[1]
+    low, high = (line.get_ydata() for line in force.get_lines()[:2])
+    assert (low.min(), high.max()) == (run.force.min(), run.force.max())
