@@ -38,7 +38,7 @@ _RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
 #: Longest hold (s): beyond it squares of times would leave the range of doubles.
 _LONGEST = 1e20
 #: Points in a call of the compiled program; the smallest that is enough.
-_SHAPES = (16, 256, 2048)
+_SHAPES = (64, 1024)
 #: Distance of the points of a difference in ln(hold time): its error is that of a step.
 _STEP = 0.02
 

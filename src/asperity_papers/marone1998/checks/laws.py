@@ -87,7 +87,7 @@ def ageing_at_rest(laboratory: Laboratory) -> Numbers:
 
 @check("slip-scales-with-velocity")
 def slip_scales_with_velocity(laboratory: Laboratory) -> Numbers:
-    """Slip at imposed velocity to within 5 % of the steady state's ln(theta), by the closed form."""
+    """Slip at imposed velocity until ln(theta/theta_ss) is 5 % of ln r, by the closed form."""
     p = laboratory.numbers
     u = np.linspace(0, 20, 200_001) * p.D0_2
     slips = {}
