@@ -118,11 +118,15 @@ def drive_many(slider: Slider, V: Array, drive: Drive, Y: Array) -> Reached:
     Parameters
     ----------
     slider : Slider
-        Its parameters of shape (points,), as `V` (m/s) and the arrays of `drive`.
+        Its parameters of shape (points,) or (), as `V` (m/s) and the arrays of `drive`.
     Y : array, shape (points, size + 1)
     """
+
     # Of one type whatever they come from: one program serves all drives.
-    return _drive_many(*jax.tree.map(lambda a: jnp.asarray(a, jnp.float64), (slider, V, drive, Y)))
+    def wide(a: ArrayLike) -> Array:
+        return jnp.broadcast_to(jnp.asarray(a, jnp.float64), jnp.shape(V))
+
+    return _drive_many(*jax.tree.map(wide, (slider, V, drive)), jnp.asarray(Y, jnp.float64))
 
 
 @jax.jit

@@ -16,7 +16,7 @@ from asperity.cli.measure.source import RecordingSource
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
-    from asperity.inference import LockInTable, Prior, RecordedRun, WindowedFit
+    from asperity.inference import HealingTable, LockInTable, Prior, RecordedRun, WindowedFit
 
 _PRIOR = re.compile(r"^(?P<value>.+?)\s*(?:\+-|±|\+/-)\s*(?P<sd>[-+.\deE]+)\s*(?P<unit>.*)$")
 
@@ -128,7 +128,7 @@ class FitData:
 
     def read(
         self, paths: Sequence[Path], fixed: Mapping[str, str]
-    ) -> list[LockInTable | RecordedRun]:
+    ) -> list[LockInTable | HealingTable | RecordedRun]:
         """Tables and recordings from files.
 
         Raises
@@ -146,8 +146,12 @@ class FitData:
                 "recordings beforehand"
             )
         at = {n: fixed[n] for n in ("V", "epsilon", "frequency") if n in fixed}
-        result: list[LockInTable | RecordedRun] = []
+        held = {n: fixed[n] for n in ("V", "K", "W0") if n in fixed}
+        result: list[LockInTable | HealingTable | RecordedRun] = []
         for path, table in zip(paths, tables, strict=True):
+            if table and has_holds(path):
+                result.append(inference.read_healing(path, held))
+                continue
             if table:
                 result.append(inference.read_table(path, at))
                 continue
@@ -207,14 +211,28 @@ def is_table(path: Path) -> bool:
     require_rereadable(path, "data")
     if path.suffix.lower() == ".json":
         return True
+    cells = _heading(path)
+    # The reader of tables says what is wrong with a file that cannot be opened.
+    return cells is None or has_holds(path) or any(cell in OBSERVABLES for cell in cells)
+
+
+def has_holds(path: Path) -> bool:
+    """Whether a table is one of slide-hold-slide tests."""
+    from asperity.inference.holds.table import HEALING
+
+    return path.suffix.lower() != ".json" and HEALING in (_heading(path) or ())
+
+
+def _heading(path: Path) -> list[str] | None:
+    """Words of the first line that is no comment; None where the file cannot be opened."""
     try:
         with path.open(encoding="utf-8-sig", errors="replace") as file:
             for line in file:
                 if line.strip() and not line.lstrip().startswith("#"):
-                    return any(cell in OBSERVABLES for cell in re.split(r"[,;\t\s]+", line.strip()))
+                    return re.split(r"[,;\t\s]+", line.strip())
     except OSError:
-        return True  # the reader of tables says what is wrong
-    return False
+        return None
+    return []
 
 
 def run_options(
