@@ -18,7 +18,7 @@ def recording(tmp_path_factory):
     return path
 
 
-SET = ("--stiffness", "168 N/m", "--mass", "30.7 g", "--velocity", "358 um/s")
+SET = ("--set", "K=168 N/m", "--set", "M=30.7 g", "--set", "V=358 um/s")
 
 
 def test_a_stick_slip_recording_is_read_as_such(asperity, recording, tmp_path) -> None:
@@ -51,8 +51,9 @@ def test_a_campaign_has_one_row_a_file(asperity, recording, tmp_path) -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--stiffness", "168"], "--stiffness must"),
-        (["--stiffness", "-1 N/m"], "--stiffness must be positive"),
+        (["--set", "D0=1 um"], "--set must name one of K, V, M, W0"),
+        (["--set", "K=168"], "must carry a unit"),
+        (["--set", "K=-1 N/m"], "--set K must be positive"),
         (["--events", "events.txt"], "--events must be a CSV, NetCDF or JSON file"),
         (["--stick-slip", "--no-modulation"], "--stick-slip must go without"),
         (["--no-modulation", "--events", "e.csv"], "--events must go with a stick-slip recording"),

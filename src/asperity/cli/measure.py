@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option
+from asperity.cli.options import json_option, set_option, settings_of
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.words import in_options
 from asperity.errors import InputError, naming
@@ -82,8 +82,8 @@ Examples:
       --frequency "120 Hz" --window 10:60 --json --plot recording.png
   asperity measure velocity_step.txt --no-modulation --plot steps.png
   asperity measure amplitudes.csv --amplitudes
-  asperity measure stick_slip.mat --stiffness "168 N/m" --velocity "42 um/s" \\
-      --mass "30.7 g" --events events.csv --plot events.png
+  asperity measure stick_slip.mat --set "K=168 N/m" --set "V=42 um/s" \\
+      --set "M=30.7 g" --events events.csv --plot events.png
   asperity measure day1/*.csv --out campaign.csv
 
 \b
@@ -141,14 +141,7 @@ in place of numbers; 2: bad input.
     is_flag=True,
     help="Slip events; by default, those of a recording that is stick-slip and not modulated.",
 )
-@click.option("--stiffness", metavar="VALUE", help='Of the spring, for slip events: "168 N/m".')
-@click.option("--velocity", metavar="VALUE", help='Of its far end, for slip events: "42 um/s".')
-@click.option("--mass", metavar="VALUE", help='Of the slider, for slip events: "30.7 g".')
-@click.option(
-    "--normal-load",
-    metavar="VALUE",
-    help='Where none is recorded, for slip events: "0.3 N"; by default the weight of --mass.',
-)
+@set_option('--set "K=168 N/m" --set "V=42 um/s"', "K, V, M or W0 of the machine, for slip events")
 @click.option(
     "--events",
     type=Path,
@@ -186,10 +179,7 @@ def measure(
     steps: str | None,
     holds: str | None,
     stick_slip: bool,
-    stiffness: str | None,
-    velocity: str | None,
-    mass: str | None,
-    normal_load: str | None,
+    settings: tuple[str, ...],
     events: Path | None,
     amplitudes: bool,
     out: Path | None,
@@ -216,12 +206,11 @@ def measure(
         "steps": None if steps is None else listed_times(steps, "--steps"),
         "holds": None if holds is None else listed_times(holds, "--holds"),
         "stick_slip": True if stick_slip else None,
-        "stiffness": stiffness,
-        "velocity": velocity,
-        "mass": mass,
-        "normal_load": normal_load,
+        **_machine(settings),
     }
     question = Question(**fields)
+    if stick_slip and amplitudes:
+        raise InputError("--stick-slip must go without --amplitudes, got both; leave one out")
     if out is not None:
         if plot is not None or events is not None or steps or holds:
             raise InputError(
@@ -240,10 +229,9 @@ def measure(
         )
     (recording,) = recordings
     if amplitudes:
-        if no_modulation or stick_slip or plot is not None or events is not None:
+        if no_modulation or plot is not None:
             raise InputError(
-                "--amplitudes must go without --no-modulation, --stick-slip, --events and --plot, "
-                "got both; leave one out"
+                "--amplitudes must go without --no-modulation and --plot, got both; leave one out"
             )
         return _amplitudes(recording, source, question, as_json)
     if plot is not None:
@@ -350,6 +338,19 @@ def _catalogue(result: Any, path: Path) -> None:
             "events with --stick-slip"
         )
     write_catalogue(result, path)
+
+
+def _machine(settings: tuple[str, ...]) -> dict[str, str]:
+    """What ``--set`` says of the machine, by the fields of the question."""
+    fields = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "normal_load"}
+    given = settings_of(settings)
+    for name in given:
+        if name not in fields:
+            raise InputError(
+                f"--set must name one of {', '.join(fields)}, got '{name}'; write it like "
+                '--set "K=168 N/m"'
+            )
+    return {fields[name]: text for name, text in given.items()}
 
 
 def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:

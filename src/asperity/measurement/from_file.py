@@ -110,7 +110,7 @@ def measure_recording(
 def answer_measurement(
     trace: Trace, question: Question, *, plain: bool = False
 ) -> tuple[Measurement | SlidingMeasurement | StickSlipMeasurement, str]:
-    """What a question asks of a recording: its longest modulated stretch, slip events, or sliding.
+    """What a question asks of a recording: its longest modulated stretch, events, or sliding.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ def answer_measurement(
     -------
     measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
     what : str
-        What the recording is, where the program reads no modulation by itself; else empty.
+        What the recording is, where the program reads it as not modulated by itself; else empty.
 
     Raises
     ------
@@ -155,7 +155,7 @@ def modulated_parts(trace: Trace, question: Question) -> list[Measurement | Inpu
 def _either(
     trace: Trace, question: Question, modulated: Callable[[], Read], *, plain: bool = False
 ) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
-    """What `modulated` reads, slip events or the sliding, as the question or the recording says."""
+    """What `modulated` reads, the sliding or the slip events, as question or recording says."""
 
     def sliding() -> SlidingMeasurement:
         return measure_sliding(
@@ -168,7 +168,7 @@ def _either(
             holds=question.holds,
         )
 
-    def slip_events() -> StickSlipMeasurement:
+    def events() -> StickSlipMeasurement:
         machine = Machine(
             question.stiffness, question.velocity, question.mass, question.normal_load
         )
@@ -181,14 +181,19 @@ def _either(
         )
 
     if question.stick_slip:
-        return slip_events(), ""
+        return events(), ""
     if question.modulated is False:
         return sliding(), ""
     if question.modulated or question.frequency is not None:
         return modulated(), ""
-    # The page has no place for slip events yet.
-    events = None if plain or question.stick_slip is False else slip_events
-    return modulated_or_sliding(trace, modulated, sliding, events, load=question.load, plain=plain)
+    return modulated_or_sliding(
+        trace,
+        modulated,
+        sliding,
+        events if question.stick_slip is None else None,
+        load=question.load,
+        plain=plain,
+    )
 
 
 def _lock_in(question: Question) -> dict[str, Any]:

@@ -32,10 +32,10 @@ MEASURE_OPTIONS: Mapping[str, str] = {
     "steps": "--steps",
     "holds": "--holds",
     "stick_slip": "--stick-slip",
-    "stiffness": "--stiffness",
-    "velocity": "--velocity",
-    "mass": "--mass",
-    "normal_load": "--normal-load",
+    "stiffness": "--set K",
+    "velocity": "--set V",
+    "mass": "--set M",
+    "normal_load": "--set W0",
 }
 
 FIT_OPTIONS: Mapping[str, str] = {
@@ -52,7 +52,6 @@ FIT_OPTIONS: Mapping[str, str] = {
 
 #: Units of fields that are numbers in SI.
 _UNITS = {"frequency": "Hz", "gauge": "Hz", "velocities": "m/s", "area": "m^2"}
-_UNITS |= {"stiffness": "N/m", "velocity": "m/s", "mass": "kg", "normal_load": "N"}
 
 
 def as_options(fields: Mapping[str, Any], options: Mapping[str, str]) -> list[str]:

@@ -108,10 +108,9 @@ class Measurement(Question):
     holds : tuple of (float, float), optional
         Begin and end (s) of its holds.
     stick_slip : bool, optional
-        Whether slip events are read; by default they are if there are some, and no modulation.
+        Whether slip events are read; by default where there are some, and no modulation.
     stiffness, velocity, mass, normal_load : float or str, optional
-        K, V, M and W0 of the machine (N/m, m/s, kg, N), for slip events. Without a recorded load W0
-        is M g unless it is given.
+        K (N/m), V (m/s), M (kg) and W0 (N) of the machine, for slip events.
     """
 
     subject = "measure"
@@ -152,18 +151,18 @@ class Measurement(Question):
                 "none",
                 "give the frequency or leave it out",
             )
-        if self.stick_slip and (self.modulated is not None or self.frequency is not None):
-            raise InputError(
-                "measure.stick_slip",
-                f"go without {Argument('measure.modulated')} and {Argument('measure.frequency')}",
-                "both",
-                "leave one out",
-            )
         if self.modulated and (self.steps or self.holds):
             raise InputError(
                 "measure.steps and holds",
                 f"go with {Argument('modulated', value='False')}",
                 "them of a modulated recording",
                 "leave one of them out",
+            )
+        if self.stick_slip and (self.modulated is not None or self.frequency is not None):
+            raise InputError(
+                "measure.stick_slip",
+                f"go without {Argument('measure.modulated')} and {Argument('measure.frequency')}",
+                "both",
+                "leave one out",
             )
         return self
