@@ -27,8 +27,8 @@ CHANCE = 1e-3
 _MOST = 5
 #: Samples at the ends of a stretch that show no level on one side of them.
 _EDGE = 6
-#: Samples over which a change is gradual, and the share of its departure that a jump's exceeds. Of
-#: 180 recordings with strong hum and no jump, 9 have one without this rule, and none with it: motion
+#: Samples over which a change is gradual, and the share of its departure that a jump exceeds. Of
+#: 180 recordings with hum and no jump, 9 have one without this rule, and none with it: motion
 #: after changes of the drive. With a share of 1 one jump in six under white noise is lost.
 _GRADUAL, _SUDDEN = (4, 8, 16, 32), 0.95
 #: Samples of a stretch, at least.
