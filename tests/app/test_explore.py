@@ -26,7 +26,7 @@ def test_numbers_are_those_of_the_package(explored):
 def test_the_link_shows_the_view_and_a_slider_changes_it(visit, record_property):
     page = visit("#explore?law=rice-ruina&laws=&epsilon=0.1&V=2e-6")
     sentence = page.locator(".sentence")
-    sentence.filter(has_text="able;").wait_for()
+    sentence.filter(has_text="able:").wait_for()
     assert page.locator("label:has-text('pulling velocity') + input").input_value() == "2 µm/s"
     before = page.locator(".readings").inner_text()
     slider = page.locator(".quantity", has_text="relative amplitude").locator("input[type=range]")

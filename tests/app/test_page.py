@@ -43,7 +43,7 @@ def test_nothing_is_wider_than_the_screen(visit, tab, width):
 
 def test_the_keyboard_reaches_every_control(visit):
     page = opened(visit, "explore")
-    page.locator(".sentence", has_text="able;").wait_for()
+    page.locator(".sentence", has_text="able:").wait_for()
     shown = "[...document.querySelectorAll('a, button, input, select, summary')]"
     shown += ".filter((e) => e.checkVisibility())"
     count = page.evaluate(f"{shown}.forEach((e, i) => {{ e.dataset.test = i }}), {shown}.length")
@@ -60,7 +60,7 @@ def test_the_keyboard_reaches_every_control(visit):
 
 def test_the_keyboard_reads_the_values_of_a_chart(visit, explored):
     page = opened(visit, "explore")
-    page.locator(".sentence", has_text="able;").wait_for()
+    page.locator(".sentence", has_text="able:").wait_for()
     numbers = {"V": 1e-6, "epsilon": 0.1, "frequency": 120.0}
     force = explored({"law": "rice-ruina", "numbers": numbers})["point"]["force"]
     chart = page.locator(".panel.period .plot")
@@ -133,7 +133,7 @@ def test_the_copied_command_gives_the_same_numbers(explored):
 
 def test_figures_are_saved_as_svg_png_and_csv(visit, tmp_path):
     page = opened(visit, "explore")
-    page.locator(".sentence", has_text="able;").wait_for()
+    page.locator(".sentence", has_text="able:").wait_for()
     for what, start in (("SVG", b"<svg"), ("PNG", b"\x89PNG"), ("CSV", b"phase,force")):
         with page.expect_download() as waited:
             page.locator(".panel.period").get_by_role("button", name=what).click()
@@ -151,7 +151,7 @@ def test_print_shows_the_figures_and_no_controls(visit):
     page = opened(visit, "explore")
     page.emulate_media(media="print")
     assert not page.locator(".controls").is_visible()
-    page.locator(".sentence", has_text="able;").wait_for()
+    page.locator(".sentence", has_text="able:").wait_for()
     # What the browser sends before it prints, from a screen of any width.
     page.set_viewport_size({"width": 720, "height": 1000})
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -165,7 +165,7 @@ def test_print_shows_the_figures_and_no_controls(visit):
 
 def test_on_a_phone_the_slider_stays_beside_the_figure(visit):
     page = opened(visit, "explore", width=360, height=740)
-    page.locator(".sentence", has_text="able;").wait_for()
+    page.locator(".sentence", has_text="able:").wait_for()
     assert not page.locator(".quantity").first.is_visible()
     page.locator(".panel.period").evaluate("(e) => e.scrollIntoView()")
     dock = page.locator(".dock")

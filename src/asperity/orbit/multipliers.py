@@ -77,8 +77,8 @@ def _resolve_by_splitting(
     splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_AT_ONCE]
     for parts in splits:
         solve = partial(split_observables, parts=parts)
-        chunk = mesh_chunk(problem.system.size)
-        chunk = chunk if intervals * parts * chunk <= _MOST_SIDE_BY_SIDE else 1
+        most = _MOST_SIDE_BY_SIDE // (intervals * parts)
+        chunk = tuple(k for k in mesh_chunk(problem.system.size) if k <= most) or 1
         for part, observables in run_chunks(solve, (problem, orbit), index, chunk):
             logs = observables.log_multipliers
             gap = _compare_with_coarser(solution, part, logs)

@@ -178,17 +178,19 @@ def stability_sentence(response: PeriodicResponse) -> str:
     if response.log_multipliers.shape[-1] == 0:
         return "no dynamics: the force follows the load"
     rate, turn = float(response.growth_rate), float(response.mode_frequency)
-    per_second = f"by a factor e in {_digits(1 / abs(rate))} s" if rate else "by nothing"
+    swings = f" swings at {_digits(turn)} Hz and" if turn > 0 else ""
     if bool(response.stable):
-        how = f"turns at {_digits(turn)} Hz and" if turn > 0 else "does not turn and"
-        return f"stable; the slowest mode {how} decays {per_second}"
+        # e^-3 is 5 %.
+        fades = f"fades to 5 % in {_digits(-3 / rate)} s" if rate else "stays"
+        return f"stable: a small disturbance{swings} {fades}"
     kind = str(response.mode[()])
-    how = {
-        "fold": "away without turning (a fold)",
-        "period doubling": "with twice the period (a period doubling)",
-        "Neimark-Sacker": f"and turns at {_digits(turn)} Hz (Neimark-Sacker)",
+    doubles = f"doubles in {_digits(np.log(2) / rate)} s" if rate else "stays"
+    outcome = {
+        "fold": "; the slip runs away or comes to rest (a fold)",
+        "period doubling": "; every second period becomes another (a period doubling)",
+        "Neimark-Sacker": ": expect stick-slip (a Neimark-Sacker bifurcation)",
     }.get(kind, "")
-    return f"unstable; a disturbance grows {per_second} {how}".rstrip()
+    return f"unstable: a small disturbance{swings} {doubles}{outcome}"
 
 
 def _digits(value: float) -> str:

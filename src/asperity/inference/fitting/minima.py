@@ -39,7 +39,7 @@ _FEW_ROWS, _DATA_EACH = 16, 3
 _NEARBY = 1e-3
 #: Rows on which starts are tried first, and most starts that are tried on all; evaluations after
 #: which a way is compared with the others; how many times the lowest chi-squared is hopeless then.
-_ROWS_FIRST, _TRIED, _SOME_WAY, _HOPELESS = 4, 12, 10, 1e3
+_ROWS_FIRST, _TRIED, _SOME_WAY, _HOPELESS = 4, 6, 10, 1e2
 #: Evaluations after which a law that does not describe the data is given up.
 _LONG_WAY = 30
 #: Share that chi-squared must fall to on each part of the way beyond the fast method.
@@ -186,7 +186,8 @@ def _followed_on_few_rows(
     objective: Objective, begun: _Beginnings, few: Objective, advance: Callable[[int], None]
 ) -> list[Minimum]:
     """Minima that are looked for on few rows, and from there on all, best first."""
-    result = _of_all_rows(objective, _ends_on_few_rows(few, begun.followed, begun.starts, advance))
+    ends = _ends_on_few_rows(few, begun.followed, begun.starts, advance)
+    result = _of_all_rows(objective, few, ends)
     for u in begun.special:
         if objective.chi2(u) < min((end.chi2 for end in result), default=math.inf):
             result.append(objective.minimise(u))
@@ -291,7 +292,7 @@ def _with_other_lengths(objective: Objective, result: list[Minimum]) -> list[Min
         for factor in _OTHER_LENGTHS:
             x = float(np.clip(best[i] + math.log(factor), *unknown.bounds))
             held = _some_way(rough, best, {i: x})
-            if math.isfinite(held.chi2):
+            if math.isfinite(held.chi2) and not _hopeless(held, result[0]):
                 ends.append(_near_minimum(rough, held.u))
         # Their valleys may be flat and long: the end of the best on each side will do.
         for side in (-1, 1):
@@ -347,35 +348,49 @@ def _ends_on_few_rows(
 ) -> list[Minimum]:
     """Minima on few rows, which are where the whole table is begun with.
 
-    Each start is followed some way; those that are hopeless beside a minimum that describes the
-    data are left there, and while none does, more starts are tried.
+    Each start is followed some way, until two have come to one minimum that describes the data;
+    while none does, more starts are tried. Ways that are hopeless beside a minimum are left there.
     """
-    ways = []
-    for start in followed:
+    ways: list[Minimum] = []
+    for k, start in enumerate(followed, 1):
         ways.append(_some_way(few, start))
         advance(1)
+        if _twice(few, ways):
+            advance(len(followed) - k)
+            break
     for start in starts[_FOLLOWED + 1 : _FOLLOWED_FAR_OFF]:
         if not all(_far_off(few, way) for way in ways):
             break
         ways.append(_some_way(few, start))
     ends: list[Minimum] = []
-    for way in sorted(ways, key=_CHI2)[: _FOLLOWED + 1]:
-        best = min(ends, key=_CHI2, default=None)
-        described = best is not None and not _far_off(few, best)
-        hopeless = best is not None and way.chi2 > _HOPELESS * (best.chi2 + _FEW_ROWS)
-        if math.isfinite(way.chi2) and not (hopeless and described):
+    for way in distinct(sorted(ways, key=_CHI2), _SAME_FEW)[: _FOLLOWED + 1]:
+        if math.isfinite(way.chi2) and not (ends and _hopeless(way, min(ends, key=_CHI2))):
             ends.append(_near_minimum(few, way.u))
     return ends
 
 
-def _of_all_rows(objective: Objective, ends: list[Minimum]) -> list[Minimum]:
+def _twice(objective: Objective, ways: list[Minimum]) -> bool:
+    """Whether two ways have come to the lowest minimum so far, and the law describes the data."""
+    best = min(ways, key=_CHI2)
+    same = sum(np.abs(way.u - best.u).max() < _SAME_FEW for way in ways)
+    return same > 1 and _p_value(objective, best) > DOUBTFUL
+
+
+def _hopeless(way: Minimum, best: Minimum) -> bool:
+    """Whether a way is so far above a minimum that it leads to no better one."""
+    return way.chi2 > _HOPELESS * (best.chi2 + _FEW_ROWS)
+
+
+def _of_all_rows(objective: Objective, few: Objective, ends: list[Minimum]) -> list[Minimum]:
     """Minima on all rows from the ends on few: the best, and those that may be as good."""
     ends = distinct(sorted((end for end in ends if math.isfinite(end.chi2)), key=_CHI2), _SAME_FEW)
     if not ends:
         return []
     largest = _AS_GOOD_FEW * (ends[0].chi2 + len(objective.unknowns) + _FEW_ROWS)
-    good = [end.u for end in ends if end.chi2 <= largest][:_FOLLOWED]
-    near = [_near_minimum(objective, u) for u in good if math.isfinite(objective.chi2(u))]
+    near = [end for end in ends if end.chi2 <= largest][:_FOLLOWED]
+    if few is not objective:
+        on_all = [end.u for end in near if math.isfinite(objective.chi2(end.u))]
+        near = [_near_minimum(objective, u) for u in on_all]
     near.sort(key=_CHI2)
     if not near or _far_off(objective, near[0]):
         return near
@@ -453,7 +468,7 @@ def _special_cases(objective: Objective, starts: list[Float]) -> list[Float]:
         if unknown.logarithmic or unknown.name not in _EXTENSIONS:
             continue
         trials = []
-        for start in starts[:_TRIED]:
+        for start in starts[: _FOLLOWED + 1]:
             trials.append(start.copy())
             trials[-1][i] = _NEARLY_ZERO
         if not trials:

@@ -26,6 +26,10 @@ _FARTHEST = 0.3
 #: Reweighted fits towards the sum of distances, and fits to the rows that are nearest, at most.
 _REWEIGHTED, _CONCENTRATED = 6, 8
 
+#: Share that chi-squared of the nearest rows must fall to in a reweighted fit while its probability
+#: is below the second number.
+_FALLING, _FAR_OFF = 0.8, 1e-12
+
 #: Residuals of a table at the minimum of chi-squared of its rows with weights; residuals of priors
 #: follow as row -1. None without a solution. Weights multiply the residuals, shape (rows,).
 Refit = Callable[[Float], Residuals | None]
@@ -62,13 +66,20 @@ def outlying_rows(residuals: Residuals, refit: Refit | None = None) -> list[int]
             raise _NoFitError
         return result
 
+    def farthest_of(some: Residuals) -> set[int]:
+        return set(rows[np.argsort(-_distances(some)[rows])[:most]].tolist())
+
     try:
-        now = residuals
+        now, apart = residuals, _chi2(residuals, farthest_of(residuals))
         for _ in range(_REWEIGHTED):
             now = fitted(np.maximum(_distances(now), 1.0) ** -0.5)
+            before, apart = apart, _chi2(now, farthest_of(now))
+            if apart > _FALLING * before and _p_value(now, farthest_of(now)) < _FAR_OFF:
+                # The law is wrong for most rows, and comes no nearer to them.
+                return []
         out: set[int] = set()
         for _ in range(_CONCENTRATED):
-            farthest = set(rows[np.argsort(-_distances(now)[rows])[:most]].tolist())
+            farthest = farthest_of(now)
             if farthest == out:
                 break
             out = farthest
@@ -117,7 +128,12 @@ def _p_value(residuals: Residuals, out: Collection[int]) -> float:
     """Probability of chi-squared of the rows that are kept; NaN without degrees of freedom."""
     kept = ~np.isin(residuals.row, list(out))
     dof = int(kept.sum()) - int(residuals.jacobian.any(0).sum())
-    return float(chi2.sf(np.sum(residuals.values[kept] ** 2), dof)) if dof > 0 else math.nan
+    return float(chi2.sf(_chi2(residuals, out), dof)) if dof > 0 else math.nan
+
+
+def _chi2(residuals: Residuals, out: Collection[int]) -> float:
+    """chi-squared of the rows that are kept."""
+    return float(np.sum(residuals.values[~np.isin(residuals.row, list(out))] ** 2))
 
 
 def _chance(residuals: Residuals, row: int, out: Collection[int]) -> float:

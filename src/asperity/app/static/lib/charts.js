@@ -32,7 +32,7 @@ export function series(index) {
  * `ownLabel` says what the keyboard does on the chart where that is not reading values.
  */
 export class Figure {
-  constructor({ name, title, height = 240, columns, options, ownLabel = "" }) {
+  constructor({ name, title, height = 240, columns, options, caption = "", ownLabel = "" }) {
     Object.assign(this, { name, title, height, columns, ownLabel });
     this.readout = el("div", { class: "readout", "aria-hidden": "true" });
     this.spoken = el("div", { class: "visually-hidden", "aria-live": "polite" });
@@ -59,6 +59,7 @@ export class Figure {
           button("CSV", "the numbers as CSV", () => this.#saveCsv()))),
       el("div", { class: "stage" }, this.plot, this.readout, this.spoken),
       this.note,
+      caption && el("p", { class: "note caption" }, caption),
     );
     figures.add(this);
   }

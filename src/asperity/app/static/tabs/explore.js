@@ -3,6 +3,7 @@
 import { Figure, series } from "../lib/charts.js";
 import { choice, Dock, group, Quantity, tick } from "../lib/controls.js";
 import { el, fill, formula } from "../lib/dom.js";
+import { Machine } from "../lib/machine.js";
 import { copyText } from "../lib/save.js";
 import { get, Latest, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
@@ -20,6 +21,7 @@ export function create(page) {
   const laws = Object.keys(catalogue.laws);
   const view = fresh();
   let figures = null;
+  let machine = null;
   let searching = null;
   let resting = 0;
   let answer = null;
@@ -162,6 +164,7 @@ export function create(page) {
     const found = {
       period: new Figure({
         name: "period", title: "One period", height: 400,
+        caption: "While the load is low the slider slips fast and the contacts are young; while it is high they age.",
         columns: () => answer.point?.converged && {
           phase: answer.point.phase, force: answer.point.force, slip_velocity: answer.point.slip,
           ...(answer.point.age ? { age: answer.point.age } : {}),
@@ -170,9 +173,11 @@ export function create(page) {
       amplitude: new Figure({
         name: "amplitude", title: "Against the amplitude", height: 400, columns: amplitudeColumns,
         options: phases.element,
+        caption: "The more the load is modulated, the lower the mean friction: laws differ in the harmonics most.",
       }),
       harmonics: new Figure({
         name: "harmonics", title: "Harmonics of the force", height: 230,
+        caption: "What a lock-in amplifier reads at once, twice, three times the frequency of the load.",
         columns: () => answer.point?.converged && {
           harmonic: answer.point.harmonics.map((_, i) => i + 1),
           real: answer.point.harmonics.map((c) => c[0]),
@@ -182,6 +187,7 @@ export function create(page) {
       }),
       multipliers: new Figure({
         name: "multipliers", title: "Floquet multipliers", height: 230,
+        caption: "A small disturbance is multiplied by these in each period: inside the circle it dies out.",
         columns: () => answer.point?.converged && {
           real: answer.point.multipliers.map((m) => m[0]),
           imaginary: answer.point.multipliers.map((m) => m[1]),
@@ -189,6 +195,7 @@ export function create(page) {
       }),
       air: new Figure({
         name: "air", title: "Air layer", height: 230,
+        caption: "Air between the surfaces carries a part of the modulation; the contacts feel the rest.",
         columns: () => answer.air && {
           frequency: answer.air.frequency, share: answer.air.share, phase: answer.air.phase,
         },
@@ -211,6 +218,7 @@ export function create(page) {
   function draw() {
     if (!answer || !answer.point) return;
     drawSentence();
+    machine.show(answer.point, answer.epsilon);
     drawPeriod();
     drawHarmonics();
     drawMultipliers();
@@ -414,8 +422,9 @@ export function create(page) {
     show(parameters) {
       if (!figures) {
         figures = makeFigures();
+        machine = new Machine();
         results.append(el("div", { class: "summary" }, sentence, readings, onPaper, message, copies),
-          el("div", { class: "panels" }, Object.values(figures).map((f) => f.element)),
+          el("div", { class: "panels" }, Object.values(figures).map((f) => f.element), machine.element),
           el("section", { class: "law", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
       }
       fromParameters(parameters);
