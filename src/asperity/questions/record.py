@@ -307,7 +307,7 @@ def _mistakes(
     limits = {"greater_than_equal": "at least", "less_than_equal": "at most"}
     if reported["type"] in limits:
         (limit,) = reported["ctx"].values()
-        rule = f"be {limits[reported['type']]} {limit}"
+        rule = f"be {limits[reported['type']]} {limit:g}"
         return (InputError(field, rule, value, "correct the value"),)
     said = " ".join(reported["msg"].split()).removeprefix("Input should be ")
     rule = next(
