@@ -40,6 +40,12 @@ Harmonics are compared as complex numbers where phases are given. eps_ratio is
 the share of epsilon that the contacts carry.
 
 \b
+Holds: one slide-hold-slide test a row: hold_time, healing (static friction less
+the level of sliding), V, K over the normal load (N/m with a column W0), and
+healing_err, the standard uncertainty; without it one error for all holds is
+estimated from what the law leaves. In SI, or with units in the heading: K (1/um).
+
+\b
 Recording: any file that 'asperity measure' reads, with friction (or force and
 load) and the displacement or velocity of the load point. It is compared with the
 motion through the whole of it; its stiffness K is free, its noise autoregressive.

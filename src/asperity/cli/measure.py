@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option
+from asperity.cli.options import json_option, set_option, settings_of
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.words import in_options
 from asperity.errors import InputError, naming
@@ -39,6 +39,8 @@ class FileRows:
         """Rows of a file; one row with the reason if it cannot be measured."""
         from asperity.measurement.campaign import failed_row, modulated_rows, sliding_rows
         from asperity.measurement.from_file import measured_parts
+        from asperity.measurement.stick_slip.catalogue import stick_slip_row
+        from asperity.measurement.stick_slip.measure import StickSlipMeasurement
         from asperity.recording.readers.from_file import read_source
 
         with naming(in_options):
@@ -46,6 +48,8 @@ class FileRows:
                 result = measured_parts(read_source(path, self.source), self.question)
                 if isinstance(result, list):
                     return modulated_rows(path, result)
+                if isinstance(result, StickSlipMeasurement):
+                    return [stick_slip_row(path, result)]
                 return sliding_rows(path, result)
             except InputError as error:
                 return [failed_row(path, 1, str(error))]
@@ -78,6 +82,8 @@ Examples:
       --frequency "120 Hz" --window 10:60 --json --plot recording.png
   asperity measure velocity_step.txt --no-modulation --plot steps.png
   asperity measure amplitudes.csv --amplitudes
+  asperity measure stick_slip.mat --set "K=168 N/m" --set "V=42 um/s" \\
+      --set "M=30.7 g" --events events.csv --plot events.png
   asperity measure day1/*.csv --out campaign.csv
 
 \b
@@ -131,6 +137,18 @@ in place of numbers; 2: bad input.
     help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
 @click.option(
+    "--stick-slip",
+    is_flag=True,
+    help="Slip events; by default, those of a recording that is stick-slip and not modulated.",
+)
+@set_option('--set "K=168 N/m" --set "V=42 um/s"', "K, V, M or W0 of the machine, for slip events")
+@click.option(
+    "--events",
+    type=Path,
+    metavar="CSV|NC|JSON",
+    help="Where the catalogue of slip events goes.",
+)
+@click.option(
     "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
 )
 @click.option(
@@ -160,6 +178,9 @@ def measure(
     no_modulation: bool,
     steps: str | None,
     holds: str | None,
+    stick_slip: bool,
+    settings: tuple[str, ...],
+    events: Path | None,
     amplitudes: bool,
     out: Path | None,
     resume: bool,
@@ -184,13 +205,17 @@ def measure(
         "detrend": detrend,
         "steps": None if steps is None else listed_times(steps, "--steps"),
         "holds": None if holds is None else listed_times(holds, "--holds"),
+        "stick_slip": True if stick_slip else None,
+        **_machine(settings),
     }
     question = Question(**fields)
+    if stick_slip and amplitudes:
+        raise InputError("--stick-slip must go without --amplitudes, got both; leave one out")
     if out is not None:
-        if plot is not None or steps or holds:
+        if plot is not None or events is not None or steps or holds:
             raise InputError(
-                "--plot, --steps and --holds must go with one recording without --out, got both; "
-                "measure that recording by itself"
+                "--plot, --events, --steps and --holds must go with one recording without --out, "
+                "got both; measure that recording by itself"
             )
         return _campaign(recordings, source, question, out, resume, jobs, as_json)
     if len(recordings) > 1:
@@ -211,6 +236,8 @@ def measure(
         return _amplitudes(recording, source, question, as_json)
     if plot is not None:
         _check_picture(plot, recording)
+    if events is not None:
+        _check_catalogue(events, recording)
     from asperity.measurement.from_file import answer_measurement
     from asperity.recording.readers.from_file import read_source
 
@@ -218,6 +245,8 @@ def measure(
     result, why = answer_measurement(trace, question)
     if why:
         click.echo(f"asperity: {why}", err=True)
+    if events is not None:
+        _catalogue(result, events)
     _print(result, recording, trace.provenance, as_json)
     if plot is not None:
         _plot(result, plot)
@@ -292,29 +321,71 @@ def _check_picture(path: Path, recording: Path) -> None:
     output_files({"--plot": path}, inputs={"recording": recording})
 
 
+def _check_catalogue(path: Path, recording: Path) -> None:
+    from asperity.measurement.stick_slip.catalogue import check_catalogue
+    from asperity.outputs import output_files
+
+    check_catalogue(path)
+    output_files({"--events": path}, inputs={"recording": recording})
+
+
+def _catalogue(result: Any, path: Path) -> None:
+    from asperity.measurement.stick_slip.catalogue import write_catalogue
+
+    if not hasattr(result, "regimes"):
+        raise InputError(
+            "--events must go with a stick-slip recording, got another; leave it out, or read slip "
+            "events with --stick-slip"
+        )
+    write_catalogue(result, path)
+
+
+def _machine(settings: tuple[str, ...]) -> dict[str, str]:
+    """What ``--set`` says of the machine, by the fields of the question."""
+    fields = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "normal_load"}
+    given = settings_of(settings)
+    for name in given:
+        if name not in fields:
+            raise InputError(
+                f"--set must name one of {', '.join(fields)}, got '{name}'; write it like "
+                '--set "K=168 N/m"'
+            )
+    return {fields[name]: text for name, text in given.items()}
+
+
 def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
     from asperity._version import __version__
-    from asperity.cli.measurement_text import modulated_text, sliding_text
+    from asperity.cli.measurement_text import modulated_text, sliding_text, stick_slip_text
     from asperity.cli.report import to_json
     from asperity.measurement.record import modulated_record, sliding_record
+    from asperity.measurement.stick_slip.catalogue import stick_slip_record
 
-    modulated = hasattr(result, "reading")
-    if as_json:
-        record = modulated_record(result) if modulated else sliding_record(result)
-        provenance_record = {"recording": str(recording), "version": __version__, **provenance}
-        click.echo(to_json({**record, "provenance": provenance_record}))
+    record_of: Any
+    text_of: Any
+    if hasattr(result, "reading"):
+        record_of, text_of = modulated_record, modulated_text
+    elif hasattr(result, "regimes"):
+        record_of, text_of = stick_slip_record, stick_slip_text
     else:
-        click.echo((modulated_text if modulated else sliding_text)(result, recording.name))
+        record_of, text_of = sliding_record, sliding_text
+    if as_json:
+        provenance_record = {"recording": str(recording), "version": __version__, **provenance}
+        click.echo(to_json({**record_of(result), "provenance": provenance_record}))
+    else:
+        click.echo(text_of(result, recording.name))
 
 
 def _plot(result: Any, path: Path) -> None:
     from asperity.figures.recording import draw_modulated, draw_sliding
+    from asperity.figures.stick_slip import draw_stick_slip
     from asperity.figures.style import style
     from asperity.outputs import written_file
 
+    draw: Any = draw_modulated if hasattr(result, "reading") else draw_sliding
+    if hasattr(result, "regimes"):
+        draw = draw_stick_slip
     with style(), written_file(path, "--plot") as file:
-        figure = (draw_modulated if hasattr(result, "reading") else draw_sliding)(result)
-        figure.savefig(file, metadata={"Software": None})
+        draw(result).savefig(file, metadata={"Software": None})
 
 
 def _verdict(checks: tuple[Check, ...]) -> int:

@@ -11,6 +11,7 @@ from asperity.outputs.tables import aligned, rounded
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
     from asperity.measurement.verdicts.verdict import Check
     from asperity.recording.finding import Finding
 
@@ -143,6 +144,44 @@ def sliding_text(measurement: SlidingMeasurement, name: str) -> str:
         *_holds(measurement),
     ]
     return "\n".join([*lines, *_quality(measurement.checks), *_unread(measurement.unread)])
+
+
+def stick_slip_text(measurement: StickSlipMeasurement, name: str) -> str:
+    """A stick-slip recording, as the command prints it.
+
+    Parameters
+    ----------
+    measurement : StickSlipMeasurement
+    name : str
+        Of the recording.
+    """
+    from asperity.measurement.stick_slip.catalogue import summary_rows
+
+    time = measurement.time
+    rate = (time.size - 1) / float(time[-1] - time[0])
+    head = f"{name}: {time[0]:.10g} s to {time[-1]:.10g} s, {time.size} samples at {rate:.4g} Hz"
+    parts = [(f"{r.start:.6g}", f"{r.end:.6g}", r.kind, r.evidence) for r in measurement.regimes]
+    slope, doubt = measurement.loading_slope, measurement.loading_slope_uncertainty
+    rows = [
+        ("events", str(len(measurement.events)), "", ""),
+        *summary_rows(measurement),
+        _row("loading_slope", slope, doubt, "1/s", "median of F/W in the sticks"),
+    ]
+    stiffness, doubt = measurement.stiffness_from_slope
+    if math.isfinite(stiffness):
+        rows.append(_row("stiffness", stiffness, doubt, "N/m", "loading_slope W0/V"))
+    smallest = f"{measurement.smallest_drop:.2g}"
+    rows.append(("smallest_drop", smallest, "", "a smaller one may not have been seen"))
+    return "\n".join(
+        [
+            head,
+            "regimes",
+            aligned([("from (s)", "to (s)", "regime", "evidence"), *parts], "  "),
+            "slip events",
+            aligned(rows, "  "),
+            *_quality(measurement.checks),
+        ]
+    )
 
 
 def _segments(measurement: SlidingMeasurement) -> list[str]:

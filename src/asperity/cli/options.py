@@ -28,14 +28,16 @@ def material_option() -> Decorator:
     )
 
 
-def set_option(example: str) -> Decorator:
+def set_option(
+    example: str, meaning: str = "A number with its unit, instead of the material's"
+) -> Decorator:
     """``--set``, to be repeated."""
     return click.option(
         "--set",
         "settings",
         metavar="NAME=VALUE",
         multiple=True,
-        help=f"A number with its unit, instead of the material's; repeatable. Example: {example}",
+        help=f"{meaning}; repeatable. Example: {example}",
     )
 
 

@@ -10,6 +10,7 @@ from asperity.errors import Argument, InputError, naming
 _OPTIONS: Mapping[str, str] = {
     "measure.trace": "the recording",
     "measure.steps and holds": "--steps and --holds",
+    "measure.events": "--events",
     "lock_in.detrend": "--detrend",
     "lock_in.harmonics": "--harmonics",
     "lock_in.frequency": "--frequency",

@@ -9,6 +9,12 @@ from asperity.experiment.amplitudes import (
 )
 from asperity.experiment.exciter import Exciter
 from asperity.experiment.loading import ElasticLength, elastic_length, loading_recording
+from asperity.experiment.memory import (
+    Holds,
+    VelocityStepResponse,
+    hold_response,
+    step_response,
+)
 from asperity.experiment.motion import DISPLACEMENT, DRIVE, FORCE, LOAD
 from asperity.experiment.recipes import (
     SlideHoldSlide,
@@ -28,13 +34,17 @@ __all__ = [
     "AmplitudeSeries",
     "ElasticLength",
     "Exciter",
+    "Holds",
     "SlideHoldSlide",
+    "VelocityStepResponse",
     "VelocitySteps",
     "amplitude_motion",
     "amplitude_series",
     "channel_gain",
     "elastic_length",
+    "hold_response",
     "loading_recording",
     "slide_hold_slide",
+    "step_response",
     "velocity_steps",
 ]

@@ -7,6 +7,7 @@ from asperity.inference.fitting.intervals import bounded_interval
 from asperity.inference.fitting.result import Estimate, Fit, Optimum
 from asperity.inference.fitting.shift import shift_of_estimates
 from asperity.inference.fitting.windows import WindowedFit, WindowEstimate, fit_windows
+from asperity.inference.holds.table import HealingTable, healing_table, read_healing
 from asperity.inference.objective import DataTerm, Objective
 from asperity.inference.posterior import Posterior, sample_posterior
 from asperity.inference.runs.assembly import RunOptions
@@ -22,6 +23,7 @@ __all__ = [
     "DesignPlan",
     "Estimate",
     "Fit",
+    "HealingTable",
     "Judged",
     "LockInTable",
     "MeasuredStiffness",
@@ -38,8 +40,10 @@ __all__ = [
     "design",
     "fit",
     "fit_windows",
+    "healing_table",
     "measured_stiffness",
     "plan_of",
+    "read_healing",
     "read_plan",
     "read_table",
     "recorded_run",

@@ -15,6 +15,7 @@ from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.inputs import priors_of
 from asperity.inference.fitting.result import Fit
 from asperity.inference.fitting.windows import WindowedFit, fit_windows
+from asperity.inference.holds.table import HEALING, HealingTable, read_healing
 from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import measured_stiffness
@@ -33,7 +34,11 @@ Reader = Callable[[questions.Data], Trace]
 _TRENDS = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
 
 
-def default_law(data: Sequence[LockInTable | RecordedRun]) -> str:
+#: Sets of data of any kind.
+AnyData = LockInTable | HealingTable | RecordedRun
+
+
+def default_law(data: Sequence[AnyData]) -> str:
     """The law that is fitted where none is named: of recordings, the law of ageing contacts.
 
     A table of harmonics is compared with the law whose asperities are elastic, which alone has
@@ -49,14 +54,26 @@ def is_table(data: questions.Data) -> bool:
     require_rereadable(path, "data")
     if path.suffix.lower() == ".json":
         return True
+    cells = _heading(path)
+    # The reader of tables says what is wrong with a file that cannot be opened.
+    return cells is None or HEALING in cells or any(cell in OBSERVABLES for cell in cells)
+
+
+def _has_holds(data: questions.Data) -> bool:
+    """Whether a table is one of slide-hold-slide tests."""
+    return data.file.suffix.lower() != ".json" and HEALING in (_heading(data.file) or ())
+
+
+def _heading(path: Path) -> list[str] | None:
+    """Words of the first line that is no comment; None where the file cannot be opened."""
     try:
         with path.open(encoding="utf-8-sig", errors="replace") as file:
             for line in file:
                 if line.strip() and not line.lstrip().startswith("#"):
-                    return any(cell in OBSERVABLES for cell in re.split(r"[,;\t\s]+", line.strip()))
+                    return re.split(r"[,;\t\s]+", line.strip())
     except OSError:
-        return True  # the reader of tables says what is wrong
-    return False
+        return None
+    return []
 
 
 def _read_trace(data: questions.Data) -> Trace:
@@ -65,7 +82,7 @@ def _read_trace(data: questions.Data) -> Trace:
 
 def read_data(
     question: questions.Fit | questions.Comparison, read: Reader = _read_trace
-) -> list[LockInTable | RecordedRun]:
+) -> list[AnyData]:
     """Tables and recordings of a question.
 
     Parameters
@@ -90,9 +107,12 @@ def read_data(
     at: dict[str, Any] = {
         n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
     }
-    result: list[LockInTable | RecordedRun] = []
+    held: dict[str, Any] = {n: question.fixed[n] for n in ("V", "K", "W0") if n in question.fixed}
+    result: list[AnyData] = []
     for data, table in zip(question.data, tables, strict=True):
-        if table:
+        if table and _has_holds(data):
+            result.append(read_healing(data.file, held))
+        elif table:
             result.append(read_table(data.file, at, name=data.name))
         else:
             result.append(recorded_run(read(data), window=data.window, **_reading(data)))

@@ -20,7 +20,7 @@ from asperity.materials import Material
 from asperity.outputs.json import plain
 from asperity.parameters.arguments import counted, shown
 
-Verdict: TypeAlias = Literal["reproduced", "misprint", "differs"]
+Verdict: TypeAlias = Literal["reproduced", "misprint", "differs", "undecided"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 #: What a check returns: numbers by name, and texts that stand for more than one number.
@@ -126,9 +126,9 @@ class Claim:
         Law or formula, parameters and method.
     rule : str
         What would make it "reproduced", fixed beforehand.
-    verdict : {"reproduced", "misprint", "differs"}
+    verdict : {"reproduced", "misprint", "differs", "undecided"}
         "misprint": the printed formula fails where the one derived from the paper's own equations
-        agrees with an integration of them.
+        agrees with an integration of them. "undecided": the rule cannot be applied, as `rule` says.
     why : str
         What to make of the verdict.
     numbers : mapping of str to float
@@ -232,6 +232,8 @@ _FORMULA = ("printed", "derived", "independent")
 
 def verdict(entry: Entry, numbers: Mapping[str, float], stated: Mapping[str, float]) -> Verdict:
     """The verdict that an entry's rule gives on the numbers computed for it."""
+    if entry.rule.is_undecided:
+        return "undecided"
     if entry.rule.is_formula:
         missing = {"printed", "independent"} - set(numbers)
         if missing or entry.rule.tolerance is None:
@@ -252,6 +254,8 @@ def verdict(entry: Entry, numbers: Mapping[str, float], stated: Mapping[str, flo
 
 
 def _rule_text(entry: Entry, stated: Mapping[str, float], *, several: bool) -> str:
+    if entry.rule.is_undecided:
+        return f"cannot be applied: {entry.rule.what}"
     if entry.rule.is_formula:
         return rules.formula_text(entry.rule.tolerance or math.nan)
     text = entry.rule.build(stated, entry.id).text
@@ -402,7 +406,7 @@ class Headline:
         "holds": every claim is reproduced, at the ends of all published uncertainties too.
         "holds at the central values": every claim is reproduced there, not at all ends.
         "undecided": a claim is not reproduced at the central values, but is within the
-        uncertainties. "does not hold": a claim is reproduced nowhere.
+        uncertainties, or cannot be decided. "does not hold": a claim is reproduced nowhere.
     claims : tuple of str
         Ids of the claims that decide.
     """
@@ -442,7 +446,7 @@ def headlines(words: Sequence[HeadlineWords], claims: Sequence[Claim]) -> list[H
 
 def _standing(claims: Sequence[Claim]) -> Standing:
     failed = [claim for claim in claims if claim.verdict != "reproduced"]
-    if any(claim.decided for claim in failed):
+    if any(claim.decided and claim.verdict != "undecided" for claim in failed):
         return "does not hold"
     if failed:
         return "undecided"

@@ -39,6 +39,11 @@ class RuleWords(_Table):
     tolerance: float | None = None
 
     @property
+    def is_undecided(self) -> bool:
+        """Whether no rule can be applied, for the reason that `what` gives."""
+        return self.accept == "undecided"
+
+    @property
     def is_formula(self) -> bool:
         """Whether it judges a printed formula by an independent number."""
         return self.accept == "formula"
@@ -54,7 +59,7 @@ class RuleWords(_Table):
         if self.accept not in rules.RULES:
             raise InputError(
                 f"{claim}.rule.accept must be a rule of the ledger, got '{self.accept}'; "
-                f"{closest(self.accept, (*rules.RULES, 'formula'))}"
+                f"{closest(self.accept, (*rules.RULES, 'formula', 'undecided'))}"
             )
         make, names = rules.RULES[self.accept]
         values = []

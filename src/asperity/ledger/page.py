@@ -27,6 +27,7 @@ VERDICT_TEXTS: Mapping[str, tuple[str, str]] = {
     "reproduced": ("✓", "the models give what the paper states"),
     "misprint": ("✎", "a printed formula fails, the one derived from the paper's equations holds"),
     "differs": ("≠", "the models do not give what the paper states"),
+    "undecided": ("?", "a number that the rule needs is missing, or the rule does not fit"),
 }
 #: What each kind of claim is.
 KIND_TEXTS: Mapping[str, str] = {
@@ -251,7 +252,7 @@ def _conclusions(headlines: Sequence[Headline], claims: dict[str, Claim]) -> str
 def _standing(headline: Headline) -> str:
     kind, sign = ("reproduced", "✓") if headline.holds else ("differs", "≠")
     if headline.standing == "undecided":
-        kind, sign = "misprint", "?"
+        kind, sign = "undecided", "?"
     return _chip(kind, sign, headline.standing)
 
 
@@ -268,9 +269,9 @@ def _basis(headline: Headline, claims: dict[str, Claim]) -> str:
 
 
 def counts(claims: Sequence[Claim]) -> dict[str, int]:
-    """Number of claims by verdict, zero included."""
+    """Number of claims by verdict, zero included but for "undecided"."""
     number = Counter[str](claim.verdict for claim in claims)
-    return {verdict: number[verdict] for verdict in VERDICT_TEXTS}
+    return {v: number[v] for v in VERDICT_TEXTS if number[v] or v != "undecided"}
 
 
 def _counted_apart(claims: Sequence[Claim]) -> str:
@@ -295,6 +296,7 @@ _FILTERS = (
     ("reproduced", "reproduced"),
     ("misprint", "misprint"),
     ("differs", "differs"),
+    ("undecided", "undecided"),
     ("apart", "fits, arithmetic, identities"),
 )
 
@@ -306,6 +308,7 @@ def _tiles(claims: Sequence[Claim]) -> str:
         f'<li class="{verdict}"><a href="#show-{verdict}"><b>{number[verdict]}</b> {verdict}'
         f"<span>{rich(meaning)}</span></a></li>"
         for verdict, (_, meaning) in VERDICT_TEXTS.items()
+        if verdict in number
     )
     return f'<ul class="tiles">{tiles}</ul>'
 
@@ -319,9 +322,10 @@ def _entries(claims: Sequence[Claim]) -> str:
     """
     totals = counts([claim for claim in claims if claim.is_test])
     totals |= {"all": len(claims), "apart": sum(not claim.is_test for claim in claims)}
-    anchors = "".join(f'<span class="filter" id="show-{key}"></span>' for key, _ in _FILTERS)
+    filters = [(key, name) for key, name in _FILTERS if key in totals]
+    anchors = "".join(f'<span class="filter" id="show-{key}"></span>' for key, _ in filters)
     links = "".join(
-        f'<a href="#show-{key}">{name} <b>{totals[key]}</b></a>' for key, name in _FILTERS
+        f'<a href="#show-{key}">{name} <b>{totals[key]}</b></a>' for key, name in filters
     )
     others = sum(claim.verdict != "reproduced" for claim in claims)
     rows = "\n".join(_entry(claim) for claim in claims)

@@ -252,7 +252,7 @@ def _summary(
         points=sum(figure.points for figure in figures),
         failed=sum(figure.failed for figure in figures),
         claims=len(claims),
-        tests={verdict: tests[verdict] for verdict in VERDICTS},
+        tests={v: tests[v] for v in VERDICTS if tests[v] or v != "undecided"},
         exceptions=tuple(
             (c.verdict, c.place, c.statement) for c in claims if c.verdict != "reproduced"
         ),

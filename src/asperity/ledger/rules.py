@@ -22,6 +22,8 @@ a number with its digits        what rounds to it: half a unit of the last digit
 "saturates"                     a logarithmic slope below 1/4; "does not": above 1/2
 ==============================  =========================================================
 
+A paper whose rules were fixed with other tolerances names them with "within" and "between".
+
 A statement about a range is judged at both ends of the range and between. Where the paper states
 one number twice, the more precise statement is judged.
 """
@@ -93,6 +95,14 @@ def about(stated: float, what: str = "the value") -> AcceptanceRule:
     )
 
 
+def within(stated: float, tolerance: float, what: str = "the value") -> AcceptanceRule:
+    """Within a relative tolerance that was fixed beforehand."""
+    return AcceptanceRule(
+        f"{what} within {100 * tolerance:.2g} % of {stated:g}",
+        lambda value: abs(value - stated) <= (tolerance + _TIE) * abs(stated),
+    )
+
+
 def of_order(stated: float, what: str = "the value") -> AcceptanceRule:
     """Within half a decade."""
     return AcceptanceRule(
@@ -135,6 +145,7 @@ def formula_text(tolerance: float) -> str:
 RULES: Mapping[str, tuple[Callable[..., AcceptanceRule], tuple[str, ...]]] = {
     "rounds-to": (rounds_to, ("stated", "last_digit")),
     "about": (about, ("stated",)),
+    "within": (within, ("stated", "tolerance")),
     "of-order": (of_order, ("stated",)),
     "below": (below, ("limit",)),
     "above": (above, ("limit",)),

@@ -6,14 +6,23 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from asperity.errors import ConstantLoadError, InputError
+from asperity.errors import Argument, ConstantLoadError, InputError
 from asperity.measurement.measure import Measurement, measure, measure_amplitudes
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
+from asperity.measurement.stick_slip.measure import (
+    Machine,
+    StickSlipMeasurement,
+    measure_stick_slip,
+)
 from asperity.questions.recording import Measurement as Question
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
 Read = TypeVar("Read")
+
+#: Share of the displacement in the slips above which it is the slider's, and slip events for each
+#: velocity step or hold above which these are read within stick-slip.
+_SLIDER, _EVENTS = 0.5, 10
 
 
 def measure_recording(
@@ -30,7 +39,12 @@ def measure_recording(
     refine: bool = True,
     steps: Sequence[float] | None = None,
     holds: Sequence[tuple[float, float]] | None = None,
-) -> Measurement | SlidingMeasurement:
+    stick_slip: bool | None = None,
+    stiffness: float | str | None = None,
+    velocity: float | str | None = None,
+    mass: float | str | None = None,
+    normal_load: float | str | None = None,
+) -> Measurement | SlidingMeasurement | StickSlipMeasurement:
     """Measure a recording, as ``asperity measure`` does.
 
     Parameters
@@ -55,10 +69,15 @@ def measure_recording(
         Of a recording without modulation: times (s) of velocity steps.
     holds : sequence of (float, float), optional
         Of a recording without modulation: begin and end (s) of holds.
+    stick_slip : bool
+        Whether slip events are read; by default they are if there are some, and no modulation.
+    stiffness, velocity, mass, normal_load : float or str, optional
+        K, V, M and W0 of the machine (N/m, m/s, kg, N), for slips, velocities and energies of slip
+        events. Without a recorded load W0 is M g unless it is given.
 
     Returns
     -------
-    Measurement or SlidingMeasurement
+    Measurement, SlidingMeasurement or StickSlipMeasurement
 
     Raises
     ------
@@ -77,6 +96,11 @@ def measure_recording(
         "detrend": detrend,
         "steps": steps,
         "holds": holds,
+        "stick_slip": stick_slip,
+        "stiffness": stiffness,
+        "velocity": velocity,
+        "mass": mass,
+        "normal_load": normal_load,
     }
     question = Question(**fields)
     trace = recording if isinstance(recording, Trace) else read(recording)
@@ -85,8 +109,8 @@ def measure_recording(
 
 def answer_measurement(
     trace: Trace, question: Question, *, plain: bool = False
-) -> tuple[Measurement | SlidingMeasurement, str]:
-    """What a question asks of a recording: its longest modulated stretch, or its sliding.
+) -> tuple[Measurement | SlidingMeasurement | StickSlipMeasurement, str]:
+    """What a question asks of a recording: its longest modulated stretch, events, or sliding.
 
     Parameters
     ----------
@@ -97,9 +121,9 @@ def answer_measurement(
 
     Returns
     -------
-    measurement : Measurement or SlidingMeasurement
+    measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
     what : str
-        What the recording is, where the program reads it as sliding by itself; else empty.
+        What the recording is, where the program reads it as not modulated by itself; else empty.
 
     Raises
     ------
@@ -116,7 +140,7 @@ def answer_measurement(
 
 def measured_parts(
     trace: Trace, question: Question
-) -> list[Measurement | InputError] | SlidingMeasurement:
+) -> list[Measurement | InputError] | SlidingMeasurement | StickSlipMeasurement:
     """As `answer_measurement`, with every modulated stretch of the recording or of the window."""
     return _either(trace, question, lambda: modulated_parts(trace, question))[0]
 
@@ -130,8 +154,8 @@ def modulated_parts(trace: Trace, question: Question) -> list[Measurement | Inpu
 
 def _either(
     trace: Trace, question: Question, modulated: Callable[[], Read], *, plain: bool = False
-) -> tuple[Read | SlidingMeasurement, str]:
-    """What `modulated` reads, or the sliding, as the question or the recording says."""
+) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
+    """What `modulated` reads, the sliding or the slip events, as question or recording says."""
 
     def sliding() -> SlidingMeasurement:
         return measure_sliding(
@@ -144,11 +168,32 @@ def _either(
             holds=question.holds,
         )
 
+    def events() -> StickSlipMeasurement:
+        machine = Machine(
+            question.stiffness, question.velocity, question.mass, question.normal_load
+        )
+        return measure_stick_slip(
+            trace,
+            load=question.load,
+            force=question.force,
+            window=question.window,
+            machine=machine,
+        )
+
+    if question.stick_slip:
+        return events(), ""
     if question.modulated is False:
         return sliding(), ""
     if question.modulated or question.frequency is not None:
         return modulated(), ""
-    return modulated_or_sliding(trace, modulated, sliding, load=question.load, plain=plain)
+    return modulated_or_sliding(
+        trace,
+        modulated,
+        sliding,
+        events if question.stick_slip is None else None,
+        load=question.load,
+        plain=plain,
+    )
 
 
 def _lock_in(question: Question) -> dict[str, Any]:
@@ -167,10 +212,11 @@ def modulated_or_sliding(
     trace: Trace,
     modulated: Callable[[], Read],
     sliding: Callable[[], SlidingMeasurement],
+    stick_slip: Callable[[], StickSlipMeasurement] | None = None,
     *,
     load: str = "W",
     plain: bool = False,
-) -> tuple[Read | SlidingMeasurement, str]:
+) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
     """Measure a recording as what it is.
 
     Parameters
@@ -180,14 +226,17 @@ def modulated_or_sliding(
         Measures a modulated recording.
     sliding : callable
         Measures one of which the load is constant, or not recorded.
+    stick_slip : callable, optional
+        Measures the slip events of one; None where these are not asked for.
     load : str
         Channel, by name or role.
     plain : bool
-        Whether sliding at one velocity counts; if not, velocity steps or holds are needed.
+        Whether sliding at one velocity counts whatever it is; if not, there must be velocity steps,
+        holds, slip events, or sliding that is steady.
 
     Returns
     -------
-    measurement : Measurement or SlidingMeasurement
+    measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
         Or what else `modulated` returns.
     reason : str
         What the recording is, where it was not read as modulated; else empty.
@@ -195,7 +244,7 @@ def modulated_or_sliding(
     Raises
     ------
     InputError
-        If it is neither.
+        If it is none of these.
     """
     try:
         return modulated(), ""
@@ -204,14 +253,54 @@ def modulated_or_sliding(
         if not constant and _recorded(trace, load):
             raise
         reason = error
+    what = "The normal load is constant" if constant else "No channel is the normal load"
+    events = _events(stick_slip)
     try:
         measurement = sliding()
     except InputError as error:
+        if not constant and len(trace.channels) == 1:
+            raise _which_force(trace) from None
         raise (error if constant and plain else reason) from None
-    if not (plain or measurement.steps or measurement.holds):
+    changes = len(measurement.steps) + len(measurement.holds)
+    if events is not None and _rather_events(events, changes):
+        return events, f"{what}: {events.kind} is read, not a modulation."
+    if changes:
+        return measurement, f"{what}: velocity steps and holds are read, not a modulation."
+    steady = events is not None and events.kind == "steady sliding"
+    if not (plain or steady):
         raise reason
-    what = "The normal load is constant" if constant else "No channel is the normal load"
-    return measurement, f"{what}: velocity steps and holds are read, not a modulation."
+    return measurement, f"{what}: steady sliding is read, not a modulation."
+
+
+def _events(read: Callable[[], StickSlipMeasurement] | None) -> StickSlipMeasurement | None:
+    try:
+        return None if read is None else read()
+    except InputError:
+        return None
+
+
+def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
+    """Whether slip events say more of a recording than its velocity steps and holds do.
+
+    Where the displacement is the slider's, each stick looks like a hold.
+    """
+    if not events.clear:
+        return False
+    if not changes or events.slip_share > _SLIDER:
+        return True
+    return any(r.sticks for r in events.regimes) and len(events.events) > _EVENTS * changes
+
+
+def _which_force(trace: Trace) -> InputError:
+    (name,) = trace.channels
+    friction, force = (Argument("columns", role, name) for role in ("friction", "F"))
+    return InputError(
+        Argument("columns", "friction"),
+        "name the friction in a recording of one column",
+        f"'{name}'",
+        f"where it is F/W write {friction}; where it is the force write {force} and give the load "
+        "too",
+    )
 
 
 def _recorded(trace: Trace, name: str) -> bool:

@@ -31,6 +31,11 @@ MEASURE_OPTIONS: Mapping[str, str] = {
     "detrend": "--detrend",
     "steps": "--steps",
     "holds": "--holds",
+    "stick_slip": "--stick-slip",
+    "stiffness": "--set K",
+    "velocity": "--set V",
+    "mass": "--set M",
+    "normal_load": "--set W0",
 }
 
 FIT_OPTIONS: Mapping[str, str] = {

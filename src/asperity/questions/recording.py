@@ -107,6 +107,10 @@ class Measurement(Question):
         Times (s) of the velocity steps of a recording without modulation.
     holds : tuple of (float, float), optional
         Begin and end (s) of its holds.
+    stick_slip : bool, optional
+        Whether slip events are read; by default where there are some, and no modulation.
+    stiffness, velocity, mass, normal_load : float or str, optional
+        K (N/m), V (m/s), M (kg) and W0 (N) of the machine, for slip events.
     """
 
     subject = "measure"
@@ -123,6 +127,11 @@ class Measurement(Question):
     detrend: Literal["none", "linear", "quadratic"] = "linear"
     steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
     holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
+    stick_slip: bool | None = None
+    stiffness: quantity("stiffness", "positive") | None = None  # type: ignore[valid-type]
+    velocity: quantity("velocity", "positive") | None = None  # type: ignore[valid-type]
+    mass: quantity("mass", "positive") | None = None  # type: ignore[valid-type]
+    normal_load: quantity("force", "positive") | None = None  # type: ignore[valid-type]
 
     @model_validator(mode="before")
     @classmethod
@@ -148,5 +157,12 @@ class Measurement(Question):
                 f"go with {Argument('modulated', value='False')}",
                 "them of a modulated recording",
                 "leave one of them out",
+            )
+        if self.stick_slip and (self.modulated is not None or self.frequency is not None):
+            raise InputError(
+                "measure.stick_slip",
+                f"go without {Argument('measure.modulated')} and {Argument('measure.frequency')}",
+                "both",
+                "leave one out",
             )
         return self

@@ -30,7 +30,7 @@ Form: TypeAlias = Literal["derived", "as_printed"]
 
 #: Laws whose steady sliding loses stability at a stiffness known in closed form: of rigid
 #: asperities, and of elastic ones with the velocity of their age law.
-_RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip")
+_RIGID = ("rice-ruina", "linker-dieterich", "ruina-slip", "perrin-rice-zheng")
 _ELASTIC = {"elasto-plastic": "slider", "elasto-plastic-age": "plastic"}
 
 

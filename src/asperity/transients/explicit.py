@@ -58,27 +58,53 @@ def _run(
     atol: Array,
 ) -> AcceptedSteps:
     def attempt(t: Array, Y: Array, h: Array, slope: Array) -> TrialStep:
-        return _attempt(system, t, Y, h, slope, rtol, atol)
+        return attempt_step(system, t, Y, h, slope, rtol, atol)
 
     slope = system.rates(system.at(t), Y)
     return run_steps(system, t, Y, h, end, longest, attempt, slope, _LIMITS)
 
 
-def _attempt(
-    system: SegmentEquations, t: Array, Y: Array, h: Array, slope: Array, rtol: Array, atol: Array
+def attempt_step(
+    system: SegmentEquations,
+    t: Array,
+    Y: Array,
+    h: Array,
+    slope: Array,
+    rtol: Array,
+    atol: Array,
+    *,
+    rolled: bool = False,
 ) -> TrialStep:
+    """One step of length `h` (s) from `Y`, whose rates are `slope`.
+
+    `rolled` compiles the stages as a loop: a twelfth of the program, for many motions at once.
+    """
     table, size = dormand_prince_8(), Y.shape[0]
     # Excitation of all stages at once: it does not depend on the states. The last two coincide.
     C = jnp.asarray(table.C[1:12])
     drive = jax.tree.map(lambda a: jnp.broadcast_to(a, C.shape), system.at(t + C * h))
     stages = jnp.zeros((13, size)).at[0].set(slope)
-    new = Y
-    # Unrolled: the number of terms in the sum differs from stage to stage.
-    for k in range(1, 13):
-        before, new = new, Y + h * _combined(table.A[k, :k], stages)
-        at = jax.tree.map(lambda a, k=k: a[min(k, 11) - 1], drive)
-        slope = system.rates(at, new)
-        stages = stages.at[k].set(slope)
+
+    def stage(k: Array | int, weights: Array, stages: Array) -> tuple[Array, Array]:
+        new = Y + h * _combined(weights, stages)
+        at = jax.tree.map(lambda a: a[jnp.minimum(k, 11) - 1], drive)
+        return new, stages.at[k].set(system.rates(at, new))
+
+    before = new = Y
+    if rolled:
+        rows = jnp.asarray(table.A)
+
+        def one(k: Array, carry: tuple) -> tuple:
+            _, before, stages = carry
+            return before, *stage(k, rows[k], stages)
+
+        before, new, stages = jax.lax.fori_loop(1, 13, one, (Y, Y, stages))
+    else:
+        # The number of terms in the sum differs from stage to stage.
+        for k in range(1, 13):
+            before = new
+            new, stages = stage(k, table.A[k, :k], stages)
+    slope = stages[12]
     scale = system.scale(jnp.maximum(jnp.abs(Y), jnp.abs(new)), rtol, atol)
     fifth = jnp.square(_combined(table.E5, stages) / scale).sum()
     third = jnp.square(_combined(table.E3, stages) / scale).sum()

@@ -120,8 +120,8 @@ def overview(question: ChosenPaper) -> dict[str, Any]:
 
 
 def _section(place: str) -> str:
-    """The section that a place such as "Section III.A.2; Fig. 7" names first."""
-    section = re.search(r"Abstract|Appendix|Section [IVX]+(\.[A-Z])?", place)
+    """The section, page or figure that a place such as "Section III.A.2; Fig. 7" names first."""
+    section = re.search(r"Abstract|Appendix|Section [IVX]+(\.[A-Z])?|p\. \d+|Figure \d+", place)
     return section[0] if section else "Captions"
 
 

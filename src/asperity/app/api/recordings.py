@@ -122,7 +122,8 @@ def _measured(
 ) -> dict[str, Any]:
     from asperity.measurement.from_file import answer_measurement
 
-    question = questions.Measurement(**argument["options"])
+    # The page shows modulated recordings, velocity steps and holds.
+    question = questions.Measurement(**{**argument["options"], "stick_slip": False})
     name = argument["name"]
     report(stage="measuring")
     measurement: Any

@@ -22,6 +22,7 @@ from asperity.inference.fitting.inputs import (
     require_enough,
     require_free,
     require_motion,
+    require_rows,
     start_values,
 )
 from asperity.inference.fitting.minima import extends, minima_of
@@ -33,7 +34,9 @@ from asperity.inference.fitting.plausibility import (
     unusual_numbers,
 )
 from asperity.inference.fitting.result import Fit
-from asperity.inference.objective import DataTerm, Objective
+from asperity.inference.holds.table import HealingTable, joined_holds
+from asperity.inference.holds.term import HoldTerm
+from asperity.inference.objective import DataTerm, Minimum, Objective
 from asperity.inference.runs.assembly import (
     USUAL_STIFFNESS,
     RunOptions,
@@ -48,17 +51,22 @@ from asperity.inference.runs.assembly import (
     stiffness_in,
     usual_ranges,
 )
-from asperity.inference.runs.blocks import coarser, reduced
+from asperity.inference.runs.blocks import coarser
+from asperity.inference.runs.cleaning import cleaned
 from asperity.inference.runs.reading import GAIN
-from asperity.inference.runs.run import RecordedRun, run_of, with_jumps
+from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.materials import Material
+from asperity.parameters import law_parameters
 from asperity.recording import Trace
 
-Data = LockInTable | RecordedRun | Trace
+#: The level of sliding (dimensionless; m/s), for data that are counted from it.
+_OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
+
+Data = LockInTable | HealingTable | RecordedRun | Trace
 
 
 def fit(
@@ -81,12 +89,12 @@ def fit(
     check_stiffness: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> Fit:
-    """Fit a friction law to lock-in readings and recordings.
+    """Fit a friction law to lock-in readings, tables of holds, and recordings.
 
     Parameters
     ----------
-    data : LockInTable, RecordedRun or Trace, or several
-        All in one likelihood.
+    data : LockInTable, HealingTable, RecordedRun or Trace, or several
+        All in one likelihood; tables of holds go with their like alone.
     law : str or type of Law
         Rate-dependent.
     free : sequence of str, optional
@@ -144,10 +152,29 @@ def fit(
         )
     options = runs or RunOptions()
     several = listed_data(data, options)
+    holds = [d for d in several if isinstance(d, HealingTable)]
     tables = [d for d in several if isinstance(d, LockInTable)]
     recordings = [d for d in several if isinstance(d, RecordedRun)]
     table = joined(tables)[0] if tables else None
     names = free_by_default(chosen, several, fixed, material) if free is None else list(free)
+
+    if holds:
+        if len(holds) < len(several):
+            raise InputError(
+                "data must be tables of holds alone or other data, got both; fit them one after "
+                "the other, with the first as the prior of the second"
+            )
+        objective = _hold_objective(
+            chosen,
+            joined_holds(holds),
+            names,
+            fixed=fixed or {},
+            material=material,
+            prior=prior,
+            start=start,
+            bare=bare,
+        )
+        return _fit_to_holds(objective, seed, starts, progress, profile=profile, simpler=simpler)
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
         return _objective(
@@ -210,6 +237,63 @@ def fit(
     return replace(result, warnings=(*result.warnings, other)) if other else result
 
 
+def _hold_objective(
+    law: type[Law],
+    table: HealingTable,
+    free: list[str],
+    *,
+    fixed: Mapping[str, Any],
+    material: Material | None,
+    prior: Material | Mapping[str, Prior] | None,
+    start: Mapping[str, Any] | None,
+    bare: bool,
+) -> Objective:
+    """The function to minimise for a table of holds, everything wrong refused."""
+    numbers = law_parameters(law)
+    for name in free:
+        if name not in numbers:
+            raise InputError(
+                f"free must be parameters of {law.name} with holds, got '{name}'; leave it out: "
+                "the table has stiffness and velocity"
+            )
+    priors = material_priors(prior, free) if isinstance(prior, Material) else dict(prior or {})
+    require_free(law, free, priors, bare=bare)
+    # Healing is counted from the level of sliding: the level itself does not enter.
+    assumed = {n: v for n, v in _OF_THE_LEVEL.items() if n in numbers and n not in free}
+    given = {n: v for n, v in fixed.items() if n not in ("V", "K", "W0")}
+    known = {n for n in assumed if material is not None and n in material} | set(given)
+    given |= {n: v for n, v in assumed.items() if n not in known}
+    constants = fixed_values(law, None, free, given, material)
+    begun = start_values(law, free, start, material)
+    unknowns = unknowns_of(law, free, largest_epsilon=0.0, start=begun, priors=priors)
+    require_rows(table.name, table.rows, unknowns)
+    term = HoldTerm(table, law, constants)
+    return Objective((term,), law, unknowns, constants, tolerance=1e-9)
+
+
+def _fit_to_holds(
+    objective: Objective,
+    seed: int,
+    starts: int,
+    progress: Callable[[int, int], None] | None,
+    *,
+    profile: bool,
+    simpler: Sequence[Fit],
+) -> Fit:
+    """The fit, under the error that the residuals of the best minimum show if none is given."""
+    steps = _Steps(progress, len(objective.unknowns))
+    special = [f.values for f in simpler if f.converged and extends(objective.law, f.objective.law)]
+    minima = minima_of(objective, seed, steps.minimised, drawn=starts, simpler=special)
+    if not minima or not math.isfinite(minima[0].chi2):
+        return failed_fit(objective)
+    for term in objective.terms_of(HoldTerm):
+        term.estimate_error(objective.named(minima[0].u), len(objective.unknowns))
+    objective.forget()
+    best = objective.minimise(minima[0].u)
+    others = [Minimum(m.u, objective.chi2(m.u)) for m in minima[1:]]
+    return described_fit(objective, [best, *others], profile=profile, described=steps.described)
+
+
 class _Steps:
     """Progress of a fit: minimisations, then parameters whose intervals are known."""
 
@@ -244,13 +328,14 @@ def _begun(result: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[s
 
 def listed_data(
     data: Data | Iterable[Data], options: RunOptions
-) -> list[LockInTable | RecordedRun]:
+) -> list[LockInTable | HealingTable | RecordedRun]:
     """One set of data or several as a list, recordings made ready."""
-    several = [data] if isinstance(data, LockInTable | RecordedRun | Trace) else list(data)
-    ready = [d if isinstance(d, LockInTable) else run_of(d) for d in several]
+    one = isinstance(data, LockInTable | HealingTable | RecordedRun | Trace)
+    several = [data] if one else list(data)
+    ready = [d if isinstance(d, LockInTable | HealingTable) else run_of(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate
-    return [d if isinstance(d, LockInTable) else with_jumps(reduced(d, rate)) for d in ready]
+    return [cleaned(d, rate) if isinstance(d, RecordedRun) else d for d in ready]
 
 
 def _objective(

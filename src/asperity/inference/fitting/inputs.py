@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import Argument, InputError
+from asperity.inference.holds.table import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
 from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
@@ -45,7 +46,7 @@ _REFERENCE_VELOCITY = 1e-6
 
 def free_by_default(
     law: type[Law],
-    data: Sequence[LockInTable | RecordedRun],
+    data: Sequence[LockInTable | HealingTable | RecordedRun],
     fixed: Mapping[str, Any] | None,
     material: Material | None,
 ) -> list[str]:
@@ -54,7 +55,7 @@ def free_by_default(
     Parameters
     ----------
     law : type of Law
-    data : sequence of LockInTable or RecordedRun
+    data : sequence of LockInTable, HealingTable or RecordedRun
         The stiffness of a recording is free in any case.
     fixed : mapping, optional
     material : Material, optional
@@ -301,10 +302,15 @@ def require_enough(table: LockInTable, unknowns: Sequence[Unknown]) -> None:
     InputError
     """
     count = int(sum(np.isfinite(v).sum() for v in table.values.values()))
+    require_rows(table.name, count, unknowns)
+
+
+def require_rows(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
+    """The same for a number of data."""
     needed = sum(1 for u in unknowns if u.prior is None)
     if count < max(needed + (needed > 1), 1):
         raise InputError(
-            table.name,
+            name,
             "hold more data than free parameters",
             f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})",
             "free fewer or measure more",

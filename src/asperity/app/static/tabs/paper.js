@@ -11,7 +11,7 @@ import { elementDrawing } from "./paper/element.js";
 export const name = "paper";
 export const title = "Paper";
 
-const VERDICTS = ["reproduced", "misprint", "differs"];
+const VERDICTS = ["reproduced", "misprint", "differs", "undecided"];
 /** Time (ms) without a change after which curves with the slider's mass are asked for. */
 const REST = 200;
 const KINDS = ["test", "fit", "arithmetic", "identity"];

@@ -1,0 +1,498 @@
+"""Holds and velocity steps of a simulated slider: what they do to friction, for many at once.
+
+Static friction, healing and its rate, what happens in the hold, the extremum after a step, and the
+way back to steady sliding. The extremum is located, not sampled.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity._version import __version__
+from asperity.algebra.small_systems import jacobian_columns, spectral_abscissa
+from asperity.errors import InputError
+from asperity.laws import Law
+from asperity.loads import Excitation
+from asperity.orbit.response import dimension_names
+from asperity.parameters import MACHINE, law_parameters, obeying
+from asperity.parameters.arguments import instance, switch
+from asperity.parameters.parameter import Displayed, SummaryLine, number_line
+from asperity.slider import QuasiStatic, Slider
+from asperity.slider.named import slider_values
+from asperity.transients.batch import End
+from asperity.transients.hold_and_step import SETTLED, HoldResponse, Settling, hold, settle, step
+
+if TYPE_CHECKING:
+    import xarray
+
+Float = NDArray[np.float64]
+
+#: Velocity (m/s) to which a slider without inertia can only run away, and that over the drive's.
+_RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
+#: Longest hold (s): beyond it squares of times would leave the range of doubles.
+_LONGEST = 1e20
+#: Points in a call of the compiled program; the smallest that is enough.
+_SHAPES = (64, 1024)
+#: Distance of the points of a difference in ln(hold time): its error is that of a step.
+_STEP = 0.02
+
+_SENTENCES = {
+    End.STEADY: "comes back to steady sliding",
+    End.RUNAWAY: (
+        "runs away after the extremum: steady sliding is stable, but the disturbance is too large "
+        "for this spring and law; take a stiffer spring, or inertia in asperity.transient"
+    ),
+    End.TOO_MANY_STEPS: "was not solved: no step was accurate, or more steps than allowed",
+    End.CROSSING: "was followed to the extremum only",
+}
+_UNSTABLE = (
+    "runs away after the extremum: the spring is softer than the critical stiffness; take a "
+    "stiffer spring, or inertia in asperity.transient"
+)
+
+
+@dataclass(frozen=True, repr=False)
+class Holds(Displayed):
+    """Slide, hold, slide: static friction and what leads to it; arrays of one shape.
+
+    Attributes
+    ----------
+    hold_time, velocity : array
+        s; of the drive before and after the hold (m/s).
+    level, minimum, maximum : array
+        F/W0 in steady sliding, at the end of the hold, and static friction, at the maximum after
+        it. Where friction rises to its steady value without a maximum (`has_maximum`), static
+        friction is that value.
+    healing : array
+        maximum - level, known as Delta mu_s.
+    healing_rate : array
+        Its derivative with respect to log10(hold time): per decade.
+    relaxation : array
+        level - minimum, positive.
+    hold_slip : array
+        Slip in the hold (m).
+    end_velocity : array
+        Plastic velocity at the end of the hold (m/s).
+    velocity_at_maximum : array
+        m/s; that of the drive.
+    states, states_at_maximum : array, shape (..., size)
+        Of the quasi-static motion: spring force (with that of the asperities), then the law's.
+    distance, slip : array
+        Way of the drive and of the slider from the end of the hold to the maximum (m).
+    settling_distance, settling_slip : array
+        The same to where the force stays within 5 % of the healing from its steady value; NaN where
+        it does not come there or was not asked for.
+    stable : bool array
+        Whether steady sliding is stable: K above the critical stiffness.
+    has_maximum : bool array
+    result : str array
+        What happens after the maximum.
+    slider : Slider
+    """
+
+    hold_time: Float
+    velocity: Float
+    level: Float
+    minimum: Float
+    maximum: Float
+    healing_rate: Float
+    hold_slip: Float
+    end_velocity: Float
+    velocity_at_maximum: Float
+    states: Float
+    states_at_maximum: Float
+    distance: Float
+    slip: Float
+    settling_distance: Float
+    settling_slip: Float
+    stable: NDArray[np.bool_]
+    has_maximum: NDArray[np.bool_]
+    result: NDArray[np.object_]
+    slider: Slider
+
+    @property
+    def healing(self) -> Float:
+        """Static friction less the level of sliding before the hold."""
+        return self.maximum - self.level
+
+    @property
+    def relaxation(self) -> Float:
+        """What the force falls by in the hold, over W0."""
+        return self.level - self.minimum
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Healing, its rate, and what follows."""
+        names = ("healing", "healing_rate", "relaxation", "hold_slip", "settling_slip")
+        lines = [number_line(name, getattr(self, name), _MEANINGS[name][1]) for name in names]
+        return f"Holds, {self.slider.law.name}, {_outcomes(self.result)}", lines
+
+    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
+        """Labelled arrays; axes are named by what varies along them alone, or by `dims`."""
+        drive = {"hold_time": ("s", self.hold_time), "velocity": ("m/s", self.velocity)}
+        return _dataset(self, drive, dims)
+
+
+@dataclass(frozen=True, repr=False)
+class VelocityStepResponse(Displayed):
+    """Steps of the drive's velocity from steady sliding; arrays of one shape.
+
+    Attributes
+    ----------
+    velocity_before, velocity : array
+        m/s.
+    before, extremum, after : array
+        F/W0 in steady sliding before, at the first extremum after the step, and in steady sliding
+        at the new velocity. Where there is no extremum (`has_extremum`), it is `after`.
+    direct : array
+        extremum - before: A ln(V/V_before) of a stiff spring.
+    evolution : array
+        extremum - after: B ln(V/V_before) of a stiff spring.
+    distance, slip : array
+        Way of the drive and of the slider from the step to the extremum (m).
+    settling_distance, settling_slip : array
+        The same to where the force stays within 5 % of `evolution` from its steady value; NaN where
+        it does not come there.
+    states_at_extremum : array, shape (..., size)
+    stable, has_extremum : bool array
+    result : str array
+    slider : Slider
+        As of `Holds`.
+    """
+
+    velocity_before: Float
+    velocity: Float
+    before: Float
+    extremum: Float
+    after: Float
+    distance: Float
+    slip: Float
+    settling_distance: Float
+    settling_slip: Float
+    states_at_extremum: Float
+    stable: NDArray[np.bool_]
+    has_extremum: NDArray[np.bool_]
+    result: NDArray[np.object_]
+    slider: Slider
+
+    @property
+    def direct(self) -> Float:
+        """What the step changes at once."""
+        return self.extremum - self.before
+
+    @property
+    def evolution(self) -> Float:
+        """What is lost again on the way to steady sliding."""
+        return self.extremum - self.after
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Direct effect, evolution, and what follows."""
+        names = ("direct", "evolution", "settling_slip")
+        lines = [number_line(name, getattr(self, name), _MEANINGS[name][1]) for name in names]
+        title = f"VelocityStepResponse, {self.slider.law.name}, {_outcomes(self.result)}"
+        return title, lines
+
+    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
+        """Labelled arrays; axes are named by what varies along them alone, or by `dims`."""
+        drive = {n: ("m/s", getattr(self, n)) for n in ("velocity_before", "velocity")}
+        return _dataset(self, drive, dims)
+
+
+def hold_response(
+    slider: Slider | Law,
+    *,
+    hold_time: ArrayLike | str,
+    velocity: ArrayLike | str,
+    stiffness: ArrayLike | str | None = None,
+    settling: bool = True,
+) -> Holds:
+    """Slide steadily, hold the drive, and slide again, for any law and any stiffness.
+
+    Parameters
+    ----------
+    slider : Slider or Law
+        A law alone takes `stiffness`. Its parameters may be arrays, which broadcast with the rest.
+    hold_time : array or str
+        Seconds, positive.
+    velocity : array or str
+        Of the drive before and after the hold (m/s), positive.
+    stiffness : array or str, optional
+        K/W0 (1/m), of a law alone: ``"0.002 1/um"``.
+    settling : bool
+        Whether to follow the motion beyond the maximum, to steady sliding or runaway.
+
+    Returns
+    -------
+    Holds
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or the law does not depend on velocity.
+
+    Notes
+    -----
+    Inertia is left out. Marone (1998), Eqs. (1)-(6), for the laws there. Integrated at a relative
+    1e-11 a step; `maximum` is accurate to about 1e-10.
+    """
+    slider = _slider(slider, stiffness)
+    time = obeying(hold_time, "hold_response.hold_time", "time", "positive")
+    if np.any(time > _LONGEST):
+        raise InputError(
+            f"hold_response.hold_time must be at most {_LONGEST:g} s, got {np.max(time):g} s; "
+            "asperity.theory.memory has the limits of long holds"
+        )
+    V = obeying(velocity, "hold_response.velocity", "velocity", "positive")
+    follow = switch(settling, "hold_response.settling")
+    (flat, V, time), shape = _flat((slider, V, time), "hold_response")
+
+    def run(slider: Slider, V: jax.Array, time: jax.Array, runaway: jax.Array) -> tuple:
+        found, extremum = hold(slider, V, time)
+        after = settle(slider, V, extremum, runaway) if follow else None
+        # The derivative by differences of order 4 in ln(hold time).
+        others = [hold(slider, V, time * np.exp(n * _STEP))[0].maximum for n in (-2, -1, 1, 2)]
+        slope = (others[0] - 8 * others[1] + 8 * others[2] - others[3]) / (12 * _STEP)
+        return found, after, np.log(10) * slope
+
+    runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
+    found, after, rate = _in_shapes(run, flat, V, time, runaway)
+    assert isinstance(found, HoldResponse)
+    stable = _stable(flat, V)
+    shaped = _Shaped(shape)
+    crossing = found.end == End.CROSSING
+    return Holds(
+        hold_time=shaped(time),
+        velocity=shaped(V),
+        level=shaped(found.level),
+        minimum=shaped(found.minimum),
+        maximum=shaped(found.maximum),
+        healing_rate=shaped(rate),
+        hold_slip=shaped(found.hold_slip),
+        end_velocity=shaped(found.velocity * V),
+        velocity_at_maximum=shaped(np.where(crossing, found.velocity_at_maximum * V, np.nan)),
+        states=shaped(found.states),
+        states_at_maximum=shaped(found.states_at_maximum),
+        distance=shaped(np.where(crossing, found.distance, np.nan)),
+        slip=shaped(np.where(crossing, found.slip, np.nan)),
+        **_settling(after, found.end, stable, shaped),
+        stable=shaped(stable),
+        has_maximum=shaped(crossing),
+        slider=slider,
+    )
+
+
+def step_response(
+    slider: Slider | Law,
+    *,
+    velocity_before: ArrayLike | str,
+    velocity: ArrayLike | str,
+    stiffness: ArrayLike | str | None = None,
+    settling: bool = True,
+) -> VelocityStepResponse:
+    """Slide steadily and step the drive's velocity, for any law and any stiffness.
+
+    Parameters
+    ----------
+    slider, stiffness, settling
+        As of `hold_response`.
+    velocity_before, velocity : array or str
+        Of the drive (m/s), positive and different.
+
+    Returns
+    -------
+    VelocityStepResponse
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or the law does not depend on velocity.
+    """
+    slider = _slider(slider, stiffness)
+    first = obeying(velocity_before, "step_response.velocity_before", "velocity", "positive")
+    V = obeying(velocity, "step_response.velocity", "velocity", "positive")
+    follow = switch(settling, "step_response.settling")
+    (flat, first, V), shape = _flat((slider, first, V), "step_response")
+    if np.any(first == V):
+        raise InputError(
+            f"step_response.velocity must differ from the one before, got {V[first == V][0]:g} m/s "
+            "for both; leave such points out"
+        )
+
+    def run(slider: Slider, V: jax.Array, first: jax.Array, runaway: jax.Array) -> tuple:
+        found, extremum = step(slider, first, V)
+        return found, settle(slider, V, extremum, runaway) if follow else None
+
+    runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
+    found, after = _in_shapes(run, flat, V, first, runaway)
+    stable = _stable(flat, V)
+    shaped = _Shaped(shape)
+    crossing = found.end == End.CROSSING
+    over = np.where(found.end == End.STEADY, found.after, found.extremum)
+    return VelocityStepResponse(
+        velocity_before=shaped(first),
+        velocity=shaped(V),
+        before=shaped(found.before),
+        extremum=shaped(over),
+        after=shaped(found.after),
+        distance=shaped(np.where(crossing, found.distance, np.nan)),
+        slip=shaped(np.where(crossing, found.slip, np.nan)),
+        states_at_extremum=shaped(found.states_at_extremum),
+        **_settling(after, found.end, stable, shaped),
+        stable=shaped(stable),
+        has_extremum=shaped(crossing),
+        slider=slider,
+    )
+
+
+def _slider(slider: Any, stiffness: Any) -> Slider:
+    advice = "give a law with stiffness, or asperity.Slider(law, spring=, load=)"
+    slider = instance(slider, (Slider, Law), "slider", advice)
+    if isinstance(slider, Law):
+        if stiffness is None:
+            raise InputError(
+                "stiffness must be given with a law alone, got none; give K/W0, as "
+                "stiffness='0.01 1/um', or a Slider"
+            )
+        K = obeying(stiffness, "stiffness", "per_length", "positive")
+        slider = Slider(slider, spring=K, load=1.0)
+    elif stiffness is not None:
+        raise InputError(
+            "stiffness must be left out with a slider, got both; the slider has a spring and a load"
+        )
+    if not slider.law.rate_dependent:
+        raise InputError(
+            f"law must depend on the velocity, got {slider.law.name}; it has no memory to test"
+        )
+    return slider
+
+
+def _flat(tree: Any, name: str) -> tuple[Any, tuple[int, ...]]:
+    leaves = jax.tree.leaves(tree)
+    try:
+        shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
+    except ValueError:
+        shapes = sorted({str(np.shape(leaf)) for leaf in leaves if np.shape(leaf)})
+        raise InputError(
+            f"{name} must have arguments of shapes that broadcast, got {', '.join(shapes)}; "
+            "give arrays of one shape, or add axes of length 1"
+        ) from None
+    flat = jax.tree.map(lambda a: np.ravel(np.broadcast_to(np.asarray(a, float), shape)), tree)
+    return flat, shape
+
+
+def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float) -> Any:
+    """Run many points in calls of a few shapes; the last points of a call may be repetitions."""
+    size = next((n for n in _SHAPES if len(V) <= n), _SHAPES[-1])
+    parts = []
+    for i in range(0, max(len(V), 1), size):
+        at = np.minimum(np.arange(i, i + size), len(V) - 1)
+        arguments = jax.tree.map(lambda a, at=at: jnp.asarray(a[at]), (slider, V, other, runaway))
+        kept = min(len(V) - i, size)
+        parts.append(jax.tree.map(lambda a, n=kept: np.asarray(a)[:n], run(*arguments)))
+    return jax.tree.map(lambda *a: np.concatenate(a), *parts)
+
+
+def _stable(slider: Slider, V: Float) -> NDArray[np.bool_]:
+    """Whether a small disturbance of steady sliding dies out."""
+    motion = QuasiStatic(slider, V, 1.0)
+    at = Excitation(jnp.ones(len(V)))
+    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), motion.steady())
+    return np.asarray(spectral_abscissa(jnp.stack(columns, axis=1)) < 0)
+
+
+class _Shaped:
+    """Arrays in the shape of the arguments."""
+
+    def __init__(self, shape: tuple[int, ...]) -> None:
+        self._shape = shape
+
+    def __call__(self, array: Any) -> Any:
+        array = np.asarray(array)
+        return array.reshape((*self._shape, *array.shape[1:]))
+
+
+def _settling(
+    after: Settling | None, end: Any, stable: NDArray[np.bool_], shaped: _Shaped
+) -> dict[str, Any]:
+    none = np.full(len(stable), np.nan)
+    ends = end if after is None else after.end
+    texts = np.array([_SENTENCES[End(int(e))] for e in ends], dtype=object)
+    texts[(ends == End.RUNAWAY) & ~stable] = _UNSTABLE
+    return {
+        "settling_distance": shaped(none if after is None else after.distance),
+        "settling_slip": shaped(none if after is None else after.slip),
+        "result": shaped(texts),
+    }
+
+
+def _outcomes(result: NDArray[np.object_]) -> str:
+    lost = sum(text != _SENTENCES[End.STEADY] for text in result.ravel())
+    return f"{result.size} points" + (f", {lost} of which do not settle" if lost else "")
+
+
+#: Unit and meaning of what the records hold.
+_MEANINGS: dict[str, tuple[str, str]] = {
+    "level": ("1", "F/W0 of steady sliding"),
+    "minimum": ("1", "F/W0 at the end of the hold"),
+    "maximum": ("1", "static friction: F/W0 at the maximum after the hold"),
+    "healing": ("1", "static friction less the level of sliding"),
+    "healing_rate": ("1", "healing per decade of hold time"),
+    "relaxation": ("1", "fall of F/W0 in the hold"),
+    "hold_slip": ("m", "slip in the hold"),
+    "end_velocity": ("m/s", "plastic velocity at the end of the hold"),
+    "before": ("1", "F/W0 of steady sliding before the step"),
+    "extremum": ("1", "F/W0 at the first extremum after the step"),
+    "after": ("1", "F/W0 of steady sliding after the step"),
+    "direct": ("1", "extremum less F/W0 before the step"),
+    "evolution": ("1", "extremum less F/W0 in steady sliding after the step"),
+    "distance": ("m", "way of the drive to the extremum"),
+    "slip": ("m", "slip to the extremum"),
+    "settling_distance": ("m", f"way of the drive to within {100 * SETTLED:g} % of steady sliding"),
+    "settling_slip": ("m", f"slip to within {100 * SETTLED:g} % of steady sliding"),
+    "stable": ("1", "whether steady sliding is stable"),
+}
+
+
+def _dataset(
+    record: Any, drive: dict[str, tuple[str, Float]], dims: tuple[str, ...] | None
+) -> xarray.Dataset:
+    import xarray
+
+    shape = record.result.shape
+    values = {name: (np.asarray(v), {"units": unit}) for name, (unit, v) in drive.items()}
+    known = {**law_parameters(type(record.slider.law)), **MACHINE}
+    for name, value in slider_values(record.slider).items():
+        array = np.asarray(value, float)
+        padded = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
+        values[name] = padded, known[name].attributes
+    varying = {name: _varying(value) for name, (value, _) in values.items()}
+    names = dimension_names(shape, varying, dims)
+    data = {
+        name: (names, getattr(record, name), {"units": unit, "long_name": meaning})
+        for name, (unit, meaning) in _MEANINGS.items()
+        if hasattr(record, name)
+    }
+    data["result"] = (names, record.result.astype(str), {"long_name": "what follows"})
+    coords = {
+        name: (
+            [d for d, n in zip(names, varying[name], strict=True) if n > 1],
+            value[tuple(slice(None) if n > 1 else 0 for n in varying[name])],
+            attributes,
+        )
+        for name, (value, attributes) in values.items()
+    }
+    attrs = {"asperity_version": __version__, "law": record.slider.law.name}
+    return xarray.Dataset(data, coords=coords, attrs=attrs)
+
+
+def _varying(value: Float) -> tuple[int, ...]:
+    """The shape of an array, with length 1 along the axes on which it does not vary."""
+    return tuple(
+        1 if np.all(value == np.take(value, [0], axis=axis)) else size
+        for axis, size in enumerate(value.shape)
+    )

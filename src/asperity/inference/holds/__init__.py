@@ -1,0 +1,1 @@
+"""Healing against hold time as data of a fit."""

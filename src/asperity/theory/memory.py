@@ -1,0 +1,269 @@
+"""Closed forms of an interface's memory: velocity steps, holds, healing, critical stiffness.
+
+Lengths in m, stiffness over the normal load, k = K/W0, in 1/m. Phi is the age, D0 the memory
+length, V the velocity, u the slip at constant V. With x = V Phi/D0 three laws have closed forms:
+
+==================  ==========================  ================================================
+law                 state                       after a step of the velocity by the factor r
+==================  ==========================  ================================================
+rice-ruina          dPhi/dt = 1 - x             x = 1 + (r - 1) exp(-u/D0)
+ruina-slip          dPhi/dt = -x ln x           ln x = ln r exp(-u/D0)
+perrin-rice-zheng   dPhi/dt = 1 - (x/2)^2       x/2 = (r + T)/(1 + r T),  T = tanh(u/(2 D0))
+==================  ==========================  ================================================
+
+All three relax as exp(-u/D0) near steady sliding, and lose its stability at k = (B - A)/D0. They
+differ in what a hold does.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from jax.typing import ArrayLike
+from numpy.typing import NDArray
+
+from asperity.algebra.small_systems import jacobian_columns, spectral_abscissa
+from asperity.errors import InputError
+from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
+from asperity.loads import Excitation
+from asperity.parameters import obeying
+from asperity.parameters.arguments import instance, number
+from asperity.slider import QuasiStatic, Slider
+
+Float = NDArray[np.float64]
+
+#: Stiffnesses at which stability is looked at, over the scale of the law: decades and points.
+_DECADES, _POINTS = 8, 400
+_BISECTIONS = 60
+_DECADE = math.log(10)
+
+
+def decay_rates(law: Law, velocity: float | str) -> NDArray[np.complex128]:
+    """Rates per slip (1/m) at which states relax to steady sliding at imposed velocity.
+
+    Parameters
+    ----------
+    law : Law
+        With one number for each parameter.
+    velocity : float or str
+        m/s.
+
+    Returns
+    -------
+    array, shape (states,)
+        Eigenvalues of -d(state rate)/d(state) over the velocity, by rising real part: 1/D0 of the
+        three laws above.
+    """
+    law = instance(law, Law, "law", "build one such as material.law('rice-ruina')")
+    V = jnp.asarray(number(velocity, "decay_rates.velocity", "velocity", "positive"))
+    one = jnp.ones(())
+
+    def rates(states: Array) -> Array:
+        return jnp.stack(jnp.broadcast_arrays(*law.state_rate(V, V, tuple(states), one)))
+
+    steady = jnp.stack(jnp.broadcast_arrays(*law.steady_state(V)))
+    return np.sort_complex(-np.linalg.eigvals(np.asarray(jax.jacfwd(rates)(steady)))) / float(V)
+
+
+def critical_stiffness(law: Law, velocity: float | str) -> float:
+    """Largest stiffness K/W0 (1/m) at which steady sliding is unstable, without inertia.
+
+    Parameters
+    ----------
+    law, velocity
+        As of `decay_rates`. Any law; elastic asperities count.
+
+    Returns
+    -------
+    float
+        (B - A)/D0 of the three laws above; 0 where steady sliding is stable at any stiffness.
+    """
+    rates = np.abs(decay_rates(law, velocity))
+    V = number(velocity, "critical_stiffness.velocity", "velocity", "positive")
+    state = law.steady_state(jnp.asarray(V))
+    _, direct = jax.jvp(
+        lambda log_v: law.friction(jnp.exp(log_v), state, jnp.ones(())),
+        (jnp.log(jnp.asarray(V)),),
+        (jnp.ones(()),),
+    )
+    scale = float(direct) * float(rates.max(initial=0.0))
+    if not scale > 0:
+        raise InputError(
+            f"law must have a state that relaxes and a direct effect, got {law.name}; "
+            "its sliding has no critical stiffness"
+        )
+    k = scale * np.logspace(-_DECADES, _DECADES, _POINTS)
+    unstable = np.flatnonzero(_growth(law, V, k) > 0)
+    if not unstable.size:
+        return 0.0
+    low, high = k[unstable[-1]], k[min(unstable[-1] + 1, _POINTS - 1)]
+    for _ in range(_BISECTIONS):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if _growth(law, V, np.array([middle]))[0] > 0 else (low, middle)
+    return float(low)
+
+
+def _growth(law: Law, V: float, k: Float) -> Float:
+    """Growth rate of a small disturbance of steady sliding, at stiffnesses `k`."""
+    wide = jax.tree.map(lambda a: jnp.broadcast_to(jnp.asarray(a, float), k.shape), law)
+    motion = QuasiStatic(Slider(wide, spring=k, load=np.ones_like(k)), jnp.full(k.shape, V), 1.0)
+    at = Excitation(jnp.ones(k.shape))
+    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), motion.steady())
+    return np.asarray(spectral_abscissa(jnp.stack(columns, axis=1)))
+
+
+def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) -> Array:
+    """ln(Phi/Phi_ss) after a slip at constant velocity that follows a step by the factor `ratio`.
+
+    Parameters
+    ----------
+    law : RiceRuina, RuinaSlip or PerrinRiceZheng
+        Others have no closed form here.
+    ratio : array
+        New velocity over the old one, positive.
+    slip : array or str
+        Since the step (m).
+    """
+    name, law = _one_of_three(law)
+    r = jnp.asarray(obeying(ratio, "state_after_step.ratio", "dimensionless", "positive"))
+    u = obeying(slip, "state_after_step.slip", "length", "not negative") / law.D0
+    if name == "rice-ruina":
+        return jnp.log1p((r - 1) * jnp.exp(-u))
+    if name == "ruina-slip":
+        return jnp.log(r) * jnp.exp(-u)
+    T = jnp.tanh(u / 2)
+    return jnp.log((r + T) / (1 + r * T))
+
+
+class LongHold(NamedTuple):
+    """Healing after a long hold of the ageing law, and what it leaves out.
+
+    Attributes
+    ----------
+    leading : array
+        Of contacts that only age in the hold.
+    renewal : array
+        Next order: what the slip in the hold takes off, negative. It falls with the hold time as
+        t^(-(B - A)/A) if B > A, slowly where A and B are close.
+    """
+
+    leading: Array
+    renewal: Array
+
+    @property
+    def healing(self) -> Array:
+        """Both."""
+        return self.leading + self.renewal
+
+
+def ageing_long_hold(
+    law: RiceRuina, *, velocity: ArrayLike | str, hold_time: ArrayLike | str, stiffness: Any
+) -> LongHold:
+    """Healing of the ageing law after a long hold, in closed form.
+
+    Parameters
+    ----------
+    law : RiceRuina
+    velocity : array or str
+        Before and after the hold (m/s).
+    hold_time : array or str
+        Seconds; V t/D0 is large.
+    stiffness : array or str
+        K/W0 (1/m).
+
+    Returns
+    -------
+    LongHold
+
+    Notes
+    -----
+    With y = V t/D0, kappa = k D0 and q = (B - A)/A, contacts that only age give, from
+    A ln(v/V) + B ln y = -k x, the slip x of the hold,
+
+        exp(k x/A) = 1 + kappa (1 - y^-q)/(B - A),    s = v Phi/D0 = y^-q / exp(k x/A),
+
+    and reloading, in which they are only renewed, takes the slip A D0 ln(kappa/B)/(kappa - B) to
+    the maximum:
+
+        leading = B ln y - B A ln(kappa/B)/(kappa - B),   renewal = B ln(1 - mean of s over t).
+    """
+    if type(law) is not RiceRuina:
+        raise InputError(
+            f"law must be the ageing law 'rice-ruina', got {getattr(law, 'name', type(law))}; "
+            "asperity.experiment.hold_response takes any law"
+        )
+    V = obeying(velocity, "ageing_long_hold.velocity", "velocity", "positive")
+    t = obeying(hold_time, "ageing_long_hold.hold_time", "time", "positive")
+    k = obeying(stiffness, "ageing_long_hold.stiffness", "per_length", "positive")
+    A, B, kappa = law.A, law.B, jnp.asarray(k * law.D0)
+    y = jnp.asarray(V * t / law.D0)
+    way = jnp.where(
+        jnp.abs(kappa / B - 1) < 1e-6,
+        A / B * (1 - 0.5 * (kappa / B - 1)),
+        A * jnp.log(kappa / B) / jnp.where(kappa == B, 1.0, kappa - B),
+    )
+    # The mean of s over y from the steady state on, by Gauss-Legendre in ln y.
+    nodes, weights = np.polynomial.legendre.leggauss(64)
+    shape = np.broadcast_shapes(y.shape, kappa.shape, jnp.shape(A), jnp.shape(B))
+    ln_y = jnp.broadcast_to(jnp.log(y), shape)[..., None]
+    z = jnp.exp(0.5 * ln_y * (nodes + 1))
+    A, B, kappa = (jnp.broadcast_to(jnp.asarray(a), shape)[..., None] for a in (A, B, kappa))
+    q = (B - A) / A
+    log_z = jnp.log(z)
+    grown = jnp.where(jnp.abs(q) < 1e-9, log_z / A, -jnp.expm1(-q * log_z) / (A * q))
+    s = jnp.exp(-q * log_z) / (1 + kappa * grown)
+    mean = (0.5 * ln_y * s * z) @ weights / jnp.broadcast_to(y, shape)
+    leading = law.B * (jnp.log(y) - way)
+    return LongHold(leading, law.B * jnp.log1p(-mean))
+
+
+def healing_rate_limit(law: RiceRuina) -> Array:
+    """Healing per decade of hold time to which a law tends as the hold gets long.
+
+    Parameters
+    ----------
+    law : RiceRuina, RuinaSlip or PerrinRiceZheng
+
+    Notes
+    -----
+    ==================  ==========================  ==============================================
+    law                 limit over ln 10            how slowly
+    ==================  ==========================  ==============================================
+    rice-ruina          B                           t^(-(B - A)/A) if B > A
+    ruina-slip          the smaller of A and B      1/ln t, with a factor that grows with k D0
+    perrin-rice-zheng   B - A/2, if B > A/2         t^(-1/2)
+    ==================  ==========================  ==============================================
+
+    Ageing: contacts age by t, and reloading takes a slip that does not depend on the hold. Slip law
+    with B > A: ln(v/V) = X - ln(Phi/Phi_ss), where -X grows as the exponential of the slip, so that
+    ln(Phi/Phi_ss) = (A/B) ln t, and reloading takes off its logarithm only. PRZ: contacts age by t;
+    in reloading they are renewed from v/V = y^(-1/2) on, y = V t/D0, where v Phi^(B/A) stays
+    constant, which takes the share A/(2 B) of ln t.
+    """
+    name, law = _one_of_three(law)
+    A, B = jnp.asarray(law.A), jnp.asarray(law.B)
+    if name == "rice-ruina":
+        return _DECADE * B
+    if name == "ruina-slip":
+        return _DECADE * jnp.minimum(A, B)
+    if not np.all(B > A / 2):
+        raise InputError(
+            "law.B must be above law.A / 2 for a healing rate in closed form, got less; "
+            "integrate with asperity.experiment.hold_response"
+        )
+    return _DECADE * (B - A / 2)
+
+
+def _one_of_three(law: Any) -> tuple[str, RiceRuina]:
+    if type(law) not in (RiceRuina, RuinaSlip, PerrinRiceZheng):
+        name = getattr(law, "name", type(law).__name__)
+        raise InputError(
+            f"law must be rice-ruina, ruina-slip or perrin-rice-zheng, got {name}; "
+            "asperity.experiment has the same for any law by integration"
+        )
+    return law.name, law

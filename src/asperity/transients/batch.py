@@ -1,0 +1,256 @@
+"""Many motions at once, each under constant load and drive: to a time, or to a crossing.
+
+Every motion takes steps of its length by the explicit method of order 8. A crossing is located by
+repeating the step in which it lies with another length, so that the states there have the accuracy
+of a step and not that of an interpolation. Derivatives with respect to the parameters are those of
+the steps at their lengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import IntEnum
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+from jax import Array
+from jax.lax import stop_gradient
+from jax.typing import ArrayLike
+
+from asperity.loads import Excitation
+from asperity.slider import QuasiStatic, Slider
+from asperity.transients.equations import SegmentEquations
+from asperity.transients.explicit import attempt_step
+
+#: Tolerated error of a step, of logarithms and relative of forces, and absolute of forces.
+_RTOL, _ATOL = 1e-11, 1e-13
+_SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
+
+#: Steps that a motion may take, rejected ones among them.
+MOST_STEPS = 60_000
+_ROOT_STEPS = 60
+
+
+class End(IntEnum):
+    """Why a motion ended."""
+
+    TIME = 0  # at the time that it was integrated to
+    CROSSING = 1  # where the distance rises through zero
+    STEADY = 2  # close to steady sliding, without a crossing
+    RUNAWAY = 3  # beyond the velocity to which a slider without inertia can only run away
+    TOO_MANY_STEPS = 4
+
+
+class ConstantDrive(SegmentEquations):
+    """Equations under the mean load, the drive moving at `pull` times V of the motion."""
+
+    pull: ArrayLike = 1.0
+
+    def at(self, t: Array) -> Excitation:
+        """The excitation, the same at all times."""
+        one = jnp.ones(jnp.shape(t))
+        return Excitation(one, pull=self.pull * one)
+
+    def log_slip(self, Y: Array) -> Array:
+        """ln(v_pl / V) of the states Y, shape (size + 1, ...)."""
+        return self.motion.log_slip(Y[:-1], self.at(jnp.zeros(Y.shape[1:])))
+
+
+class Drive(NamedTuple):
+    """What drives a motion, and where it ends; arrays of one shape.
+
+    Attributes
+    ----------
+    pull : array
+        Velocity of the drive over V.
+    until : array
+        Time (s) at which the motion ends at the latest.
+    up : array
+        The motion ends where this times ln(v_pl / V) rises through zero; 0 for never.
+    level, width : array
+        The last time is located at which F/W0 comes as close to `level` as `width`.
+    steady : array
+        The motion ends where ln(v_pl / V) and the distances of the law's states from steady sliding
+        sum up to less than this; 0 for never.
+    runaway : array
+        ln(v_pl / V) at which the motion ends as a runaway.
+    """
+
+    pull: ArrayLike = 1.0
+    until: ArrayLike = jnp.inf
+    up: ArrayLike = 0.0
+    level: ArrayLike = 0.0
+    width: ArrayLike = jnp.inf
+    steady: ArrayLike = 0.0
+    runaway: ArrayLike = jnp.inf
+
+
+class Reached(NamedTuple):
+    """Where a motion ended; arrays of one shape.
+
+    Attributes
+    ----------
+    t : array
+        Seconds.
+    Y : array, shape (..., size + 1)
+        States, and x K/W0.
+    end : array
+        `End`.
+    steps : array
+        Steps taken, rejected ones among them.
+    last, last_Y : array
+        Time at which the force last came as close to its level as the width, 0 if it never was
+        farther, and the states then.
+    """
+
+    t: Array
+    Y: Array
+    end: Array
+    steps: Array
+    last: Array
+    last_Y: Array
+
+
+def drive_many(slider: Slider, V: Array, drive: Drive, Y: Array) -> Reached:
+    """Integrate many motions without inertia, each from its states.
+
+    Parameters
+    ----------
+    slider : Slider
+        Its parameters of shape (points,) or (), as `V` (m/s) and the arrays of `drive`.
+    Y : array, shape (points, size + 1)
+    """
+
+    # Of one type whatever they come from: one program serves all drives.
+    def wide(a: ArrayLike) -> Array:
+        return jnp.broadcast_to(jnp.asarray(a, jnp.float64), jnp.shape(V))
+
+    return _drive_many(*jax.tree.map(wide, (slider, V, drive)), jnp.asarray(Y, jnp.float64))
+
+
+@jax.jit
+def _drive_many(slider: Slider, V: Array, drive: Drive, Y: Array) -> Reached:
+    def one(slider: Slider, V: Array, drive: Drive, Y: Array) -> Reached:
+        return _drive(QuasiStatic(slider, V, jnp.ones(())), drive, Y)
+
+    return jax.vmap(one)(slider, V, drive, Y)
+
+
+class _Step(NamedTuple):
+    """The beginning of a step, and its length."""
+
+    t: Array
+    Y: Array
+    slope: Array
+    h: Array
+
+
+class _Run(NamedTuple):
+    next: _Step
+    before: Array  # the two distances at the beginning of the next step
+    crossed: tuple[_Step, _Step]  # the last steps in which they rose through zero
+    end: Array
+    steps: Array
+
+
+def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
+    system = ConstantDrive(motion, None, pull=drive.pull)
+    target = motion.steady()
+
+    def distances(Y: Array) -> Array:
+        off = jnp.abs(motion.force(Y[:-1], system.at(jnp.zeros(()))) - drive.level)
+        return stop_gradient(jnp.stack([drive.up * system.log_slip(Y), drive.width - off]))
+
+    def body(run: _Run) -> _Run:
+        t, Y, slope, h = run.next
+        cut = t + h >= drive.until
+        h = jnp.where(cut, drive.until - t, stop_gradient(h))
+        trial = attempt_step(system, t, Y, h, slope, _RTOL, _ATOL, rolled=True)
+        good = trial.error < 1
+        factor = jnp.clip(_SAFETY * trial.error ** (-1 / 8), _SHRINK, _GROW)
+        factor = jnp.where(jnp.isfinite(trial.error), factor, _SHRINK)
+        h_next = stop_gradient(h * jnp.where(good, factor, jnp.minimum(factor, _SAFETY)))
+
+        def accepted(new: Array, old: Array) -> Array:
+            return jnp.where(good, new, old)
+
+        now = distances(trial.end)
+        rising = good & (run.before < 0) & (now >= 0)
+        this = _Step(t, Y, slope, h)
+        log_slip = stop_gradient(system.log_slip(trial.end))
+        off = jnp.abs(log_slip) + jnp.abs(trial.end[:-1] - target)[1:].sum()
+        lost = ~good & ~(t + h_next > t)
+        end = jnp.select(
+            [
+                rising[0],
+                good & (log_slip > drive.runaway),
+                good & cut,
+                good & (off < drive.steady),
+                lost | (run.steps >= MOST_STEPS),
+            ],
+            [End.CROSSING, End.RUNAWAY, End.TIME, End.STEADY, End.TOO_MANY_STEPS],
+            -1,
+        )
+        follow = _Step(
+            accepted(jnp.where(cut, drive.until, t + h), t),
+            accepted(trial.end, Y),
+            accepted(trial.memory, slope),
+            h_next,
+        )
+        crossed = tuple(
+            jax.tree.map(lambda a, b, r=r: jnp.where(r, a, b), this, step)
+            for r, step in zip(rising, run.crossed, strict=True)
+        )
+        return _Run(follow, accepted(now, run.before), crossed, end, run.steps + 1)
+
+    zero = jnp.zeros(())
+    first = _Step(
+        zero, Y, system.rates(system.at(zero), Y), stop_gradient(system.first_length(zero, Y))
+    )
+    none = first._replace(h=zero)
+    start = _Run(first, distances(Y), (none, none), jnp.asarray(-1), jnp.asarray(0))
+    run = jax.lax.while_loop(lambda run: run.end < 0, body, start)
+    # Both crossings by one loop.
+    steps = jax.tree.map(lambda a, b: jnp.stack([a, b]), *run.crossed)
+    s, there = jax.vmap(lambda step, n: _located(system, step, lambda Y: distances(Y)[n]))(
+        steps, jnp.arange(2)
+    )
+    crossing = run.end == End.CROSSING
+    return Reached(
+        jnp.where(crossing, steps.t[0] + s[0], run.next.t),
+        jnp.where(crossing, there[0], run.next.Y),
+        run.end,
+        run.steps,
+        steps.t[1] + s[1],
+        there[1],
+    )
+
+
+def _located(
+    system: ConstantDrive, step: _Step, rising: Callable[[Array], Array]
+) -> tuple[Array, Array]:
+    """Length of the step that ends where `rising` crosses zero, and the states there (Illinois)."""
+    h = stop_gradient(step.h)
+
+    def body(carry: tuple) -> tuple:
+        left, f_left, right, f_right, _, _, n = carry
+        middle = right - f_right * (right - left) / (f_right - f_left)
+        # The first length to try is that of the whole step.
+        middle = jnp.where(n == 0, h, jnp.where(jnp.isfinite(middle), middle, 0.5 * (left + right)))
+        Y = attempt_step(system, step.t, step.Y, middle, step.slope, _RTOL, _ATOL, rolled=True).end
+        value = rising(Y)
+        beyond = (value * f_right < 0) | (n == 0)
+        left_new = jnp.where(beyond, right, left)
+        f_left_new = jnp.where(beyond, f_right, 0.5 * f_left)
+        change = jnp.where(n == 0, h, jnp.abs(middle - right))
+        return left_new, f_left_new, middle, value, change, Y, n + 1
+
+    def unfinished(carry: tuple) -> Array:
+        *_, change, _, n = carry
+        return (n < _ROOT_STEPS) & (change > 1e-15 * h)
+
+    zero, at_start = jnp.zeros(()), rising(step.Y)
+    start = (zero, at_start, zero, at_start, h, step.Y, 0)
+    _, _, s, _, _, Y, _ = jax.lax.while_loop(unfinished, body, start)
+    return stop_gradient(s), Y

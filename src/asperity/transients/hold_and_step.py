@@ -1,0 +1,207 @@
+"""The two tests of an interface's memory, from steady sliding: a hold, and a step of the velocity.
+
+In both the spring force has an extremum where the plastic velocity equals that of the drive, since
+dF/dt = K (V - v_pl) up to a positive factor. That instant is located, not sampled.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax.numpy as jnp
+from jax import Array
+
+from asperity.slider import QuasiStatic, Slider
+from asperity.transients.batch import ConstantDrive, Drive, End, Reached, drive_many
+
+#: Share of the way from the extremum to steady sliding within which sliding counts as steady.
+SETTLED = 0.05
+#: Logarithms within which a motion that never reached the velocity of the drive counts as over.
+_OVER = 1e-9
+
+
+class Settling(NamedTuple):
+    """The way from an extremum to steady sliding; arrays of shape (points,).
+
+    Attributes
+    ----------
+    end : array
+        `End` of the motion.
+    distance, slip : array
+        Way of the drive and of the slider (m) from the beginning of reloading, or from the step, to
+        where the force stays within `SETTLED` of the change from its extremum. NaN where the
+        motion does not come there.
+    """
+
+    end: Array
+    distance: Array
+    slip: Array
+
+
+class HoldResponse(NamedTuple):
+    """Observables of a hold; arrays of shape (points,).
+
+    Attributes
+    ----------
+    level, minimum, maximum : array
+        F/W0 in steady sliding, at the end of the hold, and at the maximum after it.
+    hold_slip : array
+        Way of the slider in the hold (m).
+    velocity, velocity_at_maximum : array
+        Plastic velocity at the end of the hold and at the maximum, over that of the drive.
+    states, states_at_maximum : array, shape (points, size)
+        States of the quasi-static motion at the end of the hold and at the maximum.
+    distance, slip : array
+        Way of the drive and of the slider (m) from the end of the hold to the maximum.
+    end : array
+        `End`: CROSSING where there is a maximum; STEADY where the force rises to its steady value
+        without one, which is then the supremum.
+    """
+
+    level: Array
+    minimum: Array
+    maximum: Array
+    hold_slip: Array
+    velocity: Array
+    velocity_at_maximum: Array
+    states: Array
+    states_at_maximum: Array
+    distance: Array
+    slip: Array
+    end: Array
+
+
+def hold(slider: Slider, V: Array, hold_time: Array) -> tuple[HoldResponse, Reached]:
+    """Hold the drive of steadily sliding interfaces, and move it again until the maximum.
+
+    Parameters
+    ----------
+    slider : Slider
+        Its parameters, `V` (m/s) and `hold_time` (s) of shape (points,).
+
+    Returns
+    -------
+    (HoldResponse, Reached)
+        And where the motion is at the maximum, for `settle`.
+    """
+    motion = QuasiStatic(slider, V, 1.0)
+    one, steady = jnp.ones_like(V), _from_here(motion.steady())
+    level = _force(motion, steady)
+    still = _filled(Drive(pull=0.0, until=hold_time), one)
+    held = drive_many(slider, V, still, steady)
+    again = _filled(Drive(up=1.0, steady=_OVER), one)
+    reloaded = drive_many(slider, V, again, held.Y)
+    lost = (held.end != End.TIME) | (reloaded.end == End.TOO_MANY_STEPS)
+    end = jnp.where(lost, End.TOO_MANY_STEPS, reloaded.end)
+    maximum = _force(motion, reloaded.Y)
+    maximum = jnp.where(end == End.STEADY, jnp.maximum(maximum, level), maximum)
+    way = slider.W0 / slider.K
+    at_end, at_maximum = (
+        jnp.exp(ConstantDrive(motion, None).log_slip(there.Y.T)) for there in (held, reloaded)
+    )
+    response = HoldResponse(
+        level,
+        _force(motion, held.Y),
+        jnp.where(lost, jnp.nan, maximum),
+        held.Y[:, -1] * way,
+        at_end,
+        at_maximum,
+        held.Y[:, :-1],
+        reloaded.Y[:, :-1],
+        jnp.where(lost, jnp.nan, reloaded.t * V),
+        jnp.where(lost, jnp.nan, (reloaded.Y[:, -1] - held.Y[:, -1]) * way),
+        end,
+    )
+    # The displacement counts from the beginning of reloading.
+    from_there = reloaded.Y.at[:, -1].add(-held.Y[:, -1])
+    return response, reloaded._replace(Y=from_there, end=end)
+
+
+class StepResponse(NamedTuple):
+    """Observables of a velocity step; arrays of shape (points,).
+
+    Attributes
+    ----------
+    before, extremum, after : array
+        F/W0 in steady sliding before the step, at its first extremum after it, and in steady
+        sliding at the new velocity.
+    distance, slip : array
+        Way of the drive and of the slider (m) from the step to the extremum.
+    states_at_extremum : array, shape (points, size)
+    end : array
+        `End`: CROSSING where there is an extremum.
+    """
+
+    before: Array
+    extremum: Array
+    after: Array
+    distance: Array
+    slip: Array
+    states_at_extremum: Array
+    end: Array
+
+
+def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reached]:
+    """Step the velocity of the drive (m/s) of steadily sliding interfaces, until the extremum.
+
+    Shapes and the second result as of `hold`.
+    """
+    before, motion = (QuasiStatic(slider, speed, 1.0) for speed in (V_before, V))
+    one, start = jnp.ones_like(V), _from_here(before.steady())
+    up = jnp.where(V_before < V, 1.0, -1.0)
+    reached = drive_many(slider, V, _filled(Drive(up=up, steady=_OVER), one), start)
+    lost = reached.end == End.TOO_MANY_STEPS
+    way = slider.W0 / slider.K
+    response = StepResponse(
+        _force(motion, start),
+        jnp.where(lost, jnp.nan, _force(motion, reached.Y)),
+        _force(motion, _from_here(motion.steady())),
+        jnp.where(lost, jnp.nan, reached.t * V),
+        jnp.where(lost, jnp.nan, reached.Y[:, -1] * way),
+        reached.Y[:, :-1],
+        reached.end,
+    )
+    return response, reached
+
+
+def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Settling:
+    """Integrate from an extremum to steady sliding, or until the slider runs away.
+
+    Parameters
+    ----------
+    slider, V
+        As of `hold`.
+    extremum : Reached
+        The second result of `hold` or `step`.
+    runaway : array, shape (points,)
+        ln(v_pl / V) at which a motion counts as a runaway.
+    """
+    motion = QuasiStatic(slider, V, 1.0)
+    level = _force(motion, _from_here(motion.steady()))
+    width = SETTLED * jnp.abs(_force(motion, extremum.Y) - level)
+    # Where all logarithms are this close to steady sliding the force stays within the width.
+    close = jnp.minimum(1e-3, 0.05 * width)
+    drive = Drive(level=level, width=width, runaway=runaway, steady=close)
+    on = drive_many(slider, V, _filled(drive, jnp.ones_like(V)), extremum.Y)
+    crossing = extremum.end == End.CROSSING
+    over = crossing & (on.end == End.STEADY)
+    way = slider.W0 / slider.K
+    return Settling(
+        jnp.where(crossing, on.end, extremum.end),
+        jnp.where(over, (extremum.t + on.last) * V, jnp.nan),
+        jnp.where(over, on.last_Y[:, -1] * way, jnp.nan),
+    )
+
+
+def _filled(drive: Drive, one: Array) -> Drive:
+    return Drive(*(jnp.zeros_like(one) + value for value in drive))
+
+
+def _from_here(states: Array) -> Array:
+    """States, shape (size, points), as Y, shape (points, size + 1), with no displacement yet."""
+    return jnp.append(states, jnp.zeros((1, states.shape[1])), axis=0).T
+
+
+def _force(motion: QuasiStatic, Y: Array) -> Array:
+    at = ConstantDrive(motion, None).at(jnp.zeros(Y.shape[0]))
+    return motion.force(Y[:, :-1].T, at)

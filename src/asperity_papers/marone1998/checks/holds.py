@@ -1,0 +1,288 @@
+"""Claims on slide-hold-slide tests: Figure 3 and what the text says of the models there."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.ledger import check
+from asperity_papers.marone1998.laboratory import AGEING, LAWS, PRZ, SLIP, Laboratory, scans
+
+Numbers = dict[str, float]
+Float = NDArray[np.float64]
+
+#: Hold times (s) of the claims that name none, and stiffnesses (1/m) of those on stiffness.
+TIMES = np.array([1.0, 10.0, 100.0, 1e3, 1e4])
+STIFFNESSES = np.logspace(3, 6, 10)
+
+
+def pairs(name: str) -> tuple[Float, Float]:
+    """Two columns of a reading of Figure 3."""
+    table = np.array(scans()["figure_3"][name])
+    return table[:, 0], table[:, 1]
+
+
+def relative(new: Float, old: Float) -> float:
+    """The largest relative change."""
+    return float(np.max(np.abs(new / old - 1)))
+
+
+@check("maximum-at-load-velocity")
+def maximum_at_load_velocity(laboratory: Laboratory) -> Numbers:
+    off = {}
+    for name, letter in LAWS.items():
+        held = laboratory.holds(name, *laboratory.stiff, TIMES)
+        law = laboratory.granite(name)
+        rate_term = law.A * np.log(held.velocity_at_maximum / held.velocity)
+        off[letter] = float(np.max(np.abs(rate_term)) / law.A)
+    return off
+
+
+@check("ageing-soft")
+def ageing_soft(laboratory: Laboratory) -> Numbers:
+    times = np.array([2.0, 10.0, 100.0, 1e3, 1e4, 1e5])
+    healing = laboratory.healing(AGEING, *laboratory.soft, times)
+    return {f"{t:g} s": float(h) for t, h in zip(times, healing, strict=True)}
+
+
+def _off(laboratory: Laboratory, name: str, reading: str) -> Numbers:
+    times, read = pairs(reading)
+    healing = laboratory.healing(name, *laboratory.stiff, times)
+    off = {f"off at {t:g} s": float(h - r) for t, h, r in zip(times, healing, read, strict=True)}
+    return off | {f"{t:g} s": float(h) for t, h in zip(times, healing, strict=True)}
+
+
+@check("ageing-stiff")
+def ageing_stiff(laboratory: Laboratory) -> Numbers:
+    return _off(laboratory, AGEING, "ageing")
+
+
+@check("slip-curves")
+def slip_curves(laboratory: Laboratory) -> Numbers:
+    return _off(laboratory, SLIP, "slip")
+
+
+@check("prz-curves")
+def prz_curves(laboratory: Laboratory) -> Numbers:
+    return _off(laboratory, PRZ, "perrin_rice_zheng")
+
+
+@check("legend-velocity")
+def legend_velocity(laboratory: Laboratory) -> Numbers:
+    (time,), (read,) = pairs("ageing")
+    k, V = laboratory.stiff
+    legend, caption = (
+        float(laboratory.healing(AGEING, k, v, time) - read)
+        for v in (laboratory.numbers.V_stiff_legend, V)
+    )
+    return {"off": legend, "off, caption": caption}
+
+
+@check("ageing-same-values")
+def ageing_same_values(laboratory: Laboratory) -> Numbers:
+    times = np.array([1e3, 1e4, 1e5])
+    soft, stiff = (
+        laboratory.healing(AGEING, *spring, times) for spring in (laboratory.soft, laboratory.stiff)
+    )
+    return {f"{t:g} s": float(b / a - 1) for t, a, b in zip(times, soft, stiff, strict=True)}
+
+
+@check("ageing-same-rate")
+def ageing_same_rate(laboratory: Laboratory) -> Numbers:
+    soft, stiff = (
+        float(laboratory.slope(AGEING, *spring, 1e3, 1e5))
+        for spring in (laboratory.soft, laboratory.stiff)
+    )
+    return {"change": stiff / soft - 1, "soft": soft, "stiff": stiff}
+
+
+@check("ageing-rate-independent-of-stiffness")
+def ageing_rate_independent(laboratory: Laboratory) -> Numbers:
+    slopes = laboratory.slope(AGEING, STIFFNESSES, laboratory.numbers.V_soft, 1e4, 1e5)
+    return {"spread": float(np.ptp(slopes) / np.mean(slopes))}
+
+
+def _over_stiffness(laboratory: Laboratory, name: str) -> Float:
+    """Change of healing from one stiffness to the next, shape (stiffnesses - 1, times)."""
+    V = laboratory.numbers.V_soft
+    return np.diff(laboratory.healing(name, STIFFNESSES[:, None], V, TIMES), axis=0)
+
+
+@check("ageing-rises-with-stiffness")
+def ageing_rises(laboratory: Laboratory) -> Numbers:
+    return {"smallest": float(_over_stiffness(laboratory, AGEING).min())}
+
+
+@check("slip-falls-with-stiffness")
+def slip_falls(laboratory: Laboratory) -> Numbers:
+    change = _over_stiffness(laboratory, SLIP)
+    by_time = {f"largest at {t:g} s": float(c) for t, c in zip(TIMES, change.max(0), strict=True)}
+    return {"largest": float(change.max()), "rising": float(np.mean(change > 0)), **by_time}
+
+
+@check("slip-rate-falls-with-stiffness")
+def slip_rate_falls(laboratory: Laboratory) -> Numbers:
+    p = laboratory.numbers
+    k = np.array([p.k_soft, p.k_stiff])
+    soft, stiff = laboratory.slope(SLIP, k, p.V_soft, 1e4, 1e5)
+    return {"change": float(stiff - soft), "soft": float(soft), "stiff": float(stiff)}
+
+
+@check("slip-difference-widens")
+def slip_difference_widens(laboratory: Laboratory) -> Numbers:
+    times = np.array([2.0, 10.0, 30.0, 100.0, 1e3, 1e4, 1e5])
+    (soft, V), (stiff, slow) = laboratory.soft, laboratory.stiff
+    reference = laboratory.healing(SLIP, soft, V, times)
+    equal, actual = (reference - laboratory.healing(SLIP, stiff, v, times) for v in (V, slow))
+    more = actual - equal
+    by_time = {f"{t:g} s": float(m) for t, m in zip(times, more, strict=True)}
+    return {"smallest": float(more.min()), **by_time}
+
+
+@check("prz-less-sensitive")
+def prz_less_sensitive(laboratory: Laboratory) -> Numbers:
+    times = np.array([10.0, 100.0, 1e3, 1e4, 1e5])
+    change = {
+        name: np.abs(
+            laboratory.healing(name, *laboratory.stiff, times)
+            / laboratory.healing(name, *laboratory.soft, times)
+            - 1
+        )
+        for name in (SLIP, PRZ)
+    }
+    less = change[SLIP] - change[PRZ]
+    by_time = {f"{t:g} s": float(v) for t, v in zip(times, less, strict=True)}
+    return {"smallest": float(less.min()), **by_time}
+
+
+@check("prz-below-data")
+def prz_below_data(laboratory: Laboratory) -> Numbers:
+    below = {}
+    for name, spring in (("soft", laboratory.soft), ("stiff", laboratory.stiff)):
+        times, read = (column[pairs(name)[0] >= 400] for column in pairs(name))
+        model = laboratory.healing(PRZ, *spring, times)
+        fits = [np.polyfit(np.log10(times), values, 1)[0] for values in (read, model)]
+        below |= {
+            f"values, {name}": float(np.min(read - model)),
+            f"rate, {name}": float(fits[0] - fits[1]),
+        }
+    return below
+
+
+def _misfit(laboratory: Laboratory, V: float) -> float:
+    times, read = pairs("stiff")
+    off = laboratory.healing(AGEING, laboratory.numbers.k_stiff, V, times) - read
+    return float(np.sqrt(np.mean(off**2)))
+
+
+@check("actual-velocities-improve")
+def actual_velocities(laboratory: Laboratory) -> Numbers:
+    equal, actual = (_misfit(laboratory, v) for v in (laboratory.soft[1], laboratory.stiff[1]))
+    return {"improvement": equal - actual, "equal": equal, "actual": actual}
+
+
+@check("data-same")
+def data_same(laboratory: Laboratory) -> Numbers:
+    times, soft = pairs("soft")
+    stiff = dict(zip(*pairs("stiff"), strict=True))
+    differences = np.array([stiff[t] for t in times]) - soft
+    slopes = [np.polyfit(np.log10(times), y, 1)[0] for y in (soft, soft + differences)]
+    return {
+        "smallest": float(differences.min()),
+        "largest": float(differences.max()),
+        "mean": float(differences.mean()),
+        "standard error": float(differences.std(ddof=1) / np.sqrt(len(differences))),
+        "soft rate": float(slopes[0]),
+        "stiff rate": float(slopes[1]),
+    }
+
+
+@check("healing-scales-as-b")
+def healing_scales_as_b(laboratory: Laboratory) -> Numbers:
+    off = {}
+    for B in (0.009, 0.012, 0.018):
+        slope = laboratory.slope(AGEING, *laboratory.soft, 1e6, 1e7, B=B)
+        off[f"b = {B:g}"] = float(slope / (B * np.log(10)))
+    return off
+
+
+@check("long-hold-limit")
+def long_hold_limit(laboratory: Laboratory) -> Numbers:
+    """theta/t, and V over the drive's, towards a hold of 1e5 s at both springs."""
+    found = {}
+    times = np.array([1e3, 1e4, 1e5])
+    for label, (k, V) in (("soft", laboratory.soft), ("stiff", laboratory.stiff)):
+        held = laboratory.holds(AGEING, k, V, times)
+        age = np.exp(held.states[:, 1]) * laboratory.numbers.D0 / laboratory.numbers.V0
+        growth = 1 - held.end_velocity * age / laboratory.numbers.D0
+        found |= {
+            f"V falls, {label}": float(np.min(-np.diff(np.log(held.end_velocity)))),
+            f"rate rises, {label}": float(np.min(np.diff(growth))),
+            f"rate at 1e5 s, {label}": float(growth[-1]),
+            f"theta/t at 1e5 s, {label}": float(age[-1] / times[-1]),
+            f"V/Vl at 1e5 s, {label}": float(held.end_velocity[-1] / V),
+        }
+    return found
+
+
+@check("rises-with-velocity")
+def rises_with_velocity(laboratory: Laboratory) -> Numbers:
+    p, more = laboratory.numbers, {}
+    V = p.V_soft * np.array([[1.0], [10.0]])
+    for name, letter in LAWS.items():
+        slow, fast = laboratory.healing(name, p.k_stiff, V, TIMES)
+        more[letter] = float(np.min(fast - slow))
+    return more
+
+
+@check("product-of-velocity-and-time")
+def product(laboratory: Laboratory) -> Numbers:
+    p, off = laboratory.numbers, {}
+    V, time = p.V_soft * np.array([1.0, 10.0]), np.array([1e3, 1e2])
+    for name, letter in LAWS.items():
+        one, other = laboratory.healing(name, p.k_stiff, V, time)
+        off[letter] = float(other / one - 1)
+    return off
+
+
+@check("faster-falls-faster")
+def faster_falls_faster(laboratory: Laboratory) -> Numbers:
+    p, lower = laboratory.numbers, {}
+    V = p.V_soft * np.array([[1.0], [10.0]])
+    times = np.array([1.0, 10.0, 100.0, 1e3])
+    for name, letter in LAWS.items():
+        slow, fast = laboratory.holds(name, p.k_stiff, V, times).end_velocity
+        lower |= {f"{letter}, {t:g} s": float(v) for t, v in zip(times, fast / slow, strict=True)}
+    return lower
+
+
+@check("lower-velocity-higher-state")
+def higher_state(laboratory: Laboratory) -> Numbers:
+    p, more = laboratory.numbers, {}
+    V = p.V_soft * np.array([[1.0], [10.0]])
+    times = np.array([10.0, 100.0, 1e3, 1e4])
+    for name, letter in LAWS.items():
+        slow, fast = laboratory.holds(name, p.k_stiff, V, times).states[..., 1]
+        more |= {f"{letter}, {t:g} s": float(d) for t, d in zip(times, fast - slow, strict=True)}
+    return more
+
+
+@check("not-the-direct-effect")
+def not_the_direct_effect(laboratory: Laboratory) -> Numbers:
+    p, change = laboratory.numbers, {}
+    for name, letter in LAWS.items():
+        base, more = (
+            laboratory.healing(name, *laboratory.stiff, 1e3, A=A) for A in (p.A, 1.5 * p.A)
+        )
+        change[letter] = abs(float(more / base - 1))
+    return change
+
+
+@check("stress-falls-by-slip")
+def stress_falls_by_slip(laboratory: Laboratory) -> Numbers:
+    off = {}
+    for name, letter in LAWS.items():
+        k, V = laboratory.stiff
+        held = laboratory.holds(name, k, V, TIMES)
+        off[letter] = relative(held.relaxation, k * held.hold_slip)
+    return off

@@ -1,0 +1,106 @@
+"""Claims on velocity steps: Figure 2 and what the text says of it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from asperity import Slider, transient
+from asperity.experiment import VelocityStepResponse, step_response
+from asperity.ledger import check
+from asperity.loads import Programme, Slide
+from asperity.theory import memory
+from asperity_papers.marone1998.laboratory import AGEING, LAWS, PRZ, SLIP, Laboratory
+
+Numbers = dict[str, float]
+
+#: Over the paper's: a spring that hardly yields.
+_STIFF = 1e4
+
+
+def up_and_down(
+    laboratory: Laboratory, name: str, factor: float = 1.0, *, settling: bool = False
+) -> VelocityStepResponse:
+    """The steps of Figure 2, from steady sliding both."""
+    p = laboratory.numbers
+    slow, fast = p["V_2"].si_values
+    return step_response(
+        laboratory.illustration(name),
+        velocity_before=[slow, fast],
+        velocity=[fast, slow],
+        stiffness=factor * p.k_2,
+        settling=settling,
+    )
+
+
+@check("figure-2-ageing", AGEING)
+@check("figure-2-slip", SLIP)
+@check("figure-2-prz", PRZ)
+def figure_2(laboratory: Laboratory, name: str) -> Numbers:
+    step, D0 = up_and_down(laboratory, name, settling=True), laboratory.numbers.D0_2
+    return {
+        "peak": float(step.direct[0]),
+        "at load": float(step.distance[0] / D0),
+        "trough": float(step.direct[1]),
+        "settled": float(step.settling_distance[0] / D0),
+    }
+
+
+@check("peak-height")
+def peak_height(laboratory: Laboratory) -> Numbers:
+    found = {letter: float(up_and_down(laboratory, n).direct[0]) for n, letter in LAWS.items()}
+    stiff = {
+        f"{letter}, stiff": float(up_and_down(laboratory, n, _STIFF).direct[0])
+        for n, letter in LAWS.items()
+    }
+    return found | stiff
+
+
+@check("peak-to-end")
+def peak_to_end(laboratory: Laboratory) -> Numbers:
+    found = {letter: float(up_and_down(laboratory, n).evolution[0]) for n, letter in LAWS.items()}
+    stiff = {
+        f"{letter}, stiff": float(up_and_down(laboratory, n, _STIFF).evolution[0])
+        for n, letter in LAWS.items()
+    }
+    return found | stiff
+
+
+@check("end-level")
+def end_level(laboratory: Laboratory) -> Numbers:
+    """At 7 Dc, by an integration of that length, and in the end."""
+    p = laboratory.numbers
+    slow, fast = p["V_2"].si_values
+    found = {}
+    for name, letter in LAWS.items():
+        slider = Slider(laboratory.illustration(name), spring=p.k_2, load=1.0)
+        run = transient(
+            slider, Programme(Slide(7 * p.D0_2 / fast, velocity=fast), load=1.0, velocity=slow)
+        )
+        found[letter] = float(run.force[0] - run.force[-1])
+    step = up_and_down(laboratory, AGEING)
+    return found | {"in the end": float(step.before[0] - step.after[0])}
+
+
+@check("direct-effect")
+def direct_effect(laboratory: Laboratory) -> Numbers:
+    signs = {}
+    for name, letter in LAWS.items():
+        up, down = up_and_down(laboratory, name).direct
+        signs |= {f"{letter}, up": float(up), f"{letter}, down": -float(down)}
+    return signs
+
+
+@check("ageing-asymmetric")
+def ageing_asymmetric(laboratory: Laboratory) -> Numbers:
+    D0, law = laboratory.numbers.D0_2, laboratory.illustration(AGEING)
+    u, imposed = np.linspace(0, 10, 100_001) * D0, {}
+    for r in (10.0, 0.1):
+        state = np.abs(np.asarray(memory.state_after_step(law, r, u)))
+        imposed[r] = u[np.argmax(state <= 0.05 * np.log(10))]
+    on_spring = up_and_down(laboratory, AGEING, settling=True).settling_slip / D0
+    return {
+        "ratio, imposed velocity": float(imposed[10.0] / imposed[0.1]),
+        "ratio, spring of Figure 2": float(on_spring[0] / on_spring[1]),
+        "up": float(on_spring[0]),
+        "down": float(on_spring[1]),
+    }

@@ -1,0 +1,207 @@
+"""Claims on data and their summaries, on stress drops, on gouge, and on afterslip."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import least_squares
+
+from asperity.experiment import hold_response
+from asperity.ledger import check
+from asperity_papers.marone1998.laboratory import AGEING, DECADE, Laboratory, scans
+
+Numbers = dict[str, float]
+
+_DAY = 86400.0
+
+
+@check("b-per-decade")
+def b_per_decade(laboratory: Laboratory) -> Numbers:
+    slope = laboratory.numbers.B_5 * DECADE
+    return {"slope": slope, "over about .01": slope / laboratory.numbers.healing_per_decade}
+
+
+@check("velocity-slope-of-gouge")
+def velocity_slope(laboratory: Laboratory) -> Numbers:
+    printed = -laboratory.numbers.B_less_A_5 * DECADE
+    return {"slope": printed, "scan": scans()["figure_5"]["velocity_slope"]}
+
+
+@check("decade-of-velocity")
+def decade_of_velocity(laboratory: Laboratory) -> Numbers:
+    """Healing and static friction itself, a decade of velocity apart, of the gouge of Figure 5."""
+    p, law = laboratory.numbers, laboratory.gouge()
+    held = hold_response(
+        law, hold_time=1e4, velocity=p["V_5"].si_values, stiffness=p.k_stiff, settling=False
+    )
+    healing, absolute = np.diff(held.healing)[0], np.diff(held.maximum)[0]
+    return {
+        "scan": scans()["figure_4"]["offset"],
+        "healing": float(healing),
+        "static friction": float(absolute),
+        "b ln 10": float(law.B) * DECADE,
+        "a ln 10": float(law.A) * DECADE,
+    }
+
+
+@check("slopes-differ")
+def slopes_differ(laboratory: Laboratory) -> Numbers:
+    p, scan = laboratory.numbers, scans()
+    slopes = np.array(scan["figure_4"]["slopes"]) / abs(scan["figure_5"]["velocity_slope"])
+    return {"low": float(slopes[0]), "high": float(slopes[1]), "model": p.B_5 / p.B_less_A_5}
+
+
+@check("stress-per-decade")
+def stress_per_decade(laboratory: Laboratory) -> Numbers:
+    p = laboratory.numbers
+    return {"MPa": 1e-6 * p.healing_per_decade * p.normal_stress}
+
+
+@check("fault-strength")
+def fault_strength(laboratory: Laboratory) -> Numbers:
+    return {"MPa": 1e-6 * laboratory.numbers.mu0 * laboratory.numbers.normal_stress}
+
+
+@check("complete-stress-drop")
+def complete_stress_drop(laboratory: Laboratory) -> Numbers:
+    p = laboratory.numbers
+    return {"percent": 100 * p.healing_per_decade / p.mu0}
+
+
+@check("seismic-healing")
+def seismic_healing(laboratory: Laboratory) -> Numbers:
+    # A stress drop s that grows to r s in a decade grows by (r - 1) s: s for 1 and 3 MPa.
+    return {
+        f"{rise:g} MPa, factor {r:g}": rise / (r - 1) for rise in (1.0, 3.0) for r in (2.0, 5.0)
+    }
+
+
+@check("scaled-memory-length")
+def scaled_memory_length(laboratory: Laboratory) -> Numbers:
+    return {"mm": 1e3 * laboratory.numbers.zeta * laboratory.numbers.shear_band}
+
+
+@check("shear-band-of-laboratory")
+def shear_band(laboratory: Laboratory) -> Numbers:
+    low, high = laboratory.numbers["D0_laboratory"].si_range
+    band = 1e3 * np.array([low, high]) / laboratory.numbers.zeta
+    # Over the 0.1 and 1 mm that are printed.
+    return {"low": float(band[0] / 0.1), "high": float(band[1] / 1.0)}
+
+
+@check("intrinsic-and-dilation")
+def intrinsic_and_dilation(laboratory: Laboratory) -> Numbers:
+    scan = scans()["figure_7"]
+    bare, gouge = scan["bare"][0], np.array(scan["gouge"])
+    needed = gouge[:, 0] - bare
+    return {"needed low": float(needed.min()), "needed high": float(needed.max())}
+
+
+@check("dilation-too-small")
+def dilation_too_small(laboratory: Laboratory) -> Numbers:
+    low, high = laboratory.numbers["strengthening"].si_range
+    return {"low": low / laboratory.numbers.dilation, "high": high / laboratory.numbers.dilation}
+
+
+@check("half-of-the-year")
+def half_of_the_year(laboratory: Laboratory) -> Numbers:
+    """U = alpha ln(1 + s t): s that makes half of a year's slip occur in 14 d, by its root."""
+    days = laboratory.numbers.half_year_afterslip / _DAY
+    # 2 ln(1 + 14 s) = ln(1 + 365 s) is quadratic: 1 + 28 s + 196 s^2 = 1 + 365 s.
+    rate = (365 - 2 * days) / days**2
+    share = np.log1p(rate * days) / np.log1p(rate * 365)
+    printed = np.log1p(1.72 * days) / np.log1p(1.72 * 365)
+    return {"share": float(printed), "rate": float(rate), "share, exact": float(share)}
+
+
+def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
+    depth, slip = np.array(scans()["figure_16a"][name]).T
+    return depth, slip
+
+
+@check("afterslip-equals-coseismic")
+def afterslip_equals_coseismic(laboratory: Laboratory) -> Numbers:
+    h, coseismic = _read("coseismic")
+    net = np.interp(h, *_read("net"), left=1.0)
+    # The depth at which half of the net slip is coseismic.
+    return {"km": float(np.interp(0.0, -(coseismic - 0.5 * net), h))}
+
+
+@check("buried-slip")
+def buried_slip(laboratory: Laboratory) -> Numbers:
+    h, coseismic = _read("coseismic")
+    return {"km": float(h[np.argmin(coseismic > 0)])}
+
+
+@check("afterslip-equals-dynamic")
+def afterslip_equals_dynamic(laboratory: Laboratory) -> Numbers:
+    return {"afterslip": float(np.interp(2.5, *_read("net")))}
+
+
+@check("slip-falls-with-depth")
+def slip_falls_with_depth(laboratory: Laboratory) -> Numbers:
+    h, coseismic = _read("coseismic")
+    depth, net = _read("net")
+    both = np.interp(h, depth, net, left=1.0)
+    ratio = (both - coseismic)[:-1] / coseismic[:-1]
+    return {
+        "coseismic": -float(np.max(np.diff(coseismic))),
+        "net": -float(np.max(np.diff(net))),
+        "faster": float(np.min(-np.diff(coseismic) + np.diff(both))),
+        "ratio rises": float(np.min(np.diff(ratio))),
+    }
+
+
+@check("afterslip-relation")
+def afterslip_relation(laboratory: Laboratory) -> Numbers:
+    """Alpha and beta of the printed relation, fitted to the curve of Figure 16b."""
+    scan = scans()["figure_16b"]
+    t, u = np.array(scan["slip"]).T
+    after = u[1:] - u[0]
+
+    def off(p: np.ndarray) -> np.ndarray:
+        alpha, rate = np.exp(p)
+        return np.asarray(alpha * np.log1p(rate * t[1:]) - after)
+
+    fit = least_squares(off, np.log([40.0, 1.0]), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    alpha, rate = np.exp(fit.x)
+    return {
+        "worst": float(np.max(np.abs(fit.fun)) / (2 * scan["pixel"])),
+        "alpha": float(alpha), "beta": float(alpha * rate), "rate": float(rate),
+    }  # fmt: skip
+
+
+@check("afterslip-amplitude")
+def afterslip_amplitude(laboratory: Laboratory) -> Numbers:
+    """By what alpha changes when lengths are counted in mm and not in m, 1/k along with them."""
+    b, per_stiffness = laboratory.numbers.A_less_B_16, 1.0
+    a = 2 * b
+    metres, millimetres = per_stiffness, 1e3 * per_stiffness
+    return {
+        "printed": (a - b * millimetres) / (a - b * metres),
+        "derived": (a - b) * millimetres / ((a - b) * metres),
+        "independent": 1e3,
+    }
+
+
+@check("three-events")
+def three_events(laboratory: Laboratory) -> Numbers:
+    return {f"event {n}": 100 * slip for n, slip in enumerate(scans()["figure_13"]["afterslip"], 1)}
+
+
+@check("maximum-condition")
+def maximum_condition(laboratory: Laboratory) -> Numbers:
+    """One and what is said to vanish: healing as printed, and d mu/dt over k V, at the maximum."""
+    k, V = laboratory.stiff
+    held = laboratory.holds(AGEING, k, V, 1e3)
+    return {
+        "printed": 1 + float(held.healing),
+        "derived": 1 + float((V - held.velocity_at_maximum) / V),
+        "independent": 1.0,
+    }
+
+
+@check("memory-length-against-strain")
+@check("distance-to-weakening")
+def not_readable(laboratory: Laboratory) -> Numbers:
+    """Nothing: the points of Figures 8 and 12 are not among the readings."""
+    return {}

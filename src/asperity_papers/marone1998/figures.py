@@ -1,0 +1,192 @@
+"""The figures that the paper's equations give, with the readings of the printed ones."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+
+import numpy as np
+import pandas as pd
+
+from asperity import Slider, materials, transient
+from asperity.ledger import FigureNumbers, FigureTable, PaperFigure, figure_words
+from asperity.loads import Programme, Slide
+from asperity.materials import Material
+from asperity_papers.marone1998.checks.summaries import afterslip_relation
+from asperity_papers.marone1998.laboratory import AGEING, DECADE, LAWS, Laboratory, scans
+
+#: Columns of the tables; "1" is a pure number.
+COLUMNS: Mapping[str, str] = {
+    "curve": "name of the curve",
+    "load": "1; load displacement since the first step over Dc",
+    "friction": "1; friction coefficient less that before the first step",
+    "hold_time": "s; duration of the hold",
+    "healing": "1; static friction less the level of sliding before the hold",
+    "ageing": "1; healing of law D at the same hold time, spring and velocity",
+    "ageing_equal": "1; the same at 1 um/s",
+    "series": "which spring, or how read",
+    "healing_uncertainty": "1; error of the reading",
+    "over": "1; t0/th with t0 = 1 s, or V/V0 with V0 = 1 um/s",
+    "days": "d; time since the earthquake",
+    "slip": "mm; slip at h = 1.9 km",
+    "slip_uncertainty": "mm; a pixel",
+    "relation": "mm; the printed relation",
+}
+
+#: Friction of a law is drawn this much above the next one.
+OFFSET = 0.04
+_PER_STRETCH = 400
+
+
+def figure_2(laboratory: Laboratory) -> FigureNumbers:
+    """Velocity steps, by an integration of both."""
+    p, rows, peaks = laboratory.numbers, [], {}
+    slow, fast = p["V_2"].si_values
+    for n, (name, letter) in enumerate(LAWS.items()):
+        slider = Slider(laboratory.illustration(name), spring=p.k_2, load=1.0)
+        programme = Programme(
+            Slide(2 * p.D0_2 / slow, velocity=slow),
+            Slide(7 * p.D0_2 / fast, velocity=fast),
+            Slide(6.1 * p.D0_2 / slow, velocity=slow),
+            load=1.0,
+            velocity=slow,
+        )
+        lengths = np.array([2.0, 7.0, 6.1])
+        spans = lengths * p.D0_2 / np.array([slow, fast, slow])
+        ends = np.concatenate([[0.0], np.cumsum(spans)])
+        way = np.concatenate([[0.0], np.cumsum(lengths)])
+        # Close to each step, where much happens, and even beyond.
+        share = np.unique(
+            np.concatenate([np.linspace(0, 1, _PER_STRETCH), np.geomspace(1e-4, 1, _PER_STRETCH)])
+        )
+        time = np.unique(np.concatenate([a + share * s for a, s in zip(ends, spans, strict=False)]))
+        run = transient(slider, programme, sampling=time)
+        friction = run.force - run.force[0]
+        load = np.interp(run.time, ends, way) - 2
+        peaks[f"peak {letter}"] = float(friction.max())
+        shift = OFFSET * (len(LAWS) - 1 - n)
+        rows.append(pd.DataFrame({"curve": letter, "load": load, "friction": friction + shift}))
+    quoted = {"a": p.A_2 * DECADE, "b": p.B_2 * DECADE, "offset": OFFSET}
+    return FigureNumbers("figure-02", pd.concat(rows, ignore_index=True), COLUMNS, peaks, quoted)
+
+
+#: Curves of Figure 3: law, spring, and how they are called.
+_SPRINGS = {"soft": "k_n", "stiff": "k_s"}
+
+
+def figure_3(laboratory: Laboratory, times: np.ndarray | None = None) -> FigureNumbers:
+    """Healing against hold time, three laws at two springs, and the points."""
+    time = np.geomspace(2, 1e5, 48) if times is None else times
+    springs = {"soft": laboratory.soft, "stiff": laboratory.stiff}
+    rows = [
+        pd.DataFrame(
+            {
+                "curve": f"{letter}, {_SPRINGS[spring]}",
+                "hold_time": time,
+                "healing": laboratory.healing(name, *springs[spring], time),
+            }
+        )
+        for name, letter in LAWS.items()
+        for spring in _SPRINGS
+    ]
+    equal = laboratory.healing(AGEING, laboratory.stiff[0], laboratory.soft[1], time)
+    rows.append(
+        pd.DataFrame({"curve": "D, k_s, equal velocity", "hold_time": time, "healing": equal})
+    )
+    points = []
+    for spring, (k, V) in springs.items():
+        at, read = np.array(scans()["figure_3"][spring]).T
+        points.append(
+            pd.DataFrame(
+                {
+                    "series": spring,
+                    "hold_time": at,
+                    "healing": read,
+                    "healing_uncertainty": scans()["figure_3"]["error"] / 2,
+                    "ageing": laboratory.healing(AGEING, k, V, at),
+                    "ageing_equal": laboratory.healing(AGEING, k, laboratory.soft[1], at),
+                }
+            )
+        )
+    table = pd.concat(points, ignore_index=True)
+    stiff = table[table["series"] == "stiff"]
+    scalars = {
+        f"rms {name}": float(np.sqrt(np.mean((stiff["healing"] - stiff[column]) ** 2)))
+        for name, column in (("actual", "ageing"), ("equal", "ageing_equal"))
+    }
+    data = pd.concat(rows, ignore_index=True)
+    return FigureNumbers("figure-03", data, COLUMNS, scalars, points=table)
+
+
+def figure_5(laboratory: Laboratory) -> FigureNumbers:
+    """Static friction against 1/hold time and dynamic friction against velocity, in one plot."""
+    p, over = laboratory.numbers, np.geomspace(1e-4, 1e4, 49)
+    static = p.mu0 - p.B_5 * np.log(over)
+    dynamic = np.asarray(laboratory.gouge().mu_ss(p.V0 * over))
+    read = p.mu0 + scans()["figure_5"]["velocity_slope"] * np.log10(over)
+    data = pd.concat(
+        [
+            pd.DataFrame({"curve": name, "over": over, "friction": values})
+            for name, values in (("static", static), ("dynamic", dynamic), ("read", read))
+        ],
+        ignore_index=True,
+    )
+    slopes = {"static slope": -p.B_5 * DECADE, "dynamic slope": -p.B_less_A_5 * DECADE}
+    return FigureNumbers("figure-05", data, COLUMNS, slopes)
+
+
+def figure_16(laboratory: Laboratory) -> FigureNumbers:
+    """Slip after an earthquake: the printed relation through the readings of the curve."""
+    fit, scan = afterslip_relation(laboratory), scans()["figure_16b"]
+    days, slip = np.array(scan["slip"]).T
+    time = np.concatenate([[0.0], np.geomspace(0.05, 365, 100)])
+
+    def relation(t: np.ndarray) -> np.ndarray:
+        return np.asarray(slip[0] + fit["alpha"] * np.log1p(fit["rate"] * t))
+
+    data = pd.DataFrame({"curve": "relation", "days": time, "slip": relation(time)})
+    points = pd.DataFrame(
+        {
+            "series": "read",
+            "days": days,
+            "slip": slip,
+            "slip_uncertainty": scan["pixel"],
+            "relation": relation(days),
+        }
+    )
+    scalars = {name: fit[name] for name in ("alpha", "beta", "rate", "worst")}
+    return FigureNumbers("figure-16", data, COLUMNS, scalars, points=points)
+
+
+NUMBERS: Mapping[str, Callable[[Laboratory], FigureNumbers]] = {
+    "figure-02": figure_2,
+    "figure-03": figure_3,
+    "figure-05": figure_5,
+    "figure-16": figure_16,
+}
+
+
+def _figure(name: str) -> PaperFigure:
+    numbers = NUMBERS[name](Laboratory(materials.load("marone1998")))
+    words = figure_words(__package__).figures[name]
+    head = ("Marone (1998), " + words.place, "computed from the numbers that are printed with it")
+    tables = [_table(name, numbers.data, head)]
+    if numbers.points is not None:
+        tables.append(_table(f"{name}-points", numbers.points, (head[0], "readings of the figure")))
+    return words.figure(numbers, tables)
+
+
+def _table(name: str, data: pd.DataFrame, head: Sequence[str]) -> FigureTable:
+    return FigureTable(name, data, head, {c: COLUMNS[c] for c in data.columns})
+
+
+FIGURES = tuple(partial(_figure, name) for name in NUMBERS)
+
+
+def moved_lines(name: str, numbers: Material) -> list[dict[str, object]]:
+    """The lines of a figure with other numbers, for the browser page."""
+    data = NUMBERS[name](Laboratory(numbers)).data
+    return [
+        {"name": str(curve), "values": {c: rows[c].to_numpy() for c in rows if c != "curve"}}
+        for curve, rows in data.groupby("curve", sort=False)
+    ]

@@ -1,0 +1,166 @@
+"""Holds and velocity steps for many at once, against SciPy at 1e-12 and closed forms."""
+
+import numpy as np
+import pytest
+
+import asperity as asp
+from asperity.errors import InputError
+from asperity.experiment import hold_response, step_response
+from asperity.laws import law_parameters, registered
+from references.memory_tests import STATE_RATES, Interface
+
+A, B, D0, V0 = 0.008, 0.009, 3e-6, 1e-6
+LAWS = tuple(STATE_RATES)
+
+
+def law(name, **changes):
+    return registered()[name](**({"mu0": 0.6, "A": A, "B": B, "D0": D0, "V0": V0} | changes))
+
+
+def holds_at_random(count, seed):
+    """K/W0 1e-4 to 1 per um, hold times 0.1 to 1e7 s, velocities over six decades."""
+    draw = np.random.default_rng(seed)
+    k = 10 ** draw.uniform(2, 6, count)
+    V = 10 ** draw.uniform(-9, -3, count)
+    return k, V, 10 ** draw.uniform(-1, 7, count)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_holds_are_those_of_scipy(name):
+    k, V, time = holds_at_random(8, 1)
+    mine = hold_response(law(name), hold_time=time, velocity=V, stiffness=k, settling=False)
+    exact = np.array(
+        [
+            Interface(name, A, B, D0, *p).hold(*q)
+            for p, q in zip(k[:, None], zip(V, time, strict=True), strict=True)
+        ]
+    ).T
+    level, low, high, slip, more = exact
+    assert mine.has_maximum.all()
+    np.testing.assert_allclose(mine.level, 0.6 + level, atol=1e-12)
+    np.testing.assert_allclose(mine.minimum, 0.6 + low, atol=1e-9)
+    np.testing.assert_allclose(mine.healing, high - level, atol=1e-9)
+    np.testing.assert_allclose(mine.hold_slip, slip, rtol=1e-7)
+    np.testing.assert_allclose(mine.slip, more, rtol=2e-5)
+    np.testing.assert_allclose(mine.velocity_at_maximum, V, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_steps_are_those_of_scipy(name):
+    k, ratios = np.array([2e3, 2e4, 1e6]), np.array([10.0, 0.1, 1e3])
+    mine = step_response(law(name), velocity_before=V0, velocity=V0 * ratios, stiffness=k)
+    exact = [Interface(name, A, B, D0, K).step(V0, r * V0) for K, r in zip(k, ratios, strict=True)]
+    for value, expected in zip(
+        (mine.before, mine.extremum, mine.after), np.transpose(exact), strict=True
+    ):
+        np.testing.assert_allclose(value, 0.6 + expected, atol=1e-9)
+
+
+def test_the_healing_rate_is_the_slope_of_healing():
+    time = 100 * np.exp([-1e-3, 0.0, 1e-3])
+    for name in LAWS:
+        holds = hold_response(law(name), hold_time=time, velocity=V0, stiffness=7.4e4)
+        slope = (holds.healing[2] - holds.healing[0]) / 2e-3 * np.log(10)
+        assert holds.healing_rate[1] == pytest.approx(slope, rel=1e-5)
+
+
+def test_no_slip_is_left_at_settling():
+    """Of a stiff spring after a small step the force follows exp(-u/D0), by any of the laws."""
+    for name in LAWS:
+        done = step_response(law(name), velocity_before=V0, velocity=1.001 * V0, stiffness=1e7)
+        assert done.settling_slip - done.slip == pytest.approx(D0 * np.log(20), rel=0.02)
+
+
+def test_a_spring_below_the_critical_stiffness_runs_away():
+    critical = (B - A) / D0
+    for name in LAWS:
+        done = hold_response(
+            law(name), hold_time=10, velocity=V0, stiffness=critical * np.array([0.97, 1.03])
+        )
+        assert list(done.stable) == [False, True]
+        assert "softer than the critical stiffness" in done.result[0]
+        assert np.isnan(done.settling_slip[0])
+
+
+def test_a_long_hold_may_run_away_above_the_critical_stiffness():
+    """Slip law and PRZ, not ageing: a large disturbance weakens them without bound."""
+    for name, expected in zip(LAWS, ("comes back", "runs away", "runs away"), strict=True):
+        done = hold_response(law(name), hold_time=1e6, velocity=1e-6, stiffness=2e3)
+        assert done.stable
+        assert str(done.result).startswith(expected)
+
+
+def test_without_a_maximum_static_friction_is_the_level():
+    """A soft spring on a strengthening interface: the force comes back from below."""
+    done = hold_response(law("rice-ruina", A=0.02), hold_time=1.0, velocity=V0, stiffness=1e2)
+    assert not done.has_maximum
+    assert done.healing == pytest.approx(0, abs=1e-10)
+    assert np.isnan(done.distance)
+
+
+def test_grids_have_names(tmp_path):
+    k = np.array([[2e3], [7.4e4]])
+    data = hold_response(
+        law("rice-ruina"), hold_time=[1, 10, 100], velocity=V0, stiffness=k
+    ).to_dataset()
+    assert dict(data.sizes) == {"K": 2, "hold_time": 3}
+    assert data.healing.attrs["units"] == "1"
+    assert data.velocity.item() == V0
+    data.to_netcdf(tmp_path / "holds.nc")
+    steps = step_response(
+        law("rice-ruina"), velocity_before=V0, velocity=[1e-5, 1e-7], stiffness="1 1/um"
+    )
+    assert dict(steps.to_dataset().sizes) == {"velocity": 2}
+
+
+@pytest.mark.long
+def test_every_law_with_a_memory_heals():
+    healed = {}
+    for name, kind in registered().items():
+        if not kind.rate_dependent:
+            with pytest.raises(InputError, match="must depend on the velocity"):
+                hold_response(kind(mu0=0.6), hold_time=1, velocity=1e-6, stiffness=1e5)
+            continue
+        given = {"mu0": 0.6, "A": A, "B": B, "D0": D0, "V0": V0}
+        others = {"lambda_": 1e-6, "alpha": 0.1, "c": 0.1, "B2": 0.002, "D2": 1e-5}
+        others |= {"V1": 1.0, "V2": 1.0, "L": 1e-6, "V_star": 1.0}
+        fields = {
+            f: (given | others)[f]
+            for f in (p.path.rsplit(".", 1)[-1] for p in law_parameters(kind).values())
+        }
+        done = hold_response(kind(**fields), hold_time=100, velocity=1e-6, stiffness=1e5)
+        healed[name] = float(done.healing)
+        assert done.has_maximum, name
+        assert done.velocity_at_maximum == pytest.approx(1e-6, rel=1e-8)
+    assert len(healed) > 8
+    assert all(0.002 < value < 0.1 for value in healed.values()), healed
+
+
+def test_a_slider_is_its_law_on_its_spring():
+    slider = asp.Slider(law("ruina-slip"), spring=2e5, load=10.0)
+    one = hold_response(slider, hold_time="10 s", velocity="1 um/s")
+    other = hold_response(law("ruina-slip"), hold_time=10, velocity=1e-6, stiffness="0.02 1/um")
+    assert float(one.healing) == pytest.approx(float(other.healing), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"hold_time": -1}, "hold_time must be positive"),
+        ({"hold_time": 1e30}, "at most 1e"),
+        ({"velocity": "1 um"}, "velocity"),
+        ({"stiffness": None}, "stiffness must be given"),
+        ({"stiffness": "1 N/m"}, "stiffness"),
+        ({"hold_time": [1.0, 2.0], "velocity": [1e-6, 2e-6, 3e-6]}, "broadcast"),
+        ({"settling": 1}, "True or False"),
+    ],
+)
+def test_what_breaks_a_rule_is_said(changes, words):
+    arguments = {"hold_time": 1, "velocity": 1e-6, "stiffness": 1e4} | changes
+    with pytest.raises(InputError, match=words):
+        hold_response(law("rice-ruina"), **arguments)
+
+
+def test_a_step_needs_two_velocities():
+    with pytest.raises(InputError, match="must differ"):
+        step_response(law("rice-ruina"), velocity_before=1e-6, velocity=1e-6, stiffness=1e4)

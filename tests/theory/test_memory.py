@@ -1,0 +1,128 @@
+"""Closed forms of steps and holds, against integrations that do not use them."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from asperity.errors import InputError
+from asperity.laws import ElastoPlastic, ElastoPlasticAge, TwoState, registered
+from asperity.theory import closed_forms, memory
+from references.memory_tests import STATE_RATES, Interface
+
+A, B, D0, V0 = 0.008, 0.009, 3e-6, 1e-6
+NUMBERS = {"mu0": 0.6, "A": A, "B": B, "D0": D0, "V0": V0}
+LAWS = tuple(STATE_RATES)
+
+
+def law(name, **changes):
+    return registered()[name](**(NUMBERS | changes))
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_states_relax_over_the_memory_length(name):
+    np.testing.assert_allclose(memory.decay_rates(law(name), "3 um/s"), [1 / D0], rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_the_critical_stiffness_of_the_three_laws(name):
+    assert memory.critical_stiffness(law(name), 2e-6) == pytest.approx((B - A) / D0, rel=1e-9)
+    assert memory.critical_stiffness(law(name, A=0.01), 2e-6) == 0
+    assert closed_forms.critical_stiffness_form(name, elastic=False, inertia=False)
+
+
+def test_the_critical_stiffness_of_other_laws():
+    """Elastic asperities by their closed forms; of two states as the larger of two alike."""
+    lengths = {"D0": D0, "lambda_": 2e-6}
+    small = closed_forms.SmallModulation(
+        mu=0.6, A=A, B=B, K=1.0, W0=1.0, V=V0, omega=1.0, **lengths
+    )
+    for kind, age in ((ElastoPlastic, "slider"), (ElastoPlasticAge, "plastic")):
+        closed = closed_forms.critical_stiffness_elastic(small, age)
+        got = memory.critical_stiffness(kind(**NUMBERS, lambda_=2e-6), V0)
+        assert got == pytest.approx(float(closed), rel=1e-8)
+    # Two states of one length are one state of B + B2.
+    same = TwoState(**(NUMBERS | {"B": 0.005}), B2=0.004, D2=D0)
+    assert memory.critical_stiffness(same, V0) == pytest.approx((B - A) / D0, rel=1e-8)
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("ratio", [0.01, 0.5, 10.0, 1e4])
+def test_the_state_after_a_step(name, ratio):
+    V = ratio * V0
+
+    def rate(u, y):
+        return STATE_RATES[name](V, y, D0, V0) / V
+
+    slip = D0 * np.array([0.01, 0.3, 1.0, 5.0])
+    options = {"rtol": 1e-12, "atol": 1e-13, "first_step": 1e-6 * slip[0] / max(ratio, 1)}
+    done = solve_ivp(rate, (0, slip[-1]), [0.0], "DOP853", t_eval=slip, **options)
+    expected = done.y[0] + np.log(ratio)
+    got = memory.state_after_step(law(name), ratio, slip)
+    np.testing.assert_allclose(got, expected, rtol=1e-9, atol=1e-11)
+
+
+def test_the_slip_laws_state_is_odd_in_the_step():
+    up, down = (memory.state_after_step(law("ruina-slip"), r, 2e-6) for r in (10.0, 0.1))
+    assert float(up + down) == pytest.approx(0, abs=1e-15)
+
+
+@pytest.mark.parametrize("k", [2e3, 7.4e4])
+def test_a_long_hold_of_the_ageing_law(k):
+    """The next order makes the error several times smaller, and it falls with the hold time."""
+    times = np.array([1e4, 1e7])
+    interface = Interface("rice-ruina", A, B, D0, k)
+    exact = np.array([interface.hold(V0, t)[2] for t in times])
+    closed = memory.ageing_long_hold(law("rice-ruina"), velocity=V0, hold_time=times, stiffness=k)
+    left = np.abs(exact - closed.leading)
+    over = np.abs(exact - closed.healing)
+    assert (over < left / 2).all()
+    assert over[1] < over[0] / 2
+    assert over[1] < 1e-4 * exact[1] * (10 if k < 1e4 else 1)
+
+
+def test_the_reload_slip_has_no_gap_at_equal_lengths():
+    """k D0 = B is a removable point of the closed form."""
+    k = B / D0 * np.array([1 - 1e-5, 1, 1 + 1e-5])
+    at = memory.ageing_long_hold(law("rice-ruina"), velocity=V0, hold_time=1e5, stiffness=k)
+    assert np.ptp(np.asarray(at.healing)) < 1e-6
+
+
+def test_the_limits_of_the_healing_rate():
+    """Slopes of long holds by SciPy: at the limit, near it, and far from it, as the table says."""
+
+    def rate(name, time, k=2e3, **changes):
+        numbers = {"A": A, "B": B, "D0": D0} | changes
+        interface = Interface(name, k=k, **numbers)
+        (_, _, low, *_), (_, _, high, *_) = (interface.hold(V0, t) for t in (time, 10 * time))
+        return (high - low) / float(memory.healing_rate_limit(law(name, **changes)))
+
+    assert rate("rice-ruina", 1e11) == pytest.approx(1, abs=3e-3)
+    assert rate("perrin-rice-zheng", 1e9) == pytest.approx(1, abs=5e-3)
+    slopes = [rate("ruina-slip", t) for t in (1e5, 1e8, 1e11)]
+    assert slopes[0] < slopes[1] < slopes[2] < 1
+    assert slopes[2] > 0.85
+    # Strengthening: all contacts age alike in the end.
+    assert rate("ruina-slip", 1e11, k=5e2, A=0.012) == pytest.approx(1, abs=0.1)
+
+
+def test_what_has_no_closed_form_is_said():
+    with pytest.raises(InputError, match="rice-ruina, ruina-slip or perrin"):
+        memory.healing_rate_limit(law("regularised"))
+    with pytest.raises(InputError, match="ageing law"):
+        memory.ageing_long_hold(law("ruina-slip"), velocity=V0, hold_time=10, stiffness=1e4)
+    with pytest.raises(InputError, match=r"above law\.A / 2"):
+        memory.healing_rate_limit(law("perrin-rice-zheng", A=0.03))
+
+
+def test_closed_forms_have_derivatives():
+    def healing(b):
+        held = memory.ageing_long_hold(
+            law("rice-ruina", B=b), velocity=V0, hold_time=1e4, stiffness=2e3
+        )
+        return held.healing
+
+    step = 1e-6
+    slope = (healing(B + step) - healing(B - step)) / (2 * step)
+    assert float(jax.grad(healing)(jnp.asarray(B))) == pytest.approx(float(slope), rel=1e-6)
