@@ -65,9 +65,11 @@ def test_the_verdicts_on_the_seventy_claims(claims):
 
 
 def test_healing_of_figure_3_is_that_of_scipy(computed):
-    read = {"ageing-stiff": ("rice-ruina", {1e5: 0.0823}),
-            "slip-curves": ("ruina-slip", {1e3: 0.0078, 1e5: 0.0172}),
-            "prz-curves": ("perrin-rice-zheng", {100: 0.0152, 1e3: 0.0312, 1e5: 0.0596})}  # fmt: skip
+    read = {
+        "ageing-stiff": ("rice-ruina", {1e5: 0.0823}),
+        "slip-curves": ("ruina-slip", {1e3: 0.0078, 1e5: 0.0172}),
+        "prz-curves": ("perrin-rice-zheng", {100: 0.0152, 1e3: 0.0312, 1e5: 0.0596}),
+    }
     for claim, (name, readings) in read.items():
         for time, value in readings.items():
             off = healing(name, STIFF, time) - value
@@ -166,7 +168,7 @@ def test_figures_are_computed_with_their_points():
     assert third.scalars["rms actual"] > 2 * third.scalars["rms equal"]
     for curve, spring, name in (("D, k_s", STIFF, "rice-ruina"), ("R, k_n", SOFT, "ruina-slip")):
         assert third.last(curve, "healing") == pytest.approx(healing(name, spring, 1e5), abs=1e-9)
-    assert {f for f in PAPER.words.figures} == set(NUMBERS)
+    assert set(PAPER.words.figures) == set(NUMBERS)
 
 
 def test_no_text_of_the_paper_is_in_its_folder():
