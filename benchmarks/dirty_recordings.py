@@ -63,6 +63,13 @@ def hum(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float
     return x + abs(_sizes(random, 0.5, 10, 1)[0]) * np.cos(phase + 6.3 * random.random())
 
 
+def line(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
+    """A steady line of 0.5 to 10 times the noise at 0.003 to 0.05 of the sampling rate."""
+    hertz = case.rate * np.exp(random.uniform(np.log(0.003), np.log(0.05)))
+    size = abs(_sizes(random, 0.5, 10, 1)[0])
+    return np.asarray(x + size * np.cos(2 * np.pi * hertz * time + 6.3 * random.random()))
+
+
 def clipped(random: np.random.Generator, case: Case, time: Float, x: Float) -> Float:
     """Friction at the end of its range, above or below, for 5 to 50 % of its height."""
     low, high = x.min(), x.max()
@@ -114,6 +121,7 @@ KINDS: dict[str, Callable[[np.random.Generator, Case, Float, Float], Float]] = {
         spike_at_change,
         jump,
         hum,
+        line,
         clipped,
         heavy,
         burst,

@@ -22,6 +22,7 @@ extensions = [
     "docstrings",
     "ledger",
     "mathml",
+    "notebooks",
     "offline",
     "parameter_tables",
 ]

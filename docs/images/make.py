@@ -39,6 +39,12 @@ def vibration() -> Figure:
     return figure
 
 
+def velocity_step() -> Figure:
+    """A fit of the sample recording, and what it leaves (docs/tutorials/velocity_step.md)."""
+    run = asp.inference.recorded_run(asp.samples.velocity_steps())
+    return asp.inference.fit(run, "rice-ruina", ["A", "B", "D0"]).plot()
+
+
 def save(figure: Figure, name: str) -> None:
     """Write a PNG with a palette of 64 colours: a third of the size, and no visible loss."""
     target = FOLDER / name
@@ -53,6 +59,7 @@ def main() -> None:
     with style():
         save(draw(figure_11(Machine())), "figure-11.png")
         save(vibration(), "vibration.png")
+        save(velocity_step(), "velocity-step.png")
 
 
 if __name__ == "__main__":

@@ -38,7 +38,7 @@ MAP = {
 MEASURED = {
     "recording": "0" * 32,
     "source": {"columns": {"W": "a"}, "units": {"a": "N"}, "rate": "1 kHz"},
-    "options": {"mode": "auto", "window": [0, 1], "steps": [1.0], "harmonics": 4},
+    "options": {"modulated": False, "window": [0, 1], "steps": [1.0], "harmonics": 4},
 }
 QUESTIONS = {"explore": POINT, "map/text": MAP, "data/measure": MEASURED}
 

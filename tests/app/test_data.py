@@ -3,18 +3,23 @@
 import base64
 import gzip
 import io
+import shlex
 import zipfile
 from pathlib import Path
 from statistics import NormalDist
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from scipy.integrate import solve_ivp
 
 import asperity as asp
 from asperity.app.api import fits, recordings
 from asperity.app.uploads import Uploads
+from asperity.cli.main import main
 from asperity.errors import InputError
+from asperity.inference.answers import read_data
+from asperity.questions import fit as questions
 
 MU1, PHASE1 = 0.012, -0.4
 
@@ -71,7 +76,7 @@ def test_a_recording_is_measured_as_the_package_does(measured, modulated, tmp_pa
 
 def test_columns_and_units_are_corrected_by_hand(measured, modulated):
     swapped = {"columns": {"W": "Ft", "F": "Fn"}, "units": {"Fn": "kN", "Ft": "kN"}}
-    lines = measured(modulated, source=swapped, options={"mode": "modulated"})
+    lines = measured(modulated, source=swapped, options={"modulated": True})
     recording = next(m["recording"] for m in lines if "recording" in m)
     assert recording["roles"]["W"] == "Ft"
     assert recording["channels"][0]["mean"] == pytest.approx(7e3, rel=1e-3)
@@ -292,20 +297,16 @@ def test_a_table_is_fitted(ask, measured):
     assert "--free mu0" in result["command"]
 
 
-def test_the_report_of_a_fit_names_its_files_as_their_sender_does(monkeypatch):
+def test_the_report_of_a_fit_is_packed_whole(monkeypatch):
     def written(folder, found, posterior):
         folder.mkdir()
-        for name in ("fit.json", "report.html"):
-            (folder / name).write_text(f"{found} fitted to sent-table-0.csv")
+        (folder / "fit.json").write_text(f"{found} fitted")
 
     monkeypatch.setattr("asperity.fit_report.write_report", written)
-    packed = fits._report("a law", {"sent-table-0.csv": '<my "readings">.csv'})
+    packed = fits._report("a law")
     with zipfile.ZipFile(io.BytesIO(base64.b64decode(packed))) as folder:
         texts = {name: folder.read(name).decode() for name in folder.namelist()}
-    assert texts == {
-        "report/fit.json": r"""a law fitted to <my \"readings\">.csv""",
-        "report/report.html": "a law fitted to &lt;my &quot;readings&quot;&gt;.csv",
-    }
+    assert texts == {"report/fit.json": "a law fitted"}
 
 
 class Drawn:
@@ -455,9 +456,10 @@ def steps(stepped, tmp_path):
     return {"asked": asked, "files": [{"path": str(path), "name": "steps.csv"}]}
 
 
-def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps):
-    asked = fits.Fitted.model_validate(steps["asked"])
-    run = fits._run(asked.runs[0], steps["files"][0])
+def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps, tmp_path):
+    asked = fits.Fitted(**steps["asked"])
+    (data,) = fits._data(asked, steps["files"], tmp_path)
+    (run,) = read_data(questions.Fit(data=[data]), fits._read)
     direct = asp.inference.recorded_run(steps["files"][0]["path"], window=(0.5, 2.75))
     assert run.name == "steps"
     assert run.velocities == direct.velocities
@@ -465,10 +467,28 @@ def test_a_recording_goes_into_a_fit_as_the_package_reads_it(steps):
     assert run.velocities == pytest.approx([1e-6, 1e-5], rel=1e-3)
 
 
-def test_the_means_a_second_go_into_the_fit_and_its_command(steps):
-    asked = fits.Fitted.model_validate(steps["asked"] | {"fit_rate": "2 Hz"})
-    assert fits._run_options(asked) == asp.inference.RunOptions(fit_rate="2 Hz")
-    assert "--fit-rate '2 Hz'" in fits._run_arguments(asked)
+def test_a_fit_of_the_page_is_copied_as_a_command_that_asks_the_same(steps, monkeypatch):
+    steps["asked"]["runs"][0] |= {"steps": [1.5], "source": {"units": {"Fn": "N"}}}
+    more = {
+        "fit_rate": "2 Hz", "gauge": "50 Hz", "fixed": {"W0": "10 N"}, "drift": True,
+        "prior": {"K": "0.2+-0.01 N/um"}, "trend": "quadratic",
+    }  # fmt: skip
+    page = fits.Fitted(**steps["asked"], **more)
+    command = shlex.split(fits._fit_command(page, ["steps.csv"]))
+    asked = []
+    monkeypatch.setattr(
+        "asperity.inference.answers.answer_fit", lambda question, **_: asked.append(question)
+    )
+    CliRunner().invoke(main, command[1:])
+    (question,) = asked
+    names = [*fits.FitOptions.model_fields]
+    assert question.model_dump(include=names) == page.model_dump(include=names)
+    assert question.law == "rice-ruina"
+    (data,) = question.data
+    run = page.runs[0]
+    assert data.window == tuple(run.window)
+    assert data.steps == tuple(run.steps)
+    assert data.source.units == run.source.units
 
 
 @pytest.mark.parametrize(
@@ -481,7 +501,7 @@ def test_the_means_a_second_go_into_the_fit_and_its_command(steps):
         ({"free": ["alpha"], "laws": ["linker-dieterich"]}, {}, "alpha"),
         ({}, {"velocities": ["1 um/s"]}, "velocities"),
         ({}, {"velocities": ["fast", "slow"]}, "velocities"),
-        ({}, {"window": [2.75, 0.5]}, "Window"),
+        ({}, {"window": [2.75, 0.5]}, "window"),
         ({}, {"source": {"columns": {"F": "no such"}}}, "no such"),
     ],
 )

@@ -50,7 +50,7 @@ def test_priors_of_a_material_want_the_free_parameters(recording):
     [
         (["--trend", "cubic"], "--trend must be none, linear or quadratic"),
         (["--initial", "any"], "--initial must be steady or free"),
-        (["--prior", "K=3"], "--prior must be a material or NAME=VALUE+-DEVIATION"),
+        (["--prior", "K=3"], "--prior K must be VALUE+-DEVIATION UNIT"),
         (["--prior", "K=3+-0 1/um"], "must have a positive deviation"),
         (["--velocities", "1 um/s"], "must be one more than the steps"),
         (["--gauge", "-1 Hz"], "--gauge must be positive"),
@@ -119,7 +119,7 @@ def test_the_slope_of_unloading_is_the_prior_of_the_stiffness(with_unloading):
     [
         (["--stiffness-from", "-10:-1"], "must lie outside what is fitted"),
         (["--stiffness-from", "-10:1", "--window", "0:140"], "must lie outside what is fitted"),
-        (["--stiffness-from", "-10:-1", "--windows", "0:140,auto"], "must lie outside"),
+        (["--stiffness-from", "-10:-1", "--windows", "auto"], "must lie outside"),
         (["--stiffness-from", "-10:-1", "--fix", "K=4000 1/m"], "must be the only number of K"),
         (["--stiffness-from", "41:60", "--window", "70:140"], "must have a force that rises"),
     ],

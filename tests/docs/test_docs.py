@@ -2,8 +2,10 @@
 
 import dataclasses
 import importlib
+import json
 import re
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -191,3 +193,29 @@ def test_formulas_become_mathml_and_unknown_commands_are_told(extension, caplog)
     module._log = type("Log", (), {"warning": lambda self, *a, **k: named.append(a)})()
     module.to_mathml(r"\nosuchcommand x", display=True)
     assert named
+
+
+def test_a_tutorial_becomes_a_notebook_of_its_text_and_python(extension) -> None:
+    page = PAGES["tutorials/vibration.md"]
+    made = json.loads(extension("notebooks").notebook(page))
+    assert (made["nbformat"], {c["cell_type"] for c in made["cells"]}) == (4, {"code", "markdown"})
+    code_cells = ["".join(c["source"]) for c in made["cells"] if c["cell_type"] == "code"]
+    assert code_cells == [
+        body.rstrip("\n") for body in re.findall(r"^```python\n(.*?)^```$", page, re.M | re.S)
+    ]
+    text = "\n".join("".join(c["source"]) for c in made["cells"] if c["cell_type"] == "markdown")
+    assert "# Lowering friction by vibration" in text
+    assert "asperity measure recording.csv" in text
+    assert "35.2 %" not in text  # what a block prints comes when it runs
+
+
+def test_outside_the_repository_the_readme_has_no_links_into_it() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    hook = settings["tool"]["hatch"]["metadata"]["hooks"]["fancy-pypi-readme"]
+    text = README
+    for change in hook["substitutions"]:
+        text = re.sub(change["pattern"], change["replacement"], text)
+    assert "<img" not in text
+    targets = re.findall(r"\]\(([^)]+)\)", text)
+    assert [t for t in targets if not t.startswith("https://")] == []
+    assert "getting started" in text.lower()

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-
 from asperity.cli.measure.reading import FileRows, ReadingOptions
 from asperity.cli.measure.source import RecordingSource
+
 from asperity.errors import InputError
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure_amplitudes

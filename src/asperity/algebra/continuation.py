@@ -32,8 +32,8 @@ class StepControl(NamedTuple):
 
     Attributes
     ----------
-    longest : float
-        Longest step.
+    shortest, longest : float
+        Length of a failed step below which a curve is left, and the longest step.
     growth : float
         Factor on the length after a step that was easy to correct.
     easy, hard : int
@@ -46,6 +46,7 @@ class StepControl(NamedTuple):
         Failures in a row after which a curve is left.
     """
 
+    shortest: float
     longest: float
     growth: float
     easy: int
@@ -181,7 +182,8 @@ def follow(
                 np.where(attempt.iterations <= control.hard, 1.0, _SLOWDOWN),
             )
             length[part] = np.where(good, factor * attempt.length, _SHRINKAGE * length[part])
-        for row in going[failures[going] >= control.most_failures]:
+        short = (failures > 0) & (np.abs(length) < control.shortest)
+        for row in going[(short | (failures >= control.most_failures))[going]]:
             why[row] = STUCK
         going = np.array([row for row in going if not why[row]], int)
     for row in going:

@@ -12,18 +12,18 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ValidationError
 from starlette.requests import Request
 
 from asperity.app.uploads import Uploads
 from asperity.errors import InputError
-from asperity.questions.record import mistakes_in
+from asperity.questions import record as questions
 
 
-class Question(BaseModel):
+class Question(questions.Question):
     """What a request holds; other fields are refused."""
 
-    model_config = ConfigDict(extra="forbid", strict=True)
+    subject = "request"
 
 
 @dataclass(frozen=True)
@@ -123,6 +123,7 @@ async def asked(request: Request, kind: type[Question]) -> Any:
     body = await request.body()
     try:
         value = json.loads(body, parse_constant=_no_constant)
+        _require_short(value)
         # Half a surrogate pair is JSON and no text: nothing can write it again.
         json.dumps(value, ensure_ascii=False).encode()
     except UnicodeEncodeError:
@@ -137,9 +138,28 @@ async def asked(request: Request, kind: type[Question]) -> Any:
     try:
         return kind.model_validate(value)
     except ValidationError as error:
-        raise mistakes_in(error, kind, "request", shown=_shown)[0] from None
+        raise questions.mistakes_in(error, kind, "request", shown=_shown)[0] from None
     except RecursionError:
         raise InputError("request.body must not be nested so deep, got more; send less") from None
+
+
+#: Characters of a text, but for those of the fields ``text``, and parts of a list or table.
+_LONGEST_TEXT, _MOST_PARTS = 300, 1000
+
+
+def _require_short(value: Any, field: str = "request") -> None:
+    """Refuse what no form of the page holds, before anything looks at it."""
+    if isinstance(value, str) and len(value) > _LONGEST_TEXT and field != "text":
+        raise InputError(
+            field, f"have at most {_LONGEST_TEXT} characters", len(value), "send fewer"
+        )
+    if isinstance(value, list | dict):
+        if len(value) > _MOST_PARTS:
+            raise InputError(field, f"have at most {_MOST_PARTS} parts", len(value), "send fewer")
+        named = value.items() if isinstance(value, dict) else ((field, part) for part in value)
+        for name, part in named:
+            _require_short(name, "a name")
+            _require_short(part, name)
 
 
 def _no_constant(name: str) -> float:

@@ -21,6 +21,9 @@ _LABELS: Mapping[str, str] = {
     "lock_in.load and force": "Normal load and shear force",
     "lock_in.load": "Normal load",
     "lock_in.time": "Time column",
+    "measure.exact_frequency": "Take it as exact",
+    "measure.harmonics": "Harmonics",
+    "measure.steps and holds": "Velocity steps and holds",
     "rate": "Sampling rate",
     "read.rate": "Sampling rate",
     "read.group": "Group",
@@ -32,6 +35,12 @@ _LABELS: Mapping[str, str] = {
     "stress_to_force.area": "Area",
     "recording.path": "The recording",
     "slice.start and slice.end": "Window",
+    "free": "Free parameters",
+    "fixed": "Fixed numbers",
+    "laws": "Laws",
+    "gauge": "Low-pass of the force gauge",
+    "fit_rate": "Means a second of long recordings",
+    "velocities": "Velocities between the steps",
 }
 _ROLES: Mapping[str, str] = {
     "time": "Time column",
@@ -46,10 +55,18 @@ _ROLES: Mapping[str, str] = {
 def in_labels(argument: Argument) -> str:
     """The words of the page: ``Normal load``, ``Unit of Fn: N``."""
     name, key, value = argument
+    # A part of a list has the label of the list.
+    while name.rpartition(".")[2].isdigit():
+        name = name.rpartition(".")[0]
+    head, _, rest = name.partition(".")
+    if head in ("data", "runs") and rest:
+        name = rest.partition(".")[2] or rest
     if name in ("columns", "Trace.channel") and key:
         label = _ROLES.get(key, f"Role {key}")
     elif name == "units" and key:
         label = f"Unit of {key}"
+    elif name == "modulated":
+        return "Velocity steps and holds"
     else:
         label = _LABELS.get(name, name)
     return f"{label}: {value}" if value and value != "..." else label

@@ -147,13 +147,14 @@ class BoundaryHalf(Curves):
     """
 
     control = StepControl(
+        shortest=1e-4,
         longest=0.02,
         growth=1.4,
         easy=0,
         hard=0,
         sharpest_turn=math.cos(0.25),
         farthest=0.3,
-        most_failures=6,
+        most_failures=20,
     )
 
     def __init__(

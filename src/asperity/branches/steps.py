@@ -164,13 +164,14 @@ class ParameterBranch(Curves):
     """
 
     control = StepControl(
+        shortest=1e-7,
         longest=0.25,  # in units of the exponent of the slip rate and of the whole span together
         growth=1.5,
         easy=4,
         hard=6,
         sharpest_turn=0.7,
         farthest=np.inf,
-        most_failures=16,
+        most_failures=20,
     )
 
     def __init__(

@@ -181,7 +181,7 @@ def _point(f: float, contact: Mapping[str, float], layer: AirLayer | None) -> di
 
 
 def _text(points: list[dict[str, Any]]) -> str:
-    from asperity.cli.report import aligned
+    from asperity.outputs.tables import aligned
     from asperity.units import format_si
 
     head = ["frequency", "eps_eff/eps", "phase (rad)"]

@@ -77,7 +77,7 @@ def _csv(result: Design) -> str:
 
 def design_text(result: Design) -> str:
     """A design as a person reads it."""
-    from asperity.cli.report import aligned
+    from asperity.outputs.tables import aligned
     from asperity.parameters import point_parameters
     from asperity.units import format_si
 
@@ -132,7 +132,7 @@ def design_text(result: Design) -> str:
 
 
 def _simulation_lines(result: Design) -> list[str]:
-    from asperity.cli.report import aligned
+    from asperity.outputs.tables import aligned
 
     s: Any = result.simulation
     if s is None:

@@ -152,7 +152,8 @@ def _plot(dataset: xarray.Dataset, path: Path, show: str) -> None:
 
 
 def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool) -> None:
-    from asperity.cli.report import aligned, to_json
+    from asperity.cli.report import to_json
+    from asperity.outputs.tables import aligned
 
     record = _record(dataset, out)
     if as_json:

@@ -36,7 +36,8 @@ def materials(name: str | None, cite: bool, as_json: bool) -> int:
     if cite:
         return _cite(name, as_json)
     from asperity import materials as known
-    from asperity.cli.report import aligned, to_json
+    from asperity.cli.report import to_json
+    from asperity.outputs.tables import aligned
 
     if name is not None:
         material = known.load(name)
@@ -85,7 +86,7 @@ def _number(number: Number) -> dict[str, Any]:
 
 
 def _text(material: Material) -> str:
-    from asperity.cli.report import aligned
+    from asperity.outputs.tables import aligned
 
     rows = [("name", "value", "kind", "place", "note")]
     rows += [(n, str(v), v.kind, v.place, v.note) for n, v in material.numbers.items()]

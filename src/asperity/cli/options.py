@@ -28,14 +28,16 @@ def material_option() -> Decorator:
     )
 
 
-def set_option(example: str) -> Decorator:
+def set_option(
+    example: str, meaning: str = "A number with its unit, instead of the material's"
+) -> Decorator:
     """``--set``, to be repeated."""
     return click.option(
         "--set",
         "settings",
         metavar="NAME=VALUE",
         multiple=True,
-        help=f"A number with its unit, instead of the material's; repeatable. Example: {example}",
+        help=f"{meaning}; repeatable. Example: {example}",
     )
 
 
@@ -76,6 +78,21 @@ def law_option(
 ) -> Decorator:
     """``--law``; a law given by its place is imported and registered, and its name passed on."""
     return click.option("--law", metavar="NAME", callback=_named_law, help=help_text)
+
+
+def law_options() -> Decorator:
+    """``--law`` that may be repeated, as `law_option`; the command gets `laws`."""
+    return click.option(
+        "--law",
+        "laws",
+        metavar="NAME",
+        multiple=True,
+        callback=lambda context, option, texts: tuple(
+            str(_named_law(context, option, text)) for text in texts
+        ),
+        help="Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
+        "of a comparison, repeatable.",
+    )
 
 
 def _named_law(context: click.Context, option: click.Parameter, text: str | None) -> str | None:

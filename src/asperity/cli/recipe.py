@@ -75,7 +75,7 @@ def recipe(
 
 def recipe_text(result: RecipeResult) -> str:
     """Numbers beside the paper's, as a person reads them."""
-    from asperity.cli.report import aligned
+    from asperity.outputs.tables import aligned
 
     rows = [("step", "", "here", "paper", "", "from")]
     for name, r in result.numbers.items():

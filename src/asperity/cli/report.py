@@ -1,8 +1,8 @@
-"""Records for people and programs: responses as JSON has them, and aligned columns of text."""
+"""Records for programs: responses as JSON has them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,16 +18,6 @@ if TYPE_CHECKING:
 def to_json(record: Mapping[str, Any]) -> str:
     """JSON for people and programs, indented; a number that is not finite becomes null."""
     return json.to_json(record, indent=2)
-
-
-def aligned(rows: Iterable[Sequence[str]], indent: str = "") -> str:
-    """Rows of text in columns, two blanks apart."""
-    table = [list(row) for row in rows]
-    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
-    return "\n".join(
-        (indent + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True))).rstrip()
-        for row in table
-    )
 
 
 #: Outputs in the order of the JSON; complex ones are pairs of real and imaginary part.

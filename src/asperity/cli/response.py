@@ -103,8 +103,8 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
 
 
 def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> str:
-    from asperity.cli.report import aligned
     from asperity.laws import get_law
+    from asperity.outputs.tables import aligned
     from asperity.parameters import OUTPUTS, point_parameters
     from asperity.units import format_si
 

@@ -198,7 +198,8 @@ def _draw(run_file: Path, picture: Path) -> Path:
 def _report(
     wanted: Protocol, done: RunSummary, files: list[Path], as_json: bool, statement: str
 ) -> None:
-    from asperity.cli.report import aligned, to_json
+    from asperity.cli.report import to_json
+    from asperity.outputs.tables import aligned
 
     if as_json:
         click.echo(

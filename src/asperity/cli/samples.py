@@ -32,9 +32,10 @@ def samples(name: str | None, out: Path | None, seed: int, as_json: bool) -> int
     recording should give back.
     """
     from asperity import samples as known
-    from asperity.cli.report import aligned, to_json
+    from asperity.cli.report import to_json
     from asperity.operating_point import known_parameters
     from asperity.outputs import output_file
+    from asperity.outputs.tables import aligned
     from asperity.recording.writers import check_path, write
     from asperity.units import format_si
 

@@ -2,54 +2,81 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
-from asperity.errors import Argument
-
-#: Options that choose the column of a role; other roles have --column.
-COLUMN_OPTIONS: Mapping[str, str] = {"W": "--load", "F": "--force", "time": "--time"}
+from asperity.errors import Argument, InputError, naming
 
 _OPTIONS: Mapping[str, str] = {
-    "measure.window": "--window",
-    "measure.detrend": "--detrend",
-    "measure.load": "--load",
-    "measure.force": "--force",
-    "measure.steps": "--steps",
-    "measure.holds": "--holds",
-    "measure.frequency": "--frequency",
     "measure.trace": "the recording",
+    "measure.steps and holds": "--steps and --holds",
+    "measure.events": "--events",
     "lock_in.detrend": "--detrend",
     "lock_in.harmonics": "--harmonics",
     "lock_in.frequency": "--frequency",
     "lock_in.load and force": "the load and the force",
     "lock_in.load": "the load",
     "lock_in.time": "the time column",
-    "rate": "--rate",
-    "read.rate": "--rate",
-    "read.group": "--group",
-    "read.format": "--format",
-    "read.delimiter": "--delimiter",
-    "read.decimal": "--decimal",
-    "columns": "--column",
-    "units": "--unit",
     "stress_to_force.area": "--area",
     "recording.path": "the recording",
     "slice.start and slice.end": "--window",
 }
 
 
-def in_options(argument: Argument) -> str:
-    """The words of the command line: ``--load``, ``--column "velocity=speed"``."""
+def in_options(argument: Argument, own: Mapping[str, str] | None = None) -> str:
+    """The words of the command line: ``--load``, ``--column "velocity=speed"``.
+
+    Parameters
+    ----------
+    argument : Argument
+    own : mapping of str to str, optional
+        Option of each field of a question, which other commands mean otherwise.
+    """
+    from asperity.questions.options import COLUMN_OPTIONS, MEASURE_OPTIONS, SOURCE_OPTIONS
+
     name, key, value = argument
+    # A part of a list has the option of the list.
+    while name.rpartition(".")[2].isdigit():
+        name = name.rpartition(".")[0]
     if name in ("columns", "Trace.channel") and key:
         if key in COLUMN_OPTIONS:
             return f"{COLUMN_OPTIONS[key]} {_quoted(value)}".rstrip()
         return f'--column "{key}={value}"' if value else f"--column {key}=NAME"
     if name == "units" and key and value:
         return f'--unit "{key}={"UNIT" if value == "..." else value}"'
-    option = _OPTIONS.get(name, name)
-    return f"{option} {_quoted(value)}".rstrip()
+    known = {**_OPTIONS, **SOURCE_OPTIONS, **(own or {})}
+    known |= {f"read.{n}": option for n, option in SOURCE_OPTIONS.items()}
+    known |= {f"measure.{n}": option for n, option in MEASURE_OPTIONS.items()}
+    option = known.get(name)
+    if option is None:
+        whole, _, part = name.partition(".")
+        option, key = (known[whole], part) if whole in (own or {}) else (name, key)
+    return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])
 
 
 def _quoted(value: str) -> str:
     return value if all(c.isalnum() or c in "_." for c in value) else f'"{value}"'
+
+
+@contextmanager
+def fields_as_options(own: Mapping[str, str]) -> Iterator[None]:
+    """Name fields of a question, which other commands mean otherwise, by this command's options.
+
+    Parameters
+    ----------
+    own : mapping of str to str
+        Option of each field.
+    """
+
+    def words(argument: Argument) -> str:
+        head, _, rest = argument.name.partition(".")
+        # All files of data have the same options.
+        if head == "data" and rest:
+            argument = argument._replace(name=rest.partition(".")[2] or rest)
+        return in_options(argument, own)
+
+    with naming(words):
+        try:
+            yield
+        except InputError as error:
+            raise InputError(str(error)) from None

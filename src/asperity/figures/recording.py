@@ -56,7 +56,7 @@ def draw_sliding(measurement: SlidingMeasurement) -> Figure:
     figure = new_figure(5.0, 3.5)
     axis = figure.subplots()
     start = measurement.time[0]
-    _band(axis, measurement.time - start, measurement.values, color=_MEASURED)
+    band(axis, measurement.time - start, measurement.values, color=_MEASURED)
     low, high = np.quantile(measurement.values, [0.002, 0.998])
     low = min(low, *(s.lowest for s in measurement.segments))
     high = max(high, *(s.highest for s in measurement.segments))
@@ -101,8 +101,8 @@ def draw_sliding(measurement: SlidingMeasurement) -> Figure:
 def _draw_recording(axis: Axes, measurement: Measurement) -> None:
     samples, reading = measurement.samples, measurement.reading
     start = samples.time[0]
-    _band(axis, samples.time - start, samples.load / reading.W0, color=_LOAD)
-    _band(axis, samples.time - start, samples.force / reading.W0, color=_FITTED)
+    band(axis, samples.time - start, samples.load / reading.W0, color=_LOAD)
+    band(axis, samples.time - start, samples.force / reading.W0, color=_FITTED)
     axis.axvspan(
         reading.start - start,
         reading.end - start,
@@ -147,7 +147,7 @@ def _draw_residual(axis: Axes, measurement: Measurement) -> None:
     reading = measurement.reading
     frequency, amplitude = residual_spectrum(measurement)
     order = np.arange(1, reading.harmonics.size + 1)
-    _band(axis, frequency, np.maximum(amplitude, 1e-300), color=_MEASURED, lines=True)
+    band(axis, frequency, np.maximum(amplitude, 1e-300), color=_MEASURED, lines=True)
     axis.plot(
         order * reading.frequency,
         np.abs(reading.harmonics),
@@ -173,7 +173,7 @@ def _since(start: float) -> str:
     return f"time $-$ {start:.10g} s (s)" if start else "time (s)"
 
 
-def _band(axis: Axes, x: Array, y: Array, *, color: str, lines: bool = False) -> None:
+def band(axis: Axes, x: Array, y: Array, *, color: str, lines: bool = False) -> None:
     """A curve; of more points than can be seen, the extremes in columns of equal width.
 
     Nothing is drawn between samples that are far apart.

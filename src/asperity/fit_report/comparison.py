@@ -19,7 +19,7 @@ from asperity.fit_report.folder import (
     provenance,
     table,
 )
-from asperity.fit_report.pictures import laws_figure, run_figure
+from asperity.fit_report.pictures import laws_figure, run_figure, svg
 from asperity.inference import Fit
 from asperity.inference.comparison.compare import Comparison
 from asperity.inference.comparison.record import comparison_record, laws_table
@@ -96,13 +96,13 @@ def _figures(fits: Mapping[str, Fit]) -> str:
             "each law, by the normal approximation."
         )
         many = len(next(iter(predicted.values()))) > _MOST_NARROW
-        parts.append(figure(laws_figure(term.table, predicted), caption, wide=many))
+        parts.append(figure(svg(laws_figure(term.table, predicted)), caption, wide=many))
     for i, run in enumerate(first.objective.terms_of(RunTerm)):
         curves = {
             name: own.objective.terms_of(RunTerm)[i].fitted_friction(own.values)
             for name, own in fits.items()
         }
-        parts.append(figure(run_figure(run.run, curves), RUN_CAPTION))
+        parts.append(figure(svg(run_figure(run.run, curves)), RUN_CAPTION))
     return "\n".join(parts)
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from asperity._version import __version__
 from asperity.errors import InputError
 from asperity.fit_report.bands import bands_of
-from asperity.fit_report.pictures import data_figure, residual_figure, run_figure
+from asperity.fit_report.pictures import data_figure, residual_figure, run_figure, svg
 from asperity.inference import Fit, Posterior
 from asperity.inference.fitting.result import fit_record
 from asperity.inference.runs.term import RunTerm
@@ -221,15 +221,15 @@ def _figures(fit: Fit, posterior: Posterior | None) -> str:
     for term, residuals in fit.parts(LockInTerm):
         parts += [
             figure(
-                data_figure(term.table, bands_of(fit, term, posterior)),
+                svg(data_figure(term.table, bands_of(fit, term, posterior))),
                 "Readings with standard uncertainties; medians and 95 % bands of the "
                 f"prediction by the {source}.",
             ),
-            figure(residual_figure(residuals, term.table.row_names), "Residuals."),
+            figure(svg(residual_figure(residuals, term.table.row_names)), "Residuals."),
         ]
     for run, _ in fit.parts(RunTerm):
         drawn = run_figure(run.run, {fit.law: run.fitted_friction(fit.values)})
-        parts.append(figure(drawn, RUN_CAPTION))
+        parts.append(figure(svg(drawn), RUN_CAPTION))
     return "\n".join(parts)
 
 

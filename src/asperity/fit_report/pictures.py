@@ -1,4 +1,4 @@
-"""Figures of fits as SVG: data with bands, recordings with motions, and residuals."""
+"""Figures of fits: data with bands, recordings with motions, and residuals."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from asperity.errors import InputError
 from asperity.figures.style import new_figure, style
-from asperity.fit_report.bands import Series
-from asperity.inference import LockInTable
+from asperity.fit_report.bands import Series, bands_of
+from asperity.inference import Fit, LockInTable
 from asperity.inference.objective import Residuals
 from asperity.inference.runs.run import RecordedRun
+from asperity.inference.runs.term import RunTerm
+from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 
@@ -27,8 +30,8 @@ _LABELS = {
 }
 
 
-def data_figure(table: LockInTable, series: Sequence[Series]) -> str:
-    """Readings with error bars, and bands of the fit, against the amplitude; as SVG."""
+def data_figure(table: LockInTable, series: Sequence[Series]) -> Figure:
+    """Readings with error bars, and bands of the fit, against the amplitude."""
     names = [n for n in _LABELS if n in table.values]
     with style():
         figure = new_figure(6.4, 2.6 * len(names))
@@ -51,11 +54,11 @@ def data_figure(table: LockInTable, series: Sequence[Series]) -> str:
             axis.set_ylabel(_LABELS[name])
         axes[0].legend(fontsize=8)
         axes[-1].set_xlabel(r"$\epsilon$ as applied")
-        return _svg(figure)
+        return figure
 
 
-def laws_figure(table: LockInTable, predicted: Mapping[str, Sequence[Series]]) -> str:
-    """Readings, and bands of several laws, a column of panels for each series; as SVG.
+def laws_figure(table: LockInTable, predicted: Mapping[str, Sequence[Series]]) -> Figure:
+    """Readings, and bands of several laws, a column of panels for each series.
 
     Parameters
     ----------
@@ -91,11 +94,11 @@ def laws_figure(table: LockInTable, predicted: Mapping[str, Sequence[Series]]) -
         for axis in axes[-1]:
             axis.set_xlabel(r"$\epsilon$ as applied")
         axes[0, 0].legend(fontsize=7)
-        return _svg(figure)
+        return figure
 
 
-def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> str:
-    """Friction of a recording with the motion of laws, and what is left; as SVG.
+def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> Figure:
+    """Friction of a recording with the motion of laws, and what is left.
 
     Parameters
     ----------
@@ -115,11 +118,11 @@ def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> str:
         above.legend(fontsize=8)
         below.set_ylabel("data - law")
         below.set_xlabel("time (s)")
-        return _svg(figure)
+        return figure
 
 
-def residual_figure(residuals: Residuals, rows: np.ndarray) -> str:
-    """Residuals in standard uncertainties, by row; as SVG."""
+def residual_figure(residuals: Residuals, rows: np.ndarray) -> Figure:
+    """Residuals in standard uncertainties, by row."""
     with style():
         figure = new_figure(6.4, 3.0)
         axis = figure.subplots()
@@ -133,12 +136,37 @@ def residual_figure(residuals: Residuals, rows: np.ndarray) -> str:
         axis.set_ylabel("residual / uncertainty")
         axis.set_xlim(0, len(rows) + 1)
         axis.legend(fontsize=8, ncols=3)
-        return _svg(figure)
+        return figure
 
 
-def _svg(figure: Figure) -> str:
-    """An SVG element, without the header of a file."""
+def draw_fit(fit: Fit) -> Figure:
+    """The first recording of a fit with the motion of its law, or its first table with bands.
+
+    Parameters
+    ----------
+    fit : Fit
+
+    Raises
+    ------
+    InputError
+        If the fit has not converged, or is one of another kind of data.
+    """
+    if not fit.converged:
+        raise InputError(f"plot must be asked of a fit that converged, got one with: {fit.message}")
+    for recording, _ in fit.parts(RunTerm):
+        return run_figure(recording.run, {fit.law: recording.fitted_friction(fit.values)})
+    for table, _ in fit.parts(LockInTerm):
+        return data_figure(table.table, bands_of(fit, table, None))
+    raise InputError(
+        "plot must be asked of a fit to a recording or a table of readings, got another kind of "
+        "data; plot its residuals yourself"
+    )
+
+
+def svg(figure: Figure) -> str:
+    """A figure as an SVG element, without the header of a file."""
     text = io.StringIO()
-    figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
+    with style():
+        figure.savefig(text, format="svg", metadata={"Date": None, "Creator": None})
     whole = text.getvalue()
     return whole[whole.index("<svg") :]

@@ -31,7 +31,7 @@ Row = dict[str, Any]
 #: Columns that stand first; the others follow in the order of their first row.
 _FIRST = ("file", "part", "kind", "start", "end", "verdict", "reason")
 #: What rows without modulation are of.
-_SLIDING_KINDS = ("step", "hold", "level")
+_SLIDING_KINDS = ("step", "hold", "level", "stick-slip")
 #: Columns of steps and holds that the table has, besides their uncertainties.
 _STEP = (
     "velocity_before",
@@ -310,7 +310,7 @@ def _write_netcdf(path: Path, table: list[Row]) -> None:
 
 def _unit(name: str) -> str:
     """SI unit of a column; W0 and mean_force are in the column 'unit'."""
-    stem = name.removesuffix("_uncertainty").removesuffix("_interval_95")
+    stem = name.removesuffix("_uncertainty").removesuffix("_interval_95").removesuffix("_spread")
     units = {
         "start": "s",
         "end": "s",
@@ -318,9 +318,16 @@ def _unit(name: str) -> str:
         "frequency": "Hz",
         "settling_slip": "m",
         "reload_slope": "1/m",
+        "loading_slope": "1/s",
+        "stiffness": "N/m",
+        "stiffness_from_slope": "N/m",
+        "mass": "kg",
+        "load": "N",
     }
     if stem.startswith("velocity"):
         return "m/s"
     if stem.startswith("phase"):
         return "rad"
+    if stem in ("recurrence", "stick_duration", "slip_duration"):
+        return "s"
     return units.get(stem, "" if stem in ("W0", "mean_force") else "1")

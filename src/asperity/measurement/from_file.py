@@ -6,14 +6,23 @@ import os
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from asperity.errors import ConstantLoadError, InputError
-from asperity.measurement.measure import Measurement, measure
+from asperity.errors import Argument, ConstantLoadError, InputError
+from asperity.measurement.measure import Measurement, measure, measure_amplitudes
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
-from asperity.parameters.arguments import number, one_of, pair, switch, whole_number
+from asperity.measurement.stick_slip.measure import (
+    Machine,
+    StickSlipMeasurement,
+    measure_stick_slip,
+)
+from asperity.questions.recording import Measurement as Question
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
 Read = TypeVar("Read")
+
+#: Share of the displacement in the slips above which it is the slider's, and slip events for each
+#: velocity step or hold above which these are read within stick-slip.
+_SLIDER, _EVENTS = 0.5, 10
 
 
 def measure_recording(
@@ -30,7 +39,12 @@ def measure_recording(
     refine: bool = True,
     steps: Sequence[float] | None = None,
     holds: Sequence[tuple[float, float]] | None = None,
-) -> Measurement | SlidingMeasurement:
+    stick_slip: bool | None = None,
+    stiffness: float | str | None = None,
+    velocity: float | str | None = None,
+    mass: float | str | None = None,
+    normal_load: float | str | None = None,
+) -> Measurement | SlidingMeasurement | StickSlipMeasurement:
     """Measure a recording, as ``asperity measure`` does.
 
     Parameters
@@ -55,58 +69,154 @@ def measure_recording(
         Of a recording without modulation: times (s) of velocity steps.
     holds : sequence of (float, float), optional
         Of a recording without modulation: begin and end (s) of holds.
+    stick_slip : bool
+        Whether slip events are read; by default they are if there are some, and no modulation.
+    stiffness, velocity, mass, normal_load : float or str, optional
+        K, V, M and W0 of the machine (N/m, m/s, kg, N), for slips, velocities and energies of slip
+        events. Without a recorded load W0 is M g unless it is given.
 
     Returns
     -------
-    Measurement or SlidingMeasurement
+    Measurement, SlidingMeasurement or StickSlipMeasurement
 
     Raises
     ------
     InputError
         If the file cannot be read, the recording lacks a channel, or an argument does not fit.
     """
-    if modulated is not None:
-        modulated = switch(modulated, "modulated")
-    one_of(detrend, ("none", "linear", "quadratic"), "detrend")
-    if modulated is not False and (steps is not None or holds is not None):
-        raise InputError(
-            "steps and holds must go with modulated=False, got them without; leave them out or say "
-            "so"
-        )
-    between = None
-    if window is not None:
-        first, last = pair(window, "window")
-        between = (number(first, "window", "time"), number(last, "window", "time"))
-    trace = recording if isinstance(recording, Trace) else read(recording)
-    common: dict[str, Any] = {"load": load, "force": force, "window": between, "detrend": detrend}
-    if modulated is False:
-        return measure_sliding(trace, steps=steps, holds=holds, **common)
-    lock_in: dict[str, Any] = {
-        "frequency": None,
-        "harmonics": whole_number(harmonics, "harmonics", least=1),
-        "only_whole_periods": switch(only_whole_periods, "only_whole_periods"),
-        "refine": switch(refine, "refine"),
+    fields: dict[str, Any] = {
+        "modulated": modulated,
+        "load": load,
+        "force": force,
+        "frequency": frequency,
+        "exact_frequency": not refine,
+        "harmonics": harmonics,
+        "window": window,
+        "whole_periods": only_whole_periods,
+        "detrend": detrend,
+        "steps": steps,
+        "holds": holds,
+        "stick_slip": stick_slip,
+        "stiffness": stiffness,
+        "velocity": velocity,
+        "mass": mass,
+        "normal_load": normal_load,
     }
-    if frequency is not None:
-        lock_in["frequency"] = number(frequency, "frequency", "frequency", "positive")
-    if modulated or frequency is not None:
-        return measure(trace, **lock_in, **common)
+    question = Question(**fields)
+    trace = recording if isinstance(recording, Trace) else read(recording)
+    return answer_measurement(trace, question)[0]
+
+
+def answer_measurement(
+    trace: Trace, question: Question, *, plain: bool = False
+) -> tuple[Measurement | SlidingMeasurement | StickSlipMeasurement, str]:
+    """What a question asks of a recording: its longest modulated stretch, events, or sliding.
+
+    Parameters
+    ----------
+    trace : Trace
+    question : asperity.questions.recording.Measurement
+    plain : bool
+        As of `modulated_or_sliding`.
+
+    Returns
+    -------
+    measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
+    what : str
+        What the recording is, where the program reads it as not modulated by itself; else empty.
+
+    Raises
+    ------
+    InputError
+        As of `measure_recording`.
+    """
+    return _either(
+        trace,
+        question,
+        lambda: measure(trace, window=question.window, **_lock_in(question)),
+        plain=plain,
+    )
+
+
+def measured_parts(
+    trace: Trace, question: Question
+) -> list[Measurement | InputError] | SlidingMeasurement | StickSlipMeasurement:
+    """As `answer_measurement`, with every modulated stretch of the recording or of the window."""
+    return _either(trace, question, lambda: modulated_parts(trace, question))[0]
+
+
+def modulated_parts(trace: Trace, question: Question) -> list[Measurement | InputError]:
+    """Every modulated stretch of a recording; that of the window, if one is given."""
+    if question.window is not None:
+        return [measure(trace, window=question.window, **_lock_in(question))]
+    return measure_amplitudes(trace, **_lock_in(question))
+
+
+def _either(
+    trace: Trace, question: Question, modulated: Callable[[], Read], *, plain: bool = False
+) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
+    """What `modulated` reads, the sliding or the slip events, as question or recording says."""
+
+    def sliding() -> SlidingMeasurement:
+        return measure_sliding(
+            trace,
+            load=question.load,
+            force=question.force,
+            window=question.window,
+            detrend=question.detrend,
+            steps=question.steps,
+            holds=question.holds,
+        )
+
+    def events() -> StickSlipMeasurement:
+        machine = Machine(
+            question.stiffness, question.velocity, question.mass, question.normal_load
+        )
+        return measure_stick_slip(
+            trace,
+            load=question.load,
+            force=question.force,
+            window=question.window,
+            machine=machine,
+        )
+
+    if question.stick_slip:
+        return events(), ""
+    if question.modulated is False:
+        return sliding(), ""
+    if question.modulated or question.frequency is not None:
+        return modulated(), ""
     return modulated_or_sliding(
         trace,
-        lambda: measure(trace, **lock_in, **common),
-        lambda: measure_sliding(trace, **common),
-        load=load,
-    )[0]
+        modulated,
+        sliding,
+        events if question.stick_slip is None else None,
+        load=question.load,
+        plain=plain,
+    )
+
+
+def _lock_in(question: Question) -> dict[str, Any]:
+    return {
+        "load": question.load,
+        "force": question.force,
+        "frequency": question.frequency,
+        "harmonics": question.harmonics,
+        "detrend": question.detrend,
+        "only_whole_periods": question.whole_periods,
+        "refine": not question.exact_frequency,
+    }
 
 
 def modulated_or_sliding(
     trace: Trace,
     modulated: Callable[[], Read],
     sliding: Callable[[], SlidingMeasurement],
+    stick_slip: Callable[[], StickSlipMeasurement] | None = None,
     *,
     load: str = "W",
     plain: bool = False,
-) -> tuple[Read | SlidingMeasurement, str]:
+) -> tuple[Read | SlidingMeasurement | StickSlipMeasurement, str]:
     """Measure a recording as what it is.
 
     Parameters
@@ -116,14 +226,17 @@ def modulated_or_sliding(
         Measures a modulated recording.
     sliding : callable
         Measures one of which the load is constant, or not recorded.
+    stick_slip : callable, optional
+        Measures the slip events of one; None where these are not asked for.
     load : str
         Channel, by name or role.
     plain : bool
-        Whether sliding at one velocity counts; if not, velocity steps or holds are needed.
+        Whether sliding at one velocity counts whatever it is; if not, there must be velocity steps,
+        holds, slip events, or sliding that is steady.
 
     Returns
     -------
-    measurement : Measurement or SlidingMeasurement
+    measurement : Measurement, SlidingMeasurement or StickSlipMeasurement
         Or what else `modulated` returns.
     reason : str
         What the recording is, where it was not read as modulated; else empty.
@@ -131,7 +244,7 @@ def modulated_or_sliding(
     Raises
     ------
     InputError
-        If it is neither.
+        If it is none of these.
     """
     try:
         return modulated(), ""
@@ -140,14 +253,54 @@ def modulated_or_sliding(
         if not constant and _recorded(trace, load):
             raise
         reason = error
+    what = "The normal load is constant" if constant else "No channel is the normal load"
+    events = _events(stick_slip)
     try:
         measurement = sliding()
     except InputError as error:
+        if not constant and len(trace.channels) == 1:
+            raise _which_force(trace) from None
         raise (error if constant and plain else reason) from None
-    if not (plain or measurement.steps or measurement.holds):
+    changes = len(measurement.steps) + len(measurement.holds)
+    if events is not None and _rather_events(events, changes):
+        return events, f"{what}: {events.kind} is read, not a modulation."
+    if changes:
+        return measurement, f"{what}: velocity steps and holds are read, not a modulation."
+    steady = events is not None and events.kind == "steady sliding"
+    if not (plain or steady):
         raise reason
-    what = "The normal load is constant" if constant else "No channel is the normal load"
-    return measurement, f"{what}: velocity steps and holds are read, not a modulation."
+    return measurement, f"{what}: steady sliding is read, not a modulation."
+
+
+def _events(read: Callable[[], StickSlipMeasurement] | None) -> StickSlipMeasurement | None:
+    try:
+        return None if read is None else read()
+    except InputError:
+        return None
+
+
+def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
+    """Whether slip events say more of a recording than its velocity steps and holds do.
+
+    Where the displacement is the slider's, each stick looks like a hold.
+    """
+    if not events.clear:
+        return False
+    if not changes or events.slip_share > _SLIDER:
+        return True
+    return any(r.sticks for r in events.regimes) and len(events.events) > _EVENTS * changes
+
+
+def _which_force(trace: Trace) -> InputError:
+    (name,) = trace.channels
+    friction, force = (Argument("columns", role, name) for role in ("friction", "F"))
+    return InputError(
+        Argument("columns", "friction"),
+        "name the friction in a recording of one column",
+        f"'{name}'",
+        f"where it is F/W write {friction}; where it is the force write {force} and give the load "
+        "too",
+    )
 
 
 def _recorded(trace: Trace, name: str) -> bool:

@@ -179,8 +179,9 @@ class ResponseFunction:
         values = _cut(whole, points)
         cut = table[:, 0] if points is None else table[:, :points]
         columns = zip(self._program.equations.names, cut, strict=True)
-        wanted = self._program.equations.names if names is None else names
-        return values, {n: _derivative(c, values) for n, c in columns if n in wanted}
+        return values, {
+            n: _derivative(c, values) for n, c in columns if names is None or n in names
+        }
 
     def _require_fitting(self, known: KnownOrbits | None, points: int, *, traced: bool) -> None:
         """Refuse known orbits that this call cannot begin with."""

@@ -34,8 +34,22 @@ T = TypeVar("T")
 Given = bool | float | str
 #: Characters of a part of a field's place.
 _LONGEST = 60
-#: What pydantic puts behind the place of a field that may be of several types.
+#: What pydantic puts into the place of a field that may be of several types, besides texts with
+#: brackets and the names of records.
 _TYPES = frozenset({"bool", "float", "int", "str", "nullable"})
+
+#: What a value must be, by the beginning of pydantic's name of the mistake.
+_WORDS = {
+    "bool_": "true or false",
+    "int_": "a whole number",
+    "float_": "a number",
+    "string_type": "a text",
+    "tuple_": "a list",
+    "list_": "a list",
+    "dict_": "a table",
+    "mapping_": "a table",
+    "model_": "a table",
+}
 
 _units_required: ContextVar[bool] = ContextVar("units_required", default=False)
 
@@ -192,31 +206,22 @@ def _seconds(value: Any) -> float:
     return float(to_si(value, "time", ""))
 
 
-def _ends(value: Any) -> Any:
+def _span(value: Any) -> tuple[float, float]:
     """Both ends of a span; one that is left open in a text is infinite."""
-    if not isinstance(value, str):
-        if isinstance(value, list | tuple | np.ndarray) and len(value) == 2:
-            return tuple(value)
+    if isinstance(value, str):
+        start, colon, end = (part.strip() for part in value.partition(":"))
+        if not colon:
+            raise InputError("", "be START:END", f"'{value}'", "write it like 10:60")
+        value = (start or -np.inf, end or np.inf)
+    if not isinstance(value, list | tuple | np.ndarray) or len(value) != 2:
         raise InputError("", "be two times", shown(value), "give (start, end)")
-    start, colon, end = (part.strip() for part in value.partition(":"))
-    if not colon:
-        raise InputError("", "be START:END", f"'{value}'", "write it like 10:60")
-    return start or -np.inf, end or np.inf
-
-
-def _end_of_a_span(value: Any) -> float:
-    return value if value in (-np.inf, np.inf) else _seconds(value)
+    first, last = (end if end in (-np.inf, np.inf) else _seconds(end) for end in value)
+    return first, last
 
 
 Seconds = Annotated[float, BeforeValidator(_seconds)]
 #: Start and end of a stretch of time (s), or a text such as ``"10:60"``.
-Span = Annotated[
-    tuple[
-        Annotated[float, BeforeValidator(_end_of_a_span)],
-        Annotated[float, BeforeValidator(_end_of_a_span)],
-    ],
-    BeforeValidator(_ends),
-]
+Span = Annotated[tuple[float, float], BeforeValidator(_span)]
 
 
 def shown(value: Any) -> str:
@@ -248,10 +253,16 @@ def mistakes_in(
     shown : callable
         Words for a value.
     """
-    mistakes: dict[str, InputError] = {}
+    mistakes: dict[tuple[str, ...], InputError] = {}
     for reported in error.errors(include_url=False):
         for mistake in _mistakes(reported, model, subject, prefix, shown):
-            mistakes.setdefault(str(mistake), mistake)
+            key = (*mistake.field, mistake.got, mistake.advice)
+            other = mistakes.get(key)
+            if other is not None and mistake.rule not in other.rule:
+                # A field of several types, which the value fits none of.
+                rule = f"{other.rule} or {mistake.rule.removeprefix('be ')}"
+                mistake = InputError(mistake.field, rule, mistake.got, mistake.advice)
+            mistakes[key] = mistake if other is None or mistake.rule not in other.rule else other
     return list(mistakes.values())
 
 
@@ -265,9 +276,12 @@ def _mistakes(
     raised = reported.get("ctx", {}).get("error")
     if isinstance(raised, MistakesError):
         return raised.errors
-    place = [str(part)[:_LONGEST] for part in reported["loc"]]
-    while len(place) > 1 and place[-1] in _TYPES:
-        place.pop()
+    records = {kind.__name__ for kind in _models_in(model)}
+    place = [
+        str(part)[:_LONGEST]
+        for i, part in enumerate(reported["loc"])
+        if not (i and isinstance(part, str) and ("[" in part or part in _TYPES | records))
+    ]
     field = prefix + ".".join(place) if place else subject
     if isinstance(raised, InputError):
         # Types of values do not know where they are used.
@@ -282,7 +296,13 @@ def _mistakes(
         known = _fields_at(model, reported["loc"][:-1])
         advice = closest(place[-1], known) if known else "leave it out"
         return (InputError(field, "be a known field", value, advice),)
-    rule = " ".join(reported["msg"].split()).removeprefix("Input should be ")
+    if reported["type"] == "literal_error":
+        expected = reported["ctx"]["expected"].replace("'", "")
+        return (InputError(field, f"be {expected}", value, "choose one"),)
+    said = " ".join(reported["msg"].split()).removeprefix("Input should be ")
+    rule = next(
+        (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), said
+    )
     return (InputError(field, f"be {rule}", value, "correct the value"),)
 
 
@@ -302,9 +322,13 @@ def _is_model(kind: Any) -> bool:
     return isinstance(kind, type) and issubclass(kind, BaseModel)
 
 
-def _models_in(kind: Any) -> Iterator[type[BaseModel]]:
-    """Models within a type such as ``Mapping[str, Model] | None``."""
+def _models_in(kind: Any, known: tuple[Any, ...] = ()) -> Iterator[type[BaseModel]]:
+    """Models within a type such as ``Mapping[str, Model] | None``, the outermost first."""
+    if kind in known:
+        return
     if _is_model(kind):
         yield kind
+        for field in kind.model_fields.values():
+            yield from _models_in(field.annotation, (*known, kind))
     for part in getattr(kind, "__args__", ()):
-        yield from _models_in(part)
+        yield from _models_in(part, known)

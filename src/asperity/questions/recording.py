@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, model_validator
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.questions.record import Question, Seconds, Span, quantity
 
 Column = str | int
@@ -69,13 +71,26 @@ class Source(ReadingRecipe):
         return {name: value for name, value in named.items() if value not in (None, {}, "")}
 
 
+def _in_order(times: tuple[Any, ...]) -> tuple[Any, ...]:
+    return tuple(sorted(times))
+
+
+def _closed(spans: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+    """Holds in their order, each with a begin and an end."""
+    for start, end in spans:
+        if not (math.isfinite(start) and math.isfinite(end)):
+            raise InputError("", "have a start and an end", f"{start:g} to {end:g} s", "write both")
+    return tuple(sorted(spans))
+
+
 class Measurement(Question):
     """What is measured in a recording.
 
     Attributes
     ----------
     modulated : bool, optional
-        Whether the load is; by default velocity steps and holds are read where it is constant.
+        Whether the load is; by default velocity steps and holds are read where it is constant, or
+        where some are given.
     load, force : str
         Channels, by name or role.
     frequency : float or str, optional
@@ -92,6 +107,10 @@ class Measurement(Question):
         Times (s) of the velocity steps of a recording without modulation.
     holds : tuple of (float, float), optional
         Begin and end (s) of its holds.
+    stick_slip : bool, optional
+        Whether slip events are read; by default where there are some, and no modulation.
+    stiffness, velocity, mass, normal_load : float or str, optional
+        K (N/m), V (m/s), M (kg) and W0 (N) of the machine, for slip events.
     """
 
     subject = "measure"
@@ -106,23 +125,44 @@ class Measurement(Question):
     window: Span | None = None
     whole_periods: bool = False
     detrend: Literal["none", "linear", "quadratic"] = "linear"
-    steps: tuple[Seconds, ...] | None = None
-    holds: tuple[Span, ...] | None = None
+    steps: Annotated[tuple[Seconds, ...], AfterValidator(_in_order)] | None = None
+    holds: Annotated[tuple[Span, ...], AfterValidator(_closed)] | None = None
+    stick_slip: bool | None = None
+    stiffness: quantity("stiffness", "positive") | None = None  # type: ignore[valid-type]
+    velocity: quantity("velocity", "positive") | None = None  # type: ignore[valid-type]
+    mass: quantity("mass", "positive") | None = None  # type: ignore[valid-type]
+    normal_load: quantity("force", "positive") | None = None  # type: ignore[valid-type]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_modulation(cls, fields: Any) -> Any:
+        """Steps and holds are those of a recording without modulation."""
+        given = isinstance(fields, Mapping) and (fields.get("steps") or fields.get("holds"))
+        if given and fields.get("modulated") is None:
+            return {**fields, "modulated": False}
+        return fields
 
     @model_validator(mode="after")
     def _consistent(self) -> Measurement:
         if self.exact_frequency and self.frequency is None:
             raise InputError(
-                "exact_frequency",
-                "go with a frequency",
+                "measure.exact_frequency",
+                f"go with {Argument('measure.frequency')}",
                 "none",
                 "give the frequency or leave it out",
             )
-        if self.modulated is not False and (self.steps or self.holds):
+        if self.modulated and (self.steps or self.holds):
             raise InputError(
-                "steps and holds",
-                "go with modulated=False",
-                "them without",
-                "leave them out or say so",
+                "measure.steps and holds",
+                f"go with {Argument('modulated', value='False')}",
+                "them of a modulated recording",
+                "leave one of them out",
+            )
+        if self.stick_slip and (self.modulated is not None or self.frequency is not None):
+            raise InputError(
+                "measure.stick_slip",
+                f"go without {Argument('measure.modulated')} and {Argument('measure.frequency')}",
+                "both",
+                "leave one out",
             )
         return self

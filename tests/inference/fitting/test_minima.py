@@ -217,62 +217,11 @@ class TwoNoises(RunTerm):
         self.sizes = self._raw(math.log(values["D0"]))[0]
         return True
 
-    outliers = ()
-
     def noise_state(self):
-        return NoiseState(tuple(self.sizes), None, 1.0, (), self.outliers, (), (1.0, 1.0))
+        return NoiseState(tuple(self.sizes), 1.0, (1.0, 1.0))
 
     def restore_noise(self, state):
-        self.sizes, self.outliers = np.array(state.models), state.outliers
-
-
-class Spoiled(TwoNoises):
-    """The same with a sample of a far too small error, which is left out with the first noise."""
-
-    def residuals(self, values, *, search=None):
-        whole = super().residuals(values)
-        if self.outliers:
-            return whole
-        spike, slope = 1e3 * (math.log(values["D0"]) - SECOND), 1e3 / values["D0"]
-        return whole._replace(
-            values=np.append(whole.values, spike), jacobian=np.vstack([whole.jacobian, [slope]])
-        )
-
-    def update_noise(self, values):
-        self.outliers = (100,)
-        return super().update_noise(values)
-
-
-class Doubted(TwoNoises):
-    """The same with an exact sample that agrees with FIRST alone, or a period away."""
-
-    rate = 0.5 * math.pi / (SECOND - FIRST)
-
-    def residuals(self, values, *, search=None):
-        whole = super().residuals(values)
-        if self.outliers:
-            return whole
-        phase = self.rate * (math.log(values["D0"]) - FIRST)
-        exact, slope = 1e3 * math.sin(phase), 1e3 * self.rate * math.cos(phase) / values["D0"]
-        return whole._replace(
-            values=np.append(whole.values, exact),
-            jacobian=np.vstack([whole.jacobian, [slope]]),
-            log_scale=whole.log_scale - math.log(1e3),
-        )
-
-    def update_noise(self, values):
-        if abs(math.sin(self.rate * (math.log(values["D0"]) - FIRST))) > 0.1:
-            self.outliers = (100,)
-        return super().update_noise(values)
-
-
-def test_a_sample_that_only_a_wrong_minimum_is_off_from_is_not_left_out():
-    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
-    term = Doubted()
-    objective = Objective((term,), LAW, unknowns, {})
-    with_noise(objective, [(np.array([SECOND - 0.02]), 1.0)])
-    np.testing.assert_allclose(term.sizes, [1, 2], atol=0.01)
-    assert term.outliers == ()
+        self.sizes = np.array(state.models)
 
 
 def test_minima_of_recordings_are_compared_with_the_noise_of_each():
@@ -287,20 +236,6 @@ def test_minima_of_recordings_are_compared_with_the_noise_of_each():
     # The noise is that of the best.
     np.testing.assert_allclose(term.sizes, [1, 2], atol=0.01)
     assert chi2 == pytest.approx(2 * term.half, rel=0.01)
-
-
-def test_a_wrong_minimum_that_an_outlier_has_led_to_is_left():
-    """Without the outlier, its misfit is the noise that belongs to it, and it stays a minimum."""
-    unknowns = unknowns_of(LAW, ["D0"], largest_epsilon=0.5, start={"D0": 1e-6}, priors={})
-    term = Spoiled()
-    objective = Objective((term,), LAW, unknowns, {})
-    spoiled, chi2 = objective.minimise(np.array([FIRST + 0.1]))
-    assert spoiled[0] == pytest.approx(SECOND, abs=0.02)
-    (_, (other, _)), agreed = with_noise(objective, [(spoiled, chi2)])
-    assert agreed
-    assert other[0] == pytest.approx(SECOND, abs=1e-2)
-    # The noise of FIRST, or of one of the same minima a period away.
-    np.testing.assert_allclose(term.sizes, [1, 2], atol=0.01)
 
 
 def test_a_wrong_minimum_that_few_starts_of_the_fast_method_reach_is_left():

@@ -10,6 +10,7 @@ from scipy.signal import lfilter, lsim
 from asperity.errors import InputError
 from asperity.inference import RunOptions, fit, recorded_run
 from asperity.inference.runs.blocks import averaged, reduced
+from asperity.inference.runs.cleaning import cleaned
 from asperity.inference.runs.reading import reading_at
 from asperity.recording import Channel, Trace
 
@@ -144,9 +145,8 @@ def test_mains_are_taken_off_and_motion_is_not(clean):
 def test_single_samples_far_off_do_not_count(clean, ringing):
     spoiled = clean + ringing
     spoiled[[3_000, 9_001, 20_202]] += [0.05, -0.1, 1.0]
-    right, run = (reduced(recorded(x), 100.0) for x in (clean + ringing, spoiled))
-    assert run.blocks.spikes == 3
-    assert "3 samples" in run.blocks.sentence
+    right, run = (cleaned(recorded(x), 100.0) for x in (clean + ringing, spoiled))
+    assert len(run.spikes) == 3
     np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
 
 
@@ -157,9 +157,9 @@ def test_large_samples_far_off_take_no_good_ones_with_them(ringing):
     values = 0.6 + 0.02 * relaxing[0] - 0.02 * relaxing[1] + ringing
     spoiled = values.copy()
     spoiled[[3_000, 9_001, 20_202]] += [1.0, -1.0, 1.0]
-    right, run = (reduced(recorded(x), 100.0) for x in (values, spoiled))
-    assert right.blocks.spikes == 0
-    assert run.blocks.spikes == 3
+    right, run = (cleaned(recorded(x), 100.0) for x in (values, spoiled))
+    assert right.spikes == ()
+    assert len(run.spikes) == 3
     np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
 
 
@@ -169,8 +169,8 @@ def test_a_sample_far_off_beside_a_step_is_left_out(clean, ringing, offset, size
     values = clean + ringing
     spoiled = values.copy()
     spoiled[round(CASE.changes[0] * CASE.rate) + offset] += size
-    right, run = (reduced(recorded(x), 100.0) for x in (values, spoiled))
-    assert (right.blocks.spikes, run.blocks.spikes) == (0, 1)
+    right, run = (cleaned(recorded(x), 100.0) for x in (values, spoiled))
+    assert (len(right.spikes), len(run.spikes)) == (0, 1)
     np.testing.assert_allclose(run.friction, right.friction, atol=3 * NOISE / 24)
 
 
@@ -179,7 +179,7 @@ def test_peaks_of_one_sample_after_each_step_stay(clean, ringing):
     values = clean + ringing
     for change, size in zip(CASE.changes, (0.05, -0.04), strict=True):
         values[round(change * CASE.rate) + 1] += size
-    assert reduced(recorded(values), 100.0).blocks.spikes == 0
+    assert cleaned(recorded(values), 100.0).spikes == ()
 
 
 @pytest.mark.parametrize("rate", [0.0, "-3 Hz", "fast", "3 N"])

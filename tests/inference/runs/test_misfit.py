@@ -1,35 +1,10 @@
-"""Jumps and misfits in innovations, against generalised least squares and chance."""
+"""Innovations of a recording: misfits and whiteness, against chance."""
 
 import numpy as np
-import pytest
-from scipy.linalg import toeplitz
+from scipy.signal import lfilter
 
-from asperity.inference.runs.misfit import departures_of_jumps, misfit_after_changes
-from asperity.inference.runs.noise import Autoregression
-
-
-def test_a_jump_is_measured_as_by_generalised_least_squares():
-    noise = Autoregression(np.array([0.8, -0.5, 0.1]), 2.5)
-    n = 60
-    random = np.random.default_rng(1)
-    curves = np.stack([np.ones(n), np.linspace(-1, 1, n), np.sin(np.arange(n) / 9)], axis=1)
-    covariance = toeplitz(np.fft.ifft(noise.spectrum(np.arange(4096) / 4096)).real[:n])
-    inverse = np.linalg.inv(covariance)
-    x = random.normal(size=n)
-    basis = np.linalg.qr(noise.whiten(curves))[0]
-    white = noise.whiten(x[:, None])[:, 0]
-    found = departures_of_jumps(noise, white - basis @ (basis.T @ white), basis)
-    # The first samples are predicted by lower orders, which the formula leaves out.
-    for k in (5, 20, 41, 57):
-        design = np.column_stack([curves, np.arange(n) >= k])
-        spread = np.linalg.inv(design.T @ inverse @ design)
-        jump = (spread @ design.T @ inverse @ x)[-1]
-        assert found[k] == pytest.approx(jump / np.sqrt(spread[-1, -1]), rel=1e-8)
-    # One that is among the curves already is not found again.
-    curves[:, 2] = np.arange(n) >= 30
-    basis = np.linalg.qr(noise.whiten(curves))[0]
-    again = departures_of_jumps(noise, white - basis @ (basis.T @ white), basis)
-    assert again[30] == 0.0
+from asperity.inference.runs.misfit import misfit_after_changes
+from asperity.inference.runs.noise import whiteness
 
 
 def test_a_misfit_after_changes_is_told_from_chance():
@@ -43,3 +18,22 @@ def test_a_misfit_after_changes_is_told_from_chance():
     chance, size = misfit_after_changes(spoiled, changes)
     assert chance < 1e-4
     assert size > 1.5
+
+
+def test_whiteness_tells_noise_from_a_line():
+    steps = np.random.default_rng(0).normal(size=2500)
+    correlated = lfilter([1.0], [1.0, -1.2, 0.5], steps)[500:]
+    x = np.random.default_rng(2).normal(size=2000)
+    assert whiteness([x], 0).p_value > 0.01
+    line = 0.3 * np.cos(0.7 * np.arange(2000))
+    assert whiteness([x + line], 0).p_value < 1e-6
+    assert whiteness([correlated], 0).p_value < 1e-6
+
+
+def test_whiteness_rejects_as_often_as_it_says():
+    rejected = [
+        whiteness([np.random.default_rng(seed).normal(size=300)], 0).p_value < 0.1
+        for seed in range(300)
+    ]
+    # Two tests together reject at most as often, and not much less.
+    assert 0.03 < np.mean(rejected) < 0.1 + 3 * np.sqrt(0.09 / 300)

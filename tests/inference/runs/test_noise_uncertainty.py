@@ -6,7 +6,8 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.stats import norm, t
 
-from asperity.inference.runs.noise import Autoregression, added_by_noise, fitted
+from asperity.inference.runs.noise import added_by_noise
+from asperity.recording.defects.autoregression import Autoregression, fitted
 
 
 def autocovariances(a, n):

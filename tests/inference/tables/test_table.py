@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
+from asperity.cli.measure.reading import FileRows, ReadingOptions
+from asperity.cli.measure.source import RecordingSource
 from scipy.stats import multivariate_normal
 
 from asperity import Slider, materials, periodic_response
-from asperity.cli.measure.reading import FileRows, ReadingOptions
-from asperity.cli.measure.source import RecordingSource
 from asperity.errors import InputError
 from asperity.inference import fit, read_table, table_of
 from asperity.measurement.campaign import run_campaign

@@ -9,19 +9,19 @@ from typing import Annotated, Any
 from pydantic import Field
 
 from asperity.app.api import fits
-from asperity.app.api.operating_point import Name
-from asperity.app.api.recordings import LIMITS, Options, Source
+from asperity.app.api.recordings import LIMITS, Source
 from asperity.app.endpoints import Answer, Job, Question, Upload
 from asperity.app.uploads import LARGEST, Uploads
+from asperity.questions.recording import Measurement
 from asperity.recording.roles import ROLES
 
 
 class Recording(Question):
     """A file that was sent, and how to read and to measure it."""
 
-    recording: Name
-    source: Source = Field(default_factory=lambda: Source.model_validate({}))
-    options: Options = Field(default_factory=lambda: Options.model_validate({}))
+    recording: str
+    source: Source = Field(default_factory=Source)
+    options: Measurement = Field(default_factory=Measurement)
 
 
 class ProtocolText(Question):
@@ -48,7 +48,7 @@ def overview(question: Nothing) -> dict[str, Any]:
 
 def _file(question: Recording, uploads: Uploads) -> dict[str, Any]:
     upload = uploads.get(question.recording)
-    return {**question.model_dump(), "path": str(upload.path), "name": upload.name}
+    return {**question.model_dump(mode="json"), "path": str(upload.path), "name": upload.name}
 
 
 def check_protocol(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:

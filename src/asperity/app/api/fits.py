@@ -3,39 +3,29 @@
 from __future__ import annotations
 
 import base64
-import html
 import io
-import json
 import math
 import shlex
 import tempfile
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field
 
 from asperity.app.api.catalogue import known_materials
-from asperity.app.api.operating_point import Name
-from asperity.app.api.recordings import (
-    LARGEST_TABLE,
-    LIMITS,
-    Seconds,
-    Source,
-    Text,
-    named,
-    read_source,
-    source_options,
-)
+from asperity.app.api.recordings import LARGEST_TABLE, LIMITS, Source, named
 from asperity.app.decimation import extremes
 from asperity.app.endpoints import Question
 from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
-from asperity.errors import InputError, closest
-from asperity.outputs.json import to_json
-from asperity.units import to_si
+from asperity.app.words import in_labels
+from asperity.errors import InputError, closest, naming
+from asperity.questions.fit import FitOptions
+from asperity.questions.options import FIT_OPTIONS, as_options, source_options
+from asperity.recording.readers.from_file import read_source
 
 #: Blocks of a curve that is shown.
 _BLOCKS = 700
@@ -44,36 +34,34 @@ _BLOCKS = 700
 class Table(Question):
     """A lock-in table as text."""
 
-    name: Text
+    name: str
     text: Annotated[str, Field(max_length=LARGEST_TABLE)]
 
 
 class Run(Question):
-    """A recording that is fitted as a whole; the fields are those of `inference.recorded_run`.
+    """A recording that is fitted as a whole; the fields are those of a fit's data.
 
     Attributes
     ----------
     recording : str
         A file that was sent.
     source : Source
-    window, steps : list of float or None
-        In seconds.
-    velocities : list of str or None
-        Of the segments between `steps`, with units, 0 in a hold.
+    window, steps, velocities
+        As of `asperity.questions.fit.Data`.
     """
 
-    recording: Name
-    source: Source = Field(default_factory=lambda: Source.model_validate({}))
-    window: Annotated[list[Seconds], Field(min_length=2, max_length=2)] | None = None
-    steps: Annotated[list[Seconds], Field(max_length=200)] | None = None
-    velocities: Annotated[list[Name], Field(max_length=201)] | None = None
+    recording: str
+    source: Source = Field(default_factory=Source)
+    window: tuple[Any, ...] | None = None
+    steps: tuple[Any, ...] | None = None
+    velocities: tuple[Any, ...] | None = None
 
 
 Cell = str | float | int | None
 
 
-class Fitted(Question):
-    """Data and laws of a fit, as the options of ``asperity fit`` and ``asperity compare``.
+class Fitted(Question, FitOptions):
+    """Data and laws of a fit, with the fields of ``asperity fit`` and ``asperity compare``.
 
     Attributes
     ----------
@@ -83,39 +71,19 @@ class Fitted(Question):
     rows : list of dict
         What measuring has given, see `asperity.measurement.campaign`.
     runs : list of Run
-    trend, drift, initial, gauge, gauge_order, fit_rate
-        How recordings are compared with the motion.
-    posterior, chains, draws, seed
+    posterior, chains, draws
         Whether to sample the posterior of the one law, and how.
     report : bool
         Whether to write the folder of the fit or of the comparison.
     """
 
-    laws: Annotated[list[Name], Field(min_length=1, max_length=20)]
-    free: Annotated[list[Name], Field(max_length=20)]
-    tables: Annotated[list[Table], Field(max_length=10, default_factory=list)]
-    rows: Annotated[
-        list[Annotated[dict[Name, Cell], Field(max_length=200)]],
-        Field(max_length=1000, default_factory=list),
-    ]
-    runs: Annotated[list[Run], Field(max_length=10, default_factory=list)]
-    trend: Literal["none", "linear", "quadratic"] = "linear"
-    drift: bool = False
-    initial: Literal["steady", "free"] = "steady"
-    gauge: Name | None = None
-    gauge_order: Annotated[int, Field(ge=1, le=8)] = 1
-    fit_rate: Name | None = None
-    fixed: Annotated[dict[Name, Name], Field(max_length=30, default_factory=dict)]
-    start: Annotated[dict[Name, Name], Field(max_length=30, default_factory=dict)]
-    material: Name | None = None
-    prior: Name | None = None
-    profile: bool = False
-    inertia: bool = False
-    radiation_damping: bool = False
+    laws: Annotated[tuple[str, ...], Field(min_length=1, max_length=20)]
+    tables: Annotated[tuple[Table, ...], Field(max_length=10)] = ()
+    rows: Annotated[tuple[dict[str, Cell], ...], Field(max_length=1000)] = ()
+    runs: Annotated[tuple[Run, ...], Field(max_length=10)] = ()
     posterior: bool = False
     chains: Annotated[int, Field(ge=2, le=8)] = 4
     draws: Annotated[int, Field(ge=100, le=10_000)] = 1000
-    seed: Annotated[int, Field(ge=0, le=2**31)] = 0
     report: bool = False
 
 
@@ -125,8 +93,8 @@ def check(question: Fitted) -> None:
 
     for law in question.laws:
         get_law(law) if law in registered() else _refuse_law(law, registered())
-    for field in ("material", "prior"):
-        chosen = getattr(question, field)
+    published = [name for name, prior in question.prior.items() if prior is None]
+    for field, chosen in (("material", question.material), *(("prior", p) for p in published)):
         if chosen is not None and chosen not in known_materials():
             raise InputError(
                 f"{field} must be one of the package's, got '{chosen}'; "
@@ -151,7 +119,7 @@ def with_files(question: Fitted, uploads: Uploads) -> dict[str, Any]:
     """The fields, with the place and the name of each recording."""
     files = [uploads.get(run.recording) for run in question.runs]
     places = [{"path": str(file.path), "name": file.name} for file in files]
-    return {"asked": question.model_dump(), "files": places}
+    return {"asked": question.model_dump(mode="json"), "files": places}
 
 
 def _refuse_law(law: str, known: Mapping[str, Any]) -> None:
@@ -165,44 +133,33 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     ``residuals`` and ``runs``; and, where they were asked for, ``posterior`` and ``report``, the
     folder as a ZIP file in base64.
     """
-    from asperity import inference
+    from asperity.inference.answers import answer_comparison, answer_fit
     from asperity.inference.comparison.record import comparison_record
     from asperity.inference.fitting.result import fit_record
+    from asperity.questions import fit as questions
 
-    question = Fitted.model_validate(argument["asked"])
+    question = Fitted(**argument["asked"])
     files = argument["files"]
 
     def on_progress(done: int, total: int) -> None:
         report(share=done / total)
 
-    materials = known_materials()
-    options: dict[str, Any] = {
-        "fixed": question.fixed,
-        "start": question.start,
-        "material": materials.get(question.material or ""),
-        "prior": materials.get(question.prior or ""),
-        "profile": question.profile,
-        "inertia": question.inertia,
-        "radiation_damping": question.radiation_damping,
-        "runs": _run_options(question),
-        "progress": on_progress,
-    }
     report(share=0.0)
-    with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder:
-        tables, names = _tables(question, Path(folder))
-    runs = [_run(run, file) for run, file in zip(question.runs, files, strict=True)]
-    best: inference.Fit | None
-    if len(question.laws) == 1:
-        best = inference.fit([*tables, *runs], question.laws[0], question.free, **options)
-        whole: Any = best
-        record: dict[str, Any] = {"fit": fit_record(best)}
-    else:
-        whole = compared = inference.compare(
-            [*tables, *runs], question.laws, question.free, **options
-        )
-        judged = compared.laws.get(compared.best)
-        best = None if judged is None else judged.fit
-        record = {"comparison": comparison_record(compared)}
+    options = {name: getattr(question, name) for name in FitOptions.model_fields}
+    record: dict[str, Any]
+    with tempfile.TemporaryDirectory(prefix="asperity-page-") as folder, naming(in_labels):
+        options["data"] = _data(question, files, Path(folder))
+        if len(question.laws) == 1:
+            one = questions.Fit(**{**options, "law": question.laws[0]})
+            whole: Any = answer_fit(one, read=_read, progress=on_progress)
+            best = whole
+            record = {"fit": fit_record(whole)}
+        else:
+            several = questions.Comparison(**{**options, "laws": question.laws})
+            whole = answer_comparison(several, read=_read, progress=on_progress)
+            judged = whole.laws.get(whole.best)
+            best = None if judged is None else judged.fit
+            record = {"comparison": comparison_record(whole)}
     pictures: list[dict[str, Any]] = []
     posterior = None
     if best is not None and best.converged:
@@ -215,75 +172,37 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
         pictures = _run_pictures(best)
         if question.report:
             report(stage="report")
-            record["report"] = _report(whole, names, posterior)
-    text = to_json(record)
-    for name, shown in names.items():
-        text = text.replace(name, json.dumps(shown)[1:-1])
+            record["report"] = _report(whole, posterior)
     command = _fit_command(question, [file["name"] for file in files])
-    return {**json.loads(text), "runs": pictures, "command": command}
+    return {**record, "runs": pictures, "command": command}
 
 
-def _tables(question: Fitted, folder: Path) -> tuple[list[Any], dict[str, str]]:
-    """Tables from the texts that were sent, and what people call each file of the folder."""
-    from asperity import inference
+def _data(
+    question: Fitted, files: Sequence[Mapping[str, str]], folder: Path
+) -> list[dict[str, Any]]:
+    """Files of a fit: tables from the texts that were sent, and recordings."""
     from asperity.measurement.campaign import write_csv
 
-    given: dict[str, Any] = {
-        n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
-    }
-    names: dict[Path, str] = {}
+    data: list[dict[str, Any]] = []
     for k, table in enumerate(question.tables):
         is_json = table.text.lstrip().startswith("{")
         path = folder / f"sent-table-{k}.{'json' if is_json else 'csv'}"
         path.write_text(table.text, encoding="utf-8")
-        names[path] = table.name
+        data.append({"file": path, "name": table.name})
     if question.rows:
         path = folder / "sent-rows.csv"
         write_csv(path, [_row(row) for row in question.rows])
-        names[path] = "the measured rows"
-    tables = []
-    for path, name in names.items():
-        with named(path, name):
-            tables.append(inference.read_table(path, given))
-    return tables, {path.name: name for path, name in names.items()}
+        data.append({"file": path, "name": "the measured rows"})
+    for run, file in zip(question.runs, files, strict=True):
+        fields = run.model_dump(exclude={"recording"}, exclude_none=True)
+        data.append({**fields, "file": file["path"], "name": file["name"]})
+    return data
 
 
-def _run(run: Run, file: Mapping[str, str]) -> Any:
+def _read(data: Any) -> Any:
     """A recording for a fit; files are read within the limits of all readers of the page."""
-    from asperity import inference
-
-    path, name = Path(file["path"]), file["name"]
-    velocities = None
-    if run.velocities is not None:
-        velocities = [
-            0.0 if v.strip() == "0" else float(to_si(v, "velocity", "velocities"))
-            for v in run.velocities
-        ]
-    with named(path, name):
-        with limited(LIMITS):
-            trace = read_source(path, run.source.model_dump())
-        return inference.recorded_run(
-            trace,
-            name=Path(name).stem,
-            window=None if run.window is None else (run.window[0], run.window[1]),
-            steps=run.steps,
-            velocities=velocities,
-        )
-
-
-def _run_options(question: Fitted) -> Any:
-    from asperity.inference import RunOptions
-
-    trends = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
-    gauge = None
-    if question.gauge:
-        corner = float(to_si(question.gauge, "frequency", "gauge", require_unit=True))
-        if not corner > 0:
-            raise InputError(f"gauge must be positive, got '{question.gauge}'; give its low-pass")
-        gauge = question.gauge_order, corner
-    linear = ("offset", *trends[question.trend], *(("drift",) if question.drift else ()))
-    rate = question.fit_rate or None
-    return RunOptions(linear=linear, initial=question.initial, gauge=gauge, fit_rate=rate)
+    with named(data.file, data.name), limited(LIMITS):
+        return read_source(data.file, data.source)
 
 
 def _sampled(result: Any, question: Fitted, report: Callable[..., None]) -> Any:
@@ -338,7 +257,7 @@ def _bands(result: Any, posterior: Any) -> list[dict[str, Any]]:
     return pictures
 
 
-def _report(result: Any, names: Mapping[str, str], posterior: Any = None) -> str:
+def _report(result: Any, posterior: Any = None) -> str:
     """The folder of a fit or a comparison, as ``--report`` writes it: a ZIP file in base64."""
     from asperity import fit_report, inference
 
@@ -352,19 +271,8 @@ def _report(result: Any, names: Mapping[str, str], posterior: Any = None) -> str
             fit_report.write_comparison(target, result)
         with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
             for path in sorted(target.iterdir()):
-                if path.suffix == ".nc":
-                    archive.write(path, f"report/{path.name}")
-                    continue
-                text = path.read_text(encoding="utf-8")
-                for name, shown in names.items():
-                    text = text.replace(name, _escaped(shown, path.suffix))
-                archive.writestr(f"report/{path.name}", text)
+                archive.write(path, f"report/{path.name}")
     return base64.b64encode(packed.getvalue()).decode()
-
-
-def _escaped(text: str, suffix: str) -> str:
-    """A name that a sender chose, fit for a page or for the texts of JSON and TOML."""
-    return html.escape(text) if suffix == ".html" else json.dumps(text)[1:-1]
 
 
 def _row(row: Mapping[str, Cell]) -> dict[str, Any]:
@@ -400,47 +308,21 @@ def _fit_command(question: Fitted, recordings: list[str]) -> str:
     files = [t.name for t in question.tables] + ["campaign.csv"] * bool(question.rows) + recordings
     one = len(question.laws) == 1
     parts = [f"asperity {'fit' if one else 'compare'}", *map(shlex.quote, files)]
-    parts.append(f"--law {question.laws[0]}" if one else f"--laws {','.join(question.laws)}")
-    parts.append(f"--free {','.join(question.free)}")
-    parts += [f"--fix {shlex.quote(f'{n}={v}')}" for n, v in question.fixed.items()]
-    parts += [f"--start {shlex.quote(f'{n}={v}')}" for n, v in question.start.items()]
-    for option in ("material", "prior"):
-        if getattr(question, option):
-            parts.append(f"--{option} {getattr(question, option)}")
-    switches = ("profile", "inertia", "radiation_damping")
-    parts += [f"--{s.replace('_', '-')}" for s in switches if getattr(question, s)]
+    parts += [f"--law {law}" for law in question.laws]
+    own: dict[str, Any] = {}
     if question.runs:
-        parts += _run_arguments(question)
+        # Of options that each recording may have of its own, those of the first one.
+        run = question.runs[0]
+        parts += source_options(run.source)
+        own = {name: getattr(run, name) for name in ("window", "steps", "velocities")}
+    chosen = question.model_dump(include={*FitOptions.model_fields}, exclude_defaults=True)
+    parts += as_options({**chosen, **own}, FIT_OPTIONS)
     if question.posterior:
         parts.append("--posterior")
-        defaults = {n: Fitted.model_fields[n].default for n in ("chains", "draws", "seed")}
-        parts += [
-            f"--{n} {getattr(question, n)}"
-            for n, d in defaults.items()
-            if d != getattr(question, n)
-        ]
+        sampling = ("chains", "draws", "seed")
+        defaults = {name: Fitted.model_fields[name].default for name in sampling}
+        numbers = {name: getattr(question, name) for name in sampling}
+        parts += [f"--{n} {v}" for n, v in numbers.items() if v != defaults[n]]
     if question.report:
         parts.append("--report report")
     return " ".join(parts)
-
-
-def _run_arguments(question: Fitted) -> list[str]:
-    """Options on recordings; those that each may have of its own are the first one's."""
-    run = question.runs[0]
-    parts = source_options(run.source.model_dump())
-    if run.window is not None:
-        parts.append(f"--window {run.window[0]:g}:{run.window[1]:g}")
-    if run.steps is not None:
-        parts.append("--steps " + ",".join(f"{t:g}" for t in run.steps))
-    if run.velocities is not None:
-        parts.append(f"--velocities {shlex.quote(','.join(run.velocities))}")
-    if question.trend != "linear":
-        parts.append(f"--trend {question.trend}")
-    parts += ["--drift"] * question.drift
-    if question.initial != "steady":
-        parts.append(f"--initial {question.initial}")
-    if question.gauge:
-        parts.append(f"--gauge {shlex.quote(question.gauge)} --gauge-order {question.gauge_order}")
-    if question.fit_rate:
-        parts.append(f"--fit-rate {shlex.quote(question.fit_rate)}")
-    return parts

@@ -177,9 +177,10 @@ def run(
         raise InputError(
             "--out must be given, got nothing; name the store, like --out results.zarr"
         )
-    from asperity.cli.report import aligned, to_json
+    from asperity.cli.report import to_json
     from asperity.cli.sweep.command import shown
     from asperity.outputs import size_text
+    from asperity.outputs.tables import aligned
     from asperity.study import run_sweep
 
     with shown() as (progress, log):
@@ -213,10 +214,11 @@ def run(
 
 
 def _estimate(plan: Path, as_json: bool) -> int:
-    from asperity.cli.report import aligned, to_json
+    from asperity.cli.report import to_json
     from asperity.cli.sweep.command import time_text
     from asperity.orbit.search import available_cores
     from asperity.outputs import size_text
+    from asperity.outputs.tables import aligned
     from asperity.study import dry_run
 
     result = dry_run(plan)
@@ -239,8 +241,9 @@ def _estimate(plan: Path, as_json: bool) -> int:
 @json_option()
 def status(store: Path, as_json: bool) -> int:
     """How far a store is, what failed and why, and who has run it."""
-    from asperity.cli.report import aligned, to_json
+    from asperity.cli.report import to_json
     from asperity.outputs import size_text
+    from asperity.outputs.tables import aligned
     from asperity.study import store_status
     from asperity.study.results import status_record
 
@@ -281,7 +284,8 @@ def _run_text(run: dict[str, Any]) -> str:
 @json_option()
 def summary(store: Path, as_json: bool) -> int:
     """Count, mean, deviation, smallest and largest value of every output."""
-    from asperity.cli.report import aligned, to_json
+    from asperity.cli.report import to_json
+    from asperity.outputs.tables import aligned
     from asperity.study import summary_statistics
 
     result = summary_statistics(store)

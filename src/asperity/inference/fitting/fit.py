@@ -51,9 +51,10 @@ from asperity.inference.runs.assembly import (
     stiffness_in,
     usual_ranges,
 )
-from asperity.inference.runs.blocks import coarser, reduced
+from asperity.inference.runs.blocks import coarser
+from asperity.inference.runs.cleaning import cleaned
 from asperity.inference.runs.reading import GAIN
-from asperity.inference.runs.run import RecordedRun, run_of, with_jumps
+from asperity.inference.runs.run import RecordedRun, run_of
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
@@ -334,7 +335,7 @@ def listed_data(
     ready = [d if isinstance(d, LockInTable | HealingTable) else run_of(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate
-    return [with_jumps(reduced(d, rate)) if isinstance(d, RecordedRun) else d for d in ready]
+    return [cleaned(d, rate) if isinstance(d, RecordedRun) else d for d in ready]
 
 
 def _objective(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.inference.holds.table import HealingTable
-from asperity.inference.runs.assembly import over_load
+from asperity.inference.runs.assembly import PARAMETER, over_load
+from asperity.inference.runs.reading import GAIN
 from asperity.inference.runs.run import RecordedRun
 from asperity.inference.tables.table import LockInTable, joined
 from asperity.inference.unknowns import (
@@ -19,10 +21,21 @@ from asperity.inference.unknowns import (
     MissingNumberError,
     Prior,
     Unknown,
+    material_priors,
 )
-from asperity.laws import Law
+from asperity.laws import Law, registered
 from asperity.materials import Material
-from asperity.parameters import MACHINE, MODULATION, law_parameters, point_parameters
+from asperity.materials import load as load_material
+from asperity.parameters import (
+    MACHINE,
+    MODULATION,
+    Parameter,
+    all_parameters,
+    law_parameters,
+    point_parameters,
+)
+from asperity.questions.fit import NormalPrior
+from asperity.units import KINDS, to_si
 
 #: Parameters of laws that have no influence under a constant load.
 _OF_LOAD_CHANGES = ("lambda", "alpha", "L", "V_star")
@@ -302,3 +315,59 @@ def require_rows(name: str, count: int, unknowns: Sequence[Unknown]) -> None:
             f"{count} for {len(unknowns)} ({', '.join(u.name for u in unknowns)})",
             "free fewer or measure more",
         )
+
+
+def priors_of(
+    given: Mapping[str, NormalPrior | None], free: Sequence[str] | None
+) -> dict[str, Prior]:
+    """Priors by the names of parameters, in SI.
+
+    Parameters
+    ----------
+    given : mapping of str to NormalPrior or None
+        By parameter; a material, with None, stands for its published uncertainties.
+    free : sequence of str or None
+        Parameters that the priors of a material are meant for.
+
+    Raises
+    ------
+    InputError
+        If a name is no parameter, a value has another unit, or a deviation is not positive.
+    """
+    known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO, GAIN: PARAMETER}
+    result: dict[str, Prior] = {}
+    for name, prior in given.items():
+        if prior is None:
+            if free is None:
+                raise InputError(
+                    f"{Argument('prior', value=name)}",
+                    f"go with {Argument('free')}",
+                    "no free parameters",
+                    "name those that the priors of the material are meant for",
+                )
+            result |= material_priors(load_material(name), free)
+            continue
+        parameter = known.get(name.partition("[")[0])
+        if parameter is None:
+            raise InputError("prior", "name a parameter", f"'{name}'", "correct the name")
+        mean, unit = _of_some_kind(parameter, prior.mean, f"prior {name}")
+        sd, other = _of_some_kind(parameter, prior.std, f"prior {name}")
+        if not sd > 0 or unit != other:
+            raise InputError(
+                f"prior {name}",
+                "have a positive deviation" if unit == other else "have one unit",
+                f"{sd:g}" if unit == other else f"{unit} and {other}",
+                "give one",
+            )
+        result[name] = Prior(mean, sd, "given", unit)
+    return result
+
+
+def _of_some_kind(parameter: Parameter, value: float | str, label: str) -> tuple[float, str]:
+    """SI value and SI unit; K may be of a stress or of a pure number over a length."""
+    others = ["stress_per_length", "per_length"] if parameter.name == "K" else []
+    if isinstance(value, str):
+        for kind in others:
+            with contextlib.suppress(InputError):
+                return float(to_si(value, kind, label)), KINDS[kind].si
+    return float(to_si(value, parameter.kind, label)), parameter.unit

@@ -17,7 +17,7 @@ from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain
 from asperity.parameters import point_parameters
-from asperity.parameters.parameter import Displayed, SummaryLine
+from asperity.parameters.parameter import Drawn, SummaryLine
 
 Float = NDArray[np.float64]
 T = TypeVar("T")
@@ -63,7 +63,7 @@ class Optimum:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Fit(Displayed):
+class Fit(Drawn):
     """A law fitted to data.
 
     Attributes
@@ -97,6 +97,8 @@ class Fit(Displayed):
         Rows of the table without which the law describes it, from 0; at most a tenth of them, or
         two of eight and more.
     """
+
+    _drawn_by = "asperity.fit_report.pictures:draw_fit"
 
     law: str
     converged: bool

@@ -113,23 +113,6 @@ def whiteness(innovations: Sequence[Float], fitted_order: int) -> Whiteness:
     return Whiteness(portmanteau, min(1.0, worst * count), min(1.0, peak * count))
 
 
-def strongest_peak(innovations: Float) -> tuple[float, float]:
-    """Frequency of the highest peak of white noise (cycles a sample), and its chance.
-
-    Parameters
-    ----------
-    innovations : array, shape (n,)
-    """
-    n = innovations.size
-    spectrum = np.abs(np.fft.rfft(innovations, 8 * n)) ** 2
-    inside = slice(8, 4 * n - 8)
-    k = int(np.argmax(spectrum[inside])) + 8
-    # Frequencies between those of the periodogram make some four times as many chances.
-    height = spectrum[k] / spectrum[inside].mean()
-    chance = -math.expm1(2 * n * math.log1p(-math.exp(-height)))
-    return k / (8 * n), chance
-
-
 #: Samples whose derivatives are held at once.
 _CHUNK = 4096
 

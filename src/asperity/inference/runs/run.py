@@ -18,15 +18,13 @@ from scipy.stats import norm
 from asperity.errors import InputError
 from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.velocities import constant_velocities
-from asperity.measurement.samples import compressive
+from asperity.measurement.samples import compressive, load_channel, shear_channel
 from asperity.measurement.sliding.segments import Cut
 from asperity.measurement.sliding.signals import sliding_signals
 from asperity.recording import Trace
-from asperity.recording.defects.jumps import find_jumps
 from asperity.recording.defects.levels import coarsely_rounded, saturated
 from asperity.recording.defects.rounded_time import even_times
-from asperity.recording.defects.sampling import gap_rows, rate_stretches
-from asperity.recording.defects.spikes import away_from_changes, spikes, without
+from asperity.recording.defects.sampling import rate_stretches
 from asperity.recording.readers import read
 
 Float = NDArray[np.float64]
@@ -46,13 +44,6 @@ LONGEST = 20_000
 _LOAD_BLOCKS, _LOAD_BY_CHANCE = 4_000, 1e-3
 #: Friction above this is a mistake of units.
 _LARGEST_FRICTION = 5.0
-#: Changes of the load are few if there are so many samples to each.
-_FEW_CHANGES = 100
-#: Share of the segments beside a change of the drive, and samples about it, in which friction is
-#: too quick for a jump to be told.
-_NEAR_CHANGE, _SAMPLES_NEAR_CHANGE = 0.05, 20
-#: Share of samples that may be spikes: noise with more of them is not normal.
-_MOST_SPIKES = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,12 +116,9 @@ class RecordedRun:
         First sample and the one after the last of each stretch of one sampling rate.
     doubts : tuple of str
         Sentences on what about the drive is open.
-    spikes : tuple of float
-        Times (s) of single samples that were wrong: `friction` has the line between their
-        neighbours there.
-    jumps : tuple of float, or None
-        Times (s) from which on the level of the gauge is another one; None where they have not been
-        looked for.
+    spikes, jumps : tuple of float, or None
+        Times (s) of single samples that are wrong, and times from which on the level of the gauge
+        is another one; None where they have not been looked for.
     blocks : Blocks or None
         None where `friction` is that of single samples.
     """
@@ -150,7 +138,7 @@ class RecordedRun:
     load_varies: bool
     stretches: tuple[tuple[int, int], ...]
     doubts: tuple[str, ...]
-    spikes: tuple[float, ...] = ()
+    spikes: tuple[float, ...] | None = None
     jumps: tuple[float, ...] | None = None
     blocks: Blocks | None = None
 
@@ -174,6 +162,8 @@ def recorded_run(
     velocities: Sequence[float] | None = None,
     load: str = "W",
     force: str = "F",
+    spikes: Sequence[float] | None = None,
+    jumps: Sequence[float] | None = None,
 ) -> RecordedRun:
     """Friction and drive of a recording, ready for `asperity.inference.fit`.
 
@@ -192,6 +182,9 @@ def recorded_run(
         default.
     load, force : str
         Channels, by name or role.
+    spikes, jumps : sequence of float, optional
+        Times (s) of single wrong samples, and of jumps of the gauge's level, in place of those that
+        a fit finds; empty for none.
 
     Returns
     -------
@@ -222,14 +215,8 @@ def recorded_run(
         np.concatenate([[0.0], np.cumsum(np.array(speeds) * np.diff([0, *cut_times, times[-1]]))]),
     )
     doubts += [finding.sentence for finding in signals.signs]
-    doubts += friction_doubts(friction)
-    wrong = away_from_changes(friction, spikes(friction), _first_after_changes(times, drive, cuts))
-    if wrong.size > _MOST_SPIKES * friction.size:
-        doubts.append(
-            f"{wrong.size} samples of friction stand out of their neighbours: the noise is not "
-            "normal, and intervals may not hold"
-        )
-        wrong = wrong[:0]
+    doubts += clipped(trace, load, force, window)
+    doubts += strange_friction(friction)
     if signals.left_out:
         doubts.append(
             f"{signals.left_out} samples are left out, where a value is no number or time does not "
@@ -238,7 +225,7 @@ def recorded_run(
     return RecordedRun(
         name=shown,
         time=times,
-        friction=without(friction, wrong),
+        friction=friction,
         slip=slip,
         drive=drive,
         cuts=tuple(cuts),
@@ -251,8 +238,27 @@ def recorded_run(
         load_varies=varies,
         stretches=rate_stretches(times),
         doubts=tuple(doubts),
-        spikes=tuple(times[wrong].tolist()),
+        spikes=_of_the_user(spikes, origin, times, "spikes"),
+        jumps=_of_the_user(jumps, origin, times, "jumps"),
     )
+
+
+def _of_the_user(
+    given: Sequence[float] | None, origin: float, times: Float, name: str
+) -> tuple[float, ...] | None:
+    """Times from the first sample on of samples that a user has named; None if none were."""
+    if given is None:
+        return None
+    result = []
+    for at in given:
+        k = int(np.argmin(np.abs(times - (at - origin))))
+        if not 0 < k < times.size - 1:
+            raise InputError(
+                f"{name} must lie inside the recording, got {at:.10g} s; it runs from "
+                f"{origin:.10g} s to {origin + times[-1]:.10g} s"
+            )
+        result.append(float(times[k]))
+    return tuple(sorted(result))
 
 
 def _cut_uncertainty(time: Float, cuts: Sequence[Cut]) -> tuple[float, ...]:
@@ -266,22 +272,30 @@ def _cut_uncertainty(time: Float, cuts: Sequence[Cut]) -> tuple[float, ...]:
     return tuple(uncertain)
 
 
-def friction_doubts(friction: Float) -> list[str]:
-    """Sentences on friction that is cut off, rounded too coarsely, or of no usual size.
+def clipped(trace: Trace, load: str, force: str, window: tuple[float, float] | None) -> list[str]:
+    """Sentences on a gauge at the end of its range."""
+    values = shear_channel(trace, force, load_channel(trace, load))[0].values
+    low, high = window or (-np.inf, np.inf)
+    use = (trace.time >= low) & (trace.time <= high) & np.isfinite(values)
+    time, values = trace.time[use], values[use]
+    return [
+        f"{level.rows.size} samples from {time[level.rows[0]]:.6g} s on are at the {level.side} "
+        f"value, {level.value:.6g}: the gauge seems to be at the end of its range, and a fit to "
+        "clipped friction is wrong; give a window without"
+        for level in saturated(values)
+        # A recording that begins or ends at its extreme is at rest.
+        if level.rows[0] > 0 and level.rows[-1] < values.size - 1
+    ]
+
+
+def strange_friction(friction: Float) -> list[str]:
+    """Sentences on friction of no usual size, and on friction whose digits are too coarse.
 
     Parameters
     ----------
     friction : array, shape (n,)
     """
     said = []
-    for level in saturated(friction):
-        # A recording that begins or ends at its extreme is at rest.
-        if level.rows[0] > 0 and level.rows[-1] < friction.size - 1:
-            said.append(
-                f"{level.rows.size} samples are at the {level.side} friction, {level.value:.6g}: "
-                "the gauge seems to be at the end of its range, and a fit to clipped friction is "
-                "wrong; give a window without"
-            )
     usual = float(np.median(np.abs(friction)))
     if usual > _LARGEST_FRICTION:
         said.append(
@@ -478,48 +492,6 @@ def _drive(
     slope = np.diff(at_edges) / np.diff(edges)
     cuts = [int(np.searchsorted(edges, c)) for c in cut_times]
     return Drive(edges, pull, np.zeros_like(pull), at_edges[:-1], slope), cuts
-
-
-def _first_after_changes(time: Float, drive: Drive, cuts: Sequence[int]) -> list[int]:
-    """First samples after changes of the velocity, and of the load where they are few."""
-    inner = drive.edges[1:-1]
-    few = inner.size * _FEW_CHANGES <= time.size
-    edges = inner if few else drive.edges[list(cuts)]
-    return [int(k) for k in np.searchsorted(time, edges)]
-
-
-def first_after_changes(run: RecordedRun) -> list[int]:
-    """First samples after changes of the velocity, and of the load where they are few."""
-    return _first_after_changes(run.time, run.drive, run.cuts)
-
-
-def with_jumps(run: RecordedRun) -> RecordedRun:
-    """The run with the times at which its level jumps by itself; as it is where they are known.
-
-    Beside a change of the drive, where friction itself is quick, and next to gaps none is looked
-    for.
-    """
-    if run.jumps is not None:
-        return run
-    time, edges = run.time, run.drive.edges
-    apart = []
-    for before, at, after in zip(edges[:-2], edges[1:-1], edges[2:], strict=True):
-        near = [at - _NEAR_CHANGE * (at - before), at + _NEAR_CHANGE * (after - at)]
-        first, last = np.searchsorted(time, near)
-        apart.append((int(first) - _SAMPLES_NEAR_CHANGE, int(last) + _SAMPLES_NEAR_CHANGE))
-    gaps = {*gap_rows(time).tolist(), *(a for a, _ in run.stretches[1:])}
-    bounds = [0, *(edge for gap in sorted(gaps) for edge in (gap, gap)), time.size]
-    stretches = []
-    for a, b in zip(bounds[::2], bounds[1::2], strict=True):
-        begin = a
-        for first, last in apart:
-            if last <= begin or first >= b:
-                continue
-            stretches.append((begin, max(first, begin)))
-            begin = min(max(last, begin), b)
-        stretches.append((begin, b))
-    jumps = find_jumps(run.friction, stretches)
-    return replace(run, jumps=tuple(sorted(float(time[jump.sample]) for jump in jumps)))
 
 
 def run_of(data: Any) -> RecordedRun:

@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.inference.objective import Residuals
+from asperity.inference.runs.cleaning import first_after_changes
 from asperity.inference.runs.drive import filled_up
 from asperity.inference.runs.misfit import misfit_after_changes
 from asperity.inference.runs.motion import RunArrays, RunLikelihood, RunMotion
 from asperity.inference.runs.noise import (
     added_by_noise,
     innovations,
-    strongest_peak,
     whiteness,
 )
 from asperity.inference.runs.reading import reading_at
-from asperity.inference.runs.run import RecordedRun, first_after_changes
+from asperity.inference.runs.run import RecordedRun
 from asperity.inference.unknowns import Prior, Unknown
 from asperity.laws import Law
 from asperity.parameters import Parameter, law_parameters
@@ -32,8 +32,6 @@ Float = NDArray[np.float64]
 
 #: Below this probability the innovations are not white: the model of the noise fails.
 _NOT_WHITE = 1e-3
-#: A peak of the innovations less probable than this is a line; so many are removed.
-_LINE, _LINES = 1e-4, 6
 #: Correlation of neighbouring samples of a slow drift.
 _SLOW = 0.999
 #: Steps towards the noise at given parameters, and what of the fitted curve counts as seen.
@@ -49,12 +47,10 @@ _NAMED = 5
 
 
 class NoiseState(NamedTuple):
-    """Noise of a recording, and what is taken off it: the parts of a `RunTerm` that change."""
+    """Noise of a recording: the parts of a `RunTerm` that change."""
 
     models: tuple[Autoregression, ...]
-    columns: Float
     whiteness: float
-    lines: tuple[float, ...]
     after_changes: tuple[float, float]
 
 
@@ -62,8 +58,7 @@ class RunTerm:
     """A recorded run as a `DataTerm` of an objective.
 
     Nuisances that enter linearly, such as the offset of the gauge and a trend over slip, are
-    eliminated by projection: residuals are those of their best values, under flat priors. Lines of
-    the mains or a servo that the noise model does not hold are removed in the same way.
+    eliminated by projection: residuals are those of their best values, under flat priors.
 
     Parameters
     ----------
@@ -87,7 +82,7 @@ class RunTerm:
     models : list of Autoregression
         Noise of each stretch of one sampling rate.
     basis : array, shape (n, columns)
-        Whitened linear nuisances and lines, orthonormal.
+        Whitened linear nuisances, orthonormal.
     """
 
     failure = (
@@ -124,7 +119,6 @@ class RunTerm:
         self._known = {*law_parameters(law), "K", "W0", "M", "eta", "eps_ratio"}
         self._columns = _linear_columns(run, linear)
         self._whiteness = math.nan
-        self._lines: list[float] = []
         self._after_changes = (1.0, 1.0)
         # Of starts, shared by copies that differ in their noise.
         self._differences: dict[tuple[float, ...], Float | None] = {}
@@ -153,8 +147,8 @@ class RunTerm:
             "effective_samples": round(
                 sum(m.effective_samples(n) for m, n in zip(self.models, sizes, strict=True)), 1
             ),
-            "lines_removed": list(self._lines),
-            "outliers": list(self.run.spikes),
+            "lines_removed": [] if self.run.blocks is None else list(self.run.blocks.lines),
+            "outliers": list(self.run.spikes or ()),
             "jumps": list(self.run.jumps or ()),
             "whiteness_p": self._whiteness,
             "standard_deviation": [math.sqrt(m.variance) for m in self.models],
@@ -162,19 +156,12 @@ class RunTerm:
 
     def noise_state(self) -> NoiseState:
         """Everything that `update_noise` changes."""
-        return NoiseState(
-            tuple(self.models),
-            self._columns,
-            self._whiteness,
-            tuple(self._lines),
-            self._after_changes,
-        )
+        return NoiseState(tuple(self.models), self._whiteness, self._after_changes)
 
     def restore_noise(self, state: NoiseState) -> None:
         """Take the noise back to an earlier state."""
-        self.models, self._columns = list(state.models), state.columns
+        self.models = list(state.models)
         self._whiteness, self._after_changes = state.whiteness, state.after_changes
-        self._lines = list(state.lines)
         self._prepare()
 
     def expect_slow_noise(self) -> None:
@@ -280,13 +267,10 @@ class RunTerm:
         raw = self.departures(values)
         if raw is None:
             return False
-        while True:
-            for _ in range(_NOISE_STEPS):
-                self._estimate_noise(*raw)
-            left = raw[0] + self._columns @ self._coefficients(raw[0])
-            white = self._whitened(left[:, None])[:, 0]
-            if self._order == 0 or not self._add_line(white):
-                break
+        for _ in range(_NOISE_STEPS):
+            self._estimate_noise(*raw)
+        left = raw[0] + self._columns @ self._coefficients(raw[0])
+        white = self._whitened(left[:, None])[:, 0]
         innovations = [white[a:b] for a, b in self.run.stretches]
         self._whiteness = whiteness(innovations, max(m.order for m in self.models)).p_value
         self._after_changes = misfit_after_changes(white, first_after_changes(self.run))
@@ -318,26 +302,6 @@ class RunTerm:
         """Whether innovations after changes of the drive are too large for the law."""
         return self._after_changes[0] < _LAW_FAILS
 
-    def _add_line(self, white: Float) -> bool:
-        """Remove the strongest line that the innovations hold, if there is one."""
-        if len(self._lines) >= _LINES:
-            return False
-        for a, b in self.run.stretches:
-            if b - a < 64:
-                continue
-            frequency, chance = strongest_peak(white[a:b])
-            if chance < _LINE:
-                at = self.run.time[a:b]
-                hertz = frequency / float(np.median(np.diff(at)))
-                columns = np.zeros((white.size, 2))
-                angle = 2 * np.pi * hertz * at
-                columns[a:b] = np.stack([np.cos(angle), np.sin(angle)], axis=1)
-                self._columns = np.column_stack([self._columns, columns])
-                self._lines.append(hertz)
-                self._prepare()
-                return True
-        return False
-
     def uncertainty_of_noise(
         self, values: Mapping[str, float], slopes: Float, covariance: Float
     ) -> tuple[Float, Float]:
@@ -355,7 +319,7 @@ class RunTerm:
         return added, variance
 
     def fitted_friction(self, values: Mapping[str, float]) -> Float:
-        """Friction at the samples by the law with linear nuisances and lines; NaN without motion.
+        """Friction at the samples by the law with linear nuisances; NaN without motion.
 
         Parameters
         ----------
@@ -405,7 +369,7 @@ class RunTerm:
         return said
 
     def _said_of_spikes(self) -> str:
-        times = [f"{time:.6g}" for time in self.run.spikes]
+        times = [f"{time:.6g}" for time in self.run.spikes or ()]
         shown = ", ".join(times[:_NAMED]) + (", ..." if len(times) > _NAMED else "")
         those = f"{len(times)} samples" if len(times) > 1 else "a sample"
         return (

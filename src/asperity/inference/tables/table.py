@@ -131,7 +131,9 @@ class LockInTable:
         )
 
 
-def read_table(path: str | Path, given: Mapping[str, Any] | None = None) -> LockInTable:
+def read_table(
+    path: str | Path, given: Mapping[str, Any] | None = None, *, name: str = ""
+) -> LockInTable:
     """Read a table from a text file.
 
     Parameters
@@ -145,6 +147,8 @@ def read_table(path: str | Path, given: Mapping[str, Any] | None = None) -> Lock
     given : mapping, optional
         V, epsilon and frequency of all rows, in SI or as texts with units, where the table has
         no such column.
+    name : str
+        What messages call the table; the file's name by default.
 
     Raises
     ------
@@ -153,6 +157,7 @@ def read_table(path: str | Path, given: Mapping[str, Any] | None = None) -> Lock
         negative, or a row occurs twice.
     """
     path = Path(path)
+    shown = name or path.name
     require_rereadable(path, "data")
     try:
         lines = file_content(path).decode("utf-8-sig").splitlines()
@@ -162,52 +167,52 @@ def read_table(path: str | Path, given: Mapping[str, Any] | None = None) -> Lock
             f"data must be a readable table, got '{path}': {reason}; give a CSV file"
         ) from None
     if path.suffix.lower() == ".json":
-        return table_of(_given(_reading(path.name, "\n".join(lines)), given), name=path.name)
+        return table_of(_given(_reading(shown, "\n".join(lines)), given), name=shown)
     lines = [line for line in lines if line.strip() and not line.lstrip().startswith("#")]
     if len(lines) < 2:
         raise InputError(
-            f"{path.name} must have a header and rows, got {len(lines)} lines; give one "
+            f"{shown} must have a header and rows, got {len(lines)} lines; give one "
             "operating point a row"
         )
     delimiter = max(_DELIMITERS, key=lines[0].count)
     header, *rows = csv.reader(lines, delimiter=delimiter)
     names = [cell.strip() for cell in header]
-    for name in names:
-        if names.count(name) > 1:
+    for column in names:
+        if names.count(column) > 1:
             raise InputError(
-                f"{path.name} must have each column once, got '{name}' {names.count(name)} times; "
+                f"{shown} must have each column once, got '{column}' {names.count(column)} times; "
                 "remove all but one"
             )
     for number, row in enumerate(rows, start=1):
         if len(row) != len(names):
             raise InputError(
-                f"{path.name} must have {len(names)} cells in each row, got {len(row)} in row "
+                f"{shown} must have {len(names)} cells in each row, got {len(row)} in row "
                 f"{number}; correct the separators"
             )
-    places = {name: i for i, name in enumerate(names) if name not in _OF_RESPONSES}
+    places = {n: i for i, n in enumerate(names) if n not in _OF_RESPONSES}
     texts = {n: [row[places[n]].strip() for row in rows] for n in _TEXTS if n in places}
     lost = [i for i in range(len(rows)) if _not_a_reading(texts, i)]
     remarks = []
     if lost:
         if len(lost) == len(rows):
             raise InputError(
-                f"{path.name} must have lock-in readings, got none: every row is another kind of "
+                f"{shown} must have lock-in readings, got none: every row is another kind of "
                 "measurement or has a reason why it could not be measured; measure a modulated "
                 "recording"
             )
         remarks.append(
-            f"{len(lost)} rows of {path.name} are no lock-in readings and are left out, the first "
+            f"{len(lost)} rows of {shown} are no lock-in readings and are left out, the first "
             f"of them row {lost[0] + 1}"
         )
     kept = [row for i, row in enumerate(rows) if i not in set(lost)]
     texts = {n: [t for i, t in enumerate(c) if i not in set(lost)] for n, c in texts.items()}
     columns: dict[str, Any] = {
-        name: _numbers(path.name, name, i, kept) for name, i in places.items() if name not in _TEXTS
+        n: _numbers(shown, n, i, kept) for n, i in places.items() if n not in _TEXTS
     }
     if _UNIT in texts and "W0" in columns:
-        columns["W0"] = _loads_in_si(path.name, columns["W0"], texts[_UNIT])
-    run = next((texts[name] for name in _RUN if name in texts), None)
-    table = table_of(_given(columns, given), name=path.name, run=run, remarks=remarks)
+        columns["W0"] = _loads_in_si(shown, columns["W0"], texts[_UNIT])
+    run = next((texts[n] for n in _RUN if n in texts), None)
+    table = table_of(_given(columns, given), name=shown, run=run, remarks=remarks)
     places_in_file = [i for i in range(1, len(rows) + 1) if i - 1 not in set(lost)]
     return replace(table, row_names=np.array([f"row {i}" for i in places_in_file]))
 

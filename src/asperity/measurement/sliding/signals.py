@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _FEWEST = 32
+#: Names of a force divided by the weight, and what its unit measures if one is known.
+_NORMALISED = frozenset({"fnorm", "forcenorm", "normforce", "fnormalised", "fnormalized"})
+_PURE = (None, "dimensionless")
 #: Names of the displacement that the machine imposes.
 _LOAD_POINT = re.compile(r"\b(load ?point|lp|lpd|ram|vertical|axial|actuator)\b")
 
@@ -93,6 +96,7 @@ def sliding_signals(
     InputError
         If neither force and load nor friction is recorded, or fewer than 32 samples are left.
     """
+    trace = _with_normalised_force(trace)
     if window is not None:
         _check_window(window, trace)
     friction, weight, unit, read, signs = _friction(trace, load, force)
@@ -142,6 +146,19 @@ def sliding_signals(
         signs=tuple(signs),
         left_out=left_out,
     )
+
+
+def _with_normalised_force(trace: Trace) -> Trace:
+    """The same recording, with a force that is named as F/(m g) in the role of the friction.
+
+    Only where it is the only channel: next to others such a name is the normal force.
+    """
+    if len(trace.channels) != 1 or trace.roles:
+        return trace
+    (name,) = trace.channels
+    if "".join(words(name)) not in _NORMALISED or trace.channels[name].kind not in _PURE:
+        return trace
+    return replace(trace, roles={"friction": name})
 
 
 def _check_window(window: tuple[float, float], trace: Trace) -> None:

@@ -17,9 +17,14 @@ Index = NDArray[np.intp]
 _PER_CYCLE, _PER_CYCLE_OF_NOISE = 8, 32
 #: Rises on each side of which the loading slope next to an event is the usual one.
 _NEAR = 10
+#: Share of the time of rises in which the force rises no faster than by the usual loading.
+_LOADING = 0.75
 #: Share of the rises that last longer than the falls next to them in symmetrical noise: a half. An
 #: excess of so many standard deviations is loading and slip.
 _ASYMMETRY = 3.0
+
+#: Cycles of an oscillation scatter by less than this share; those of a noise by half and more.
+_REGULAR, _FEWEST_CYCLES = 0.25, 8
 
 
 def turning_points(values: Array, height: float) -> Index:
@@ -105,21 +110,25 @@ def find_falls(force: Array, noise: Noise) -> Falls:
     Notes
     -----
     Noise that lasts as long as a cycle cannot be told from cycles. The shortest width of means is
-    sought whose falls are a cycle of eight widths or more apart and follow on longer rises; means
-    up to an eighth of that cycle are then searched together. Of falls that overlap at different
-    widths those of the width that tells most of them apart are kept.
+    sought whose falls are a cycle of eight widths or more apart and follow on longer rises, or else
+    come back regularly, as those of an oscillation do; means up to an eighth of that cycle are then
+    searched together. Of falls that overlap at different widths those of the width that tells most
+    of them apart are kept.
     """
     most = noise.octaves.size - 1
-    empty = np.empty(0, dtype=np.intp)
+    regular = None
     for octave in range(most + 1):
         scatter = noise.of_means(octave, octave)
         peak, trough = _at_width(force, octave, scatter[octave], noise, 0.0)
-        if not _loads_and_slips(peak, trough):
+        if not peak.size or _cycle(peak, trough, force.size) < _PER_CYCLE << octave:
             continue
-        cycle = _cycle(peak, trough, force.size)
-        if cycle < _PER_CYCLE << octave:
-            continue
-        return _at_all_widths(force, noise, octave, (peak, trough))
+        if _loads_and_slips(peak, trough):
+            return _at_all_widths(force, noise, octave, (peak, trough))
+        if regular is None and _returns(peak):
+            regular = octave, (peak, trough)
+    if regular is not None:
+        return _at_all_widths(force, noise, *regular)
+    empty = np.empty(0, dtype=np.intp)
     scatter = noise.of_means(most, most)
     return Falls(empty, empty, scatter, _thresholds(noise, scatter))
 
@@ -146,6 +155,15 @@ def _loads_and_slips(peak: Index, trough: Index) -> bool:
     if peak.size < _ASYMMETRY**2:
         return bool(np.median(rise) > 4 * np.median(fall))
     return longer - peak.size / 2 > _ASYMMETRY * np.sqrt(peak.size) / 2
+
+
+def _returns(peak: Index) -> bool:
+    """Whether the peaks of a symmetrical signal come back regularly."""
+    cycles = np.diff(peak)
+    if cycles.size < _FEWEST_CYCLES:
+        return False
+    low, middle, high = np.quantile(cycles, [0.16, 0.5, 0.84])
+    return bool((high - low) / 2 < _REGULAR * middle)
 
 
 def _means(force: Array, octave: int) -> tuple[Array, int]:
@@ -234,8 +252,8 @@ def _most_resolved(sets: list[tuple[Index, Index]]) -> tuple[Index, Index]:
 def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, Index]:
     """Join falls between which the force rises faster than the spring can load.
 
-    The slider does not move backwards: a rise twice as fast as the loading around it, in the mean
-    weighted by duration, is the instrument's.
+    The slider does not move backwards: a rise twice as fast as the loading around it is the
+    instrument's. Loading is as fast as the fastest rises but for a quarter of the time.
     """
     if peak.size < 3:
         return peak, trough
@@ -247,7 +265,7 @@ def _without_ringing(force: Array, peak: Index, trough: Index) -> tuple[Index, I
     rates, weights = rate[near], np.where(inside, length[near], 0.0)
     order = np.argsort(rates, axis=1)
     weights = np.take_along_axis(weights, order, 1).cumsum(1)
-    middle = (weights >= weights[:, -1:] / 2).argmax(1)
-    usual = np.take_along_axis(rates, order, 1)[np.arange(rate.size), middle]
+    fast = (weights >= _LOADING * weights[:, -1:]).argmax(1)
+    usual = np.take_along_axis(rates, order, 1)[np.arange(rate.size), fast]
     apart = rate <= 2 * usual
     return peak[np.concatenate([[True], apart])], trough[np.concatenate([apart, [True]])]

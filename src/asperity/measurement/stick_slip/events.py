@@ -26,8 +26,8 @@ _CANDIDATES = 8
 _ZOOMS = 4
 #: Events that are searched together: their arrays fit the memory.
 _TOGETHER = 256
-#: A drop of fewer standard uncertainties is none.
-_CONFIRMED = 3.0
+#: Readings of the falls, each without those that the one before has not confirmed.
+_READINGS = 4
 #: Standard uncertainty of an onset or end of half a cosine of d samples and drop D in white noise
 #: s: this times sqrt(d) s/D samples (inverse of Fisher's information of both).
 _TIMING = 2.65
@@ -124,16 +124,19 @@ def read_events(time: Array, force: Array, falls: Falls) -> SlipEvents:
         Without impulses.
     falls : Falls
     """
-    while len(falls):
+    least = falls.thresholds.min()
+    for _ in range(_READINGS):
+        if not len(falls):
+            break
         events = _read(time, force, falls)
-        # What a line before and a line after do not confirm is a bend in the loading.
-        least = np.maximum(falls.thresholds.min(), _CONFIRMED * events.drop_uncertainty)
+        # What a line before and a line after do not confirm is a bend in the loading; the others
+        # are read again without it.
         real = events.drop > least
         if real.all():
             return events
         falls = replace(falls, peak=falls.peak[real], trough=falls.trough[real])
     none: dict[str, Any] = {f.name: np.empty(0) for f in fields(SlipEvents)}
-    return SlipEvents(**none)
+    return events if len(falls) else SlipEvents(**none)
 
 
 def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
@@ -145,7 +148,7 @@ def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
         [[(before[0] + peak[0]) // 2], (trough[:-1] + peak[1:]) // 2, [(trough[-1] + n) // 2]]
     ).astype(np.intp)
     sums = _Sums(force, edges[:-1], peak)
-    drop = np.maximum(force[peak] - force[trough], falls.thresholds.min())
+    drop = np.maximum(force[peak] - force[trough], 2 * falls.scatter[0])
     length = np.ceil((2 * falls.scatter[0] / (_PRECISION * drop)) ** 2) + _SHORTEST
     length = np.minimum(length, n).astype(np.intp) + (trough - peak)
     first = np.maximum(edges[:-1], peak - length)
@@ -199,7 +202,9 @@ def _onset_and_end(
         squares = sums.yy[since][:, None, :] - sums.yy[until][:, :, None]
         misfit += np.where(since[:, None, :] > until[:, :, None], squares, 0.0)
         misfit += left[2][:, :, None] + right[2][:, None, :]
-        misfit[off[:, None, :] <= on[:, :, None]] = np.inf
+        # The end comes after the onset, and the force falls.
+        wrong = (off[:, None, :] <= on[:, :, None]) | (low[:, None, :] >= high[:, :, None])
+        misfit[wrong] = np.inf
         best = misfit.reshape(peak.size, -1).argmin(1)
         i, j = np.unravel_index(best, (_CANDIDATES, _CANDIDATES))
         onset, end = on[rows, i], off[rows, j]
@@ -207,7 +212,8 @@ def _onset_and_end(
             reach = (span[1] - span[0]) / (_CANDIDATES - 1)
             span[:] = [np.maximum(here - reach, span[0]), np.minimum(here + reach, span[1])]
     freedom = np.maximum(stop - first - 6, 1)
-    return onset, end, np.maximum(misfit.min((1, 2)), 0.0) / freedom
+    squares = misfit.min((1, 2))
+    return onset, end, np.maximum(np.where(np.isfinite(squares), squares, 0.0), 0.0) / freedom
 
 
 def _half_cosine(u: Array) -> Array:
@@ -240,7 +246,7 @@ def _measured(
     doubt = 2 * np.hypot(_of_mean(scatter, until - first), _of_mean(scatter, stop - since))
     duration = end - onset
     timing = np.hypot(
-        _TIMING * np.sqrt(np.maximum(duration, 1.0)) * scatter[0] / np.maximum(drop, 1e-300),
+        _TIMING * np.sqrt(np.maximum(duration, 1.0)) * scatter[0] / np.maximum(drop, scatter[0]),
         1 / np.sqrt(12.0),
     )
     rates = np.hypot(left[1], right[1])

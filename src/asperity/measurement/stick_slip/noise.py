@@ -18,9 +18,8 @@ Array = NDArray[np.float64]
 #: Median filter whose output two neighbouring impulses leave as it is.
 _FILTER = 5
 #: Quantile of second differences that gives their scatter: up to two thirds of the blocks may hold
-#: a slip or a peak. And the quantile of a normal deviate.
-_QUANTILE = 0.25
-_NORMAL = float(ndtri(0.5 + _QUANTILE / 2))
+#: a slip or a peak. And the largest share on one level of a coarse recorder that tells a scatter.
+_QUANTILE, _MOST = 0.25, 0.99
 #: Blocks that give a scatter, and its relative standard error times the root of their number.
 _FEWEST_BLOCKS = 32
 _QUANTILE_ERROR = 1.8
@@ -100,13 +99,27 @@ def estimate(force: Array) -> Noise:
         bends = np.abs(means[2:] - 2 * means[1:-1] + means[:-2])
         # The variance of the bend of white means is six times theirs; half of a mean's variance is
         # in its octave.
-        scatter = float(np.quantile(bends, _QUANTILE)) / _NORMAL / np.sqrt(6.0)
+        scatter = _deviation(bends) / np.sqrt(6.0)
         # Two standard errors more: a threshold from a scatter that came out small is none.
         scatter *= 1 + 2 * _QUANTILE_ERROR / np.sqrt(bends.size)
         octaves.append(max(scatter / np.sqrt(2.0), floor))
         pairs = means.size // 2
         means = (means[: 2 * pairs : 2] + means[1 : 2 * pairs : 2]) / 2
     return Noise(np.array(octaves), force.size)
+
+
+def _deviation(sizes: Array) -> float:
+    """Standard deviation of a normal variable, from its smaller absolute values.
+
+    Values on the levels of a coarse recorder count up to the middle between two levels.
+    """
+    level = float(np.quantile(sizes, _QUANTILE, method="lower"))
+    level += 1e-9 * float(sizes.max(initial=0.0))
+    above = sizes[sizes > level]
+    if not above.size:
+        return 0.0
+    share = min(1 - above.size / sizes.size, _MOST)
+    return (level + float(above.min())) / 2 / float(ndtri(0.5 + share / 2))
 
 
 def without_impulses(force: Array) -> tuple[Array, NDArray[np.intp]]:

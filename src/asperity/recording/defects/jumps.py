@@ -4,7 +4,7 @@ A jump is one large step among the steps from sample to sample, and its neighbou
 steps are an autoregression, which follows what is slow, be it drift, motion or noise of any length:
 a level that wanders by itself is no jump, whatever its size. A jump's size is estimated by
 generalised least squares, and a jump is one whose size over its standard error is beyond what noise
-makes anywhere in one recording of a thousand.
+makes anywhere in one recording of a thousand, and beyond that of any gradual change about it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.stats import norm
 
@@ -26,6 +27,8 @@ CHANCE = 1e-3
 _MOST = 5
 #: Samples at the ends of a stretch that show no level on one side of them.
 _EDGE = 6
+#: Samples over which a change is gradual.
+_GRADUAL = (4, 8, 16, 32)
 #: Samples of a stretch, at least.
 _SHORTEST = 64
 
@@ -95,8 +98,20 @@ def find_jumps(
 
 
 def _impulses(model: Autoregression, steps: Float) -> tuple[Float, Float]:
-    """Size of an impulse at each sample, and the same over its standard error."""
-    departure = model.departures_of_single_samples(model.whiten(steps[:, None])[:, 0])
-    weights = np.concatenate([[1.0], model.coefficients[-1]])
-    error = model.innovation / np.sqrt(float(weights @ weights))
-    return error * departure, departure
+    """Size of an impulse at each sample, and the same over its standard error.
+
+    The latter is 0 where a change over several samples departs as far: motion is gradual.
+    """
+    white = model.whiten(steps[:, None])[:, 0]
+    departure = model.departures_of_single_samples(white)
+    weights = np.concatenate([[1.0], -model.coefficients[-1]])
+    length = float(np.sqrt(weights @ weights))
+    sums = np.concatenate([[0.0], np.cumsum(departure)])
+    sudden = np.ones(steps.size, bool)
+    for wide in _GRADUAL:
+        spread = np.convolve(weights, np.ones(wide))
+        apart = np.abs(sums[wide:] - sums[:-wide]) * length / np.sqrt(float(spread @ spread))
+        # The farthest of the changes that a sample is within.
+        around = np.concatenate([np.zeros(wide - 1), apart, np.zeros(wide - 1)])
+        sudden &= np.abs(departure) > sliding_window_view(around, wide).max(axis=1)
+    return model.innovation / length * departure, np.where(sudden, departure, 0.0)

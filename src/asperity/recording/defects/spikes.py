@@ -31,9 +31,8 @@ _SIDE = 16
 #: A chunk's usual difference is taken from every so many of them.
 _EVERY = 8
 #: Samples on either side of a change of the drive at which a peak is no spike by itself; samples
-#: on either side of it that say nothing on the differences elsewhere; and how many times as far off
-#: as those a spike is there.
-_AT_CHANGE, _BESIDE, _CLEARLY = 5, 32, 2.0
+#: beside it whose differences are its own; and how many times as far off as all others a spike is.
+_AT_CHANGE, _ITS_OWN, _CLEARLY = 16, 3, 2.0
 
 
 def spikes(values: Array) -> NDArray[np.intp]:
@@ -119,7 +118,7 @@ def away_from_changes(
     kept = list(rows[~near])
     steps = np.abs(np.diff(without(values, rows[~near])))
     for k in rows[near]:
-        elsewhere = np.concatenate([steps[: max(k - _BESIDE, 0)], steps[k + _BESIDE :]])
+        elsewhere = np.concatenate([steps[: max(k - _ITS_OWN, 0)], steps[k + _ITS_OWN :]])
         if min(steps[k - 1], steps[k]) > _CLEARLY * elsewhere.max(initial=0.0):
             kept.append(k)
     return np.sort(np.array(kept, np.intp))

@@ -21,6 +21,7 @@ from asperity.recording.readers.formats import raw_recording
 from asperity.recording.roles import role_of
 
 if TYPE_CHECKING:
+    from asperity.questions.recording import Source
     from asperity.recording.recipe import ReadingRecipe
     from asperity.recording.trace import Trace
 
@@ -118,6 +119,25 @@ def read(
         provenance = {**trace.provenance, "recipe": rules.model_dump(exclude_defaults=True)}
         trace = replace(trace, provenance=provenance)
     return replace(trace, findings=(*trace.findings, *_library_warnings(warned)))
+
+
+def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
+    """Read a recording as a question says.
+
+    Parameters
+    ----------
+    path : str or path
+    source : Source
+
+    Raises
+    ------
+    InputError
+        As of `read`; or if the area makes no force of a stress.
+    """
+    from asperity.recording.conversions import stress_to_force
+
+    trace = read(path, **source.arguments)
+    return trace if source.area is None else stress_to_force(trace, source.area)
 
 
 def _with_content(file: Path) -> Path:

@@ -252,6 +252,7 @@ class SteadyBranches(Curves):
     """
 
     control = StepControl(
+        shortest=0.0,
         longest=3.0,  # in the space of states, phase and share
         growth=2.0,
         easy=4,

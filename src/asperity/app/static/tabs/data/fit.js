@@ -7,8 +7,13 @@ import { copyText, csv, saveFile } from "../../lib/save.js";
 import { Refused, run } from "../../lib/server.js";
 import { digits } from "../../lib/units.js";
 
+/** What a fit begins with, by the kind of data; without free parameters, all that the data may show. */
+const DEFAULTS = {
+  tables: { laws: ["elasto-plastic"], material: "bureau2000", free: ["eps_ratio", "lambda"] },
+  runs: { laws: ["rice-ruina"], material: "", free: [] },
+};
 const SETTINGS = {
-  laws: ["elasto-plastic"], material: "bureau2000", free: ["eps_ratio", "lambda"], fixed: "",
+  ...DEFAULTS.tables, fixed: "",
   prior: false, profile: false, inertia: false, report: false, posterior: false, draws: "1000", chains: "4",
   trend: "linear", drift: false, initial: "steady", gauge: "", fit_rate: "", velocities: "",
 };
@@ -61,8 +66,20 @@ export class FitPanel {
     const runs = this.runs().length;
     this.element.hidden = !(rows || tables || runs);
     this.runOptions.hidden = !runs;
+    this.#begin(runs && !rows && !tables ? "runs" : "tables");
     const parts = [rows && `${rows} measured ${rows === 1 ? "amplitude" : "amplitudes"}`, tables && `${tables} ${tables === 1 ? "table" : "tables"}`, runs && `${runs} whole ${runs === 1 ? "recording" : "recordings"}`].filter(Boolean);
     this.data.textContent = `Data: ${parts.join(" and ")}.`;
+  }
+
+  /** The defaults of another kind of data, where those of the earlier one were left as they are. */
+  #begin(kind) {
+    const before = DEFAULTS[this.kind || "tables"];
+    const untouched = Object.keys(before).every((n) => JSON.stringify(this.settings[n]) === JSON.stringify(before[n]));
+    if (kind !== (this.kind || "tables") && untouched) {
+      Object.assign(this.settings, structuredClone(DEFAULTS[kind]));
+      this.#build();
+    }
+    this.kind = kind;
   }
 
   #build() {
@@ -96,11 +113,11 @@ export class FitPanel {
         text("Low-pass of the force gauge", "gauge", "none, or 50 Hz"),
         text("Means a second of long recordings", "fit_rate", "chosen, or 100 Hz, or full"),
         text("Velocities between the steps", "velocities", "measured, or 1 um/s, 10 um/s"),
-        tick("A drift over time besides", settings.drift, set("drift")).element));
+        tick("The friction may drift over time too", settings.drift, set("drift")).element));
     fill(this.form,
       el("fieldset", {}, el("legend", {}, "Laws: one is fitted, several are compared"),
         el("div", { class: "ticks" }, names.map((n) => tick(n, settings.laws.includes(n), toggle("laws", n, names), laws[n].title).element))),
-      el("fieldset", {}, el("legend", {}, "Free parameters"), this.freeHolder),
+      el("fieldset", {}, el("legend", {}, "Free parameters; without any, all that the data may show"), this.freeHolder),
       el("div", { class: "fit-more" },
         choice("Other numbers from", [["", "no material"], ...Object.keys(materials).map((n) => [n, n])], settings.material, set("material")).element,
         el("div", { class: "choice" }, el("label", { for: id }, "Fixed numbers, one a line; V is the pulling velocity"), fixed),
@@ -109,7 +126,7 @@ export class FitPanel {
           tick("Intervals by profile likelihood", settings.profile, set("profile")).element,
           tick("Posterior by sampling, of one law", settings.posterior, (on) => { set("posterior")(on); this.sampling.hidden = !on; },
             "As asperity fit --posterior; it takes a minute or more").element,
-          tick("The mass counts", settings.inertia, set("inertia")).element,
+          tick("With the inertia of the slider", settings.inertia, set("inertia")).element,
           tick("Write the report folder", settings.report, set("report"), "As asperity fit --report and asperity compare --report write it").element),
         this.sampling),
       this.runOptions);
@@ -129,6 +146,12 @@ export class FitPanel {
     this.names = names;
   }
 
+  /** Free parameters, null where none is chosen: all that the data may show are. */
+  #freed() {
+    const free = this.settings.free.filter((n) => this.names.includes(n));
+    return free.length ? free : null;
+  }
+
   async start() {
     this.work?.abort();
     this.work = new AbortController();
@@ -146,7 +169,7 @@ export class FitPanel {
       fixed[n.trim()] = rest.join("=").trim();
     }
     const asked = {
-      laws: settings.laws, free: settings.free.filter((n) => this.names.includes(n)),
+      laws: settings.laws, free: this.#freed(),
       rows: this.rows(), tables: this.tables(), fixed,
       runs: this.runs().map((r) => r.asked),
       trend: settings.trend, drift: settings.drift, initial: settings.initial, gauge: settings.gauge || null,
@@ -336,7 +359,7 @@ export class FitPanel {
   }
 
   #python() {
-    const { laws, free, material, profile, inertia, posterior, chains, draws } = this.settings;
+    const { laws, material, profile, inertia, posterior, chains, draws } = this.settings;
     const one = laws.length === 1;
     const list = (names) => `[${names.map((n) => `"${n}"`).join(", ")}]`;
     const fixed = this.settings.fixed.split(/[\n;]+/).filter((l) => l.includes("=")).map((l) => l.split("=").map((p) => p.trim()));
@@ -344,7 +367,7 @@ export class FitPanel {
     const files = [...this.tables().map((t) => t.name), ...(this.rows().length ? ["campaign.csv"] : [])];
     return `import asperity as asp\nfrom asperity import inference\n\nfixed = ${chosen}\ngiven = {name: fixed[name] for name in ("V", "epsilon", "frequency") if name in fixed}\ntables = [inference.read_table(path, given) for path in ${list(files)}]\n`
       + this.runs().map(({ name, python, asked }) => `${python}\ntables.append(inference.recorded_run(trace, name=${JSON.stringify(name.replace(/\.[^.]*$/, ""))}${asked.window ? `, window=(${asked.window.join(", ")})` : ""}${asked.steps ? `, steps=[${asked.steps.join(", ")}]` : ""}))\n`).join("")
-      + `found = inference.${one ? "fit" : "compare"}(\n    tables,\n    ${one ? `"${laws[0]}"` : list(laws)},\n    ${list(free.filter((n) => this.names.includes(n)))},\n    fixed=fixed,\n`
+      + `found = inference.${one ? "fit" : "compare"}(\n    tables,\n    ${one ? `"${laws[0]}"` : list(laws)},\n    ${this.#freed() ? list(this.#freed()) : "None"},\n    fixed=fixed,\n`
       + `${material ? `    material=asp.materials.load("${material}"),\n` : ""}${profile ? "    profile=True,\n" : ""}${inertia ? "    inertia=True,\n" : ""}${this.#runOptions()})\n`
       + (posterior && one ? `posterior = inference.sample_posterior(found, chains=${Number(chains)}, draws=${Number(draws)})\n` : "");
   }

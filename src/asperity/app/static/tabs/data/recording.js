@@ -91,7 +91,9 @@ export class RecordingCard {
     this.bar.removeAttribute("value");
     this.#says("Reading…");
     try {
-      const { source, options } = this.state;
+      const { source } = this.state;
+      const { mode, ...options } = this.state.options;
+      if (mode && mode !== "auto") options.modulated = mode === "modulated";
       const last = await run("data/measure", { recording: this.state.key, source, options }, (part) => {
         if (signal.aborted) return;
         if (part.waiting) this.#says("Waiting for another recording…");

@@ -6,12 +6,11 @@ from scipy.linalg import toeplitz
 from scipy.signal import lfilter
 from scipy.stats import multivariate_normal
 
-from asperity.inference.runs.noise import (
+from asperity.recording.defects.autoregression import (
     Autoregression,
     _reflections,
     _reflections_of_smooth,
     fitted,
-    whiteness,
 )
 
 
@@ -57,23 +56,6 @@ def test_effective_samples_are_those_of_the_mean():
     noise = Autoregression(np.array([0.9]), 1.0)
     assert noise.effective_samples(1000) == pytest.approx(1000 * 0.1 / 1.9)
     assert Autoregression(np.zeros(0), 1.0).effective_samples(50) == 50
-
-
-def test_whiteness_tells_noise_from_a_line():
-    x = np.random.default_rng(2).normal(size=2000)
-    assert whiteness([x], 0).p_value > 0.01
-    line = 0.3 * np.cos(0.7 * np.arange(2000))
-    assert whiteness([x + line], 0).p_value < 1e-6
-    assert whiteness([process(n=2000)], 0).p_value < 1e-6
-
-
-def test_whiteness_rejects_as_often_as_it_says():
-    rejected = [
-        whiteness([np.random.default_rng(seed).normal(size=300)], 0).p_value < 0.1
-        for seed in range(300)
-    ]
-    # Two tests together reject at most as often, and not much less.
-    assert 0.03 < np.mean(rejected) < 0.1 + 3 * np.sqrt(0.09 / 300)
 
 
 def test_a_single_sample_that_is_off_is_measured_as_by_generalised_least_squares():

@@ -6,11 +6,12 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from asperity.cli.report import aligned
+from asperity.outputs.tables import aligned, rounded
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
     from asperity.measurement.verdicts.verdict import Check
     from asperity.recording.finding import Finding
 
@@ -145,6 +146,44 @@ def sliding_text(measurement: SlidingMeasurement, name: str) -> str:
     return "\n".join([*lines, *_quality(measurement.checks), *_unread(measurement.unread)])
 
 
+def stick_slip_text(measurement: StickSlipMeasurement, name: str) -> str:
+    """A stick-slip recording, as the command prints it.
+
+    Parameters
+    ----------
+    measurement : StickSlipMeasurement
+    name : str
+        Of the recording.
+    """
+    from asperity.measurement.stick_slip.catalogue import summary_rows
+
+    time = measurement.time
+    rate = (time.size - 1) / float(time[-1] - time[0])
+    head = f"{name}: {time[0]:.10g} s to {time[-1]:.10g} s, {time.size} samples at {rate:.4g} Hz"
+    parts = [(f"{r.start:.6g}", f"{r.end:.6g}", r.kind, r.evidence) for r in measurement.regimes]
+    slope, doubt = measurement.loading_slope, measurement.loading_slope_uncertainty
+    rows = [
+        ("events", str(len(measurement.events)), "", ""),
+        *summary_rows(measurement),
+        _row("loading_slope", slope, doubt, "1/s", "median of F/W in the sticks"),
+    ]
+    stiffness, doubt = measurement.stiffness_from_slope
+    if math.isfinite(stiffness):
+        rows.append(_row("stiffness", stiffness, doubt, "N/m", "loading_slope W0/V"))
+    smallest = f"{measurement.smallest_drop:.2g}"
+    rows.append(("smallest_drop", smallest, "", "a smaller one may not have been seen"))
+    return "\n".join(
+        [
+            head,
+            "regimes",
+            aligned([("from (s)", "to (s)", "regime", "evidence"), *parts], "  "),
+            "slip events",
+            aligned(rows, "  "),
+            *_quality(measurement.checks),
+        ]
+    )
+
+
 def _segments(measurement: SlidingMeasurement) -> list[str]:
     table = [("from (s)", "to (s)", "velocity", "mean friction", "drift (1/s)", "scatter")]
     for s in measurement.segments:
@@ -252,16 +291,8 @@ def _holds(measurement: SlidingMeasurement) -> list[str]:
 
 def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tuple[str, ...]:
     """A number with as many digits as its uncertainty allows: two uncertain ones."""
-    if not (math.isfinite(doubt) and doubt > 0 and math.isfinite(value)):
-        return name, f"{value:.9g} {unit}".strip(), "", meaning
-    last = math.floor(math.log10(doubt)) - 1
-    digits = max(0, min(15, -last))
-    if value and (abs(value) < 1e-3 or abs(value) >= 1e6):
-        power = math.floor(math.log10(abs(value)))
-        shown = f"{value:.{max(0, min(15, power - last))}e}"
-    else:
-        shown = f"{value:.{digits}f}"
-    return name, f"{shown} {unit}".strip(), f"+- {doubt:.2g}", meaning
+    number, uncertain = rounded(value, doubt)
+    return name, f"{number} {unit}".strip(), uncertain, meaning
 
 
 def _quality(checks: Iterable[Check]) -> list[str]:

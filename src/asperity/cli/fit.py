@@ -1,0 +1,358 @@
+"""``asperity fit`` and ``asperity compare``: laws fitted to lock-in readings and recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.options import json_option, law_options, settings_of
+from asperity.cli.recording import listed_times, source_options
+from asperity.cli.words import fields_as_options
+from asperity.errors import InputError
+from asperity.outputs import require_folder
+
+if TYPE_CHECKING:
+    from asperity.inference import Fit
+    from asperity.inference.posterior import Posterior
+
+_EPILOG = """\b
+Examples:
+  asperity fit velocity_steps.csv
+  asperity fit velocity_steps.csv --law rice-ruina --free A,B,D0,K --window 100:400
+  asperity fit readings.csv --law elasto-plastic --material bureau2000 \\
+      --free lambda,eps_ratio,A,B
+  asperity fit readings.csv --law elasto-plastic --material bureau2000 \\
+      --free lambda,eps_ratio --fix "K=0.21 N/um" --prior bureau2000 --profile --json
+  asperity fit readings.csv --law elasto-plastic --material bureau2000 \\
+      --free lambda,eps_ratio --posterior --out posterior.nc
+
+\b
+Table: one operating point a row, in SI without units: V, epsilon (as applied),
+frequency, other parameters that differ between rows, and observables
+mean_friction, delta_mu, mu1, mu2, phase1, phase2 with the standard uncertainty
+of each in NAME_err, covariances in NAME_NAME_cov. Tables and JSON by
+'asperity measure' go in as they are; give the velocity by --fix "V=1 um/s".
+Harmonics are compared as complex numbers where phases are given. eps_ratio is
+the share of epsilon that the contacts carry.
+
+\b
+Holds: one slide-hold-slide test a row: hold_time, healing (static friction less
+the level of sliding), V, K over the normal load (N/m with a column W0), and
+healing_err, the standard uncertainty; without it one error for all holds is
+estimated from what the law leaves. In SI, or with units in the heading: K (1/um).
+
+\b
+Recording: any file that 'asperity measure' reads, with friction (or force and
+load) and the displacement or velocity of the load point. It is compared with the
+motion through the whole of it; its stiffness K is free, its noise autoregressive.
+More than 20,000 samples are compared as means over blocks (--fit-rate).
+"""
+
+#: Options of the data and of what is estimated, what is needed first before the others.
+_FIRST = (
+    click.option(
+        "--free",
+        metavar="NAMES",
+        help="Free parameters: a,b,c; by default all of the law that the data may show.",
+    ),
+    click.option("--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Fix a parameter."),
+    click.option("--start", multiple=True, metavar="NAME=VALUE", help="Start value."),
+    click.option("--material", metavar="NAME", help="Fixes what is given nowhere else."),
+    click.option(
+        "--prior",
+        multiple=True,
+        metavar="NAME|NAME=VALUE+-SD",
+        help='Published uncertainties of a material, or "K=0.2+-0.01 N/um"; repeatable.',
+    ),
+    click.option("--window", metavar="START:END", help="Seconds of a recording to fit."),
+)
+_THEN = (
+    click.option(
+        "--steps",
+        metavar="TIMES|FILE",
+        help="Times (s) at which the velocity of the drive changes.",
+    ),
+    click.option(
+        "--velocities",
+        metavar="VALUES",
+        help='Velocities between --steps, like "1 um/s,10 um/s"; 0 in a hold.',
+    ),
+    click.option(
+        "--stiffness-from",
+        metavar="START:END",
+        help="Seconds of unloading and reloading whose slope is the prior of K; outside --window.",
+    ),
+    click.option(
+        "--trend",
+        metavar="none|linear|quadratic",
+        default="linear",
+        show_default=True,
+        help="Trend of the friction of a recording over slip.",
+    ),
+    click.option("--drift", is_flag=True, help="Let the friction drift over time too."),
+    click.option(
+        "--initial",
+        metavar="steady|free",
+        default="steady",
+        show_default=True,
+        help="State at the beginning of a recording.",
+    ),
+    click.option("--gauge", metavar="HZ", help='Low-pass of the force gauge, like "50 Hz".'),
+    click.option(
+        "--gauge-order", type=click.IntRange(1, 8), default=1, show_default=True, help="Its order."
+    ),
+    click.option(
+        "--fit-rate",
+        metavar="HZ|full",
+        help='Means a second that stand for the samples of a recording, like "100 Hz"; by default '
+        "as many as it needs where it has more than 20,000 samples.",
+    ),
+    click.option("--profile", is_flag=True, help="Intervals by profile likelihood."),
+    click.option("--inertia", is_flag=True, help="The mass of the slider counts."),
+    click.option("--radiation-damping", is_flag=True, help="The damping eta counts."),
+)
+#: Options that are fields of the question under the same name.
+_FIELDS = (
+    *("free", "material", "profile", "inertia", "radiation_damping", "stiffness_from", "trend"),
+    *("drift", "initial", "gauge", "gauge_order", "fit_rate", "windows"),
+)
+
+
+def _question_options(*own: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Options of data and estimation; the command gets `fields` of its question.
+
+    Parameters
+    ----------
+    *own : click options
+        Of this command alone, which follow those that are needed first.
+    """
+
+    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(command)
+        def gathered(
+            *,
+            data: tuple[Path, ...],
+            source: Any,
+            fixed: tuple[str, ...],
+            start: tuple[str, ...],
+            prior: tuple[str, ...],
+            window: str | None,
+            steps: str | None,
+            velocities: str | None,
+            **others: Any,
+        ) -> Any:
+            from asperity.questions.options import FIT_OPTIONS
+
+            with fields_as_options(FIT_OPTIONS):
+                of_run = {
+                    "window": window,
+                    "steps": None if steps is None else listed_times(steps, "--steps"),
+                    "velocities": None if velocities is None else velocities.split(","),
+                }
+                fields = {
+                    "data": [{"file": path, "source": source, **of_run} for path in data],
+                    "fixed": settings_of(fixed, "--fix"),
+                    "start": settings_of(start, "--start"),
+                    "prior": prior,
+                    **{n: others.pop(n) for n in _FIELDS if n in others},
+                }
+                return command(fields=fields, **others)
+
+        result = source_options(gathered)
+        for option in reversed(
+            (
+                click.argument("data", nargs=-1, required=True, type=Path),
+                law_options(),
+                *_FIRST,
+                *own,
+                json_option(),
+                *_THEN,
+            )
+        ):
+            result = option(result)
+        return result
+
+    return with_options
+
+
+_REPORT = click.option(
+    "--report", type=Path, metavar="DIR", help="Folder for a page, materials, and draws."
+)
+
+
+@click.command(epilog=_EPILOG)
+@_question_options(
+    click.option(
+        "--windows",
+        metavar="SPANS|auto",
+        help="Fit a recording in several windows, like 100:400,120:380; their spread is reported.",
+    ),
+    _REPORT,
+    click.option("--posterior", is_flag=True, help="Sample the posterior (extra 'bayes')."),
+    click.option("--chains", default=4, show_default=True, metavar="N", help="Chains."),
+    click.option(
+        "--draws", default=1000, show_default=True, metavar="N", help="Draws of each chain."
+    ),
+    click.option("--seed", default=0, show_default=True, metavar="N", help="Of the draws."),
+    click.option("--out", type=Path, metavar="NC", help="Where the draws go, for ArviZ."),
+)
+def fit(
+    laws: tuple[str, ...],
+    fields: dict[str, Any],
+    posterior: bool,
+    chains: int,
+    draws: int,
+    seed: int,
+    out: Path | None,
+    report: Path | None,
+    as_json: bool,
+) -> int:
+    """Fit a friction law to tables of lock-in readings and to recordings.
+
+    Estimates with intervals, correlations, what the data cannot determine, and whether the law
+    describes them.
+    """
+    from asperity.cli.progress import bar
+    from asperity.cli.report import to_json
+    from asperity.inference import WindowedFit
+    from asperity.inference.answers import answer_fit
+    from asperity.inference.fitting.result import fit_record
+    from asperity.inference.report import fit_report, posterior_sections, windows_sections
+    from asperity.outputs.tables import as_text
+    from asperity.questions.fit import Fit as Question
+
+    if len(laws) > 1:
+        raise InputError(
+            "--law", "be one law for a fit", len(laws), "compare several with asperity compare"
+        )
+    sampling = {"chains": chains, "draws": draws, "seed": seed}
+    _check_sampling(posterior, sampling, out)
+    if report is not None:
+        require_folder(report, "--report")
+    question = Question(law=laws[0] if laws else None, **fields)
+    with bar("window" if question.windows else "step", raising=False) as update:
+        answer = answer_fit(question, progress=update)
+    over = answer if isinstance(answer, WindowedFit) else None
+    result: Fit = answer.fits[0] if isinstance(answer, WindowedFit) else answer
+    sampled = _sampled(result, sampling, out) if posterior and result.converged else None
+    if report is not None and result.converged:
+        from asperity.fit_report import write_report
+
+        write_report(report, result, sampled)
+    if as_json:
+        more = {"posterior": sampled.record()} if sampled else {}
+        more |= {"windows": over.record()} if over else {}
+        click.echo(to_json({**fit_record(result), **more}))
+    else:
+        sections = fit_report(result)
+        sections += windows_sections(over) if over else []
+        sections += posterior_sections(sampled) if sampled else []
+        click.echo(as_text(sections))
+    if report is not None and result.converged:
+        click.echo(f"asperity: the report is {report / 'report.html'}", err=True)
+    return 0 if result.converged and (sampled is None or sampled.converged) else 1
+
+
+def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None) -> None:
+    """Refuse what cannot be sampled or written before anything is computed."""
+    if not posterior:
+        if out is not None:
+            raise InputError("--out must come with --posterior, got it alone; add --posterior")
+        return
+    from asperity.inference.posterior import require_bayes
+    from asperity.inference.posterior.sampling import require_sizes
+    from asperity.outputs import output_file
+
+    require_sizes(sampling["chains"], sampling["draws"])
+    require_bayes()
+    if out is not None:
+        if out.suffix.lower() != ".nc":
+            raise InputError(
+                f"--out must be a NetCDF file, got '{out}'; write it like --out posterior.nc"
+            )
+        output_file(out, "--out", example="posterior.nc")
+
+
+def _sampled(fit: Fit, sampling: dict[str, int], out: Path | None) -> Posterior:
+    """Sample with a progress bar, and write the draws."""
+    from asperity.cli.progress import bar
+    from asperity.inference.posterior import sample_posterior
+    from asperity.outputs import written_file
+
+    with bar("draw") as update:
+        posterior = sample_posterior(fit, **sampling, progress=update)
+    if out is not None:
+        with written_file(out, "--out") as path:
+            posterior.to_netcdf(path)
+    return posterior
+
+
+_EPILOG_OF_COMPARE = """\b
+Examples:
+  asperity compare velocity_steps.csv
+  asperity compare readings.csv --law rice-ruina --law linker-dieterich --law elasto-plastic \\
+      --material bureau2000 --free lambda,alpha,eps_ratio,A,B
+
+\b
+Each law takes those of the free parameters that it has. A law is excluded if
+chi-squared has a probability below 0.001 while that of another law has not, or
+if its AICc exceeds the lowest by 10 or more.
+"""
+
+
+@click.command(epilog=_EPILOG_OF_COMPARE)
+@_question_options(
+    click.option(
+        "--laws",
+        "listed",
+        default="all",
+        metavar="NAMES",
+        help="The same as several --law: a,b,c or all.",
+    ),
+    _REPORT,
+    click.option("--windows", hidden=True, metavar="SPANS"),
+)
+def compare(
+    laws: tuple[str, ...],
+    listed: str,
+    fields: dict[str, Any],
+    report: Path | None,
+    as_json: bool,
+) -> int:
+    """Fit several laws to the same readings and say which the data exclude."""
+    from asperity.cli.progress import bar
+    from asperity.cli.report import to_json
+    from asperity.inference.answers import answer_comparison
+    from asperity.inference.comparison.record import comparison_record
+    from asperity.inference.report import comparison_report
+    from asperity.outputs.tables import as_text
+    from asperity.questions.fit import Comparison as Question
+
+    if fields.pop("windows") is not None:
+        raise InputError(
+            "--windows must go with asperity fit, got it with compare: windows of one recording "
+            "overlap, so that what they say against a law does not add up; compare with --window "
+            "START:END, one at a time"
+        )
+    if report is not None:
+        require_folder(report, "--report")
+    fields["laws"] = laws or listed
+    question = Question(**fields)
+    with bar("%", raising=False) as update:
+        comparison = answer_comparison(
+            question, progress=lambda done, total: update(round(100 * done / total), 100)
+        )
+    if report is not None and any(j.fit.converged for j in comparison.laws.values()):
+        from asperity.fit_report import write_comparison
+
+        write_comparison(report, comparison)
+        click.echo(f"asperity: the report is {report / 'report.html'}", err=True)
+    if as_json:
+        click.echo(to_json(comparison_record(comparison)))
+    else:
+        click.echo(as_text(comparison_report(comparison)))
+    return 0 if all(j.fit.converged for j in comparison.laws.values()) else 1

@@ -1,1 +1,0 @@
-"""``asperity fit``: data read, a law fitted to them, its posterior sampled."""

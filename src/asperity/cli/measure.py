@@ -1,0 +1,395 @@
+"""``asperity measure``: friction in a recording, with uncertainties and verdicts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from asperity.cli.options import json_option, set_option, settings_of
+from asperity.cli.recording import listed_times, source_options
+from asperity.cli.words import in_options
+from asperity.errors import InputError, naming
+
+if TYPE_CHECKING:
+    from asperity.measurement.verdicts.verdict import Check
+    from asperity.questions.recording import Measurement as Question
+    from asperity.questions.recording import Source
+
+
+Rows = list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class FileRows:
+    """Measures one file of a campaign; it can be sent to another process.
+
+    Attributes
+    ----------
+    source : Source
+    question : Question
+    """
+
+    source: Source
+    question: Question
+
+    def __call__(self, path: Path) -> Rows:
+        """Rows of a file; one row with the reason if it cannot be measured."""
+        from asperity.measurement.campaign import failed_row, modulated_rows, sliding_rows
+        from asperity.measurement.from_file import measured_parts
+        from asperity.measurement.stick_slip.catalogue import stick_slip_row
+        from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+        from asperity.recording.readers.from_file import read_source
+
+        with naming(in_options):
+            try:
+                result = measured_parts(read_source(path, self.source), self.question)
+                if isinstance(result, list):
+                    return modulated_rows(path, result)
+                if isinstance(result, StickSlipMeasurement):
+                    return [stick_slip_row(path, result)]
+                return sliding_rows(path, result)
+            except InputError as error:
+                return [failed_row(path, 1, str(error))]
+            except Exception as error:  # one damaged file must not cost the others
+                reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
+                return [failed_row(path, 1, f"the recording could not be measured ({reason})")]
+
+    def inputs(self) -> dict[str, Any]:
+        """All that rows depend on besides the files, as JSON values.
+
+        Of a reduction file its contents: a campaign is not resumed with another one.
+
+        Raises
+        ------
+        InputError
+            If the reduction file cannot be read.
+        """
+        source = self.source.model_dump(mode="json")
+        if self.source.recipe is not None:
+            from asperity.recording.recipe import load_recipe
+
+            source["recipe"] = load_recipe(self.source.recipe).model_dump()
+        return {"source": source, "options": self.question.model_dump(mode="json")}
+
+
+_EPILOG = """\b
+Examples:
+  asperity measure recording.csv
+  asperity measure recording.csv --load Fn --force Ft --unit Fn=N --unit Ft=N \\
+      --frequency "120 Hz" --window 10:60 --json --plot recording.png
+  asperity measure velocity_step.txt --no-modulation --plot steps.png
+  asperity measure amplitudes.csv --amplitudes
+  asperity measure stick_slip.mat --set "K=168 N/m" --set "V=42 um/s" \\
+      --set "M=30.7 g" --events events.csv --plot events.png
+  asperity measure day1/*.csv --out campaign.csv
+
+\b
+Convention: W/W0 = 1 + epsilon cos phi, phi from the measured load,
+F/W0 = mean_friction + sum of mu_n cos(n phi + phase_n).
+
+\b
+Exit code 0: measured; 1: measured, but a check says bad, or rows of a table have a reason
+in place of numbers; 2: bad input.
+"""
+
+
+@click.command(epilog=_EPILOG)
+@click.argument("recordings", type=Path, nargs=-1, required=True)
+@source_options
+@click.option(
+    "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
+    help='Where to look for the modulation, like "120 Hz"; it is fitted.',
+)  # fmt: skip
+@click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
+@click.option(
+    "--harmonics", metavar="N", type=click.IntRange(1, 64), default=4, show_default=True,
+    help="How many.",
+)  # fmt: skip
+@click.option(
+    "--window",
+    metavar="START:END",
+    help="Seconds to read, like 10:60; chosen by the program if not given.",
+)
+@click.option("--whole-periods", is_flag=True, help="Cut the window to whole periods.")
+@click.option(
+    "--detrend",
+    metavar="none|linear|quadratic",
+    default="linear",
+    show_default=True,
+    help="Drift that is fitted together with the harmonics.",
+)
+@click.option(
+    "--no-modulation",
+    is_flag=True,
+    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
+)
+@click.option(
+    "--steps",
+    metavar="TIMES|FILE",
+    help="Times of the velocity steps in seconds, like 12.5,60, or a file of them, one a line.",
+)
+@click.option(
+    "--holds",
+    metavar="TIMES|FILE",
+    help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
+)
+@click.option(
+    "--stick-slip",
+    is_flag=True,
+    help="Slip events; by default, those of a recording that is stick-slip and not modulated.",
+)
+@set_option('--set "K=168 N/m" --set "V=42 um/s"', "K, V, M or W0 of the machine, for slip events")
+@click.option(
+    "--events",
+    type=Path,
+    metavar="CSV|NC|JSON",
+    help="Where the catalogue of slip events goes.",
+)
+@click.option(
+    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
+)
+@click.option(
+    "--out",
+    type=Path,
+    metavar="CSV|NC",
+    help="Measure all recordings into one table: a row for each amplitude, step and hold.",
+)
+@click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
+@click.option(
+    "--jobs",
+    metavar="N",
+    type=click.IntRange(1),
+    help="Processes of a table; as many as cores if not given.",
+)
+@json_option()
+@click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
+def measure(
+    recordings: tuple[Path, ...],
+    source: Source,
+    frequency: str,
+    exact_frequency: bool,
+    harmonics: int,
+    window: str | None,
+    whole_periods: bool,
+    detrend: str,
+    no_modulation: bool,
+    steps: str | None,
+    holds: str | None,
+    stick_slip: bool,
+    settings: tuple[str, ...],
+    events: Path | None,
+    amplitudes: bool,
+    out: Path | None,
+    resume: bool,
+    jobs: int | None,
+    as_json: bool,
+    plot: Path | None,
+) -> int:
+    """Harmonics of the friction force against the measured load, with uncertainties and verdicts.
+
+    RECORDINGS are files of a laboratory: CSV or other text, HDF5, MATLAB, TDMS or LOOK. Several
+    are measured into one table with --out.
+    """
+    from asperity.questions.recording import Measurement as Question
+
+    fields: dict[str, Any] = {
+        "modulated": False if no_modulation else None,
+        "frequency": None if frequency == "auto" else frequency,
+        "exact_frequency": exact_frequency,
+        "harmonics": harmonics,
+        "window": window,
+        "whole_periods": whole_periods,
+        "detrend": detrend,
+        "steps": None if steps is None else listed_times(steps, "--steps"),
+        "holds": None if holds is None else listed_times(holds, "--holds"),
+        "stick_slip": True if stick_slip else None,
+        **_machine(settings),
+    }
+    question = Question(**fields)
+    if stick_slip and amplitudes:
+        raise InputError("--stick-slip must go without --amplitudes, got both; leave one out")
+    if out is not None:
+        if plot is not None or events is not None or steps or holds:
+            raise InputError(
+                "--plot, --events, --steps and --holds must go with one recording without --out, "
+                "got both; measure that recording by itself"
+            )
+        return _campaign(recordings, source, question, out, resume, jobs, as_json)
+    if len(recordings) > 1:
+        raise InputError(
+            f"--out must be given with several recordings, got {len(recordings)} without; name "
+            "the table, like --out campaign.csv"
+        )
+    if resume or jobs is not None:
+        raise InputError(
+            "--resume and --jobs must go with --out, got no table; name it or leave them out"
+        )
+    (recording,) = recordings
+    if amplitudes:
+        if no_modulation or plot is not None:
+            raise InputError(
+                "--amplitudes must go without --no-modulation and --plot, got both; leave one out"
+            )
+        return _amplitudes(recording, source, question, as_json)
+    if plot is not None:
+        _check_picture(plot, recording)
+    if events is not None:
+        _check_catalogue(events, recording)
+    from asperity.measurement.from_file import answer_measurement
+    from asperity.recording.readers.from_file import read_source
+
+    trace = read_source(recording, source)
+    result, why = answer_measurement(trace, question)
+    if why:
+        click.echo(f"asperity: {why}", err=True)
+    if events is not None:
+        _catalogue(result, events)
+    _print(result, recording, trace.provenance, as_json)
+    if plot is not None:
+        _plot(result, plot)
+    return _verdict(result.checks)
+
+
+def _amplitudes(recording: Path, source: Source, question: Question, as_json: bool) -> int:
+    from asperity.cli.measurement_text import amplitudes_text
+    from asperity.cli.report import to_json
+    from asperity.measurement.campaign import modulated_rows
+    from asperity.measurement.from_file import modulated_parts
+    from asperity.recording.readers.from_file import read_source
+
+    rows = modulated_rows(recording, modulated_parts(read_source(recording, source), question))
+    if as_json:
+        click.echo(to_json({"recording": str(recording), "amplitudes": rows}))
+    else:
+        click.echo(amplitudes_text(rows, recording.name))
+    return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
+
+
+def _campaign(
+    recordings: tuple[Path, ...],
+    source: Source,
+    question: Question,
+    out: Path,
+    resume: bool,
+    jobs: int | None,
+    as_json: bool,
+) -> int:
+    import os
+
+    from asperity.cli.progress import bar
+    from asperity.cli.report import to_json
+    from asperity.measurement.campaign import run_campaign
+
+    rows_of = FileRows(source, question)
+    with bar("files") as update:
+        done = run_campaign(
+            recordings,
+            rows_of,
+            out,
+            inputs=rows_of.inputs(),
+            resume=resume,
+            jobs=jobs or os.cpu_count() or 1,
+            progress=update,
+        )
+    if as_json:
+        numbers = {"files": done.files, "rows": done.rows, "failed": done.failed}
+        click.echo(to_json({**numbers, "out": str(out)}))
+    if done.sliding and question.modulated is None:
+        click.echo(
+            f"asperity: {done.sliding} of {done.files} files have a constant load: their velocity "
+            "steps and holds are in the table, as with --no-modulation",
+            err=True,
+        )
+    if done.failed:
+        click.echo(
+            f"asperity: {done.failed} of {done.rows} rows have no numbers; the column 'reason' of "
+            f"{out} says why",
+            err=True,
+        )
+    return int(done.failed > 0)
+
+
+def _check_picture(path: Path, recording: Path) -> None:
+    """Check the picture's path before anything is read."""
+    from asperity.outputs import output_files
+
+    if path.suffix.lower() != ".png":
+        raise InputError(f"--plot must be a PNG file, got '{path}'; write it like --plot out.png")
+    output_files({"--plot": path}, inputs={"recording": recording})
+
+
+def _check_catalogue(path: Path, recording: Path) -> None:
+    from asperity.measurement.stick_slip.catalogue import check_catalogue
+    from asperity.outputs import output_files
+
+    check_catalogue(path)
+    output_files({"--events": path}, inputs={"recording": recording})
+
+
+def _catalogue(result: Any, path: Path) -> None:
+    from asperity.measurement.stick_slip.catalogue import write_catalogue
+
+    if not hasattr(result, "regimes"):
+        raise InputError(
+            "--events must go with a stick-slip recording, got another; leave it out, or read slip "
+            "events with --stick-slip"
+        )
+    write_catalogue(result, path)
+
+
+def _machine(settings: tuple[str, ...]) -> dict[str, str]:
+    """What ``--set`` says of the machine, by the fields of the question."""
+    fields = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "normal_load"}
+    given = settings_of(settings)
+    for name in given:
+        if name not in fields:
+            raise InputError(
+                f"--set must name one of {', '.join(fields)}, got '{name}'; write it like "
+                '--set "K=168 N/m"'
+            )
+    return {fields[name]: text for name, text in given.items()}
+
+
+def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
+    from asperity._version import __version__
+    from asperity.cli.measurement_text import modulated_text, sliding_text, stick_slip_text
+    from asperity.cli.report import to_json
+    from asperity.measurement.record import modulated_record, sliding_record
+    from asperity.measurement.stick_slip.catalogue import stick_slip_record
+
+    record_of: Any
+    text_of: Any
+    if hasattr(result, "reading"):
+        record_of, text_of = modulated_record, modulated_text
+    elif hasattr(result, "regimes"):
+        record_of, text_of = stick_slip_record, stick_slip_text
+    else:
+        record_of, text_of = sliding_record, sliding_text
+    if as_json:
+        provenance_record = {"recording": str(recording), "version": __version__, **provenance}
+        click.echo(to_json({**record_of(result), "provenance": provenance_record}))
+    else:
+        click.echo(text_of(result, recording.name))
+
+
+def _plot(result: Any, path: Path) -> None:
+    from asperity.figures.recording import draw_modulated, draw_sliding
+    from asperity.figures.stick_slip import draw_stick_slip
+    from asperity.figures.style import style
+    from asperity.outputs import written_file
+
+    draw: Any = draw_modulated if hasattr(result, "reading") else draw_sliding
+    if hasattr(result, "regimes"):
+        draw = draw_stick_slip
+    with style(), written_file(path, "--plot") as file:
+        draw(result).savefig(file, metadata={"Software": None})
+
+
+def _verdict(checks: tuple[Check, ...]) -> int:
+    for check in checks:
+        if check.verdict == "bad":
+            click.echo(f"asperity: {check.name} is bad: {check.sentence}", err=True)
+    return int(any(check.verdict == "bad" for check in checks))

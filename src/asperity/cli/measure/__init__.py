@@ -1,1 +1,0 @@
-"""``asperity measure``: recordings read by options, measured, printed as text, JSON or tables."""

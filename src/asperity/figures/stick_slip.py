@@ -1,0 +1,112 @@
+"""Figure of a stick-slip recording: the signal with its regimes, events at close range, drops."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from asperity.figures.recording import band
+from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+
+#: Events at close range.
+_CLOSE = 8
+_LETTER: dict[str, Any] = {"va": "top", "ha": "left", "fontsize": 10}
+
+
+def draw_stick_slip(measurement: StickSlipMeasurement) -> Figure:
+    """The recording with its regimes, some events, and drop against stick time.
+
+    Parameters
+    ----------
+    measurement : StickSlipMeasurement
+    """
+    figure = new_figure(5.0, 7.2)
+    whole, close, drops = figure.subplots(3, 1)
+    _draw_whole(whole, measurement)
+    _draw_close(close, measurement)
+    _draw_drops(drops, measurement)
+    for axis, letter in zip((whole, close, drops), "abc", strict=True):
+        axis.text(0.015, 0.96, f"({letter})", transform=axis.transAxes, **_LETTER)
+    return figure
+
+
+def _draw_whole(axis: Axes, measurement: StickSlipMeasurement) -> None:
+    start = float(measurement.time[0])
+    band(axis, measurement.time - start, measurement.friction, color=GREY)
+    names: set[str] = set()
+    for k, regime in enumerate(measurement.regimes):
+        if regime.sticks and len(measurement.regimes) > 1:
+            span = regime.start - start, regime.end - start
+            axis.axvspan(*span, color=STATED_FILL, alpha=0.35, zorder=0)
+        if regime.kind not in names or len(measurement.regimes) < 6:
+            axis.text(
+                (regime.start + regime.end) / 2 - start,
+                1.01 + 0.07 * (k % 2),
+                regime.kind,
+                transform=axis.get_xaxis_transform(),
+                ha="center",
+                va="bottom",
+                fontsize=7,
+            )
+        names.add(regime.kind)
+    axis.set(xlabel=f"time after {start:.6g} s (s)", ylabel="$F/W$")
+    axis.margins(x=0)
+
+
+def _draw_close(axis: Axes, measurement: StickSlipMeasurement) -> None:
+    events = measurement.events
+    start = float(measurement.time[0])
+    if not len(events):
+        axis.set_axis_off()
+        axis.text(0.5, 0.5, "no events", transform=axis.transAxes, ha="center")
+        return
+    first = max((len(events) - _CLOSE) // 2, 0)
+    last = min(first + _CLOSE, len(events)) - 1
+    around = (float(events.end[last]) - float(events.onset[first])) / (2 * _CLOSE)
+    around = max(around, float(events.slip_duration[first]))
+    near = (measurement.time >= events.onset[first] - around) & (
+        measurement.time <= events.end[last] + around
+    )
+    band(axis, measurement.time[near] - start, measurement.friction[near], color=GREY)
+    shown = slice(first, last + 1)
+    axis.plot(
+        np.stack([events.onset[shown], events.end[shown]]) - start,
+        np.stack([events.force_before[shown], events.force_after[shown]]),
+        ".-",
+        color=ELASTO_PLASTIC,
+        linewidth=1.2,
+        markersize=4,
+    )
+    axis.set(xlabel=f"time after {start:.6g} s (s)", ylabel="$F/W$")
+    axis.margins(x=0)
+
+
+def _draw_drops(axis: Axes, measurement: StickSlipMeasurement) -> None:
+    events = measurement.events
+    known = np.isfinite(np.asarray(events.stick_duration, float))
+    axis.set(xlabel="stick time (s)", ylabel=r"drop of $F/W$")
+    if not known.any():
+        return
+    axis.errorbar(
+        events.stick_duration[known],
+        events.drop[known],
+        yerr=events.drop_uncertainty[known],
+        fmt="o",
+        color=ELASTO_PLASTIC,
+        markersize=2.5,
+        linewidth=0.7,
+    )
+    axis.axhline(measurement.smallest_drop, color=GREY, linewidth=0.8, linestyle="--")
+    axis.text(
+        0.985, measurement.smallest_drop, "smallest drop that is seen", fontsize=7,
+        va="bottom", ha="right", transform=axis.get_yaxis_transform(),
+    )  # fmt: skip
+    axis.set_xscale("log")
+    axis.set_ylim(bottom=0)

@@ -1,0 +1,267 @@
+"""From a question to its answer: files of data read, a law fitted or several compared."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from asperity import materials
+from asperity.errors import Argument, InputError
+from asperity.inference.comparison.compare import Comparison, compare
+from asperity.inference.fitting.fit import fit
+from asperity.inference.fitting.inputs import priors_of
+from asperity.inference.fitting.result import Fit
+from asperity.inference.fitting.windows import WindowedFit, fit_windows
+from asperity.inference.holds.table import HEALING, HealingTable, read_healing
+from asperity.inference.runs.assembly import RunOptions
+from asperity.inference.runs.run import RecordedRun, recorded_run
+from asperity.inference.runs.unloading import measured_stiffness
+from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
+from asperity.laws import get_law, known_law, registered
+from asperity.outputs.targets import require_rereadable
+from asperity.questions import fit as questions
+from asperity.recording import Trace
+from asperity.recording.readers.from_file import read_source
+
+Progress = Callable[[int, int], None]
+#: Reads the file of a recording.
+Reader = Callable[[questions.Data], Trace]
+
+#: Columns of the recording that a trend of the friction over slip takes.
+_TRENDS = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
+
+
+#: Sets of data of any kind.
+AnyData = LockInTable | HealingTable | RecordedRun
+
+
+def default_law(data: Sequence[AnyData]) -> str:
+    """The law that is fitted where none is named: of recordings, the law of ageing contacts.
+
+    A table of harmonics is compared with the law whose asperities are elastic, which alone has
+    the phases of a modulated load; a recording of velocity steps does not show their elasticity.
+    """
+    tables = any(isinstance(d, LockInTable) for d in data)
+    return "elasto-plastic" if tables else "rice-ruina"
+
+
+def is_table(data: questions.Data) -> bool:
+    """Whether a file holds readings rather than a recording: it has a column of an observable."""
+    path = data.file
+    require_rereadable(path, "data")
+    if path.suffix.lower() == ".json":
+        return True
+    cells = _heading(path)
+    # The reader of tables says what is wrong with a file that cannot be opened.
+    return cells is None or HEALING in cells or any(cell in OBSERVABLES for cell in cells)
+
+
+def _has_holds(data: questions.Data) -> bool:
+    """Whether a table is one of slide-hold-slide tests."""
+    return data.file.suffix.lower() != ".json" and HEALING in (_heading(data.file) or ())
+
+
+def _heading(path: Path) -> list[str] | None:
+    """Words of the first line that is no comment; None where the file cannot be opened."""
+    try:
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            for line in file:
+                if line.strip() and not line.lstrip().startswith("#"):
+                    return re.split(r"[,;\t\s]+", line.strip())
+    except OSError:
+        return None
+    return []
+
+
+def _read_trace(data: questions.Data) -> Trace:
+    return read_source(data.file, data.source)
+
+
+def read_data(
+    question: questions.Fit | questions.Comparison, read: Reader = _read_trace
+) -> list[AnyData]:
+    """Tables and recordings of a question.
+
+    Parameters
+    ----------
+    question : Fit or Comparison
+    read : callable
+        Reads the file of a recording.
+
+    Raises
+    ------
+    InputError
+        If a file cannot be read, or what is said of one recording meets several.
+    """
+    tables = [is_table(data) for data in question.data]
+    recordings = tables.count(False)
+    # Velocities, for one, have no number where there is no recording.
+    for name in ("steps", "velocities"):
+        if any(getattr(d, name) is not None for d in question.data) and recordings != 1:
+            raise InputError(
+                name, "go with one recording", recordings, "cut the recordings beforehand"
+            )
+    at: dict[str, Any] = {
+        n: question.fixed[n] for n in ("V", "epsilon", "frequency") if n in question.fixed
+    }
+    held: dict[str, Any] = {n: question.fixed[n] for n in ("V", "K", "W0") if n in question.fixed}
+    result: list[AnyData] = []
+    for data, table in zip(question.data, tables, strict=True):
+        if table and _has_holds(data):
+            result.append(read_healing(data.file, held))
+        elif table:
+            result.append(read_table(data.file, at, name=data.name))
+        else:
+            result.append(recorded_run(read(data), window=data.window, **_reading(data)))
+    return result
+
+
+def _reading(data: questions.Data) -> dict[str, Any]:
+    """How a trace becomes a run, but for its window."""
+    return {
+        "name": Path(data.name or data.file).stem,
+        "steps": data.steps,
+        "velocities": data.velocities,
+    }
+
+
+def run_options(question: questions.Fit | questions.Comparison) -> RunOptions:
+    """How recordings are compared with the motion."""
+    drift = ("drift",) if question.drift else ()
+    return RunOptions(
+        linear=("offset", *_TRENDS[question.trend], *drift),
+        initial=question.initial,
+        gauge=None if question.gauge is None else (question.gauge_order, question.gauge),
+        fit_rate=question.fit_rate,
+    )
+
+
+def _options(
+    question: questions.Fit | questions.Comparison, read: Reader, progress: Progress | None
+) -> dict[str, Any]:
+    """Keyword arguments that fits and comparisons share."""
+    priors = priors_of(question.prior, question.free)
+    if question.stiffness_from is not None:
+        priors |= {"K": _prior_of_unloading(question, priors, read)}
+    return {
+        "fixed": question.fixed,
+        "start": question.start,
+        "material": None if question.material is None else materials.load(question.material),
+        "prior": priors,
+        "profile": question.profile,
+        "inertia": question.inertia,
+        "radiation_damping": question.radiation_damping,
+        "runs": run_options(question),
+        "starts": question.starts,
+        "seed": question.seed,
+        "progress": progress,
+    }
+
+
+def _prior_of_unloading(
+    question: questions.Fit | questions.Comparison, priors: Mapping[str, Any], read: Reader
+) -> Any:
+    """The prior of K by the slope of a stretch of unloading and reloading."""
+    label = "stiffness_from"
+    other = "fixed" if "K" in question.fixed else "prior" if "K" in priors else None
+    if other is not None:
+        raise InputError(label, "be the only number of K", f"{Argument(other)} K too", "drop one")
+    if len(question.data) != 1 or is_table(question.data[0]):
+        raise InputError(
+            label, "go with one recording", f"{len(question.data)} files", "give one recording"
+        )
+    if any(name.partition("[")[0] == "gain" for name in priors):
+        raise InputError(
+            label,
+            "be without a prior of gain",
+            "both: the slope is measured by the same gauge, and scales with it",
+            "give the prior of K from another source",
+        )
+    assert question.stiffness_from is not None  # by the caller
+    (data,) = question.data
+    low, high = question.stiffness_from
+    windows: Any = getattr(question, "windows", None)
+    spans = [data.window] if windows in (None, "auto") else windows
+    for span in spans:
+        begin, end = span or (-math.inf, math.inf)
+        if low < end and begin < high:
+            where = "the whole recording" if span is None else f"{begin:g} to {end:g} s"
+            raise InputError(
+                label,
+                "lie outside what is fitted",
+                f"{low:g} to {high:g} s in {where}",
+                "give a window without it: its samples would count twice",
+            )
+    return measured_stiffness(read(data), (low, high)).prior
+
+
+def answer_fit(
+    question: questions.Fit, *, read: Reader = _read_trace, progress: Progress | None = None
+) -> Fit | WindowedFit:
+    """The fit that a question asks for.
+
+    Parameters
+    ----------
+    question : Fit
+    read : callable
+        Reads the file of a recording.
+    progress : callable, optional
+        Called with the work done so far and all work.
+
+    Returns
+    -------
+    Fit or WindowedFit
+        The latter where there are several windows.
+
+    Raises
+    ------
+    InputError
+        As of `asperity.inference.fit`, or if a file cannot be read.
+    """
+    options = _options(question, read, progress)
+    law = None if question.law is None else known_law(question.law)
+    windows: Any = question.windows
+    if windows is None:
+        data = read_data(question, read)
+        return fit(data, law or default_law(data), question.free, **options)
+    (recording,) = question.data
+    if is_table(recording):
+        raise InputError("windows", "go with one recording", "a table", "give one recording")
+    return fit_windows(
+        read(recording),
+        law or default_law(()),
+        question.free,
+        None if windows == "auto" else windows,
+        reading={n: v for n, v in _reading(recording).items() if v is not None},
+        **options,
+    )
+
+
+def answer_comparison(
+    question: questions.Comparison, *, read: Reader = _read_trace, progress: Progress | None = None
+) -> Comparison:
+    """The comparison that a question asks for; parameters as of `answer_fit`."""
+    options = _options(question, read, progress)
+    laws = compared_laws(question.laws)
+    return compare(read_data(question, read), laws, question.free, **options)
+
+
+def compared_laws(names: Sequence[str]) -> list[str]:
+    """Names of laws; "all" stands for those that depend on the velocity.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or there is none.
+    """
+    if "all" in names:
+        return [name for name, law in registered().items() if law.rate_dependent]
+    if not names:
+        raise InputError("laws", "name laws", "none", "write 'all' or a,b,c")
+    known = [known_law(name) for name in names]
+    for name in known:
+        get_law(name)
+    return known

@@ -1,0 +1,188 @@
+"""What fits and comparisons say, described once: text, page, notebook and JSON render it."""
+
+from __future__ import annotations
+
+import math
+
+from asperity.inference.comparison.compare import Comparison
+from asperity.inference.comparison.record import laws_table
+from asperity.inference.fitting.result import Estimate, Fit
+from asperity.inference.fitting.windows import WindowedFit
+from asperity.inference.posterior import Posterior
+from asperity.inference.runs.term import RunTerm
+from asperity.outputs.tables import Section, rounded
+
+#: Of a parameter whose numbers say nothing.
+NOT_DETERMINED = "not determined"
+#: Probability of chi-squared below which law or uncertainties are wrong.
+_MISFIT = 0.01
+#: Standard errors from which the sign of A - B is known.
+_KNOWN_SIGN = 2.0
+
+
+def fit_report(fit: Fit) -> list[Section]:
+    """Outcome in words, estimates, correlations, quality, and warnings of a fit."""
+    if not fit.converged:
+        return [Section(f"{fit.law}: {fit.message}")]
+    names = list(fit.parameters)
+    correlations = tuple(
+        (n, *(f"{fit.correlation[i, j]:+.2f}" if j < i else "" for j in range(len(names) - 1)))
+        for i, n in enumerate(names)
+        if i
+    )
+    return [
+        Section(fit.law, fit_in_words(fit)),
+        estimates(fit),
+        *([Section("correlations", (), ("", *names[:-1]), correlations)] if correlations else []),
+        quality(fit),
+        Section("", warnings=tuple(fit.warnings)),
+    ]
+
+
+def fit_in_words(fit: Fit) -> tuple[str, ...]:
+    """What a fit says of the friction, before its numbers."""
+    if not fit.converged:
+        return ()
+    sentences = []
+    difference = rate_dependence(fit)
+    if difference is not None:
+        value, error = difference
+        shown = " ".join(rounded(value, error))
+        kind = "velocity weakening" if value < 0 else "velocity strengthening"
+        known = abs(value) > _KNOWN_SIGN * error
+        sentences.append(f"A - B = {shown}: {kind if known else 'its sign is not determined'}")
+    if fit.undetermined:
+        sentences.append(f"not determined by these data: {', '.join(fit.undetermined)}")
+    return tuple(sentences)
+
+
+def rate_dependence(fit: Fit) -> tuple[float, float] | None:
+    """A - B with its standard error, from the errors of both and their correlation.
+
+    None where the law has no A and B, or one of them is not determined.
+    """
+    if {"A", "B"} - {*fit.parameters, *fit.objective.fixed} or {"A", "B"} & {*fit.undetermined}:
+        return None
+    value, variance = 0.0, 0.0
+    errors = {}
+    for name, sign in (("A", 1.0), ("B", -1.0)):
+        p = fit.parameters.get(name)
+        if p is None:
+            value += sign * float(fit.objective.fixed[name])
+            continue
+        value += sign * p.value
+        errors[name] = p.se
+        variance += p.se**2
+    if len(errors) == 2:
+        i, j = (list(fit.parameters).index(name) for name in errors)
+        variance -= 2 * float(fit.correlation[i, j]) * errors["A"] * errors["B"]
+    if not errors or not math.isfinite(variance):
+        return None
+    return value, math.sqrt(max(variance, 0.0))
+
+
+def estimates(fit: Fit) -> Section:
+    """Estimates with standard errors and intervals; "not determined" stands for those without."""
+    head = ("", "estimate", "std. error", "68 % interval", "95 % interval", "", "")
+    rows = tuple(
+        _estimate_row(name, p, name in fit.undetermined)
+        for name, p in {**fit.parameters, **fit.over_load}.items()
+    )
+    return Section("", (), head, rows)
+
+
+def _estimate_row(name: str, p: Estimate, undetermined: bool) -> tuple[str, ...]:
+    if undetermined:
+        return name, NOT_DETERMINED, "", "", "", p.unit, "by these data"
+    notes = "at its bound" if p.at_bound else ""
+    if p.prior is not None:
+        notes = f"prior {p.prior.mean:.4g} +- {p.prior.sd:.2g} ({p.prior.source})"
+    intervals = (interval(p.interval_68), interval(p.interval_95))
+    return name, f"{p.value:.6g}", f"{p.se:.2g}", *intervals, p.unit, notes
+
+
+def interval(ends: tuple[float, float]) -> str:
+    """An interval in words; one that the data do not bound on either side is none."""
+    low, high = ends
+    if not math.isfinite(high):
+        return f"above {low:.5g}" if math.isfinite(low) and low > 0 else NOT_DETERMINED
+    return f"{low:.5g} to {high:.5g}"
+
+
+def quality(fit: Fit) -> Section:
+    """Whether the law describes the data, and the noise."""
+    sentences = [
+        "the noise is estimated from what the law leaves: chi-squared judges nothing, and AICc "
+        "compares laws"
+    ]
+    rows: tuple[tuple[str, ...], ...] = ()
+    if fit.judged_by_chi2:
+        good = fit.dof <= 0 or fit.p_value >= _MISFIT
+        sentences = [
+            f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom, p = {fit.p_value:.3g}: "
+            f"the law {'describes' if good else 'does not describe'} these data within their "
+            f"uncertainties (it does not below {_MISFIT:g})"
+        ]
+        rows = tuple(
+            (name, f"{chi2:.4g}", f"for {count} data")
+            for name, (chi2, count) in fit.observables.items()
+        )
+    for term in fit.objective.terms_of(RunTerm):
+        noise = term.noise
+        sentences.append(
+            f"{term.name}: noise {noise['model']}, {noise['effective_samples']:.4g} effective of "
+            f"{noise['samples']} samples, whiteness p = {noise['whiteness_p']:.2g}"
+        )
+        sentences += [f"{term.name}: {noise['averaged']}"] if noise["averaged"] else []
+    sentences.append(
+        f"log-likelihood {fit.log_likelihood:.6g}, AICc {fit.aicc:.6g}, BIC {fit.bic:.6g}"
+    )
+    return Section("", tuple(sentences), (), rows)
+
+
+def windows_sections(over: WindowedFit) -> list[Section]:
+    """Estimates over several windows."""
+    spans = ", ".join(f"{a:.6g} to {b:.6g}" for a, b in over.windows)
+    head = ("", "estimate", "std. error", "of noise", "of the window", "95 % interval", "", "")
+    rows = []
+    for name, p in over.parameters.items():
+        if name in over.undetermined:
+            rows.append((name, NOT_DETERMINED, "", "", "", "", p.unit, "by these data"))
+            continue
+        errors = (f"{p.se:.2g}", f"{p.se_noise:.2g}", f"{p.se_window:.2g}")
+        rows.append((name, f"{p.value:.6g}", *errors, interval(p.interval_95), p.unit, ""))
+    first = set(over.fits[0].warnings)
+    new = tuple(w for w in over.warnings if w.partition(" s: ")[2] not in first)
+    title = f"over {len(over.windows)} windows ({spans} s)"
+    return [Section(title, (), head, tuple(rows), new)]
+
+
+def posterior_sections(posterior: Posterior) -> list[Section]:
+    """Means, standard deviations and diagnostics of a posterior."""
+    chains, draws = posterior.log_density.shape
+    head = ("", "mean", "sd", "95 % interval", "", "R-hat", "ESS bulk", "ESS tail")
+    rows = tuple(
+        (
+            name,
+            f"{p.mean:.6g}",
+            f"{p.sd:.2g}",
+            interval(p.interval_95),
+            p.unit,
+            f"{p.r_hat:.4f}",
+            f"{p.ess_bulk:.0f}",
+            f"{p.ess_tail:.0f}",
+        )
+        for name, p in posterior.parameters.items()
+    )
+    diverging = int(posterior.diverging.sum())
+    title = f"posterior, {chains} chains of {draws} draws, {diverging} diverging"
+    return [Section(title, (), head, rows, tuple(posterior.warnings))]
+
+
+def comparison_report(comparison: Comparison, *, reasons: bool = False) -> list[Section]:
+    """The verdict, the laws with what decides, and the warnings of each."""
+    head, rows = laws_table(comparison, reasons=reasons)
+    warned = tuple(
+        f"{name}: {warning}" for name, j in comparison.laws.items() for warning in j.fit.warnings
+    )
+    return [Section("", (comparison.verdict,), head, tuple(rows), warned)]

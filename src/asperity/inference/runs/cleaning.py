@@ -1,0 +1,105 @@
+"""A recorded run without its defects: what is found once, before the fit, and reported by it.
+
+Spikes give way to the line between their neighbours, long recordings are averaged over blocks, and
+the level behind a jump of the gauge is a nuisance of the fit. What the drive does is known here:
+friction itself is quick after a change of the velocity or the load.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.inference.runs.blocks import reduced
+from asperity.inference.runs.run import RecordedRun
+from asperity.recording.defects.jumps import find_jumps
+from asperity.recording.defects.sampling import gap_rows
+from asperity.recording.defects.spikes import away_from_changes, spikes, without
+
+Float = NDArray[np.float64]
+
+#: Changes of the load are few if there are so many samples to each.
+_FEW_CHANGES = 100
+#: Share of samples that may be spikes, besides one: noise with more of them is not normal.
+_MOST_SPIKES = 0.01
+#: Share of the segments beside a change of the drive, and samples about it, in which friction is
+#: too quick for a jump to be told.
+_NEAR_CHANGE, _SAMPLES_NEAR_CHANGE = 0.05, 20
+
+
+def cleaned(run: RecordedRun, rate: Any = None) -> RecordedRun:
+    """The run as it is compared with the motion, with its spikes and jumps.
+
+    Parameters
+    ----------
+    run : RecordedRun
+        As recorded; one that was cleaned stays as it is.
+    rate : float, str or None
+        As in `reduced`.
+    """
+    return with_jumps(reduced(without_spikes(run), rate))
+
+
+def first_after_changes(run: RecordedRun) -> list[int]:
+    """First samples after changes of the velocity, and of the load where they are few."""
+    inner = run.drive.edges[1:-1]
+    few = inner.size * _FEW_CHANGES <= run.time.size
+    edges = inner if few else run.drive.edges[list(run.cuts)]
+    return [int(k) for k in np.searchsorted(run.time, edges)]
+
+
+def without_spikes(run: RecordedRun) -> RecordedRun:
+    """The run with lines between the neighbours in place of spikes.
+
+    Parameters
+    ----------
+    run : RecordedRun
+        With the spikes that its user has named, or none yet.
+    """
+    if run.blocks is not None:
+        return run
+    if run.spikes is None:
+        wrong = away_from_changes(run.friction, spikes(run.friction), first_after_changes(run))
+        if wrong.size > 1 + _MOST_SPIKES * run.time.size:
+            doubt = (
+                f"{wrong.size} samples of friction stand out of their neighbours: the noise is not "
+                "normal, and intervals may not hold"
+            )
+            return replace(run, spikes=(), doubts=(*run.doubts, doubt))
+    else:
+        wrong = np.searchsorted(run.time, run.spikes)
+    if not wrong.size:
+        return replace(run, spikes=()) if run.spikes is None else run
+    return replace(
+        run, friction=without(run.friction, wrong), spikes=tuple(run.time[wrong].tolist())
+    )
+
+
+def with_jumps(run: RecordedRun) -> RecordedRun:
+    """The run with the times at which its level jumps by itself; as it is where they are known.
+
+    None is looked for next to a change of the drive, where friction itself is quick, or to a gap.
+
+    Parameters
+    ----------
+    run : RecordedRun
+    """
+    if run.jumps is not None:
+        return run
+    time, edges = run.time, run.drive.edges
+    level = np.ones(time.size, bool)
+    for before, at, after in zip(edges[:-2], edges[1:-1], edges[2:], strict=True):
+        near = [at - _NEAR_CHANGE * (at - before), at + _NEAR_CHANGE * (after - at)]
+        first, last = np.searchsorted(time, near)
+        level[max(first - _SAMPLES_NEAR_CHANGE, 0) : last + _SAMPLES_NEAR_CHANGE] = False
+    # A stretch ends where the drive changes, samples are missing, or the sampling rate changes.
+    ends = np.flatnonzero(np.diff(level)) + 1
+    bounds = {0, *ends, *gap_rows(time), *(a for a, _ in run.stretches), time.size}
+    cuts = sorted(map(int, bounds))
+    stretches = [(a, b) for a, b in pairwise(cuts) if level[a]]
+    jumps = find_jumps(run.friction, stretches)
+    return replace(run, jumps=tuple(sorted(float(time[jump.sample]) for jump in jumps)))

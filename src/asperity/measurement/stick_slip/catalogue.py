@@ -1,0 +1,245 @@
+"""The catalogue of slip events as CSV, NetCDF or JSON, and a recording as one row or one record."""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import Argument, InputError
+from asperity.measurement.verdicts.verdict import percent
+from asperity.outputs import json, written_file
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+
+Array = NDArray[np.float64]
+
+CONVENTIONS = (
+    "forces are F/W; drop = force_before - force_after; recurrence and stick_duration run from the "
+    "onset and the end of the event before to the onset; creep is what the force at onset lacks to "
+    "the line of the first half of the stick; slip_velocity = V - dF/dt/K; uncertainties are "
+    "standard uncertainties"
+)
+#: Columns of the catalogue: unit and meaning.
+COLUMNS: dict[str, tuple[str, str]] = {
+    "onset": ("s", "time at which the force begins to fall"),
+    "end": ("s", "time at which it ceases to fall"),
+    "timing_uncertainty": ("s", "of either"),
+    "stick_duration": ("s", "from the end of the event before to the onset"),
+    "slip_duration": ("s", "from onset to end"),
+    "recurrence": ("s", "from the onset of the event before to the onset"),
+    "force_before": ("1", "F/W at onset"),
+    "force_after": ("1", "F/W at the end"),
+    "drop": ("1", "fall of F/W"),
+    "drop_uncertainty": ("1", ""),
+    "loading_slope": ("1/s", "of F/W in the first half of the stick"),
+    "slope_uncertainty": ("1/s", ""),
+    "creep": ("1", "what F/W at onset lacks to the line of that slope"),
+    "creep_uncertainty": ("1", ""),
+    "fall_rate": ("1/s", "steepest fall of F/W"),
+    "slip": ("m", "of the slider"),
+    "slip_velocity": ("m/s", "largest"),
+    "energy": ("J", "released by the spring"),
+}
+_OF_MEASUREMENT = ("slip", "slip_velocity", "energy")
+
+
+def column(measurement: StickSlipMeasurement, name: str) -> Array:
+    """Values of a column of `COLUMNS`, one for each event."""
+    source: Any = measurement if name in _OF_MEASUREMENT else measurement.events
+    return np.asarray(getattr(source, name), dtype=float)
+
+
+def regime_of_events(measurement: StickSlipMeasurement) -> list[str]:
+    """Kind of the regime of each event."""
+    kinds = [""] * len(measurement.events)
+    for regime in measurement.regimes:
+        kinds[regime.first : regime.stop] = [regime.kind] * (regime.stop - regime.first)
+    return kinds
+
+
+def catalogue(measurement: StickSlipMeasurement) -> xr.Dataset:
+    """All events as a labelled table.
+
+    Parameters
+    ----------
+    measurement : StickSlipMeasurement
+
+    Returns
+    -------
+    xarray.Dataset
+        A variable over ``event`` for each of `COLUMNS`, with units, and the regime.
+    """
+    import xarray as xr
+
+    variables: dict[str, Any] = {
+        name: ("event", column(measurement, name), {"units": unit, "long_name": meaning})
+        for name, (unit, meaning) in COLUMNS.items()
+    }
+    variables["regime"] = ("event", np.array(regime_of_events(measurement), dtype=object))
+    title = "slip events of a recording, by asperity measure"
+    return xr.Dataset(variables, attrs={"title": title, "conventions": CONVENTIONS})
+
+
+def write_catalogue(measurement: StickSlipMeasurement, path: Path) -> None:
+    """Write the catalogue as its ending says.
+
+    Parameters
+    ----------
+    measurement : StickSlipMeasurement
+    path : Path
+        ``.csv``, ``.nc`` or ``.json``.
+
+    Raises
+    ------
+    InputError
+        If the ending is another, or the file cannot be written.
+    """
+    ending = check_catalogue(path)
+    with written_file(path, "--events") as file:
+        if ending == ".nc":
+            catalogue(measurement).to_netcdf(file, engine="h5netcdf")
+        elif ending == ".json":
+            events = events_record(measurement)
+            units = {name: unit for name, (unit, _) in COLUMNS.items()}
+            record = {"units": units, "conventions": CONVENTIONS, "events": events}
+            file.write_text(json.to_json(record, indent=2) + "\n", encoding="utf-8")
+        else:
+            _write_csv(measurement, file)
+
+
+def check_catalogue(path: Path) -> str:
+    """Ending of the catalogue's file; raises `InputError` for one that is not written."""
+    ending = path.suffix.lower()
+    if ending not in (".csv", ".nc", ".json"):
+        raise InputError(
+            Argument("measure.events"),
+            "be a CSV, NetCDF or JSON file",
+            f"'{path}'",
+            "write it like events.csv",
+        )
+    return ending
+
+
+def _write_csv(measurement: StickSlipMeasurement, file: Path) -> None:
+    columns = [column(measurement, name) for name in COLUMNS]
+    heads = [name if unit == "1" else f"{name} ({unit})" for name, (unit, _) in COLUMNS.items()]
+    with file.open("w", encoding="utf-8", newline="") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow([*heads, "regime"])
+        for *numbers, kind in zip(*columns, regime_of_events(measurement), strict=True):
+            cells = [f"{x:.10g}" if math.isfinite(x) else "" for x in numbers]
+            writer.writerow([*cells, kind])
+
+
+def events_record(measurement: StickSlipMeasurement) -> list[dict[str, Any]]:
+    """Events as dicts of numbers."""
+    columns = {name: column(measurement, name).tolist() for name in COLUMNS}
+    kinds = regime_of_events(measurement)
+    return [
+        {name: values[k] for name, values in columns.items()} | {"regime": kinds[k]}
+        for k in range(len(kinds))
+    ]
+
+
+def means(measurement: StickSlipMeasurement) -> dict[str, float]:
+    """Number, means and spreads (standard deviations) of the events, as a campaign's row has them.
+
+    Uncertainties of means are from the spread: they count events as independent.
+    """
+    events = measurement.events
+    row: dict[str, float] = {"events": len(events)}
+    for name in ("drop", "recurrence", "stick_duration", "slip_duration"):
+        values = column(measurement, name)
+        values = values[np.isfinite(values)]
+        if values.size:
+            spread = float(np.std(values, ddof=1)) if values.size > 1 else math.nan
+            row |= {
+                name: float(np.mean(values)),
+                f"{name}_spread": spread,
+                f"{name}_uncertainty": spread / math.sqrt(values.size),
+            }
+    stiffness, doubt = measurement.stiffness_from_slope
+    machine = measurement.machine
+    row |= {
+        "force_before": float(np.mean(events.force_before)) if len(events) else math.nan,
+        "loading_slope": measurement.loading_slope,
+        "loading_slope_uncertainty": measurement.loading_slope_uncertainty,
+        "stiffness_from_slope": stiffness,
+        "stiffness_from_slope_uncertainty": doubt,
+        "smallest_drop": measurement.smallest_drop,
+    }
+    for name in ("stiffness", "velocity", "mass", "load"):
+        value = getattr(machine, name)
+        row[name] = math.nan if value is None else value
+    return row
+
+
+def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, Any]:
+    """The row of a recording in the table of a campaign."""
+    doubts = "; ".join(f"{c.name}: {c.verdict}" for c in measurement.checks if c.verdict != "ok")
+    return {
+        "file": str(path),
+        "part": 1,
+        "kind": "stick-slip",
+        "start": float(measurement.time[0]),
+        "end": float(measurement.time[-1]),
+        "verdict": measurement.verdict,
+        "reason": "",
+        "regime": measurement.kind,
+        **means(measurement),
+        "checks": doubts,
+    }
+
+
+def stick_slip_record(measurement: StickSlipMeasurement) -> dict[str, Any]:
+    """Everything that a stick-slip recording says, as numbers, texts, lists and dicts in SI."""
+    return {
+        "mode": "stick-slip",
+        "verdict": measurement.verdict,
+        "regime": measurement.kind,
+        "regimes": [asdict(regime) for regime in measurement.regimes],
+        **means(measurement),
+        "noise": measurement.noise,
+        "impulses": int(measurement.impulses.size),
+        "samples": int(measurement.time.size),
+        "catalogue": events_record(measurement),
+        "checks": [asdict(check) for check in measurement.checks],
+        "channels": list(measurement.names),
+        "units": {name: unit for name, (unit, _) in COLUMNS.items()},
+        "conventions": CONVENTIONS,
+    }
+
+
+def summary_rows(measurement: StickSlipMeasurement) -> list[tuple[str, str, str, str]]:
+    """Name, value, spread and meaning of what the events say, as texts."""
+    rows = []
+    for name, meaning in (
+        ("drop", "of F/W"),
+        ("recurrence", "from onset to onset"),
+        ("stick_duration", ""),
+        ("slip_duration", ""),
+        ("creep", "of F/W, before the onset"),
+        ("slip", "of the slider"),
+        ("slip_velocity", "largest in a slip"),
+        ("energy", "released by the spring"),
+    ):
+        values = column(measurement, name)
+        values = values[np.isfinite(values)]
+        if not values.size:
+            continue
+        unit = COLUMNS[name][0]
+        mean = float(np.mean(values))
+        spread = percent(float(np.std(values)) / abs(mean)) if mean else "-"
+        low, high = np.min(values), np.max(values)
+        span = f"spread {spread}, {low:.3g} to {high:.3g}"
+        rows.append((name, f"{mean:.4g}{'' if unit == '1' else ' ' + unit}", span, meaning))
+    return rows

@@ -1,0 +1,354 @@
+"""A stick-slip recording measured: events, regimes, loading, and what is to be thought of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import Argument, InputError
+from asperity.measurement.samples import about_channels
+from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
+from asperity.measurement.stick_slip.detection import Falls, find_falls
+from asperity.measurement.stick_slip.events import SlipEvents, read_events
+from asperity.measurement.stick_slip.noise import estimate, without_impulses
+from asperity.measurement.stick_slip.regimes import Regime, regimes
+from asperity.measurement.verdicts.checks import findings
+from asperity.measurement.verdicts.verdict import Check, Verdict, judged, percent, worst
+from asperity.parameters.parameter import Displayed, SummaryLine
+from asperity.recording.defects.sampling import even_rate
+from asperity.recording.trace import Channel
+
+if TYPE_CHECKING:
+    from asperity.recording.trace import Trace
+
+Array = NDArray[np.float64]
+
+#: Events that tell no regime.
+_FEW = 2
+#: Standard gravity (m/s^2), by which F/(m g) is a friction coefficient.
+GRAVITY = 9.80665
+#: Where suspicious and bad begin.
+LIMITS = {
+    "events": (10.0, 3.0),
+    "sampling": (0.05, 0.5),
+    "threshold": (0.5, np.inf),
+    "drift": (3.0, 30.0),
+    "stiffness": (0.05, 0.3),
+    "impulses": (0.05, 0.3),
+}
+
+
+@dataclass(frozen=True)
+class Machine:
+    """What is known of the machine, in SI; None where it is not.
+
+    Attributes
+    ----------
+    stiffness : float or None
+        K (N/m).
+    velocity : float or None
+        V, of the far end of the spring (m/s).
+    mass : float or None
+        M (kg).
+    load : float or None
+        W0 (N).
+    """
+
+    stiffness: float | None = None
+    velocity: float | None = None
+    mass: float | None = None
+    load: float | None = None
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StickSlipMeasurement(Displayed):
+    """Events of a recording and what they say.
+
+    Attributes
+    ----------
+    time, friction : array, (n,)
+        Seconds and F/W, without impulses.
+    events : SlipEvents
+        Forces over the load.
+    regimes : tuple of Regime
+    machine : Machine
+        As given, completed by the recording.
+    loading_slope, loading_slope_uncertainty : float
+        Median slope of F/W in the sticks (1/s), and its standard uncertainty; NaN with fewer than
+        two events.
+    smallest_drop : float
+        A smaller drop of F/W may not have been seen, in white noise at the usual loading.
+    noise : float
+        Standard deviation of a sample of F/W.
+    impulses : int array
+        Samples that were replaced.
+    slip_share : float
+        Share of the recorded displacement that falls into the slips: near 1 where it is the
+        slider's, small where it is the load point's; NaN where none is recorded.
+    slip, slip_velocity, energy : array, (k,)
+        Of each event: slip (m), largest slip velocity (m/s), energy that the spring releases (J);
+        NaN where stiffness, velocity or load are not known.
+    names : tuple of str
+        Channels that were read.
+    checks : tuple of Check
+    """
+
+    time: Array
+    friction: Array
+    events: SlipEvents
+    regimes: tuple[Regime, ...]
+    machine: Machine
+    loading_slope: float
+    loading_slope_uncertainty: float
+    smallest_drop: float
+    noise: float
+    impulses: NDArray[np.intp]
+    slip_share: float
+    slip: Array
+    slip_velocity: Array
+    energy: Array
+    names: tuple[str, ...]
+    checks: tuple[Check, ...]
+
+    @property
+    def stiffness_from_slope(self) -> tuple[float, float]:
+        """K (N/m) that the loading slope says, with its standard uncertainty; NaN if not known."""
+        load, velocity = self.machine.load, self.machine.velocity
+        if load is None or velocity is None:
+            return np.nan, np.nan
+        return (
+            self.loading_slope * load / velocity,
+            self.loading_slope_uncertainty * load / velocity,
+        )
+
+    @property
+    def verdict(self) -> Verdict:
+        """The gravest of all."""
+        return worst(self.checks)
+
+    @property
+    def clear(self) -> bool:
+        """Whether stick-slip, or an oscillation, takes more of the recording than all else."""
+        moving = sum(r.end - r.start for r in self.regimes if r.stop - r.first > _FEW)
+        return moving > float(self.time[-1] - self.time[0]) / 2
+
+    @property
+    def kind(self) -> str:
+        """Kinds of the regimes, in their order."""
+        return ", then ".join(regime.kind for regime in self.regimes)
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Regimes, number and means of the events."""
+        events = self.events
+        lines = [SummaryLine("regime", self.kind), SummaryLine("events", str(len(events)))]
+        if len(events):
+            lines.append(SummaryLine("drop", f"{np.mean(events.drop):.4g}"))
+        doubts = [SummaryLine(c.name, str(c.verdict), c.sentence) for c in self.checks]
+        return "StickSlipMeasurement", lines + [
+            d for d in doubts if d.value in ("suspicious", "bad")
+        ]
+
+
+def measure_stick_slip(
+    trace: Trace,
+    *,
+    load: str = "W",
+    force: str = "F",
+    window: tuple[float, float] | None = None,
+    machine: Machine | None = None,
+) -> StickSlipMeasurement:
+    """Slip events of a recording, its regimes, and its loading.
+
+    Parameters
+    ----------
+    trace : Trace
+    load, force : str
+        Channels, by name or role; a friction coefficient takes their place.
+    window : (float, float), optional
+        First and last time (s).
+    machine : Machine, optional
+
+    Raises
+    ------
+    InputError
+        If neither force and load nor friction is recorded, or the sampling is uneven.
+    """
+    machine = machine or Machine()
+    if machine.load is not None:
+        trace = _with_load(trace, machine.load)
+    signals = sliding_signals(trace, load, force, window)
+    time = signals.time
+    if even_rate(time) is None:
+        raise InputError(
+            Argument("measure.trace"),
+            "be sampled evenly for slip events",
+            "uneven times or gaps",
+            "give a window without gaps, or resample the recording",
+        )
+    machine = _completed(machine, signals)
+    friction, impulses = without_impulses(signals.friction)
+    falls = find_falls(friction, estimate(friction))
+    events = read_events(time, friction, falls)
+    slope, slope_doubt = _loading(events)
+    smallest = _smallest_drop(falls, slope * float(time[-1] - time[0]) / (time.size - 1))
+    period = None
+    if machine.mass and machine.stiffness:
+        period = 2 * np.pi * np.sqrt(machine.mass / machine.stiffness)
+    share = impulses.size / time.size
+    parts = regimes(time, friction, events, smallest, impulses=share, natural_period=period)
+    slip, speed, energy = _spring(events, machine)
+    result = StickSlipMeasurement(
+        time=time,
+        friction=friction,
+        events=events,
+        regimes=parts,
+        machine=machine,
+        loading_slope=slope,
+        loading_slope_uncertainty=slope_doubt,
+        smallest_drop=smallest,
+        noise=float(falls.scatter[0]),
+        impulses=impulses,
+        slip_share=_slip_share(signals, events),
+        slip=slip,
+        slip_velocity=speed,
+        energy=energy,
+        names=signals.names,
+        checks=(),
+    )
+    about = [f for f in about_channels(trace, signals.names) if f.name != "spike"]
+    about += signals.signs
+    checks = _checks(result) + findings(about, len(trace), float(time[-1] - time[0]))
+    return replace(result, checks=tuple(checks))
+
+
+def _with_load(trace: Trace, load: float) -> Trace:
+    """The recording with a constant load, where none is recorded."""
+    try:
+        trace.channel("W")
+    except InputError:
+        constant = Channel(np.full(len(trace), load), "force", "N", "load", "N")
+        return replace(trace, channels={**trace.channels, "load": constant})
+    return trace
+
+
+def _completed(machine: Machine, signals: SlidingSignals) -> Machine:
+    load, velocity = machine.load, machine.velocity
+    if load is None and signals.load is not None and signals.load_unit == "N":
+        load = float(np.mean(signals.load))
+    if load is None and signals.load is None and machine.mass is not None:
+        load = machine.mass * GRAVITY
+    if velocity is None and signals.displacement is not None:
+        moved = signals.displacement
+        velocity = abs(float(moved[-1] - moved[0])) / float(signals.time[-1] - signals.time[0])
+    return replace(machine, load=load, velocity=velocity or None)
+
+
+def _loading(events: SlipEvents) -> tuple[float, float]:
+    """Median slope of the sticks that show one, and its standard uncertainty."""
+    slope, doubt = events.loading_slope[1:], events.slope_uncertainty[1:]
+    clear = doubt < 0.3 * np.abs(slope)
+    if not clear.any():
+        return np.nan, np.nan
+    slope, doubt = slope[clear], doubt[clear]
+    middle = float(np.median(slope))
+    scatter = 1.4826 * float(np.median(np.abs(slope - middle)))
+    # The median of n normal values scatters by sqrt(pi/2 n).
+    usual = max(scatter, float(np.median(doubt)))
+    return middle, usual * np.sqrt(np.pi / 2 / slope.size)
+
+
+def _smallest_drop(falls: Falls, slope: float) -> float:
+    """Smallest drop that the means of any width show: they lose what is loaded in their length."""
+    width = 2.0 ** np.arange(falls.thresholds.size)
+    rise = slope if np.isfinite(slope) else 0.0
+    return float((falls.thresholds + width * max(rise, 0.0)).min())
+
+
+def _slip_share(signals: SlidingSignals, events: SlipEvents) -> float:
+    if signals.displacement is None or not len(events):
+        return np.nan
+    at = np.interp(np.stack([events.onset, events.end]), signals.time, signals.displacement)
+    while_events = np.interp([events.onset[0], events.end[-1]], signals.time, signals.displacement)
+    moved = abs(float(np.diff(while_events)[0]))
+    return float(np.abs(at[1] - at[0]).sum()) / moved if moved else np.nan
+
+
+def _spring(events: SlipEvents, machine: Machine) -> tuple[Array, Array, Array]:
+    """Slip, largest slip velocity and energy from M = 0, F = K (Vt - x)."""
+    if machine.stiffness is None or machine.load is None:
+        none = np.full(len(events), np.nan)
+        return none, none, none
+    compliance = machine.load / machine.stiffness
+    velocity = np.nan if machine.velocity is None else machine.velocity
+    slip = events.drop * compliance + velocity * events.slip_duration
+    speed = velocity + events.fall_rate * compliance
+    energy = machine.load * compliance * (events.force_before**2 - events.force_after**2) / 2
+    return slip, speed, energy
+
+
+def _checks(result: StickSlipMeasurement) -> list[Check]:
+    events, count = result.events, len(result.events)
+    checks = [
+        judged(
+            "events",
+            float(count),
+            LIMITS["events"],
+            f"{count} complete event{'' if count == 1 else 's'}"
+            + ("" if count >= LIMITS["events"][0] else "; means and spreads of so few say little"),
+        ),
+        judged(
+            "impulses",
+            result.impulses.size / result.time.size,
+            LIMITS["impulses"],
+            f"{result.impulses.size} samples stand out of both sides of themselves and were "
+            "replaced by the median around them",
+        ),
+    ]
+    if not count:
+        return checks
+    drop = float(np.median(events.drop))
+    step = float(result.time[-1] - result.time[0]) / (result.time.size - 1)
+    blind = result.smallest_drop / drop
+    fast = float(np.mean(events.slip_duration < 2 * step))
+    level = (events.force_before + events.force_after) / 2
+    drift = float(np.ptp(level)) / drop
+    checks += [
+        judged(
+            "threshold",
+            blind,
+            LIMITS["threshold"],
+            f"a drop below {result.smallest_drop:.2g}, {percent(blind)} of the median, may not "
+            "have been seen",
+        ),
+        judged(
+            "sampling",
+            fast,
+            LIMITS["sampling"],
+            f"{percent(fast)} of the slips last for less than two samples: their durations and "
+            "velocities are bounds; a higher sampling rate tells more",
+        ),
+        judged(
+            "drift",
+            drift,
+            LIMITS["drift"],
+            f"the middle of the drops varies along the track by {drift:.2g} drops",
+        ),
+    ]
+    stiffness, doubt = result.stiffness_from_slope
+    given = result.machine.stiffness
+    if given is not None and np.isfinite(stiffness):
+        off = stiffness / given - 1
+        checks.append(
+            judged(
+                "stiffness",
+                abs(off),
+                LIMITS["stiffness"],
+                f"loading slope, load and velocity make a stiffness of {stiffness:.4g} +- "
+                f"{doubt:.1g} N/m, {100 * off:+.2g} % off the {given:.4g} N/m that is stated",
+                significant=abs(stiffness - given) > 3 * doubt,
+            )
+        )
+    return checks

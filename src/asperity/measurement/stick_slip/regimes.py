@@ -1,0 +1,262 @@
+"""What a recording of friction is: stick-slip, oscillation about sliding, steady sliding.
+
+Events that follow each other make a train. The spring loads through every stick of a train; where
+the force does not rise between two events as it does in the sticks, the slider slides.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import kendalltau
+
+from asperity.measurement.stick_slip.events import SlipEvents
+
+Array = NDArray[np.float64]
+Kind = Literal[
+    "regular stick-slip",
+    "irregular stick-slip",
+    "growing stick-slip",
+    "dying stick-slip",
+    "oscillation about sliding",
+    "steady sliding",
+    "loading",
+    "cannot tell",
+]
+
+#: Events of a train, and of one whose trend is judged.
+_FEWEST, _FEWEST_OF_TREND = 3, 8
+#: A part without events longer than so many cycles is a regime of its own.
+_LONG = 5.0
+#: Events on each side that say what is usual; a ratio of their loading slopes that is no scatter.
+_NEAR, _OTHER = 5, 1.5
+#: Rise over what loading would be, above which a part without events is a stick.
+_LOADED = 0.5
+#: Relative spread of drops and recurrences of a regular train.
+_REGULAR = 0.15
+#: Ratio of the last drop to the first, by a straight line, of a train that grows.
+_GROWTH, _GROWTH_CHANCE = 1.5, 1e-4
+#: A stick shorter than this many slips is that of an oscillation; from the second on of stick-slip.
+_SYMMETRICAL, _STICKING = 1.5, 2.0
+#: Relative difference of a cycle from 2 pi sqrt(M/K).
+_INERTIAL = 0.25
+#: Share of impulses above which they may be the motion.
+_MANY = 0.05
+#: Smallest drop that could be seen, over the mean friction, above which steady is not known.
+_BLIND = 0.2
+
+
+@dataclass(frozen=True)
+class Regime:
+    """A part of a recording and what it is.
+
+    Attributes
+    ----------
+    kind : str
+        As in `Kind`.
+    start, end : float
+        Seconds.
+    first, stop : int
+        Events of it, as a slice.
+    evidence : str
+        A sentence with the numbers.
+    """
+
+    kind: Kind
+    start: float
+    end: float
+    first: int
+    stop: int
+    evidence: str
+
+    @property
+    def sticks(self) -> bool:
+        """Whether the slider stops between slips."""
+        return self.kind.endswith("stick-slip")
+
+
+def regimes(
+    time: Array,
+    force: Array,
+    events: SlipEvents,
+    smallest_drop: float,
+    *,
+    impulses: float = 0.0,
+    natural_period: float | None = None,
+) -> tuple[Regime, ...]:
+    """Divide a recording into trains of events and what lies between.
+
+    Parameters
+    ----------
+    time, force : array, (n,)
+    events : SlipEvents
+    smallest_drop : float
+        That could have been seen.
+    impulses : float
+        Share of the samples that were taken for impulses.
+    natural_period : float, optional
+        2 pi sqrt(M/K) (s).
+    """
+    if not len(events):
+        return (_without_events(time, force, smallest_drop, impulses),)
+    cycle, slope = _usual(events.recurrence), _usual(events.loading_slope)
+    cycle = np.where(np.isfinite(cycle), cycle, float(time[-1] - time[0]) / 2)
+    quiet = events.onset[1:] - events.end[:-1]
+    rise = events.force_before[1:] - events.force_after[:-1]
+    loads = rise > _LOADED * np.minimum(slope[:-1], slope[1:]) * quiet
+    slides = (quiet > _LONG * np.maximum(cycle[:-1], cycle[1:])) & ~loads
+    lasts = np.flatnonzero(slides | _other_velocity(events.loading_slope))
+    parts: list[Regime] = []
+    edge, first = float(time[0]), 0
+    for stop in [*(lasts + 1), len(events)]:
+        begin, end = float(events.onset[first]), float(events.end[stop - 1])
+        usual = float(cycle[first]), float(slope[first])
+        parts += _between(time, force, (edge, begin), first, *usual)
+        parts.append(_train(events, first, stop, (begin, end), natural_period))
+        edge, first = end, int(stop)
+    usual = float(cycle[-1]), float(slope[-1])
+    return (*parts, *_between(time, force, (edge, float(time[-1])), first, *usual))
+
+
+def _windows(values: Array) -> Array:
+    """Of each value the next `_NEAR`, itself among them; NaN beyond the end."""
+    padded = np.concatenate([values, np.full(_NEAR - 1, np.nan)])
+    return np.lib.stride_tricks.sliding_window_view(padded, _NEAR)
+
+
+def _usual(values: Array) -> Array:
+    """Median over the neighbours on both sides; NaN where none of them is known."""
+    after = _windows(values)
+    before = _windows(values[::-1])[::-1]
+    both = np.column_stack([before, after])
+    known = np.isfinite(both).any(1)
+    usual = np.full(values.size, np.nan)
+    usual[known] = np.nanmedian(both[known], axis=1)
+    return usual
+
+
+def _other_velocity(slope: Array) -> NDArray[np.bool_]:
+    """Whether the loading is another after an event: the velocity or the stiffness has changed.
+
+    An entry for each stick; entry k is true where the events up to k load otherwise than those
+    from k + 1 on.
+    """
+    changed = np.zeros(max(slope.size - 1, 0), bool)
+    # The first event has no stick before it.
+    known = slope[1:]
+    if known.size < 2 * _NEAR + 1:
+        return changed
+    windows = np.lib.stride_tricks.sliding_window_view(known, _NEAR)
+    # The stick in which the loading changes belongs to neither side.
+    before, after = windows[: -_NEAR - 1], windows[_NEAR + 1 :]
+    first, second = np.median(before, 1), np.median(after, 1)
+    jump = np.abs(second - first)
+    scatter = np.ptp(before, 1) + np.ptp(after, 1)
+    loading = np.minimum(first, second) > 0
+    other = jump > (_OTHER - 1) * np.minimum(first, second)
+    clear = np.flatnonzero(loading & other & (jump > 2 * scatter))
+    # Of neighbouring places the one whose windows are the most uniform.
+    for group in np.split(clear, np.flatnonzero(np.diff(clear) > 1) + 1):
+        if group.size:
+            changed[group[np.argmin(scatter[group])] + _NEAR] = True
+    return changed
+
+
+def _without_events(time: Array, force: Array, smallest_drop: float, impulses: float) -> Regime:
+    mean = abs(float(np.mean(force)))
+    share = smallest_drop / mean if mean else np.inf
+    seen = f"no fall of the force is larger than noise makes, {smallest_drop:.2g}"
+    kind: Kind = "steady sliding" if share < _BLIND else "cannot tell"
+    if kind == "cannot tell":
+        seen += f", which is {100 * share:.2g} % of the mean: smaller drops cannot be seen"
+    if impulses > _MANY:
+        kind = "cannot tell"
+        seen = (
+            f"{100 * impulses:.2g} % of the samples stand out of those around them: slips faster "
+            "than the sampling, or impulses; a higher sampling rate tells"
+        )
+    return Regime(kind, float(time[0]), float(time[-1]), 0, 0, seen)
+
+
+def _between(
+    time: Array,
+    force: Array,
+    span: tuple[float, float],
+    event: int,
+    cycle: float,
+    slope: float,
+) -> list[Regime]:
+    """The part before, between or after trains, if it is long."""
+    if not span[1] - span[0] > _LONG * cycle:
+        return []
+    a, b = np.searchsorted(time, span)
+    tenth = max((b - a) // 10, 1)
+    rise = float(np.mean(force[b - tenth : b]) - np.mean(force[a : a + tenth])) / 0.9
+    loads = rise > _LOADED * slope * (span[1] - span[0])
+    kind: Kind = "loading" if loads else "steady sliding"
+    share = rise / (slope * (span[1] - span[0]))
+    text = f"no event in {(span[1] - span[0]) / cycle:.3g} cycles"
+    if np.isfinite(share):
+        text += f", and the force rises by {100 * share:.2g} % of what the sticks load in that time"
+    return [Regime(kind, *span, event, event, text)]
+
+
+def _train(
+    events: SlipEvents,
+    first: int,
+    stop: int,
+    span: tuple[float, float],
+    natural_period: float | None,
+) -> Regime:
+    number = stop - first
+    if number < _FEWEST:
+        text = (
+            f"{number} event{'s' if number > 1 else ''} cannot tell stick-slip from a single slip"
+        )
+        return Regime("cannot tell", *span, first, stop, f"{text}; {_FEWEST} can")
+    cut, inner = slice(first, stop), slice(first + 1, stop)
+    drop, recurrence = events.drop[cut], events.recurrence[inner]
+    spread = _spread(drop, events.drop_uncertainty[cut])
+    uneven = _spread(recurrence, events.timing_uncertainty[inner])
+    ratio = float(np.median(events.stick_duration[inner] / events.slip_duration[inner]))
+    text = (
+        f"{number} events, drop {np.mean(drop):.3g} with a spread of {100 * spread:.2g} %, "
+        f"recurrence {np.mean(recurrence):.3g} s with one of {100 * uneven:.2g} %, sticks "
+        f"{ratio:.2g} times as long as slips"
+    )
+    cycle = float(np.median(recurrence))
+    inertial = natural_period is not None and abs(cycle / natural_period - 1) < _INERTIAL
+    if natural_period is not None:
+        text += f", median cycle {cycle / natural_period:.3g} times 2 pi sqrt(M/K)"
+    if ratio < _SYMMETRICAL or (inertial and ratio < _STICKING):
+        return Regime("oscillation about sliding", *span, first, stop, text + _mains(cycle))
+    if ratio < _STICKING and natural_period is None:
+        text += ": between stick-slip and an oscillation; stiffness and mass tell"
+        return Regime("cannot tell", *span, first, stop, text)
+    kind: Kind = "irregular stick-slip"
+    if number >= _FEWEST_OF_TREND:
+        tau = kendalltau(np.arange(number), drop)
+        line = np.polynomial.polynomial.polyfit(np.linspace(0, 1, number), drop, 1)
+        growth = float((line[0] + line[1]) / line[0]) if line[0] > 0 else np.inf
+        if tau.pvalue < _GROWTH_CHANCE and not 1 / _GROWTH < growth < _GROWTH:
+            kind = "growing stick-slip" if growth > 1 else "dying stick-slip"
+            text += f", drops grow by a factor of {growth:.3g}"
+    if kind == "irregular stick-slip" and max(spread, uneven) < _REGULAR:
+        kind = "regular stick-slip"
+    return Regime(kind, *span, first, stop, text)
+
+
+def _spread(values: Array, doubt: Array) -> float:
+    """Relative standard deviation without what noise adds."""
+    variance = float(np.var(values)) - float(np.mean(doubt**2))
+    return float(np.sqrt(max(variance, 0.0))) / float(np.mean(values))
+
+
+def _mains(cycle: float) -> str:
+    for mains in (50.0, 60.0):
+        if abs(cycle * mains - 1) < 0.01:
+            return f"; {mains:g} Hz is that of the mains"
+    return ""

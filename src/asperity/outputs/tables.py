@@ -1,0 +1,93 @@
+"""Sections of a report, once described: as text for a terminal and as HTML for a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from html import escape
+from typing import Any, NamedTuple
+
+Row = Sequence[str]
+
+
+class Section(NamedTuple):
+    """A part of a report.
+
+    Attributes
+    ----------
+    title : str
+    sentences : tuple of str
+        Before the table.
+    head : tuple of str
+        Of the columns; empty for none.
+    rows : tuple of tuple of str
+    warnings : tuple of str
+    """
+
+    title: str
+    sentences: tuple[str, ...] = ()
+    head: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def record(self) -> dict[str, Any]:
+        """Texts as JSON has them."""
+        return self._asdict()
+
+
+def aligned(rows: Iterable[Row], indent: str = "") -> str:
+    """Rows of text in columns, two blanks apart."""
+    table = [list(row) for row in rows]
+    widths = [max(map(len, column)) for column in zip(*table, strict=True)]
+    return "\n".join(
+        (indent + "  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True))).rstrip()
+        for row in table
+    )
+
+
+def as_text(sections: Iterable[Section]) -> str:
+    """Sections as lines of a terminal."""
+    lines: list[str] = []
+    for section in sections:
+        lines += [section.title] if section.title else []
+        lines += section.sentences
+        if section.rows:
+            lines.append(aligned([*([section.head] if section.head else []), *section.rows], "  "))
+        lines += [f"warning: {warning}" for warning in section.warnings]
+    return "\n".join(lines)
+
+
+def html_table(head: Row, rows: Iterable[Row]) -> str:
+    """A table of plain texts."""
+
+    def cells(row: Row, tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(c)}</{tag}>" for c in row) + "</tr>"
+
+    top = cells(head, "th") if head else ""
+    return f"<table>{top}{''.join(cells(row, 'td') for row in rows)}</table>"
+
+
+def as_html(sections: Iterable[Section], *, level: int = 3) -> str:
+    """Sections as HTML, with headings of a level."""
+    parts = []
+    for section in sections:
+        parts += [f"<h{level}>{escape(section.title)}</h{level}>"] if section.title else []
+        parts += [f"<p>{escape(sentence)}</p>" for sentence in section.sentences]
+        parts += [html_table(section.head, section.rows)] if section.rows else []
+        listed = "".join(f"<li>{escape(warning)}</li>" for warning in section.warnings)
+        parts += [f"<ul>{listed}</ul>"] if listed else []
+    return "\n".join(parts)
+
+
+def rounded(value: float, doubt: float) -> tuple[str, str]:
+    """A number and its uncertainty, with as many digits as two uncertain ones allow.
+
+    The uncertainty is empty where it is unknown or zero.
+    """
+    if not (math.isfinite(doubt) and doubt > 0 and math.isfinite(value)):
+        return f"{value:.9g}", ""
+    last = math.floor(math.log10(doubt)) - 1
+    if value and (abs(value) < 1e-3 or abs(value) >= 1e6):
+        power = math.floor(math.log10(abs(value)))
+        return f"{value:.{max(0, min(15, power - last))}e}", f"+- {doubt:.2g}"
+    return f"{value:.{max(0, min(15, -last))}f}", f"+- {doubt:.2g}"

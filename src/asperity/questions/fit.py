@@ -1,0 +1,234 @@
+"""A fit of a law to data, and a comparison of laws on the same data."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field, WrapValidator, model_validator
+
+from asperity.errors import InputError
+from asperity.questions.record import (
+    Given,
+    Names,
+    Question,
+    Record,
+    Seconds,
+    Span,
+    quantity,
+    shown,
+)
+from asperity.questions.recording import Source
+
+_Velocity = quantity("velocity", "not negative")
+
+
+def _hold(value: Any) -> Any:
+    """A velocity of zero needs no unit: it is that of a hold."""
+    return 0.0 if isinstance(value, str) and value.strip() == "0" else value
+
+
+class Data(Record):
+    """A file of data: a table of lock-in readings, or a recording.
+
+    Attributes
+    ----------
+    file : Path
+    name : str
+        What people call it; the file's name by default.
+    source : Source
+        How a recording is read.
+    window : (float, float), optional
+        First and last time (s) of what is fitted.
+    steps : tuple of float, optional
+        Times (s) at which the velocity of the drive changes.
+    velocities : tuple of float, optional
+        Between the steps (m/s), 0 in a hold.
+    """
+
+    file: Path
+    name: str = ""
+    source: Source = Field(default_factory=Source)
+    window: Span | None = None
+    steps: tuple[Seconds, ...] | None = None
+    velocities: tuple[Annotated[_Velocity, BeforeValidator(_hold)], ...] | None = None  # type: ignore[valid-type]
+
+
+class NormalPrior(Record):
+    """A normal prior, also as a text such as ``"0.2+-0.01 N/um"``.
+
+    Attributes
+    ----------
+    mean, std : float or str
+        In SI, or texts with units.
+    """
+
+    mean: float | str
+    std: float | str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _of_text(cls, value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        match = _PLUS_MINUS.match(value)
+        if match is None:
+            raise InputError(
+                "", "be VALUE+-DEVIATION UNIT", f"'{value}'", "write it like 0.2+-0.01 N/um"
+            )
+        mean, std, unit = match.groups()
+        return {"mean": f"{mean} {unit}".strip(), "std": f"{std} {unit}".strip()}
+
+
+_PLUS_MINUS = re.compile(r"^\s*(.+?)\s*(?:\+-|±|\+/-)\s*([-+.\deE]+)\s*(.*?)\s*$")
+
+
+def _priors(value: Any) -> Any:
+    """Materials stand under their names, with None."""
+    if value is None or isinstance(value, Mapping):
+        return value or {}
+    texts = (value,) if isinstance(value, str) else value
+    if not isinstance(texts, list | tuple) or not all(isinstance(text, str) for text in texts):
+        raise InputError(
+            "",
+            "be materials or priors by name",
+            shown(value),
+            "write it like {K = '0.2+-0.01 N/um'}",
+        )
+    parts = [text.partition("=") for text in texts]
+    return {name.strip(): prior.strip() if equals else None for name, equals, prior in parts}
+
+
+#: Priors by the names of parameters; the name of a material, with None, stands for its published
+#: uncertainties. Also texts: ``("bureau2000", "K=0.2+-0.01 N/um")``.
+Priors = Annotated[dict[str, NormalPrior | None], BeforeValidator(_priors)]
+
+
+class Estimation(Record):
+    """What is estimated, and how.
+
+    Attributes
+    ----------
+    free : tuple of str, optional
+        Free parameters, also as a text with commas; all that the data may show by default.
+    prior : dict of str to NormalPrior
+    profile : bool
+        Whether intervals are by profile likelihood.
+    starts, seed : int
+        Starts that are drawn besides the first one, and their seed.
+    """
+
+    free: Names | None = None
+    prior: Priors = Field(default_factory=dict)
+    profile: bool = False
+    starts: Annotated[int, Field(ge=0, le=10_000)] = 64
+    seed: Annotated[int, Field(ge=0)] = 0
+
+
+class FitOptions(Estimation):
+    """How data are compared with a law.
+
+    Attributes
+    ----------
+    fixed, start : dict of str to float or str
+        Numbers in SI, or texts with units.
+    material : str, optional
+        A material that fixes what is given nowhere else.
+    inertia, radiation_damping : bool
+        Whether the mass M and the damping eta count.
+    trend : {"none", "linear", "quadratic"}
+        Of the friction of a recording over slip.
+    drift : bool
+        Whether its friction may drift over time too.
+    initial : {"steady", "free"}
+        State at the beginning of a recording.
+    gauge : float or str, optional
+        Corner frequency (Hz) of the low-pass of the force gauge, and its order.
+    gauge_order : int
+    fit_rate : float or str, optional
+        Means a second (Hz) that stand for the samples of a recording, or "full".
+    stiffness_from : (float, float), optional
+        Stretch (s) of unloading and reloading of the one recording, whose slope is the prior of K.
+    """
+
+    fixed: dict[str, Given] = Field(default_factory=dict)
+    start: dict[str, Given] = Field(default_factory=dict)
+    material: str | None = None
+    inertia: bool = False
+    radiation_damping: bool = False
+    trend: Literal["none", "linear", "quadratic"] = "linear"
+    drift: bool = False
+    initial: Literal["steady", "free"] = "steady"
+    gauge: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
+    gauge_order: Annotated[int, Field(ge=1, le=8)] = 1
+    fit_rate: float | str | None = None
+    stiffness_from: Span | None = None
+
+
+class _OfData(Question, FitOptions):
+    """What a fit and a comparison have in common.
+
+    Attributes
+    ----------
+    data : tuple of Data
+        All in one likelihood.
+    """
+
+    subject = "fit"
+
+    data: tuple[Data, ...]
+
+    @model_validator(mode="after")
+    def _some_data(self) -> _OfData:
+        if not self.data:
+            raise InputError(
+                "data", "hold readings or a recording", "none", "give a table or a recording"
+            )
+        return self
+
+
+def _auto_or_listed(value: Any, spans: Callable[[Any], Any]) -> Any:
+    if value == "auto":
+        return value
+    return spans(value.split(",") if isinstance(value, str) else value)
+
+
+class Fit(_OfData):
+    """A law fitted to data.
+
+    Attributes
+    ----------
+    law : str, optional
+        Registered, or a place such as ``file.py:Name``; by default that of the kind of data.
+    windows : "auto" or tuple of (float, float), optional
+        Several windows of the one recording; their spread is reported.
+    """
+
+    law: str | None = None
+    windows: Annotated[tuple[Span, ...], WrapValidator(_auto_or_listed)] | None = None
+
+    @model_validator(mode="after")
+    def _one_recording(self) -> Fit:
+        if self.windows is not None and (self.data[0].window is not None or len(self.data) > 1):
+            several = len(self.data) > 1
+            raise InputError(
+                "windows",
+                "go with one recording" if several else "stand alone",
+                f"{len(self.data)} files" if several else "a window too",
+                "give one recording" if several else "leave the window out",
+            )
+        return self
+
+
+class Comparison(_OfData):
+    """Laws fitted to the same data.
+
+    Attributes
+    ----------
+    laws : tuple of str
+        Two or more, also as a text with commas; "all" are all that depend on the velocity.
+    """
+
+    laws: Names

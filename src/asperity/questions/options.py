@@ -1,0 +1,128 @@
+"""Questions as options of the command line: the name of each field, and a question as a command."""
+
+from __future__ import annotations
+
+import math
+import shlex
+from collections.abc import Mapping
+from typing import Any
+
+from asperity.questions.recording import Measurement, Source
+
+#: Options that choose the column of a role; other roles have --column.
+COLUMN_OPTIONS: Mapping[str, str] = {"W": "--load", "F": "--force", "time": "--time"}
+
+SOURCE_OPTIONS: Mapping[str, str] = {
+    "columns": "--column",
+    "units": "--unit",
+    "channels": "--channel",
+    **{n: f"--{n}" for n in ("recipe", "area", "rate", "group", "format", "delimiter", "decimal")},
+}
+
+MEASURE_OPTIONS: Mapping[str, str] = {
+    "modulated": "--no-modulation",
+    "load": "--load",
+    "force": "--force",
+    "frequency": "--frequency",
+    "exact_frequency": "--exact-frequency",
+    "harmonics": "--harmonics",
+    "window": "--window",
+    "whole_periods": "--whole-periods",
+    "detrend": "--detrend",
+    "steps": "--steps",
+    "holds": "--holds",
+    "stick_slip": "--stick-slip",
+    "stiffness": "--set K",
+    "velocity": "--set V",
+    "mass": "--set M",
+    "normal_load": "--set W0",
+}
+
+FIT_OPTIONS: Mapping[str, str] = {
+    **{
+        name: f"--{name.replace('_', '-')}"
+        for name in (
+            *("law", "laws", "free", "start", "prior", "material", "window", "windows", "steps"),
+            *("velocities", "stiffness_from", "trend", "drift", "initial", "gauge"),
+            *("gauge_order", "fit_rate", "profile", "inertia", "radiation_damping"),
+        )
+    },
+    "fixed": "--fix",
+}
+
+#: Units of fields that are numbers in SI.
+_UNITS = {"frequency": "Hz", "gauge": "Hz", "velocities": "m/s", "area": "m^2"}
+
+
+def as_options(fields: Mapping[str, Any], options: Mapping[str, str]) -> list[str]:
+    """Fields of a question as options, each quoted for a shell.
+
+    Parameters
+    ----------
+    fields : mapping
+        Values by field; one that is None or False is left out.
+    options : mapping of str to str
+        Option of each field; fields without one are left out.
+    """
+    parts = []
+    for name, value in fields.items():
+        option = options.get(name)
+        if option is None or value is None or value is False or value == ():
+            continue
+        if value is True:
+            parts.append(option)
+        elif isinstance(value, Mapping):
+            texts = (_pair(key, one) for key, one in value.items())
+            parts += [f"{option} {shlex.quote(text)}" for text in texts]
+        else:
+            parts.append(f"{option} {shlex.quote(_text(value, _UNITS.get(name, '')))}")
+    return parts
+
+
+def _pair(name: str, value: Any) -> str:
+    if value is None:  # the material of a prior
+        return name
+    if isinstance(value, Mapping):
+        mean, _, unit = str(value["mean"]).partition(" ")
+        return f"{name}={mean}+-{str(value['std']).partition(' ')[0]} {unit}".rstrip()
+    return f"{name}={value}"
+
+
+def _text(value: Any, unit: str) -> str:
+    if isinstance(value, float):
+        return f"{value!r} {unit}".rstrip() if unit else f"{value:.15g}"
+    if not isinstance(value, list | tuple):
+        return str(value)
+    numbers = [v for v in value if isinstance(v, float | int)]
+    if len(value) == len(numbers) == 2 and not unit:
+        return ":".join("" if math.isinf(end) else f"{end:.15g}" for end in value)
+    return ",".join(_text(float(v) if v in numbers else v, unit) for v in value)
+
+
+def source_options(source: Source) -> list[str]:
+    """How a file is read, as options."""
+    parts = []
+    for role, column in source.columns.items():
+        own = COLUMN_OPTIONS.get(role)
+        text = str(column) if own else f"{role}={column}"
+        parts.append(f"{own or '--column'} {shlex.quote(text)}")
+    channels = {f"{name} ": f" {expression}" for name, expression in source.channels.items()}
+    fields = source.model_dump(exclude={"columns", "title", "channels"}, exclude_defaults=True)
+    fields = {name: value for name, value in fields.items() if value != ""}
+    return parts + as_options({**fields, "channels": channels}, SOURCE_OPTIONS)
+
+
+def measure_options(question: Measurement, *, modulated: bool) -> list[str]:
+    """What is measured, as options.
+
+    Parameters
+    ----------
+    question : Measurement
+    modulated : bool
+        What the recording was read as: options of the other kind are left out.
+    """
+    other = {"steps", "holds"} if modulated else {"frequency", "exact_frequency", "harmonics"}
+    other |= set() if modulated else {"whole_periods"}
+    fields = question.model_dump(exclude=other | {"modulated"}, exclude_defaults=True)
+    switch = [] if modulated else [MEASURE_OPTIONS["modulated"]]
+    return switch + as_options(fields, MEASURE_OPTIONS)

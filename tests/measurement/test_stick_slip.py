@@ -1,0 +1,201 @@
+"""What a recording of friction is, its catalogue, and what is wrong with it."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import asperity as asp
+from asperity.errors import InputError
+from asperity.measurement.stick_slip.catalogue import COLUMNS, write_catalogue
+from asperity.measurement.stick_slip.measure import (
+    Machine,
+    StickSlipMeasurement,
+    measure_stick_slip,
+)
+from asperity.recording import Channel, Trace
+from asperity.recording.defects.check import check
+from references.populations import population
+from references.stick_slip import saw
+
+
+def recorded(friction, rate=2000.0, name="mu"):
+    channels = {name: Channel(friction, "dimensionless", "", name, "1")}
+    trace = Trace(np.arange(friction.size) / rate, channels)
+    return replace(trace, findings=check(trace))
+
+
+def growing(ratio):
+    """Cycles whose drops grow by `ratio` each."""
+    parts, level = [], 0.3
+    for k in range(40):
+        drop = 0.03 * ratio ** (k - 20)
+        stick = int(drop / 1e-4)
+        parts.append(level + 1e-4 * np.arange(stick))
+        level += 1e-4 * stick
+        parts.append(level - drop * (1 - np.cos(np.pi * np.arange(1, 21) / 20)) / 2)
+        level -= drop
+    friction = np.concatenate(parts)
+    return friction + 5e-4 * np.random.default_rng(0).standard_normal(friction.size)
+
+
+def steady(n=40_000, level=0.3, noise=0.005, seed=1):
+    return level + noise * np.random.default_rng(seed).standard_normal(n)
+
+
+def sine(frequency, n=60_000):
+    time = np.arange(n) / 2000
+    return 0.4 + 0.05 * np.sin(2 * np.pi * frequency * time) + steady(n, 0.0, 0.005)
+
+
+REGIMES = {
+    "regular": (lambda: saw(0).force, "regular stick-slip"),
+    "irregular": (lambda: saw(0, spread=0.3).force, "irregular stick-slip"),
+    "two sizes": (lambda: saw(0, small=0.4, noise=0.02).force, "irregular stick-slip"),
+    "growing": (lambda: growing(1.05), "growing stick-slip"),
+    "dying": (lambda: growing(0.95), "dying stick-slip"),
+    "inertial": (lambda: saw(0, cycle=500, slip=480).force, "oscillation about sliding"),
+    "sine": (lambda: sine(3.0), "oscillation about sliding"),
+    "steady": (steady, "steady sliding"),
+    "noisy": (lambda: steady(noise=0.1), "steady sliding"),
+    "blind": (lambda: steady(noise=0.3, n=2000), "cannot tell"),
+    "slips, then steady": (
+        lambda: np.concatenate([saw(0, events=50).force, steady()]),
+        "regular stick-slip, then steady sliding",
+    ),
+    "slips on both sides": (
+        lambda: np.concatenate([saw(0, events=50).force, steady(), saw(1, events=50).force]),
+        "regular stick-slip, then steady sliding, then regular stick-slip",
+    ),
+    "another velocity": (
+        lambda: np.concatenate(
+            [saw(0, events=40).force, saw(1, events=200, cycle=100, slip=10).force]
+        ),
+        "regular stick-slip, then regular stick-slip",
+    ),
+    "one event": (lambda: saw(0, events=1).force, "cannot tell"),
+    "too fast": (lambda: np.tile(0.3 + 0.1 * np.arange(7) / 7, 300), "cannot tell"),
+}
+
+
+@pytest.mark.parametrize("case", REGIMES)
+def test_a_recording_is_what_it_is(case) -> None:
+    friction, kind = REGIMES[case]
+    assert measure_stick_slip(recorded(friction())).kind == kind
+
+
+@pytest.mark.parametrize("seed", population(10))
+@pytest.mark.parametrize("power", [0.0, 1.0])
+def test_friction_that_varies_along_the_track_is_no_stick_slip(seed, power) -> None:
+    """White and 1/f^2 variations: symmetrical falls and rises at every length."""
+    white = np.random.default_rng(seed).standard_normal(40_000)
+    shape = np.maximum(np.fft.rfftfreq(white.size), 1e-4) ** -power
+    varying = np.fft.irfft(np.fft.rfft(white) * shape)
+    result = measure_stick_slip(recorded(0.4 + 0.03 * varying / varying.std()))
+    assert not any(r.sticks for r in result.regimes)
+
+
+def test_the_program_says_what_it_is_by_itself() -> None:
+    assert isinstance(asp.measure(recorded(saw(0).force)), StickSlipMeasurement)
+    assert not isinstance(asp.measure(recorded(steady())), StickSlipMeasurement)
+    assert isinstance(asp.measure(recorded(steady()), stick_slip=True), StickSlipMeasurement)
+
+
+def test_a_sliders_displacement_does_not_make_holds_of_sticks() -> None:
+    truth = saw(0, events=40, noise=0.02)
+    stick = np.ones(truth.time.size, bool)
+    for onset, end in zip(truth.onset, truth.end, strict=True):
+        stick &= (truth.time < onset) | (truth.time > end)
+    slider = np.cumsum(~stick) * 1e-6
+    trace = recorded(truth.force)
+    with_slip = Trace(
+        trace.time,
+        {**trace.channels, "displacement": Channel(slider, "length", "m", "displacement", "m")},
+    )
+    assert isinstance(asp.measure(with_slip), StickSlipMeasurement)
+
+
+def test_slips_velocities_and_energies_are_those_of_the_spring() -> None:
+    """K, V and W0 of a quasi-static cycle: V = s W0/K with the loading slope s."""
+    truth = saw(0, events=50, noise=0.01)
+    load, stiffness = 5.0, 2e4
+    velocity = truth.loading_slope * load / stiffness
+    trace = recorded(truth.force)
+    machine = Machine(stiffness, velocity, None, load)
+    result = measure_stick_slip(trace, machine=machine)
+    estimate, doubt = result.stiffness_from_slope
+    assert abs(estimate - stiffness) < 4 * doubt
+    # Over a cycle the spring's end and the slider move alike: slip = V recurrence.
+    assert np.mean(result.slip) == pytest.approx(velocity * np.mean(np.diff(truth.onset)), rel=0.01)
+    events = result.events
+    high, low = load * events.force_before, load * events.force_after
+    assert result.energy == pytest.approx((high**2 - low**2) / (2 * stiffness))
+    assert {c.name: c.verdict for c in result.checks}["stiffness"] == "ok"
+    wrong = measure_stick_slip(trace, machine=replace(machine, stiffness=1.5 * stiffness))
+    assert {c.name: c.verdict for c in wrong.checks}["stiffness"] == "bad"
+
+
+DEFECTS = {
+    "few events": (lambda: saw(0, events=2).force, "events"),
+    "unresolved slips": (
+        lambda: np.tile(0.3 + 0.1 * np.arange(20) / 20, 100) + steady(2000, 0.0, 5e-4),
+        "sampling",
+    ),
+    "a drift larger than the drops": (lambda: saw(0, wave=20).force, "drift"),
+    "saturated": (lambda: np.minimum(saw(0, noise=0.02).force, 0.32), "saturation"),
+}
+
+
+@pytest.mark.parametrize("case", DEFECTS)
+def test_what_is_wrong_is_told(case) -> None:
+    friction, name = DEFECTS[case]
+    verdicts = {c.name: c.verdict for c in measure_stick_slip(recorded(friction())).checks}
+    assert verdicts[name] in ("suspicious", "bad")
+
+
+def test_the_same_names_without_these_defects_are_ok() -> None:
+    checks = measure_stick_slip(recorded(saw(0).force)).checks
+    assert {c.verdict for c in checks if c.name != "saturation"} == {"ok"}
+
+
+def test_uneven_sampling_is_one_sentence() -> None:
+    trace = recorded(saw(0, events=10).force)
+    uneven = Trace(trace.time + 2e-4 * np.sin(trace.time * 700) ** 2, trace.channels)
+    with pytest.raises(InputError, match="must be sampled evenly"):
+        measure_stick_slip(uneven)
+
+
+def test_a_force_over_the_weight_goes_by_its_name() -> None:
+    result = asp.measure(recorded(saw(0).force, name="Fnorm"), mass="30.7 g")
+    assert result.machine.load == pytest.approx(0.0307 * 9.80665)
+    with pytest.raises(InputError, match=r"columns=\{'friction': 'signal'\}"):
+        asp.measure(recorded(saw(0).force, name="signal"))
+
+
+@pytest.mark.parametrize("ending", ["csv", "nc", "json"])
+def test_the_catalogue_holds_every_event(ending, tmp_path) -> None:
+    result = measure_stick_slip(recorded(saw(0, events=20).force))
+    path = tmp_path / f"events.{ending}"
+    write_catalogue(result, path)
+    if ending == "csv":
+        lines = path.read_text().splitlines()
+        assert lines[0].startswith("onset (s),end (s)")
+        rows = [line.split(",") for line in lines[1:]]
+        drops = [float(row[list(COLUMNS).index("drop")]) for row in rows]
+    elif ending == "nc":
+        with xr.open_dataset(path, engine="h5netcdf") as table:
+            drops = table["drop"].values.tolist()
+            assert table["onset"].attrs["units"] == "s"
+    else:
+        record = json.loads(path.read_text())
+        drops = [event["drop"] for event in record["events"]]
+        # Without a stiffness there is no slip.
+        assert record["events"][0]["slip"] is None
+    assert drops == pytest.approx(result.events.drop.tolist(), rel=1e-9)
+
+
+def test_another_ending_is_refused(tmp_path) -> None:
+    with pytest.raises(InputError, match="must be a CSV, NetCDF or JSON file"):
+        write_catalogue(measure_stick_slip(recorded(saw(0, events=5).force)), tmp_path / "e.txt")

@@ -1,0 +1,75 @@
+"""Jumps of the level under noise of a known correlation: false alarms by design, and power."""
+
+import numpy as np
+import pytest
+from scipy.linalg import toeplitz
+from scipy.signal import lfilter
+
+from asperity.recording.defects.autoregression import Autoregression
+from asperity.recording.defects.jumps import _impulses, find_jumps
+
+
+def ar1(random, n, correlation, size=4e-4):
+    """AR(1) noise of a standard deviation, correlated over so many samples."""
+    a = np.exp(-1 / correlation)
+    steps = size * np.sqrt(1 - a * a) * random.normal(size=n)
+    return lfilter([1.0], [1.0, -a], steps, zi=[a * size * random.normal()])[0]
+
+
+def test_noise_jumps_no_more_often_than_designed():
+    """Whatever its correlation, white noise and a slow drift among them."""
+    chance, alarms, traces = 0.1, 0, 0
+    for correlation in (0.1, 1, 3, 10, 30, 100, 300, 1000):
+        random = np.random.default_rng([1, int(10 * correlation)])
+        for _ in range(25):
+            noise = ar1(random, 1400, correlation)
+            alarms += bool(find_jumps(noise, [(0, 1400)], chance))
+            traces += 1
+    assert alarms <= traces * chance + 3 * np.sqrt(traces * chance * (1 - chance))
+
+
+@pytest.mark.parametrize("correlation", [1.0, 10.0, 100.0, 1000.0])
+def test_planted_jumps_are_found_where_they_are(correlation):
+    """By the innovations: eight of their deviations are a jump under noise of any correlation."""
+    random = np.random.default_rng(int(correlation))
+    innovation = 4e-4 * np.sqrt(1 - np.exp(-2 / correlation))
+    for _ in range(5):
+        values = ar1(random, 1400, correlation)
+        first, second = 100 + random.integers(0, 500), 800 + random.integers(0, 500)
+        values[first:] += 10 * innovation
+        values[second:] -= 8 * innovation
+        found = sorted(find_jumps(values, [(0, 1400)]))
+        assert [jump.sample for jump in found] == [first, second]
+        # The error of a size is below the innovation: so far as its neighbours tell.
+        sizes = [jump.size / innovation for jump in found]
+        np.testing.assert_allclose(sizes, [10, -8], atol=4)
+
+
+def test_a_size_is_that_of_generalised_least_squares():
+    noise = Autoregression(np.array([-0.4, -0.3, 0.1]), 2.5)
+    steps = np.random.default_rng(4).normal(size=60)
+    covariance = toeplitz(np.fft.ifft(noise.spectrum(np.arange(4096) / 4096)).real[:60])
+    inverse = np.linalg.inv(covariance)
+    size, departure = _impulses(noise, steps)
+    # The first samples are predicted by lower orders, and the last have fewer behind them.
+    for k in (5, 30, 55):
+        assert size[k] == pytest.approx(inverse[k] @ steps / inverse[k, k], rel=1e-9)
+        assert departure[k] == pytest.approx(size[k] * np.sqrt(inverse[k, k]), rel=1e-9)
+
+
+def test_a_motion_that_settles_and_a_drift_are_no_jumps():
+    random = np.random.default_rng(3)
+    time = np.arange(2000) / 10
+    motion = 0.6 + 0.01 * np.exp(-time / 5) + 1e-4 * time
+    assert find_jumps(motion + ar1(random, 2000, 5.0), [(0, 2000)]) == []
+
+
+def test_a_stretch_keeps_to_itself():
+    """Levels of two stretches may differ: what lies between them is not looked at."""
+    values = ar1(np.random.default_rng(5), 1000, 5.0)
+    values[500:] += 1.0
+    assert find_jumps(values, [(0, 500), (500, 1000)]) == []
+    values[700:] += 0.1
+    assert [jump.sample for jump in find_jumps(values, [(0, 500), (500, 1000)])] == [700]
+    # Too short to say anything.
+    assert find_jumps(values, [(680, 720)]) == []
