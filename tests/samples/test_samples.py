@@ -57,6 +57,7 @@ def test_the_stick_slip_sample_loads_as_its_spring_says_and_slips_for_half_a_per
     assert stiffness == pytest.approx(truth["K"] / joint, rel=0.02)
     half = np.pi * np.sqrt(truth["M"] / truth["K"])
     assert np.median(result.events.slip_duration) == pytest.approx(half, rel=0.15)
-    # From one onset to the next the slider moves as far as the spring's end.
-    moved = np.mean(result.slip[1:-1])
-    assert moved == pytest.approx(100e-6 * np.mean(result.events.recurrence[2:]), rel=0.02)
+    # From one onset to the next the slider moves as far as the spring's end: by slips, and by some
+    # percent of creep in the sticks.
+    moved = np.mean(result.slip[1:-1]) / (100e-6 * np.mean(result.events.recurrence[2:]))
+    assert 0.94 < moved < 1.0
