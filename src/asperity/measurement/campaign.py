@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 from asperity.errors import InputError
 from asperity.measurement.record import observable_covariance
-from asperity.outputs import Interrupted, UnfinishedText, output_file, written_file
+from asperity.outputs import UnfinishedText, output_file, written_file
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -126,7 +126,7 @@ def run_campaign(
     unfinished = UnfinishedText(out, {**inputs, "files": {str(f): _stamp(f) for f in files}})
     done = int(unfinished.start(resume).get("files", 0))
     report(done, len(files), "")
-    try:
+    with unfinished.interruptible("files", len(files), counted="files"):
         for path, rows in _measured(files[done:], rows_of, jobs):
             text = "".join(f"{json.dumps(row)}\n" for row in rows)
             failed = sum(bool(row["reason"]) for row in rows)
@@ -137,10 +137,6 @@ def run_campaign(
         with written_file(out, "--out") as file:
             (write_csv if out.suffix.lower() == ".csv" else _write_netcdf)(file, table)
         unfinished.discard()
-    except KeyboardInterrupt:
-        raise Interrupted(f"{done} of {len(files)} files" if done else "") from None
-    finally:
-        unfinished.discard_if_empty()
     failed = sum(bool(row["reason"]) for row in table)
     sliding = {row["file"] for row in table if row["kind"] in _SLIDING_KINDS}
     return CampaignSummary(len(files), len(table), failed, len(sliding), out)

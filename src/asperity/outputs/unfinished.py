@@ -228,15 +228,23 @@ class UnfinishedText(UnfinishedOutput):
         self.append(text.getvalue(), len(rows), **counts)
 
     @contextmanager
-    def interruptible(self, what: str, total: int) -> Iterator[None]:
-        """Turn Ctrl-C into `Interrupted`, with the finished rows of `total`, called `what`.
+    def interruptible(self, what: str, total: int, counted: str = "rows") -> Iterator[None]:
+        """Turn Ctrl-C into `Interrupted`, with how many of `total` are finished, called `what`.
 
         Nothing is left behind where not one block was finished.
+
+        Parameters
+        ----------
+        what : str
+        total : int
+        counted : str
+            The count that says how many are finished, by its name in `append`.
         """
         try:
             yield
         except KeyboardInterrupt:
-            raise Interrupted(f"{self.rows} of {total} {what}" if self.rows else "") from None
+            done = int(self.progress.get(counted, 0))
+            raise Interrupted(f"{done} of {total} {what}" if done else "") from None
         finally:
             self.discard_if_empty()
 
