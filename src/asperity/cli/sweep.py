@@ -178,7 +178,6 @@ def run(
             "--out must be given, got nothing; name the store, like --out results.zarr"
         )
     from asperity.cli.report import to_json
-    from asperity.cli.sweep.command import shown
     from asperity.outputs import size_text
     from asperity.outputs.tables import aligned
     from asperity.study import run_sweep
@@ -215,7 +214,6 @@ def run(
 
 def _estimate(plan: Path, as_json: bool) -> int:
     from asperity.cli.report import to_json
-    from asperity.cli.sweep.command import time_text
     from asperity.orbit.search import available_cores
     from asperity.outputs import size_text
     from asperity.outputs.tables import aligned
