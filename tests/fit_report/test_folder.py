@@ -112,7 +112,7 @@ def test_a_comparison_has_a_page_of_all_laws(found, tmp_path):
     assert record["laws"]["another law"]["excluded"]
     page = (tmp_path / "report" / "report.html").read_text(encoding="utf-8")
     assert compared.verdict[:40] in page
-    assert "excluded: its AICc is 50" in page
+    assert "its AICc is 50" in page
     assert "-12.50<" in page
     # The title of the panels.
     assert "1 µm/s" in page

@@ -44,7 +44,7 @@ Examples:
         "run": "asperity.cli.run",
         "samples": "asperity.cli.samples",
         "serve": "asperity.cli.serve",
-        "sweep": "asperity.cli.sweep.command",
+        "sweep": "asperity.cli.sweep",
     },
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},

@@ -108,7 +108,7 @@ Examples:
   asperity sweep plan.toml --dry-run
   asperity sweep plan.toml --out results.zarr
   asperity sweep plan.toml --out results.zarr --cluster 4
-  asperity.study.results results.zarr
+  asperity sweep status results.zarr
   asperity sweep summary results.zarr
   asperity sweep export results.zarr results.nc
   asperity sweep plot results.zarr --show delta_mu --x epsilon --y stiffness_ratio --out drop.png
@@ -178,7 +178,6 @@ def run(
             "--out must be given, got nothing; name the store, like --out results.zarr"
         )
     from asperity.cli.report import to_json
-    from asperity.cli.sweep.command import shown
     from asperity.outputs import size_text
     from asperity.outputs.tables import aligned
     from asperity.study import run_sweep
@@ -207,7 +206,7 @@ def run(
     if result.failed:
         click.echo(
             f"asperity: {result.failed:,} of {result.points:,} points have no answer; the variable "
-            "'outcome' says why, and asperity.study.results counts the reasons",
+            "'outcome' says why, and asperity sweep status counts the reasons",
             err=True,
         )
     return 1 if result.failed else 0
@@ -215,7 +214,6 @@ def run(
 
 def _estimate(plan: Path, as_json: bool) -> int:
     from asperity.cli.report import to_json
-    from asperity.cli.sweep.command import time_text
     from asperity.orbit.search import available_cores
     from asperity.outputs import size_text
     from asperity.outputs.tables import aligned

@@ -1,1 +1,0 @@
-"""``asperity sweep``: any number of points from a plan into a Zarr store."""
