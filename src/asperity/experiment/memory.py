@@ -51,6 +51,7 @@ _SENTENCES = {
     End.TOO_MANY_STEPS: "was not solved: no step was accurate, or more steps than allowed",
     End.CROSSING: "was followed to the extremum only",
 }
+_RINGING = "did not settle within the steps that are allowed; the extremum is as it should be"
 _UNSTABLE = (
     "runs away after the extremum: the spring is softer than the critical stiffness; take a "
     "stiffer spring, or inertia in asperity.transient"
@@ -423,6 +424,7 @@ def _settling(
     ends = end if after is None else after.end
     texts = np.array([_SENTENCES[End(int(e))] for e in ends], dtype=object)
     texts[(ends == End.RUNAWAY) & ~stable] = _UNSTABLE
+    texts[(ends == End.TOO_MANY_STEPS) & (end == End.CROSSING)] = _RINGING
     return {
         "settling_distance": shaped(none if after is None else after.distance),
         "settling_slip": shaped(none if after is None else after.slip),

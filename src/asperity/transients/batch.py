@@ -27,6 +27,9 @@ from asperity.transients.explicit import attempt_step
 _RTOL, _ATOL = 1e-11, 1e-13
 _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 
+#: ln(v_pl / V) of a slider that slips: 30 times as fast as its drive.
+_SLIPPING = 3.4
+
 #: Steps that a motion may take, rejected ones among them.
 MOST_STEPS = 60_000
 _ROOT_STEPS = 60
@@ -181,10 +184,12 @@ def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
         log_slip = stop_gradient(system.log_slip(trial.end))
         off = jnp.abs(log_slip) + jnp.abs(trial.end[:-1] - target)[1:].sum()
         lost = ~good & ~(t + h_next > t)
+        # A fast slider for which no step is short enough comes to infinity there.
+        away = lost & (stop_gradient(system.log_slip(Y)) > _SLIPPING)
         end = jnp.select(
             [
                 rising[0],
-                good & (log_slip > drive.runaway),
+                away | (good & (log_slip > drive.runaway)),
                 good & cut,
                 good & (off < drive.steady),
                 lost | (run.steps >= MOST_STEPS),

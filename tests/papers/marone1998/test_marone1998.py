@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import asperity_papers.marone1998 as package
 from asperity import materials
-from asperity.ledger import Paper
+from asperity.ledger import Paper, altered
 from references.memory_tests import Interface
 
 PAPER = Paper("marone1998", "asperity_papers.marone1998")
@@ -172,10 +172,22 @@ def test_figures_are_computed_with_their_points():
 
 
 def test_no_text_of_the_paper_is_in_its_folder():
-    """Facts and numbers; the library knows nothing of it."""
-    for file in FOLDER.rglob("*.toml"):
+    """Facts and numbers: nothing longer than a few words is quoted."""
+    files = [*FOLDER.rglob("*.toml"), *FOLDER.rglob("*.py")]
+    assert len(files) > 8
+    for file in files:
         quoted = re.findall(r"“([^”]+)”", file.read_text(encoding="utf-8"))
         assert all(len(text.split()) <= 6 for text in quoted), file.name
-    library = FOLDER.parent.parent / "asperity"
-    named = [f.name for f in library.rglob("*.py") if "marone" in f.read_text("utf-8").lower()]
-    assert set(named) <= {"memory.py"}
+
+
+def test_a_figure_moves_with_its_numbers(capsys):
+    """The Paper tab: lines for other numbers, and code that prints the same."""
+    figure = PAPER.tab["figure-05"]
+    assert set(PAPER.tab) < set(PAPER.words.figures)
+    moved = {"B_5": 0.006}
+    lines = figure.lines(altered(PAPER.numbers, moved))
+    static = next(line for line in lines if line["name"] == "static")["values"]
+    slope = np.diff(static["friction"]) / np.diff(np.log(static["over"]))
+    np.testing.assert_allclose(slope, -0.006, rtol=1e-9)
+    exec(compile(figure.python(moved), "figure-05", "exec"), {})
+    assert "static" in capsys.readouterr().out
