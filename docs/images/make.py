@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import asperity as asp
+from asperity.figures.stick_slip import draw_stick_slip
 from asperity.figures.style import style
 from asperity_papers.bureau2000.figures import draw
 from asperity_papers.bureau2000.harmonics import figure_11
@@ -45,6 +46,12 @@ def velocity_step() -> Figure:
     return asp.inference.fit(run, "rice-ruina", ["A", "B", "D0"]).plot()
 
 
+def stick_slip() -> Figure:
+    """Slip events of the sample recording (docs/stick_slip.md)."""
+    result = asp.measure(asp.samples.stick_slip(), stiffness="0.05 N/um", velocity="100 um/s")
+    return draw_stick_slip(result)
+
+
 def save(figure: Figure, name: str) -> None:
     """Write a PNG with a palette of 64 colours: a third of the size, and no visible loss."""
     target = FOLDER / name
@@ -59,6 +66,7 @@ def main() -> None:
     with style():
         save(draw(figure_11(Machine())), "figure-11.png")
         save(vibration(), "vibration.png")
+        save(stick_slip(), "stick-slip.png")
         save(velocity_step(), "velocity-step.png")
 
 

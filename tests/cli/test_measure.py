@@ -332,7 +332,6 @@ def test_amplitudes_and_a_table(asperity, recording, tmp_path) -> None:
         (["--force", "nothing"], "--force must be a column"),
         (["--detrend", "cubic"], "--detrend must be none, linear or quadratic"),
         (["--harmonics", "64"], "--harmonics must lie below half the sampling rate"),
-        (["--steps", "3"], "--steps and --holds must go with --no-modulation"),
         (["--no-modulation", "--steps", "900"], "--steps must lie inside the recording"),
         (["--no-modulation", "--steps", "no/such/file"], "--steps must be times or a file"),
         (["--no-modulation", "--holds", "5"], "--holds must be START:END"),

@@ -22,7 +22,10 @@ _spec.loader.exec_module(pages)
 
 ROOT = pages.ROOT
 #: Pages whose code takes more than about ten seconds.
-SLOW = {"docs/theory/numerical_method.md", "docs/findings.md", "docs/theory/stabilisation.md"}
+SLOW = {
+    *("docs/theory/numerical_method.md", "docs/findings.md", "docs/theory/stabilisation.md"),
+    "docs/healing.md",
+}
 #: Pages that `tests/papers/test_claims.py` runs, with the ledger that it has computed.
 ELSEWHERE = {"docs/claims.md"}
 

@@ -148,9 +148,7 @@ def test_a_material_is_frozen_and_travels(pmma: Material) -> None:
     assert Material.model_validate_json(pmma.model_dump_json()) == pmma
 
 
-@pytest.mark.parametrize(
-    "name", [name for name, law in registered().items() if law.source.startswith("bureau2000")]
-)
+@pytest.mark.parametrize("name", ["amontons", "rice-ruina", "linker-dieterich", "elasto-plastic"])
 def test_every_law_of_the_paper_is_built_from_it(pmma: Material, name: str) -> None:
     law = pmma.law(name)
     assert type(law) is registered()[name]
@@ -231,7 +229,7 @@ def test_own_file(tmp_path: Path) -> None:
     [
         ('title = "A test"', "", "title must be given, got nothing"),
         ('"A test"', '"A test', "material.file must be valid TOML"),
-        ("value = 3", 'value = "3"', "numbers.K.value must be a valid number, got '3'"),
+        ("value = 3", 'value = "3"', "numbers.K.value must be a number, got '3'"),
         ("value = 3", "value = nan", "numbers.K.value must be a finite number, got nan"),
         ("value = 3", "value = -3", "numbers.K must be positive, got -3000 N/m"),
         ("value = 3", "valu = 3", "did you mean 'value'?"),
@@ -242,10 +240,10 @@ def test_own_file(tmp_path: Path) -> None:
             "numbers.K must have a value, got only its uncertainty 0.5",
         ),
         ("value = 3", "value = 3\nrange = [2, 1]", "range from low to high, got [2.0, 1.0]"),
-        ("uncertainty = 0.5", "uncertainty = -1", "numbers.K.uncertainty must be greater than"),
+        ("uncertainty = 0.5", "uncertainty = -1", "numbers.K.uncertainty must be at least 0"),
         ('"kN/m"', '"kN"', "numbers.K must have a unit of the dimension stiffness, got 'kN'"),
         ('"stiffness"', '"stifness"', "got 'stifness'; did you mean 'stiffness'?"),
-        ('"assumed"', '"guessed"', "numbers.K.kind must be 'published', 'fitted' or 'assumed'"),
+        ('"assumed"', '"guessed"', "numbers.K.kind must be published, fitted or assumed"),
         ("numbers.K", "numbers.'K c'", "names that can follow a dot and are not taken, got 'K c'"),
         ("numbers.K", "numbers.law", "names that can follow a dot and are not taken, got 'law'"),
         ("numbers.K", "number.K", "mistakes"),

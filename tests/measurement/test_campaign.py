@@ -7,13 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from asperity.cli.measure.reading import FileRows, ReadingOptions
-from asperity.cli.measure.source import RecordingSource
 
+from asperity.cli.measure import FileRows
 from asperity.errors import InputError
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure_amplitudes
 from asperity.outputs import Interrupted
+from asperity.questions.recording import Measurement as Question
+from asperity.questions.recording import Source
+from asperity.recording.readers.from_file import read
 
 AMPLITUDES, STARTS = (0.05, 0.1, 0.2), (5.0, 17.0, 29.0)
 
@@ -40,7 +42,7 @@ def amplitudes(tmp_path_factory) -> Path:
     return path
 
 
-def options(**changes) -> ReadingOptions:
+def options(**changes) -> Question:
     chosen = {
         "modulated": True,
         "frequency": None,
@@ -50,10 +52,10 @@ def options(**changes) -> ReadingOptions:
         "whole_periods": False,
         "detrend": "linear",
     }
-    return ReadingOptions(**(chosen | changes))
+    return Question(**(chosen | changes))
 
 
-ROWS = FileRows(RecordingSource({}, {}), options())
+ROWS = FileRows(Source(), options())
 
 
 def table_of(path: Path) -> list[dict[str, str]]:
@@ -62,7 +64,7 @@ def table_of(path: Path) -> list[dict[str, str]]:
 
 
 def test_every_amplitude_of_a_recording_has_its_delta_mu(amplitudes) -> None:
-    found = measure_amplitudes(RecordingSource({}, {}).read(amplitudes), harmonics=2)
+    found = measure_amplitudes(read(amplitudes), harmonics=2)
     assert len(found) == 3
     for measurement, epsilon, start in zip(found, AMPLITUDES, STARTS, strict=True):
         reading = measurement.reading
@@ -119,7 +121,7 @@ def test_an_interrupted_campaign_goes_on(amplitudes, tmp_path) -> None:
     assert not out.exists()
     with pytest.raises(InputError, match="go on with --resume"):
         run_campaign(files, ROWS, out, inputs=ROWS.inputs())
-    other = FileRows(RecordingSource({}, {}), options(harmonics=3))
+    other = FileRows(Source(), options(harmonics=3))
     with pytest.raises(InputError, match=r"options\.harmonics"):
         run_campaign(files, other, out, inputs=other.inputs(), resume=True)
 
@@ -141,7 +143,7 @@ def test_a_changed_reduction_file_is_noticed(amplitudes, tmp_path) -> None:
     files = [tmp_path / f"{name}.csv" for name in "ab"]
     for file in files:
         file.write_bytes(amplitudes.read_bytes())
-    rows_of = FileRows(RecordingSource({}, {}, recipe=recipe), options())
+    rows_of = FileRows(Source(recipe=recipe), options())
     out = tmp_path / "campaign.csv"
 
     def stop(done: int, total: int, label: str) -> None:
@@ -162,7 +164,7 @@ def test_steps_and_holds_are_rows(pulled, tmp_path) -> None:
     header = "Time(s)\tDispl(microns)\tFriction"
     values = np.stack([time, 1e6 * slip, friction], axis=1)
     np.savetxt(file, values, "%.6f", "\t", header=header, comments="")
-    rows_of = FileRows(RecordingSource({}, {}), options(modulated=False))
+    rows_of = FileRows(Source(), options(modulated=False))
     out = tmp_path / "campaign.csv"
     run_campaign([file], rows_of, out, inputs=rows_of.inputs())
     step, hold = table_of(out)

@@ -45,7 +45,9 @@ def test_every_event_is_read_and_no_other(case, seed) -> None:
     true, found = matched(truth, events, tolerance)
     # Where the spread makes some smaller than noise shows, few are missed.
     assert true.size >= 0.97 * truth.drop.size
-    assert len(events) - np.unique(found).size <= 0.002 * truth.drop.size
+    # Where the gauge rings by 30 % of the drop one in a hundred may be a bump of the ringing.
+    false = 0.01 if case == "ringing" else 0.0
+    assert len(events) - np.unique(found).size <= false * truth.drop.size
     assert np.median(events.drop[found] - truth.drop[true]) == pytest.approx(
         0, abs=0.02 * truth.drop.max()
     )

@@ -44,3 +44,19 @@ def test_a_name_or_seed_that_is_none_is_named() -> None:
         asp.samples.record("velocity_step")
     with pytest.raises(InputError, match=r"samples\.seed must be a whole number of at least 0"):
         asp.samples.record("modulated", -1)
+
+
+def test_the_stick_slip_sample_loads_as_its_spring_says_and_slips_for_half_a_period() -> None:
+    truth = {name: number.value for name, number in asp.samples.truth("stick_slip").items()}
+    trace = asp.samples.stick_slip(seed=1)
+    result = asp.measure(trace, stiffness=truth["K"], velocity="100 um/s", mass=truth["M"])
+    assert result.kind in ("regular stick-slip", "irregular stick-slip")
+    # The joint is a second spring in series with the first: K/(1 + lambda K/W0).
+    joint = 1 + truth["lambda"] * truth["K"] / truth["W0"]
+    stiffness, _ = result.stiffness_from_slope
+    assert stiffness == pytest.approx(truth["K"] / joint, rel=0.02)
+    half = np.pi * np.sqrt(truth["M"] / truth["K"])
+    assert np.median(result.events.slip_duration) == pytest.approx(half, rel=0.15)
+    # From one onset to the next the slider moves as far as the spring's end.
+    moved = np.mean(result.slip[1:-1])
+    assert moved == pytest.approx(100e-6 * np.mean(result.events.recurrence[2:]), rel=0.02)

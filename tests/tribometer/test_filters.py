@@ -61,3 +61,14 @@ def test_values_between_samples_are_those_of_a_cubic() -> None:
     np.testing.assert_allclose(between(cubic(grid), 10.0, grid), cubic(grid), rtol=1e-14)
     outside = between(cubic(grid), 10.0, np.array([-1.0, 99.0]))
     np.testing.assert_allclose(outside, cubic(grid[[0, -1]]))
+
+
+@pytest.mark.parametrize("frequency", [200.0, 900.0])
+def test_a_gauge_that_rings_is_a_damped_oscillator(frequency) -> None:
+    from asperity.tribometer.sensors import resonant
+
+    out = filtered(np.cos(2 * np.pi * F * TIME), RATE, *resonant(frequency, 0.1))
+    ratio = F / frequency
+    expected = 1 / (1 - ratio**2 + 2j * 0.1 * ratio)
+    # The cubic between samples, as above, and the ringing of the start, which has died out.
+    assert abs(phasor(out, TIME, F) - expected) < 1e-6

@@ -179,9 +179,25 @@ def stick_slip_text(measurement: StickSlipMeasurement, name: str) -> str:
             aligned([("from (s)", "to (s)", "regime", "evidence"), *parts], "  "),
             "slip events",
             aligned(rows, "  "),
+            *_stick_slip_healing(measurement),
             *_quality(measurement.checks),
         ]
     )
+
+
+def _stick_slip_healing(measurement: StickSlipMeasurement) -> list[str]:
+    from asperity.measurement.stick_slip.healing import ASSUMPTION
+
+    healed = measurement.healing
+    if healed is None:
+        return []
+    if healed.reason:
+        return [f"healing: cannot tell: {healed.reason}"]
+    low, high = healed.interval_95
+    return [
+        f"healing: friction at onset grows by {healed.per_efold:.3g} +- {healed.uncertainty:.1g} "
+        f"for each e-fold of stick time (95 %: {low:.2g} to {high:.2g}), {ASSUMPTION}"
+    ]
 
 
 def _segments(measurement: SlidingMeasurement) -> list[str]:

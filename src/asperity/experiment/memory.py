@@ -465,7 +465,8 @@ def _dataset(
 
     shape = record.result.shape
     values = {name: (np.asarray(v), {"units": unit}) for name, (unit, v) in drive.items()}
-    known = {**law_parameters(type(record.slider.law)), **MACHINE}
+    law: type[Law] = type(record.slider.law)
+    known = {**law_parameters(law), **MACHINE}
     for name, value in slider_values(record.slider).items():
         array = np.asarray(value, float)
         padded = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
@@ -486,7 +487,7 @@ def _dataset(
         )
         for name, (value, attributes) in values.items()
     }
-    attrs = {"asperity_version": __version__, "law": record.slider.law.name}
+    attrs = {"asperity_version": __version__, "law": law.name}
     return xarray.Dataset(data, coords=coords, attrs=attrs)
 
 

@@ -109,4 +109,5 @@ def _draw_drops(axis: Axes, measurement: StickSlipMeasurement) -> None:
         va="bottom", ha="right", transform=axis.get_yaxis_transform(),
     )  # fmt: skip
     axis.set_xscale("log")
+    axis.margins(x=0.04)
     axis.set_ylim(bottom=0)

@@ -11,20 +11,20 @@ from asperity.errors import InputError
 from asperity.fit_report.bands import bands_of
 from asperity.fit_report.folder import (
     RUN_CAPTION,
-    UNDETERMINED,
     data_tables,
     document,
     figure,
     material_text,
     provenance,
-    table,
 )
 from asperity.fit_report.pictures import laws_figure, run_figure, svg
 from asperity.inference import Fit
 from asperity.inference.comparison.compare import Comparison
-from asperity.inference.comparison.record import comparison_record, laws_table
+from asperity.inference.comparison.record import comparison_record
+from asperity.inference.report import comparison_report, estimates
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
+from asperity.outputs.tables import as_html
 from asperity.outputs.written import written_folder
 
 #: Columns of panels that are legible in half the width of the page.
@@ -70,10 +70,11 @@ def page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
     first = next(iter(fits.values()))
     names = " and ".join(term.name for term in first.objective.terms)
     sections = {
-        "Verdict": f"<p>{escape(comparison.verdict)}</p>"
-        + table(*laws_table(comparison, reasons=True)),
+        "Verdict": as_html(comparison_report(comparison, reasons=True)),
         "Data and laws": _figures(fits),
-        "Estimates": _estimates(fits),
+        "Estimates": "".join(
+            f"<h3>{escape(name)}</h3>{as_html([estimates(own)])}" for name, own in fits.items()
+        ),
         "Data": data_tables(first),
         "Provenance": "".join(
             f"<h3>{escape(name)}</h3>{provenance(own)}" for name, own in fits.items()
@@ -104,26 +105,3 @@ def _figures(fits: Mapping[str, Fit]) -> str:
         }
         parts.append(figure(svg(run_figure(run.run, curves)), RUN_CAPTION))
     return "\n".join(parts)
-
-
-def _estimates(fits: Mapping[str, Fit]) -> str:
-    rows = [
-        (
-            law,
-            name,
-            f"{p.value:.6g}",
-            f"{p.se:.2g}",
-            f"{p.interval_95[0]:.5g} to {p.interval_95[1]:.5g}",
-            p.unit,
-            UNDETERMINED if name in own.undetermined else "",
-        )
-        for law, own in fits.items()
-        for name, p in {**own.parameters, **own.over_load}.items()
-    ]
-    warned = "".join(
-        f"<li>{escape(law)}: {escape(said)}</li>"
-        for law, own in fits.items()
-        for said in own.warnings
-    )
-    result = table(("law", "", "estimate", "standard error", "95 %", "unit", ""), rows)
-    return result + (f"<ul>{warned}</ul>" if warned else "")

@@ -6,7 +6,7 @@ A page is one file, with nothing to fetch.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from datetime import UTC, datetime
 from html import escape
 from importlib.resources import files
@@ -21,9 +21,11 @@ from asperity.fit_report.bands import bands_of
 from asperity.fit_report.pictures import data_figure, residual_figure, run_figure, svg
 from asperity.inference import Fit, Posterior
 from asperity.inference.fitting.result import fit_record
+from asperity.inference.report import fit_report, posterior_sections
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.materials import cited_works
+from asperity.outputs.tables import as_html, html_table
 from asperity.outputs.written import written_folder
 from asperity.parameters import law_parameters, point_parameters
 
@@ -58,15 +60,6 @@ def document(title: str, kicker: str, heading: str, sections: Mapping[str, str])
     )
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """A table of plain texts."""
-
-    def cells(row: Sequence[str], tag: str) -> str:
-        return "<tr>" + "".join(f"<{tag}>{escape(c)}</{tag}>" for c in row) + "</tr>"
-
-    return f"<table>{cells(head, 'th')}{''.join(cells(row, 'td') for row in rows)}</table>"
-
-
 def figure(svg: str, caption: str, *, wide: bool = False) -> str:
     """A figure with its caption, a plain text, beside it or, of a wide one, below."""
     shape = ' class="wide"' if wide else ""
@@ -77,8 +70,6 @@ RUN_CAPTION = (
     "Friction of the recording, thinned where it has many samples, and the motion of the law with "
     "offset and trend of the gauge; below, what is left."
 )
-#: Of a parameter whose numbers say nothing.
-UNDETERMINED = "not determined by these data"
 
 
 def write_report(folder: Path, fit: Fit, posterior: Posterior | None = None) -> None:
@@ -143,76 +134,15 @@ def material_text(fit: Fit) -> str:
 def page(fit: Fit, posterior: Posterior | None) -> str:
     """The page as text, with its figures in it and nothing to fetch."""
     name = fit.objective.terms[0].name
+    sampled = as_html(posterior_sections(posterior)) if posterior else ""
     sections = {
-        "Verdict": _verdict(fit, posterior),
-        "Estimates": _estimates(fit),
-        **({"Posterior": _posterior(posterior)} if posterior else {}),
-        "Correlations": _correlations(fit),
+        "Fit": as_html(fit_report(fit)),
+        **({"Posterior": sampled} if sampled else {}),
         "Data and fit": _figures(fit, posterior),
         "Data": data_tables(fit),
         "Provenance": provenance(fit),
     }
     return document(f"Fit of {fit.law} to {name}", "A fit", f"{fit.law} fitted to {name}", sections)
-
-
-def _verdict(fit: Fit, posterior: Posterior | None) -> str:
-    good = fit.dof <= 0 or fit.p_value >= 0.01
-    lines = [
-        f"chi-squared {fit.chi2:.4g} for {fit.dof} degrees of freedom, p = "
-        f"{fit.p_value:.3g}: the law {'describes' if good else 'does not describe'} these data "
-        "within their uncertainties."
-    ]
-    if not fit.judged_by_chi2:
-        lines = [
-            "The noise of a recording is estimated from what the law leaves, so that chi-squared "
-            f"does not judge the law; AICc {fit.aicc:.6g} compares it with others."
-        ]
-    warnings = [*fit.warnings, *(posterior.warnings if posterior else ())]
-    listed = "".join(f"<li>{escape(w)}</li>" for w in warnings)
-    observables = table(
-        ("observable", "chi-squared", "data"),
-        [(n, f"{c:.4g}", str(k)) for n, (c, k) in fit.observables.items()],
-    )
-    return f"<p>{escape(lines[0])}</p>{observables}" + (f"<ul>{listed}</ul>" if listed else "")
-
-
-def _estimates(fit: Fit) -> str:
-    rows = [
-        (
-            n,
-            f"{p.value:.6g}",
-            f"{p.se:.2g}",
-            f"{p.interval_68[0]:.5g} to {p.interval_68[1]:.5g}",
-            f"{p.interval_95[0]:.5g} to {p.interval_95[1]:.5g}",
-            p.unit,
-            UNDETERMINED if n in fit.undetermined else "",
-        )
-        for n, p in {**fit.parameters, **fit.over_load}.items()
-    ]
-    return table(("", "estimate", "standard error", "68 %", "95 %", "unit", ""), rows)
-
-
-def _posterior(posterior: Posterior) -> str:
-    rows = [
-        (
-            n,
-            f"{p.mean:.6g}",
-            f"{p.sd:.2g}",
-            f"{p.interval_95[0]:.5g} to {p.interval_95[1]:.5g}",
-            f"{p.r_hat:.4f}",
-            f"{p.ess_bulk:.0f}",
-            f"{p.ess_tail:.0f}",
-        )
-        for n, p in posterior.parameters.items()
-    ]
-    head = ("", "mean", "standard deviation", "95 %", "R-hat", "ESS bulk", "ESS tail")
-    return table(head, rows)
-
-
-def _correlations(fit: Fit) -> str:
-    names = list(fit.parameters)
-    rows = [(n, *(f"{x:+.3f}" for x in row)) for n, row in zip(names, fit.correlation, strict=True)]
-    return table(("", *names), rows)
 
 
 def _figures(fit: Fit, posterior: Posterior | None) -> str:
@@ -245,7 +175,7 @@ def data_tables(fit: Fit) -> str:
             (str(read.row_names[i]), *(f"{c[i]:.6g}" for c in columns.values()))
             for i in range(read.rows)
         ]
-        parts.append(table(("", *columns), rows))
+        parts.append(html_table(("", *columns), rows))
     parts += [_recording(term) for term in fit.objective.terms_of(RunTerm)]
     return "\n".join(parts)
 
@@ -263,7 +193,7 @@ def _recording(term: RunTerm) -> str:
         f"independent; noise {noise['model']}, whiteness p = {noise['whiteness_p']:.2g}."
         + (f" {noise['averaged']}." if noise["averaged"] else "")
     )
-    return f"<p>{escape(said)}</p>" + table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
+    return f"<p>{escape(said)}</p>" + html_table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
 
 
 def provenance(fit: Fit) -> str:
@@ -279,5 +209,5 @@ def provenance(fit: Fit) -> str:
     names = ", ".join(term.name for term in fit.objective.terms)
     return (
         f"<p>asperity {__version__}, {made}; data: {escape(names)}; numbers that were fixed, in "
-        f"SI:</p>{table(('', 'value'), fixed)}<p>The law:</p>{sources}"
+        f"SI:</p>{html_table(('', 'value'), fixed)}<p>The law:</p>{sources}"
     )

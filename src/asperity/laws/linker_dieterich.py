@@ -34,7 +34,7 @@ class LinkerDieterich(RiceRuina):
     """
 
     name: ClassVar[str] = "linker-dieterich"
-    source: ClassVar[str] = "bureau2000, linker1992"
+    source: ClassVar[str] = "linker1992, bureau2000"
     equations: ClassVar[tuple[str, ...]] = (
         r"F_i=W\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\ln\frac{V_0\Phi}{D_0}\right]",
         r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}-\frac{\alpha}{B}\frac{\dot W}{W}\Phi",

@@ -34,7 +34,7 @@ class RiceRuina(Law):
     """
 
     name: ClassVar[str] = "rice-ruina"
-    source: ClassVar[str] = "bureau2000"
+    source: ClassVar[str] = "dieterich1979, ruina1983"
     equations: ClassVar[tuple[str, ...]] = (
         r"F_i=W\left[\mu_0+A\ln\frac{\dot x}{V_0}+B\ln\frac{V_0\Phi}{D_0}\right]",
         r"\dot\Phi=1-\frac{\dot x\Phi}{D_0}",

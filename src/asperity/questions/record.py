@@ -299,6 +299,16 @@ def _mistakes(
     if reported["type"] == "literal_error":
         expected = reported["ctx"]["expected"].replace("'", "")
         return (InputError(field, f"be {expected}", value, "choose one"),)
+    if reported["type"] in ("too_short", "too_long"):
+        edge = reported["ctx"]
+        rule = f"have {'at least' if 'min_length' in edge else 'at most'} "
+        rule += f"{edge.get('min_length', edge.get('max_length'))} parts"
+        return (InputError(field, rule, edge["actual_length"], "correct it"),)
+    limits = {"greater_than_equal": "at least", "less_than_equal": "at most"}
+    if reported["type"] in limits:
+        (limit,) = reported["ctx"].values()
+        rule = f"be {limits[reported['type']]} {limit:g}"
+        return (InputError(field, rule, value, "correct the value"),)
     said = " ".join(reported["msg"].split()).removeprefix("Input should be ")
     rule = next(
         (words for kind, words in _WORDS.items() if reported["type"].startswith(kind)), said

@@ -108,3 +108,8 @@ def load_steps(seed: int = 0) -> Trace:
 def modulated(seed: int = 0) -> Trace:
     """A load modulated by 24 % at 120 Hz, on the slider of Bureau et al. (2000); see `record`."""
     return record("modulated", seed)
+
+
+def stick_slip(seed: int = 0) -> Trace:
+    """Stick-slip of a soft spring on a gauge that rings and has impulses; see `record`."""
+    return record("stick_slip", seed)

@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import Field, PositiveInt, field_validator, model_validator
+from pydantic import Field, PositiveInt, model_validator
 
 from asperity.errors import InputError, MistakesError
-from asperity.questions.record import Given, Question, Record
+from asperity.questions.fit import Estimation
+from asperity.questions.record import Given, Names, Question, Record
 
 
 class PlanError(MistakesError):
@@ -130,46 +131,16 @@ class TransientTable(Record):
     most_steps: float = 2e6
 
 
-class PriorTable(Record):
-    """A normal prior of a free parameter.
-
-    Attributes
-    ----------
-    mean, std : float or str
-    """
-
-    mean: float | str
-    std: float | str
-
-
-class FitTable(Record):
+class FitTable(Estimation):
     """A fit at every point.
 
     Attributes
     ----------
-    free : tuple of str
-        Free parameters.
     data : tuple of str
         Tables of readings, all in one likelihood, where no axis has a column ``data``.
-    prior : str or mapping of str to PriorTable
-        A material with published uncertainties, or priors by name.
-    profile : bool
-        Intervals by profile likelihood.
-    starts, seed : int
-        Starts that are drawn besides the first one, and their seed.
     """
 
-    free: tuple[str, ...]
-    data: tuple[str, ...] | None = None
-    prior: str | Mapping[str, PriorTable] | None = None
-    profile: bool = False
-    starts: PositiveInt = 64
-    seed: int = Field(default=0, ge=0)
-
-    @field_validator("data", mode="before")
-    @classmethod
-    def _one_or_several(cls, value: Any) -> Any:
-        return (value,) if isinstance(value, str) else value
+    data: Names | None = None
 
 
 class SweepPlan(Question):

@@ -45,6 +45,23 @@ def low_pass(order: int, frequency: float) -> tuple[NDArray, NDArray]:
     return poles, corner**order / np.array(others)
 
 
+def resonant(frequency: float, damping: float) -> tuple[NDArray, NDArray]:
+    """Poles (rad/s) and residues of a damped oscillator with gain 1 at frequency 0.
+
+    Parameters
+    ----------
+    frequency : float
+        Undamped (Hz).
+    damping : float
+        Damping ratio, below 1.
+    """
+    corner = 2 * np.pi * frequency
+    pole = corner * complex(-damping, np.sqrt(1 - damping**2))
+    poles = np.array([pole, pole.conjugate()])
+    residues = corner**2 / np.array([pole - pole.conjugate(), pole.conjugate() - pole])
+    return poles, residues
+
+
 def filtered(values: Array, rate: float, poles: NDArray, residues: NDArray) -> Array:
     """Output of a filter at the samples of its input, which was steady before the first.
 
@@ -123,6 +140,9 @@ _KINDS = {
     "bandwidth": "frequency",
     "high_pass": "frequency",
     "delay": "time",
+    "resonance": "frequency",
+    "damping": "dimensionless",
+    "impulses": "dimensionless",
     "stiffness": "stiffness",
 }
 _POSITIVE = ("bandwidth", "stiffness")
@@ -154,6 +174,13 @@ class Sensor:
         Change of the offset per second, in SI.
     delay : float or str
         Dead time (s): a phase of -2 pi f delay on top of that of the bandwidth.
+    resonance, damping : float or str
+        Of the gauge that carries the sensor (Hz, ratio): it rings after a slip. 0 Hz for a rigid
+        one.
+    impulses : float
+        Share of the samples of the motion at which the reading jumps out and back.
+    impulse_size : float or str
+        Standard deviation of these jumps, in the unit of the quantity.
     """
 
     #: Kind of noise, resolution and offset, and kind of the reading, as keys of `KINDS`.
@@ -166,6 +193,10 @@ class Sensor:
     offset: Given = 0.0
     drift: float = 0.0
     delay: Given = 0.0
+    resonance: Given = 0.0
+    damping: Given = 0.05
+    impulses: Given = 0.0
+    impulse_size: Given = 0.0
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -180,6 +211,12 @@ class Sensor:
                     f"{name} must be {rule}, got {value:g} {KINDS[kind].si}; correct the value"
                 )
             object.__setattr__(self, field.name, value)
+        for name in ("damping", "impulses"):
+            if not getattr(self, name) < 1:
+                raise InputError(
+                    f"{type(self).__name__}.{name} must be below 1, got {getattr(self, name):g}; "
+                    "correct the value"
+                )
 
     def read(self, values: Array, rate: float, random: np.random.Generator) -> Array:
         """The sensor's output at the samples of a quantity; its delay is the clock's work.
@@ -197,19 +234,26 @@ class Sensor:
         InputError
             If the samples are too far apart for the sensor's bandwidth.
         """
-        if rate < 2 * self.bandwidth:
-            raise InputError(
-                f"{type(self).__name__}.bandwidth must be at most half the sampling rate of the "
-                f"motion, {rate / 2:g} Hz, got {self.bandwidth:g} Hz; sample the motion faster"
-            )
+        for name in ("bandwidth", "resonance"):
+            if rate < 2 * getattr(self, name):
+                raise InputError(
+                    f"{type(self).__name__}.{name} must be at most half the sampling rate of the "
+                    f"motion, {rate / 2:g} Hz, got {getattr(self, name):g} Hz; sample the motion "
+                    "faster"
+                )
         seen = self._responded(values, rate)
         seen = seen + self._noise(values.size, rate, random)
         seen = seen + self.offset + self.drift * np.arange(values.size) / rate
+        if self.impulses:
+            hit = random.random(values.size) < self.impulses
+            seen = seen + hit * self.impulse_size * random.standard_normal(values.size)
         if self.resolution > 0:
             seen = self.resolution * np.rint(seen / self.resolution)
         return seen
 
     def _responded(self, values: Array, rate: float) -> Array:
+        if self.resonance:
+            values = filtered(values, rate, *resonant(self.resonance, self.damping))
         return filtered(values, rate, *low_pass(1, self.bandwidth))
 
     def _noise(self, n: int, rate: float, random: np.random.Generator) -> Array:

@@ -17,7 +17,15 @@ from asperity.errors import InputError
 from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
-from asperity.tribometer.sensors import Accelerometer, Given, Sensor, between, filtered, low_pass
+from asperity.tribometer.sensors import (
+    Accelerometer,
+    Given,
+    Sensor,
+    between,
+    filtered,
+    low_pass,
+    resonant,
+)
 from asperity.units import KINDS, to_si
 
 Array = NDArray[np.float64]
@@ -225,6 +233,8 @@ def channel_gain(
     sensor, recorder = tribometer.sensors[channel], tribometer.recorder
     s = 2j * np.pi * np.asarray(frequency, float)
     gain = _filter(s, *low_pass(1, sensor.bandwidth)) * np.exp(-s * sensor.delay)
+    if sensor.resonance > 0:
+        gain = gain * _filter(s, *resonant(sensor.resonance, sensor.damping))
     if isinstance(sensor, Accelerometer) and sensor.high_pass > 0:
         gain = gain * (1 - _filter(s, *low_pass(1, sensor.high_pass)))
     if recorder.cut_off is not None:

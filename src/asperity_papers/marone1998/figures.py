@@ -41,7 +41,7 @@ _PER_STRETCH = 400
 def figure_2(laboratory: Laboratory) -> FigureNumbers:
     """Velocity steps, by an integration of both."""
     p, rows, peaks = laboratory.numbers, [], {}
-    slow, fast = p["V_2"].si_values
+    slow, fast = laboratory.pair("V_2")
     for n, (name, letter) in enumerate(LAWS.items()):
         slider = Slider(laboratory.illustration(name), spring=p.k_2, load=1.0)
         programme = Programme(

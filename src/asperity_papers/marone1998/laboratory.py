@@ -41,6 +41,12 @@ class Laboratory:
         self.soft = numbers.k_soft, numbers.V_soft
         self.stiff = numbers.k_stiff, numbers.V_stiff
 
+    def pair(self, name: str) -> tuple[float, float]:
+        """Two values, or the ends of a range, of one of the paper's numbers."""
+        number = self.numbers[name]
+        first, second = number.si_values or number.si_range or ()
+        return first, second
+
     def granite(self, name: str, **changes: Any) -> RiceRuina:
         """Bare granite of Figure 3."""
         law = self.numbers.law(name, **changes)

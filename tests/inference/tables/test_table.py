@@ -4,16 +4,18 @@ import json
 
 import numpy as np
 import pytest
-from asperity.cli.measure.reading import FileRows, ReadingOptions
-from asperity.cli.measure.source import RecordingSource
 from scipy.stats import multivariate_normal
 
 from asperity import Slider, materials, periodic_response
+from asperity.cli.measure import FileRows
 from asperity.errors import InputError
 from asperity.inference import fit, read_table, table_of
 from asperity.measurement.campaign import run_campaign
 from asperity.measurement.measure import measure
 from asperity.measurement.record import modulated_record
+from asperity.questions.recording import Measurement as Question
+from asperity.questions.recording import Source
+from asperity.recording.readers.from_file import read
 
 V, EPSILON = [1e-6, 1e-6, 1e-5], [0.1, 0.3, 0.3]
 
@@ -121,7 +123,7 @@ def recorded(tmp_path_factory):
 def test_a_campaign_goes_straight_into_a_fit(recorded, tmp_path, pmma):
     chosen = {"modulated": True, "frequency": None, "exact_frequency": False, "harmonics": 2}
     chosen |= {"window": None, "whole_periods": False, "detrend": "linear"}
-    rows = FileRows(RecordingSource({}, {}), ReadingOptions(**chosen))
+    rows = FileRows(Source(), Question(**chosen))
     broken = tmp_path / "broken.csv"
     broken.write_text("no recording\n", encoding="utf-8")
     run_campaign([broken, recorded], rows, tmp_path / "all.csv", inputs={})
@@ -141,7 +143,7 @@ def test_a_campaign_goes_straight_into_a_fit(recorded, tmp_path, pmma):
 
 
 def test_a_reading_as_json_is_a_table_of_one_row(recorded, tmp_path):
-    record = modulated_record(measure(RecordingSource({}, {}).read(recorded)))
+    record = modulated_record(measure(read(recorded)))
     path = tmp_path / "reading.json"
     path.write_text(json.dumps(record), encoding="utf-8")
     table = read_table(path, {"V": 1e-6})

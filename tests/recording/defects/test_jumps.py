@@ -30,19 +30,19 @@ def test_noise_jumps_no_more_often_than_designed():
 
 @pytest.mark.parametrize("correlation", [1.0, 10.0, 100.0, 1000.0])
 def test_planted_jumps_are_found_where_they_are(correlation):
-    """By the innovations: eight of their deviations are a jump under noise of any correlation."""
+    """By the innovations: ten of their deviations are a jump under noise of any correlation."""
     random = np.random.default_rng(int(correlation))
     innovation = 4e-4 * np.sqrt(1 - np.exp(-2 / correlation))
     for _ in range(5):
         values = ar1(random, 1400, correlation)
         first, second = 100 + random.integers(0, 500), 800 + random.integers(0, 500)
-        values[first:] += 10 * innovation
-        values[second:] -= 8 * innovation
+        values[first:] += 12 * innovation
+        values[second:] -= 10 * innovation
         found = sorted(find_jumps(values, [(0, 1400)]))
         assert [jump.sample for jump in found] == [first, second]
         # The error of a size is below the innovation: so far as its neighbours tell.
         sizes = [jump.size / innovation for jump in found]
-        np.testing.assert_allclose(sizes, [10, -8], atol=4)
+        np.testing.assert_allclose(sizes, [12, -10], atol=4)
 
 
 def test_a_size_is_that_of_generalised_least_squares():
@@ -54,14 +54,17 @@ def test_a_size_is_that_of_generalised_least_squares():
     # The first samples are predicted by lower orders, and the last have fewer behind them.
     for k in (5, 30, 55):
         assert size[k] == pytest.approx(inverse[k] @ steps / inverse[k, k], rel=1e-9)
-        assert departure[k] == pytest.approx(size[k] * np.sqrt(inverse[k, k]), rel=1e-9)
+        # Among gradual changes as large a jump is none.
+        assert departure[k] in (0.0, pytest.approx(size[k] * np.sqrt(inverse[k, k]), rel=1e-9))
+    assert np.count_nonzero(departure) > 3
 
 
 def test_a_motion_that_settles_and_a_drift_are_no_jumps():
     random = np.random.default_rng(3)
     time = np.arange(2000) / 10
-    motion = 0.6 + 0.01 * np.exp(-time / 5) + 1e-4 * time
-    assert find_jumps(motion + ar1(random, 2000, 5.0), [(0, 2000)]) == []
+    for seconds in (1.0, 2.0, 5.0):
+        motion = 0.6 + 0.01 * np.exp(-time / seconds) + 1e-4 * time
+        assert find_jumps(motion + ar1(random, 2000, 5.0), [(0, 2000)]) == []
 
 
 def test_a_stretch_keeps_to_itself():

@@ -17,6 +17,14 @@ from asperity.inference.comparison.evidence import (
     evidence_of,
     leave_one_run_out,
 )
+from asperity.inference.comparison.scale import (
+    DISFAVOURED,
+    EXCLUDED,
+    FACTOR,
+    IMPOSSIBLE,
+    Standing,
+    standing,
+)
 from asperity.inference.fitting.fit import Data, fit, listed_data
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.plausibility import stiffness_that_describes
@@ -40,14 +48,8 @@ Report = Callable[[float], None]
 _STEPS = 100
 #: Drawn starts of a fit that is repeated without outliers.
 _STARTS_AGAIN = 16
-#: A law is excluded by its own misfit below this probability of chi-squared, if another law is not.
-_IMPOSSIBLE = 1e-3
 #: At or above this probability of chi-squared there are no outliers to look for.
 _DESCRIBED = 0.01
-#: Not so if its AICc is less than this above the lowest: the other law is no better then.
-_AS_GOOD = 4.0
-#: A law is excluded beside the best one from this difference of AICc on: its weight is 1/150.
-LARGEST_AICC_DIFFERENCE = 10.0
 #: What is tried to tell two laws apart: factors of the applied amplitude, velocity and frequency.
 _FACTORS = (0.25, 0.5, 1.0, 2.0, 4.0)
 #: Largest amplitude on the contacts that is tried.
@@ -104,6 +106,21 @@ class Comparison:
     verdict: str
     left_out: tuple[str, ...] = ()
     not_compared: Mapping[str, str] = field(default_factory=dict)
+
+    def standing(self, name: str) -> Standing:
+        """Where a law stands on the scale of verdicts, and by which number."""
+        judged, best = self.laws[name], self.laws.get(self.best)
+        behind = judged.fit.aicc - best.fit.aicc if best else math.nan
+        pair = best.evidence if best else None, judged.evidence
+        lost = math.nan
+        if pair[0] and pair[1] and pair[0].reliable and pair[1].reliable:
+            lost = pair[0].log - pair[1].log
+        return standing(
+            excluded=judged.why if judged.excluded else "",
+            behind=behind if judged.fit.converged else math.nan,
+            evidence_behind=lost,
+            p_value=judged.fit.p_value if judged.fit.judged_by_chi2 else None,
+        )
 
 
 def compare(
@@ -263,7 +280,7 @@ def _within_law(report: Report, laws: int, done: int, total: int) -> None:
 def _freed(comparison: Comparison) -> str:
     """What a free stiffness would change, where no law describes the data."""
     fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
-    if any(f.dof <= 0 or f.p_value >= _IMPOSSIBLE for f in fits):
+    if any(f.dof <= 0 or f.p_value >= IMPOSSIBLE for f in fits):
         return ""
     # The law with the fewest parameters that does: those that extend it do as well.
     for f in sorted(fits, key=lambda f: len(f.parameters)):
@@ -330,9 +347,13 @@ def _second_opinion(judged: Mapping[str, Judged], best: str) -> str:
         if top and other and top.reliable and other.reliable:
             apart = top.log - other.log
             ahead, behind = (best, name) if apart >= 0 else (name, best)
+            factor = math.exp(min(abs(apart), 700.0))
+            tells = (
+                f"disfavours {behind} against" if factor >= FACTOR else f"cannot tell {behind} from"
+            )
             said += (
-                f" The evidence prefers {ahead} to {behind} by a factor of "
-                f"{math.exp(min(abs(apart), 700.0)):.2g}, with the priors stated."
+                f" The evidence {tells} {ahead}: a factor of {factor:.2g}, of which {FACTOR:g} "
+                "decides, with the priors stated."
             )
         first, second = judged[best].cross_validation, judged[name].cross_validation
         if first and second and math.isfinite(first.log_density + second.log_density):
@@ -355,7 +376,7 @@ def judge(fits: Mapping[str, Fit]) -> Comparison:
             "These data were not described by any law: no fit converged.",
         )
     best = min(done, key=lambda name: done[name].aicc)
-    describes = any(f.dof <= 0 or f.p_value >= _IMPOSSIBLE for f in done.values())
+    describes = any(f.dof <= 0 or f.p_value >= IMPOSSIBLE for f in done.values())
     top = done[best]
     inflation = 1.0 if describes else max(1.0, top.chi2 / max(top.dof, 1))
     total = sum(math.exp(-(f.aicc - top.aicc) / 2) for f in done.values())
@@ -391,7 +412,7 @@ def _excluded(result: Fit, best: Fit, describes: bool, inflation: float) -> tupl
         return False, ""
     behind = result.aicc - best.aicc
     if not result.judged_by_chi2:
-        if behind < LARGEST_AICC_DIFFERENCE:
+        if behind < EXCLUDED:
             return False, ""
         return True, (
             f"its log-likelihood is {best.log_likelihood - result.log_likelihood:.4g} lower than "
@@ -406,15 +427,15 @@ def _excluded(result: Fit, best: Fit, describes: bool, inflation: float) -> tupl
         f"the worst observable is {worst} with chi-squared {chi2:.4g} for {n} data, where "
         f"{best.law} has {rival:.4g}"
     )
-    misfit = result.dof > 0 and result.p_value < _IMPOSSIBLE
-    if misfit and describes and behind >= _AS_GOOD:
+    misfit = result.dof > 0 and result.p_value < IMPOSSIBLE
+    if misfit and describes and behind >= DISFAVOURED:
         return True, (
             f"chi-squared {result.chi2:.4g} for {result.dof} degrees of freedom has a probability "
             f"of {result.p_value:.2g}; {where}"
         )
     deviance = 2 * (best.log_likelihood - result.log_likelihood)
     fair = behind - deviance + deviance / inflation
-    if fair >= LARGEST_AICC_DIFFERENCE:
+    if fair >= EXCLUDED:
         even = (
             f", and {fair:.4g} above it if all uncertainties are {math.sqrt(inflation):.3g} times "
             "as large"
@@ -440,10 +461,17 @@ def _verdict(judged: Mapping[str, Judged], left: Sequence[str], best: str, descr
         )
     elif len(left) == 1 and not unknown:
         parts.append(f"These data leave {left[0]} and exclude {_listed(out)}")
-    elif out:
-        parts.append(f"These data exclude {_listed(out)} and cannot tell {_listed(left)} apart")
     else:
-        parts.append(f"These data cannot tell {_listed(left)} apart")
+        lowest = min(judged[name].fit.aicc for name in left)
+        behind = {name: judged[name].fit.aicc - lowest for name in left}
+        near = [name for name in left if behind[name] < DISFAVOURED]
+        far = [f"{name} (AICc {behind[name]:.3g} above)" for name in left if name not in near]
+        words = [
+            f"exclude {_listed(out)}" if out else "",
+            f"disfavour {_listed(far)}" if far else "",
+            f"cannot tell {_listed(near)} apart" if len(near) > 1 else f"prefer {near[0]}",
+        ]
+        parts.append(f"These data {_listed([word for word in words if word])}")
     parts += [f"{name}: {judged[name].why}" for name in out]
     if unknown:
         parts.append(f"{_listed(unknown)}: no fit converged, so that nothing is said of it")

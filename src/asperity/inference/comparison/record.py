@@ -19,6 +19,8 @@ def comparison_record(comparison: Comparison) -> dict[str, Any]:
                 **fit_record(judged.fit),
                 "excluded": judged.excluded,
                 "why": judged.why,
+                "standing": comparison.standing(name).word,
+                "deciding": comparison.standing(name).number,
                 "weight": plain(judged.weight),
                 "evidence": _evidence(judged.evidence),
                 "leave_one_run_out": _cross_validation(judged.cross_validation),
@@ -43,6 +45,7 @@ def laws_table(
     """
     fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
     lowest = min((f.aicc for f in fits), default=0.0)
+    # Where the noise is estimated from the same residuals, chi-squared judges nothing.
     by_chi2 = any(f.judged_by_chi2 for f in fits)
     numbers = ("chi-squared", "dof", "p") if by_chi2 else ("log-likelihood",)
     head = ("law", *numbers, "AICc - lowest", "weight", "ln evidence", "")
@@ -58,7 +61,9 @@ def laws_table(
         # Of excluded laws among searched orbits it is the normal approximation's.
         if j.evidence and math.isfinite(j.evidence.standard_error):
             evidence += f" +- {j.evidence.standard_error:.2g}"
-        notes = [f"excluded: {j.why}" if reasons else "excluded"] if j.excluded else []
+        word, number = comparison.standing(name)
+        notes = [f"{word}: {number}" if name != comparison.best else "lowest AICc"]
+        notes += [j.why] if reasons and j.excluded else []
         if f.undetermined:
             notes.append(f"{', '.join(f.undetermined)} not determined")
         rows.append(

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.comparison.compare import LARGEST_AICC_DIFFERENCE
+from asperity.inference.comparison.scale import EXCLUDED
 from asperity.inference.design.candidates import Candidates
 from asperity.inference.design.plan import DesignPlan, Hypothesis
 from asperity.inference.design.predictions import (
@@ -249,7 +249,7 @@ def probability_of_deciding(
     if not np.isfinite(penalty).all():
         return 0.0
     behind = difference + penalty[1] - penalty[0]
-    return float((behind >= LARGEST_AICC_DIFFERENCE).mean())
+    return float((behind >= EXCLUDED).mean())
 
 
 def _outside(jacobian: Float, vectors: Float) -> Float:

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.inference.comparison.compare import LARGEST_AICC_DIFFERENCE
+from asperity.inference.comparison.scale import EXCLUDED
 from asperity.inference.design.plan import Hypothesis
 from asperity.inference.design.predictions import PointModel, refit, repeated
 from asperity.inference.tables.table import LockInTable
@@ -110,7 +110,7 @@ def simulated(
         spread[unknown.name], uncertainty[unknown.name] = _spread(sample, noise)
     decided = None
     if rival is not None and behind:
-        decided = float((np.array(behind) >= LARGEST_AICC_DIFFERENCE).mean())
+        decided = float((np.array(behind) >= EXCLUDED).mean())
     return Simulated(len(u), failed, spread, uncertainty, decided)
 
 

@@ -288,7 +288,9 @@ def _fit_with(
         message="converged",
         parameters=dict(estimates),
         correlation=at.total / np.outer(at.se, at.se),
-        undetermined=at.undetermined,
+        undetermined=tuple(
+            name for name, e in estimates.items() if name in at.undetermined or not _bounded(e)
+        ),
         chi2=at.chi2,
         dof=at.dof,
         p_value=at.p_value,
@@ -301,6 +303,12 @@ def _fit_with(
         warnings=(),
         objective=objective,
     )
+
+
+def _bounded(estimate: Estimate) -> bool:
+    """Whether the data bound a parameter, by an interval that holds its estimate."""
+    low, high = estimate.interval_95
+    return low <= estimate.value <= high and (low > 0 or low < 0 or math.isfinite(high))
 
 
 def _profiled(

@@ -330,8 +330,8 @@ def listed_data(
     data: Data | Iterable[Data], options: RunOptions
 ) -> list[LockInTable | HealingTable | RecordedRun]:
     """One set of data or several as a list, recordings made ready."""
-    one = isinstance(data, LockInTable | HealingTable | RecordedRun | Trace)
-    several = [data] if one else list(data)
+    single = LockInTable | HealingTable | RecordedRun | Trace
+    several = [data] if isinstance(data, single) else list(data)
     ready = [d if isinstance(d, LockInTable | HealingTable) else run_of(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate

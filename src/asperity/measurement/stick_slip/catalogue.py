@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import Argument, InputError
+from asperity.measurement.stick_slip.healing import ASSUMPTION
 from asperity.measurement.verdicts.verdict import percent
 from asperity.outputs import json, written_file
 
@@ -202,6 +203,7 @@ def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, A
 
 def stick_slip_record(measurement: StickSlipMeasurement) -> dict[str, Any]:
     """Everything that a stick-slip recording says, as numbers, texts, lists and dicts in SI."""
+    healed = measurement.healing
     return {
         "mode": "stick-slip",
         "verdict": measurement.verdict,
@@ -212,6 +214,7 @@ def stick_slip_record(measurement: StickSlipMeasurement) -> dict[str, Any]:
         "impulses": int(measurement.impulses.size),
         "samples": int(measurement.time.size),
         "catalogue": events_record(measurement),
+        "healing": None if healed is None else {**asdict(healed), "assumption": ASSUMPTION},
         "checks": [asdict(check) for check in measurement.checks],
         "channels": list(measurement.names),
         "units": {name: unit for name, (unit, _) in COLUMNS.items()},

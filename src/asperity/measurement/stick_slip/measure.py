@@ -13,6 +13,7 @@ from asperity.measurement.samples import about_channels
 from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
 from asperity.measurement.stick_slip.detection import Falls, find_falls
 from asperity.measurement.stick_slip.events import SlipEvents, read_events
+from asperity.measurement.stick_slip.healing import StickSlipHealing, healing
 from asperity.measurement.stick_slip.noise import estimate, without_impulses
 from asperity.measurement.stick_slip.regimes import Regime, regimes
 from asperity.measurement.verdicts.checks import findings
@@ -128,6 +129,15 @@ class StickSlipMeasurement(Displayed):
     def verdict(self) -> Verdict:
         """The gravest of all."""
         return worst(self.checks)
+
+    @property
+    def healing(self) -> StickSlipHealing | None:
+        """Growth of friction with stick time, from the longest train of stick-slip."""
+        trains = [r for r in self.regimes if r.sticks]
+        if not trains:
+            return None
+        longest = max(trains, key=lambda r: r.stop - r.first)
+        return healing(self.events, longest.first, longest.stop)
 
     @property
     def clear(self) -> bool:

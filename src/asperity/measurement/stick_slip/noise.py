@@ -17,11 +17,15 @@ Array = NDArray[np.float64]
 
 #: Median filter whose output two neighbouring impulses leave as it is.
 _FILTER = 5
+#: Standard deviations by which an impulse stands out of the median, whose noise counts too. Two
+#: samples that stand out by less, one up and one down, are no fall.
+_IMPULSE = 4.5
 #: Quantile of second differences that gives their scatter: up to two thirds of the blocks may hold
 #: a slip or a peak. And the largest share on one level of a coarse recorder that tells a scatter.
 _QUANTILE, _MOST = 0.25, 0.99
-#: Blocks that give a scatter, and its relative standard error times the root of their number.
-_FEWEST_BLOCKS = 32
+#: Blocks that give a scatter, blocks that give it by themselves, and its relative standard error
+#: times the root of their number.
+_FEWEST_BLOCKS, _MANY_BLOCKS = 32, 256
 _QUANTILE_ERROR = 1.8
 #: Probability of a false event in a recording of Gaussian noise.
 FALSE_ALARM = 0.01
@@ -102,7 +106,11 @@ def estimate(force: Array) -> Noise:
         scatter = _deviation(bends) / np.sqrt(6.0)
         # Two standard errors more: a threshold from a scatter that came out small is none.
         scatter *= 1 + 2 * _QUANTILE_ERROR / np.sqrt(bends.size)
-        octaves.append(max(scatter / np.sqrt(2.0), floor))
+        octave = max(scatter / np.sqrt(2.0), floor)
+        if octaves and bends.size < _MANY_BLOCKS:
+            # Few blocks may scatter little by chance: noise falls no faster than white noise does.
+            octave = max(octave, octaves[-1] / np.sqrt(2.0))
+        octaves.append(octave)
         pairs = means.size // 2
         means = (means[: 2 * pairs : 2] + means[1 : 2 * pairs : 2]) / 2
     return Noise(np.array(octaves), force.size)
@@ -139,21 +147,22 @@ def without_impulses(force: Array) -> tuple[Array, NDArray[np.intp]]:
     Notes
     -----
     An impulse stands out of the median of five samples, and of the lines that the medians before
-    and behind it make: the sharp peak of a cycle lies on one of these. About one sample of a
-    recording without impulses is replaced.
+    and behind it make: the sharp peak of a cycle lies on one of these. Of 10,000 samples without
+    impulses less than one is replaced. What is left lies within the smallest fall that counts.
     """
     middle = median_filter(force, _FILTER, mode="nearest")
     away = force - middle
     scatter = float(np.quantile(np.abs(np.diff(force, 2)), 0.5)) / (0.6745 * np.sqrt(6.0))
     # Steps of the recorder: rounding noise has no quantile of zero.
     scatter = max(scatter, _resolution(force) / np.sqrt(12.0))
-    limit = -ndtri(0.5 / force.size) * scatter * np.sqrt(1.3)
+    limit = _IMPULSE * scatter
     at = np.flatnonzero(np.abs(away) > limit)
     for step in (-3, 3):
         near = np.clip(at + step, 0, force.size - 1)
         far = np.clip(at + 2 * step, 0, force.size - 1)
         out = force[at] - (2 * middle[near] - middle[far])
-        at = at[(np.abs(out) > limit) & (out * away[at] > 0)]
+        # The noise of the line is in this too.
+        at = at[(np.abs(out) > limit / 2) & (out * away[at] > 0)]
     clean = force.copy()
     clean[at] = middle[at]
     return clean, at

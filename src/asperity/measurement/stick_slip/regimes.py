@@ -35,6 +35,9 @@ _LONG = 5.0
 _NEAR, _OTHER = 5, 1.5
 #: Rise over what loading would be, above which a part without events is a stick.
 _LOADED = 0.5
+#: Relative spread of the loading slopes of many events, and of few, above which it is no spring
+#: that loads: that of friction with a spectrum of 1/f^2 is 0.6 and more, by chance 0.23 for few.
+_ALIKE, _ALIKE_OF_FEW, _MANY_EVENTS = 0.5, 0.2, 20
 #: Relative spread of drops and recurrences of a regular train.
 _REGULAR = 0.15
 #: Ratio of the last drop to the first, by a straight line, of a train that grows.
@@ -227,6 +230,12 @@ def _train(
         f"recurrence {np.mean(recurrence):.3g} s with one of {100 * uneven:.2g} %, sticks "
         f"{ratio:.2g} times as long as slips"
     )
+    slope = events.loading_slope[inner]
+    usual = float(np.median(slope))
+    other = 1.4826 * float(np.median(np.abs(slope - usual)))
+    if not other < (_ALIKE if number >= _MANY_EVENTS else _ALIKE_OF_FEW) * usual:
+        text += ": the force does not rise alike in the sticks, as a spring loads"
+        return Regime("cannot tell", *span, first, stop, text)
     cycle = float(np.median(recurrence))
     inertial = natural_period is not None and abs(cycle / natural_period - 1) < _INERTIAL
     if natural_period is not None:

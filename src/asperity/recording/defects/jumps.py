@@ -27,8 +27,10 @@ CHANCE = 1e-3
 _MOST = 5
 #: Samples at the ends of a stretch that show no level on one side of them.
 _EDGE = 6
-#: Samples over which a change is gradual.
-_GRADUAL = (4, 8, 16, 32)
+#: Samples over which a change is gradual, and the share of its departure that a jump exceeds. Of
+#: 180 recordings with hum and no jump, 9 have one without this rule, and none with it: motion
+#: after changes of the drive. With a share of 1 one jump in six under white noise is lost.
+_GRADUAL, _SUDDEN = (4, 8, 16, 32), 0.95
 #: Samples of a stretch, at least.
 _SHORTEST = 64
 
@@ -113,5 +115,5 @@ def _impulses(model: Autoregression, steps: Float) -> tuple[Float, Float]:
         apart = np.abs(sums[wide:] - sums[:-wide]) * length / np.sqrt(float(spread @ spread))
         # The farthest of the changes that a sample is within.
         around = np.concatenate([np.zeros(wide - 1), apart, np.zeros(wide - 1)])
-        sudden &= np.abs(departure) > sliding_window_view(around, wide).max(axis=1)
+        sudden &= np.abs(departure) > _SUDDEN * sliding_window_view(around, wide).max(axis=1)
     return model.innovation / length * departure, np.where(sudden, departure, 0.0)

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity import materials
 from asperity.errors import InputError, closest
 from asperity.laws import get_law, registered
 from asperity.operating_point import respond
@@ -183,7 +182,7 @@ def _free(table: FitTable) -> list[str]:
 
     known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
     names = []
-    for name in table.free:
+    for name in table.free or ():
         canonical = canonical_name(name, known)
         if canonical is None:
             raise InputError(f"fit.free must name parameters, got '{name}'; {closest(name, known)}")
@@ -195,25 +194,23 @@ def _free(table: FitTable) -> list[str]:
 
 def _priors(plan: SweepPlan, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
     """Mean, standard deviation (SI) and source of each prior."""
-    from asperity.inference.unknowns import EPS_RATIO, material_priors
-    from asperity.parameters import obeying
+    from asperity.inference.fitting.inputs import priors_of
+    from asperity.inference.unknowns import EPS_RATIO
 
-    if isinstance(table.prior, str):
-        file = table.prior.endswith(".toml")
-        material = materials.load(plan.folder / table.prior if file else table.prior)
-        return {n: [p.mean, p.sd, p.source] for n, p in material_priors(material, free).items()}
     known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
-    priors: dict[str, list[Any]] = {}
-    for name, prior in (table.prior or {}).items():
+    given: dict[str, Any] = {}
+    for name, prior in table.prior.items():
         canonical = canonical_name(name, known)
-        if canonical is None or canonical not in free:
+        if prior is None:
+            given[str(plan.folder / name) if name.endswith(".toml") else name] = prior
+        elif canonical is None or canonical not in free:
             raise InputError(
                 f"fit.prior must be of free parameters, got '{name}'; free it or leave it out"
             )
-        mean = float(known[canonical].check(prior.mean, f"fit.prior.{name}.mean"))
-        std = float(obeying(prior.std, f"fit.prior.{name}.std", known[canonical].kind, "positive"))
-        priors[canonical] = [mean, std, "plan"]
-    return priors
+        else:
+            given[canonical] = prior
+    priors = priors_of(given, free)
+    return {name: [p.mean, p.sd, p.source] for name, p in priors.items()}
 
 
 def _outputs(free: Sequence[str], known: Mapping[str, Parameter]) -> dict[str, Output]:

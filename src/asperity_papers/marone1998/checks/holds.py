@@ -157,7 +157,7 @@ def prz_less_sensitive(laboratory: Laboratory) -> Numbers:
 
 @check("prz-below-data")
 def prz_below_data(laboratory: Laboratory) -> Numbers:
-    below = {}
+    below: Numbers = {}
     for name, spring in (("soft", laboratory.soft), ("stiff", laboratory.stiff)):
         times, read = (column[pairs(name)[0] >= 400] for column in pairs(name))
         model = laboratory.healing(PRZ, *spring, times)
@@ -209,7 +209,7 @@ def healing_scales_as_b(laboratory: Laboratory) -> Numbers:
 @check("long-hold-limit")
 def long_hold_limit(laboratory: Laboratory) -> Numbers:
     """theta/t, and V over the drive's, towards a hold of 1e5 s at both springs."""
-    found = {}
+    found: Numbers = {}
     times = np.array([1e3, 1e4, 1e5])
     for label, (k, V) in (("soft", laboratory.soft), ("stiff", laboratory.stiff)):
         held = laboratory.holds(AGEING, k, V, times)
@@ -247,7 +247,8 @@ def product(laboratory: Laboratory) -> Numbers:
 
 @check("faster-falls-faster")
 def faster_falls_faster(laboratory: Laboratory) -> Numbers:
-    p, lower = laboratory.numbers, {}
+    p = laboratory.numbers
+    lower: Numbers = {}
     V = p.V_soft * np.array([[1.0], [10.0]])
     times = np.array([1.0, 10.0, 100.0, 1e3])
     for name, letter in LAWS.items():
@@ -258,7 +259,8 @@ def faster_falls_faster(laboratory: Laboratory) -> Numbers:
 
 @check("lower-velocity-higher-state")
 def higher_state(laboratory: Laboratory) -> Numbers:
-    p, more = laboratory.numbers, {}
+    p = laboratory.numbers
+    more: Numbers = {}
     V = p.V_soft * np.array([[1.0], [10.0]])
     times = np.array([10.0, 100.0, 1e3, 1e4])
     for name, letter in LAWS.items():

@@ -22,7 +22,7 @@ def up_and_down(
 ) -> VelocityStepResponse:
     """The steps of Figure 2, from steady sliding both."""
     p = laboratory.numbers
-    slow, fast = p["V_2"].si_values
+    slow, fast = laboratory.pair("V_2")
     return step_response(
         laboratory.illustration(name),
         velocity_before=[slow, fast],
@@ -69,7 +69,7 @@ def peak_to_end(laboratory: Laboratory) -> Numbers:
 def end_level(laboratory: Laboratory) -> Numbers:
     """At 7 Dc, by an integration of that length, and in the end."""
     p = laboratory.numbers
-    slow, fast = p["V_2"].si_values
+    slow, fast = laboratory.pair("V_2")
     found = {}
     for name, letter in LAWS.items():
         slider = Slider(laboratory.illustration(name), spring=p.k_2, load=1.0)
@@ -83,7 +83,7 @@ def end_level(laboratory: Laboratory) -> Numbers:
 
 @check("direct-effect")
 def direct_effect(laboratory: Laboratory) -> Numbers:
-    signs = {}
+    signs: Numbers = {}
     for name, letter in LAWS.items():
         up, down = up_and_down(laboratory, name).direct
         signs |= {f"{letter}, up": float(up), f"{letter}, down": -float(down)}

@@ -31,15 +31,15 @@ def decade_of_velocity(laboratory: Laboratory) -> Numbers:
     """Healing and static friction itself, a decade of velocity apart, of the gouge of Figure 5."""
     p, law = laboratory.numbers, laboratory.gouge()
     held = hold_response(
-        law, hold_time=1e4, velocity=p["V_5"].si_values, stiffness=p.k_stiff, settling=False
+        law, hold_time=1e4, velocity=laboratory.pair("V_5"), stiffness=p.k_stiff, settling=False
     )
     healing, absolute = np.diff(held.healing)[0], np.diff(held.maximum)[0]
     return {
         "scan": scans()["figure_4"]["offset"],
         "healing": float(healing),
         "static friction": float(absolute),
-        "b ln 10": float(law.B) * DECADE,
-        "a ln 10": float(law.A) * DECADE,
+        "b ln 10": p.B_5 * DECADE,
+        "a ln 10": (p.B_5 - p.B_less_A_5) * DECADE,
     }
 
 
@@ -82,7 +82,7 @@ def scaled_memory_length(laboratory: Laboratory) -> Numbers:
 
 @check("shear-band-of-laboratory")
 def shear_band(laboratory: Laboratory) -> Numbers:
-    low, high = laboratory.numbers["D0_laboratory"].si_range
+    low, high = laboratory.pair("D0_laboratory")
     band = 1e3 * np.array([low, high]) / laboratory.numbers.zeta
     # Over the 0.1 and 1 mm that are printed.
     return {"low": float(band[0] / 0.1), "high": float(band[1] / 1.0)}
@@ -98,7 +98,7 @@ def intrinsic_and_dilation(laboratory: Laboratory) -> Numbers:
 
 @check("dilation-too-small")
 def dilation_too_small(laboratory: Laboratory) -> Numbers:
-    low, high = laboratory.numbers["strengthening"].si_range
+    low, high = laboratory.pair("strengthening")
     return {"low": low / laboratory.numbers.dilation, "high": high / laboratory.numbers.dilation}
 
 

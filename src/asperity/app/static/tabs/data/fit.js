@@ -250,7 +250,7 @@ export class FitPanel {
       const lowest = Math.min(...laws.filter(([, l]) => l.aicc !== null).map(([, l]) => l.aicc));
       fill(this.results, buttons,
         table(["Law", "χ²", "degrees of freedom", "p", "AICc − lowest", "weight", ""],
-          laws.map(([n, l]) => [n, digits(l.chi2), String(l.dof), digits(l.p_value, 2), l.aicc === null ? "–" : digits(l.aicc - lowest), digits(l.weight, 3), l.converged ? (l.excluded ? `excluded: ${l.why}` : "") : l.message]), "Comparison"),
+          laws.map(([n, l]) => [n, digits(l.chi2), String(l.dof), digits(l.p_value, 2), l.aicc === null ? "–" : digits(l.aicc - lowest), digits(l.weight, 3), l.converged ? (n === comparison.best ? "lowest AICc" : `${l.standing}: ${l.deciding}`) : l.message]), "Comparison"),
         ...laws.filter(([, l]) => l.converged).map(([n, l]) => el("details", { open: n === comparison.best }, el("summary", {}, n), el("p", {}, fitSentence(l)), ...fitTables(l))),
         ...this.#bands(bands), ...this.#runs(runs), this.#residuals(residuals));
     }

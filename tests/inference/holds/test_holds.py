@@ -1,0 +1,143 @@
+"""Tables of holds as data: A, B and D0 that an independent integration was made with come back."""
+
+import numpy as np
+import pytest
+
+from asperity.errors import InputError
+from asperity.inference import compare, fit, healing_table, read_healing, sample_posterior
+from asperity.inference.holds.term import HoldTerm
+from asperity.laws import RiceRuina
+from references.memory_tests import Interface
+
+A, B, D0 = 0.011, 0.014, 4e-6
+TIMES = np.array([3.0, 30.0, 300.0, 3e3, 3e4])
+SPRINGS = ((2e3, 1e-6), (6e4, 3e-7))
+ERROR = 2e-4
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """Healing at both springs by SciPy, with hold times, velocities and stiffnesses."""
+    rows = []
+    for k, V in SPRINGS:
+        interface = Interface("rice-ruina", A, B, D0, k)
+        for time in TIMES:
+            level, _, high, *_ = interface.hold(V, time)
+            rows.append((time, high - level, V, k))
+    return np.array(rows).T
+
+
+@pytest.fixture(scope="module")
+def noise():
+    return ERROR * np.random.default_rng(7).standard_normal(2 * TIMES.size)
+
+
+def table(exact, healing, **more):
+    time, _, V, K = exact
+    return healing_table({"hold_time": time, "healing": healing, "V": V, "K": K, **more})
+
+
+def test_the_numbers_come_back(exact, noise):
+    done = fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=16)
+    assert done.converged
+    assert done.p_value > 0.001
+    for name, true in (("A", A), ("B", B), ("D0", D0)):
+        p = done.parameters[name]
+        assert abs(p.value - true) < 4 * p.se, name
+        assert p.se < 0.15 * true
+
+
+def test_an_error_that_is_not_given_is_that_of_the_residuals(exact, noise):
+    """The same estimate; the error as rms of what is left, and intervals of Student's t."""
+    given = fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=16)
+    done = fit(table(exact, exact[1] + noise), "rice-ruina", starts=16)
+    (term,) = done.objective.terms_of(HoldTerm)
+    expected = ERROR * np.sqrt(given.chi2 / given.dof)
+    assert term.error == pytest.approx(expected, rel=1e-4)
+    assert not done.judged_by_chi2
+    assert "estimated from the residuals" in " ".join(done.warnings)
+    for name in ("A", "B", "D0"):
+        mine, known = done.parameters[name], given.parameters[name]
+        assert mine.value == pytest.approx(known.value, rel=1e-3)
+        assert mine.se == pytest.approx(known.se * expected / ERROR, rel=0.02)
+
+
+def test_derivatives_are_those_of_differences(exact):
+    term = HoldTerm(table(exact, exact[1], healing_err=1.0), RiceRuina, {"mu0": 0.6, "V0": 1e-6})
+    at = {"A": A, "B": B, "D0": D0}
+    found = term.residuals(at)
+    np.testing.assert_allclose(found.values, 0, atol=1e-8)
+    for column, name in enumerate(at):
+        high, low = (term.residuals(at | {name: at[name] * f}).values for f in (1 + 1e-4, 1 - 1e-4))
+        slope = (high - low) / (2e-4 * at[name])
+        np.testing.assert_allclose(
+            found.jacobian[:, column], slope, rtol=1e-4, atol=1e-5 * abs(slope).max()
+        )
+    many = term.chi2_of_many([at, at | {"A": 1.1 * A}])
+    other = term.residuals(at | {"A": 1.1 * A})
+    np.testing.assert_allclose(many, [0, np.sum(other.values**2)], rtol=1e-6, atol=1e-12)
+
+
+@pytest.mark.long
+def test_other_laws_are_excluded(exact, noise):
+    data = table(exact, exact[1] + noise, healing_err=ERROR)
+    result = compare(data, ["rice-ruina", "ruina-slip"], evidence=False, starts=16)
+    assert result.best == "rice-ruina"
+    assert result.laws["ruina-slip"].excluded
+
+
+def test_units_stand_in_the_heading(tmp_path):
+    path = tmp_path / "holds.csv"
+    path.write_text(
+        "# granite\nhold_time (s),healing,V [um/s],K (1/um),rock\n"
+        "10,0.01,1,0.002,x\n100,.02,10,2e-3,y\n",
+        encoding="utf-8",
+    )
+    read = read_healing(path)
+    np.testing.assert_allclose(read.V, [1e-6, 1e-5])
+    np.testing.assert_allclose(read.K, 2e3)
+    assert read.errors is None
+    over = healing_table(
+        {"hold_time": 10, "healing": 0.01, "V": "1 um/s", "K": "0.02 N/um", "W0": "10 N"}
+    )
+    np.testing.assert_allclose(over.K, 2e3)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("hold_time,healing\n1,0.1\n", "got none for V, K"),
+        ("hold_time,healing,V,K\n1,x,1e-6,1e3\n", "a number in column healing"),
+        ("hold_time,healing,V,K\n-1,0.1,1e-6,1e3\n", "hold_time must be positive"),
+        ("hold_time,healing,healing_err,V,K\n1,0.1,0,1e-6,1e3\n", "healing_err must be positive"),
+        ("hold_time,healing,V (N),K\n1,0.1,1e-6,1e3\n", "V"),
+        ("hold_time,healing,healing,V,K\n", "lines"),
+        ("", "lines"),
+    ],
+)
+def test_what_breaks_a_rule_is_said(tmp_path, text, words):
+    path = tmp_path / "holds.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputError, match=words):
+        read_healing(path)
+
+
+def test_what_holds_cannot_say_is_refused(exact):
+    data = table(exact, exact[1], healing_err=ERROR)
+    with pytest.raises(InputError, match="table has stiffness"):
+        fit(data, "rice-ruina", ["A", "K"])
+    few = healing_table({"hold_time": [1, 10], "healing": [0.1, 0.2], "V": 1e-6, "K": 1e3})
+    with pytest.raises(InputError, match="more data than free parameters"):
+        fit(few, "rice-ruina", ["A", "B", "D0"])
+
+
+def test_a_posterior_is_refused(exact):
+    done = fit(
+        table(exact, exact[1], healing_err=ERROR),
+        "rice-ruina",
+        ["B"],
+        fixed={"A": A, "D0": D0},
+        starts=2,
+    )
+    with pytest.raises(InputError, match="profile likelihood"):
+        sample_posterior(done)
