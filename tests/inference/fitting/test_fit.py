@@ -323,4 +323,7 @@ def test_one_row_with_as_many_parameters_as_data_is_refused(pmma):
         fit(table_of(columns), "elasto-plastic", ("A", "B"), material=pmma)
     # One of each is an inversion.
     del columns["mean_friction"], columns["mean_friction_err"]
-    assert fit(table_of(columns), "rice-ruina", ("eps_ratio",), material=pmma, starts=1).converged
+    columns |= {"mu1": 1e-5, "mu1_err": 1e-8}
+    found = fit(table_of(columns), "rice-ruina", ("eps_ratio",), material=pmma, starts=1)
+    assert found.converged
+    assert found.chi2 == pytest.approx(0, abs=1e-6)

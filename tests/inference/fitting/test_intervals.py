@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from asperity.inference.fitting.intervals import bounded_interval
+from references.populations import population
 
 #: Feldman and Cousins (1998), Table X: estimate in standard deviations from the bound, and the
 #: intervals of 68.27, 90 and 95 %.
@@ -41,7 +42,7 @@ def test_where_bounds_leave_no_room_the_interval_is_the_whole_range(estimate):
     assert bounded_interval(estimate, 1.0, 0.95, 0.0, 0.5) == (0.0, 0.5)
 
 
-@pytest.mark.parametrize("truth", [0.0, 0.3, 1.5])
+@pytest.mark.parametrize("truth", population([0.0, 0.3, 1.5], short=2))
 def test_coverage(truth):
     # Estimates at the middles of equal probabilities: the share is exact to two of them.
     count = 200
