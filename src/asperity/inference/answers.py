@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import re
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
@@ -20,7 +21,7 @@ from asperity.inference.runs.assembly import RunOptions
 from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
-from asperity.laws import get_law, known_law, registered
+from asperity.laws import Law, get_law, known_law, registered
 from asperity.outputs.targets import require_rereadable
 from asperity.questions import fit as questions
 from asperity.recording import Trace
@@ -247,6 +248,70 @@ def answer_comparison(
     options = _options(question, read, progress)
     laws = compared_laws(question.laws)
     return compare(read_data(question, read), laws, question.free, **options)
+
+
+def _loaded(data: Any, fixed: Mapping[str, Any] | None) -> list[Any]:
+    """Sets of data as they are, files as what they hold."""
+    several = data if isinstance(data, list | tuple) else [data]
+    loaded: list[Any] = []
+    for one in several:
+        if isinstance(one, str | os.PathLike):
+            question = questions.Fit(
+                data=(questions.Data(file=Path(one)),), fixed=dict(fixed or {})
+            )
+            loaded += read_data(question)
+        else:
+            loaded.append(one)
+    return loaded
+
+
+def fit_data(
+    data: Any, law: str | type[Law] | None = None, free: Sequence[str] | None = None, **options: Any
+) -> Fit:
+    """Fit a law to files or to data at hand, as ``asperity fit`` does.
+
+    Parameters
+    ----------
+    data : path, Trace, RecordedRun, LockInTable or HealingTable, or a list of them
+        A file is read as what it is: a table of readings, one of holds, or a recording.
+    law : str or type of Law, optional
+        By default ``rice-ruina`` for recordings and holds, ``elasto-plastic`` for readings.
+    free : sequence of str, optional
+        Free parameters; by default all that the data may show.
+    **options
+        Of `asperity.inference.fit`.
+
+    Raises
+    ------
+    InputError
+        As of `asperity.inference.fit`, or if a file cannot be read.
+    """
+    loaded = _loaded(data, options.get("fixed"))
+    return fit(loaded, default_law(loaded) if law is None else law, free, **options)
+
+
+def compare_data(
+    data: Any, laws: str | Sequence[str] = "all", free: Sequence[str] | None = None, **options: Any
+) -> Comparison:
+    """Compare laws on files or on data at hand, as ``asperity compare`` does.
+
+    Parameters
+    ----------
+    data : path, Trace, RecordedRun, LockInTable or HealingTable, or a list of them
+    laws : sequence of str or "all"
+        "all" are those that depend on the velocity.
+    free : sequence of str, optional
+        Free parameters of all laws.
+    **options
+        Of `asperity.inference.compare`.
+
+    Raises
+    ------
+    InputError
+        As of `asperity.inference.compare`, or if a file cannot be read.
+    """
+    names = compared_laws([laws] if isinstance(laws, str) else laws)
+    return compare(_loaded(data, options.get("fixed")), names, free, **options)
 
 
 def compared_laws(names: Sequence[str]) -> list[str]:
