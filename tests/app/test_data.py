@@ -189,7 +189,7 @@ def test_what_is_no_recording_gets_a_sentence(what, tmp_path):
     [
         (b"a,b\n" + b"1,2\n" * 300, {}, "Time column must be a column"),
         (b"time,b\n" + b"1,2\n" * 300, {"rate": "1 kg"}, "Sampling rate must"),
-        (b"time (s),Ft (N)\n0,1\n1,2\n2,3\n3,3\n", {}, "Normal load must name a channel"),
+        (b"time (s),Ft (N)\n0,1\n1,2\n2,3\n3,3\n", {}, "Friction must name the friction"),
         (b"PK\x03\x04" + b"\0" * 300, {}, "The recording must be"),
     ],
 )

@@ -221,6 +221,16 @@ CASES: dict[str, tuple[Callable[..., Any], dict[str, Any], list[tuple[str, Any]]
         {"recording": "recording.csv", "modulated": True, "harmonics": 4, "detrend": "linear"},
         [("recording", 3), ("modulated", None), ("detrend", 3), ("recording", SLIDER)],
     ),
+    "fit": (
+        asp.fit,
+        {"data": "recording.csv", "law": "rice-ruina", "free": ["A"]},
+        [("data", 3), ("data", SLIDER), ("law", 3), ("law", SLIDER), ("free", 3), ("free", [3])],
+    ),
+    "compare": (
+        asp.compare,
+        {"data": "recording.csv", "laws": ["rice-ruina", "ruina-slip"]},
+        [("data", 3), ("data", SLIDER), ("laws", 3), ("laws", [SLIDER]), ("laws", "rice")],
+    ),
     "run": (
         asp.run,
         {"protocol": "protocol.toml", "out": "run.nc"},

@@ -23,6 +23,7 @@ from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.laws import Law, get_law, known_law, registered
 from asperity.outputs.targets import require_rereadable
+from asperity.parameters.arguments import file_path, shown
 from asperity.questions import fit as questions
 from asperity.recording import Trace
 from asperity.recording.readers.from_file import read_source
@@ -256,9 +257,8 @@ def _loaded(data: Any, fixed: Mapping[str, Any] | None) -> list[Any]:
     loaded: list[Any] = []
     for one in several:
         if isinstance(one, str | os.PathLike):
-            question = questions.Fit(
-                data=(questions.Data(file=Path(one)),), fixed=dict(fixed or {})
-            )
+            file = questions.Data(file=Path(file_path(one, "data")))
+            question = questions.Fit(data=(file,), fixed=dict(fixed or {}))
             loaded += read_data(question)
         else:
             loaded.append(one)
@@ -310,7 +310,10 @@ def compare_data(
     InputError
         As of `asperity.inference.compare`, or if a file cannot be read.
     """
-    names = compared_laws([laws] if isinstance(laws, str) else laws)
+    listed = laws.split(",") if isinstance(laws, str) else laws
+    if not isinstance(listed, list | tuple) or not all(isinstance(law, str) for law in listed):
+        raise InputError("laws", "be names of laws", shown(laws), "write 'all' or ['rice-ruina']")
+    names = compared_laws([law.strip() for law in listed])
     return compare(_loaded(data, options.get("fixed")), names, free, **options)
 
 

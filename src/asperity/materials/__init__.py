@@ -7,6 +7,7 @@ pydantic, importing this package does not.
 from __future__ import annotations
 
 from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.materials.bibliography import available_citations, citation, cited_works
@@ -23,6 +24,7 @@ __all__ = [
     "citation",
     "cited_works",
     "load",
+    "load_from",
 ]
 
 
@@ -31,6 +33,17 @@ def available() -> tuple[str, ...]:
     from asperity.materials.loader import packaged
 
     return tuple(sorted(packaged()))
+
+
+def load_from(folder: Path, name: str) -> Material:
+    """Load the material that a file names: by its name, or by a path relative to the folder.
+
+    Raises
+    ------
+    InputError
+        As of `load`.
+    """
+    return load(folder / name if name.endswith(".toml") else name)
 
 
 def load(name: str | PathLike[str]) -> Material:

@@ -73,8 +73,7 @@ def numbers_of(
             )
     source = None
     if material:
-        file = material.endswith(".toml")
-        source = materials.load(folder / material if file else material)
+        source = materials.load_from(folder, material)
     numbers = sourced_numbers(stated, source, "protocol", law_name)
     needed = [n for n in names if known[n].default is None or (n == "M" and inertia)]
     missing = [n for n in needed if n not in numbers]

@@ -384,6 +384,10 @@ def _new_events(
 def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
     """Attributes of the file besides those of the solver."""
     numbers = protocol.numbers
+    works = materials.cited_works(protocol.slider.law.source)
+    if protocol.material:
+        source = materials.load_from(protocol.folder, protocol.material).source
+        works |= materials.cited_works(source)
     return {
         "title": protocol.title or "run of a protocol",
         "protocol": "; ".join(protocol.lines),
@@ -391,7 +395,7 @@ def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
         f"velocity {protocol.programme.level.velocity!r} m/s",
         "material": protocol.material,
         "origin_of_parameters": "; ".join(f"{n}: {v.origin}" for n, v in numbers.items()),
-        "citation": "\n".join(materials.cited_works(protocol.slider.law.source).values()),
+        "citation": "\n".join(works.values()),
         "method": " and ".join(done.methods),
         "steps": done.steps,
         "unresolved_ringing": done.unresolved_ringing,

@@ -134,10 +134,7 @@ def _numbers(
     known: Mapping[str, Parameter],
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Numbers that are the same everywhere, in SI, and where each comes from."""
-    material = None
-    if plan.material:
-        file = plan.material.endswith(".toml")
-        material = materials.load(plan.folder / plan.material if file else plan.material)
+    material = materials.load_from(plan.folder, plan.material) if plan.material else None
     ratios = {
         ratio: checked_value(RATIOS[ratio].parameter, value)
         for name, value in plan.parameters.items()

@@ -18,7 +18,7 @@ from typing import Any
 from asperity._version import __version__
 from asperity.errors import InputError, listed
 from asperity.laws import get_law
-from asperity.materials import cited_works
+from asperity.materials import cited_works, load_from
 from asperity.orbit.search import available_cores
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
 from asperity.parameters.arguments import file_path, whole_number
@@ -226,6 +226,8 @@ def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
     works: dict[str, str] = {}
     for law in grid.record["laws"]:
         works |= cited_works(get_law(law).source)
+    if plan.material:
+        works |= cited_works(load_from(plan.folder, plan.material).source)
     return {
         "title": plan.title or f"Sweep of {grid.points:,} points",
         "source": f"asperity {__version__}",

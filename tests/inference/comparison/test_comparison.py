@@ -305,4 +305,4 @@ def test_laws_of_a_recording_are_judged_by_the_likelihood_that_decides():
     assert [row[-1].partition(":")[0] for row in rows] == ["lowest AICc", "excluded"]
     undetermined = replace(out.fit, undetermined=("B", "c"))
     (row,) = laws_table(judge({"ruina-slip": undetermined}))[1]
-    assert row[-1] == "B, c not determined"
+    assert row[-1] == "lowest AICc; B, c not determined"

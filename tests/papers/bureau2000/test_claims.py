@@ -105,7 +105,8 @@ def test_every_entry_is_complete(claims):
 
 
 def test_every_verdict_and_every_kind_occurs(claims):
-    assert {claim.verdict for claim in claims.values()} == set(VERDICTS)
+    # This paper leaves nothing undecided.
+    assert {claim.verdict for claim in claims.values()} == set(VERDICTS) - {"undecided"}
     assert {claim.kind for claim in claims.values()} == set(KINDS)
 
 
@@ -159,11 +160,12 @@ def test_the_page_on_claims_runs_as_it_says(claims, monkeypatch, capsys):
 
 def test_counts_of_the_readme_are_those_of_the_ledger(claims):
     tests = [claim for claim in claims.values() if claim.is_test]
-    counts = [len(claims), len(tests), *(sum(c.verdict == v for c in tests) for v in VERDICTS)]
+    verdicts = [v for v in VERDICTS if v != "undecided"]
+    counts = [len(claims), len(tests), *(sum(c.verdict == v for c in tests) for v in verdicts)]
     text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     stated = re.search(
-        r"(\d+) statements of the paper .*?(\d+) of them are tests .*?: (\d+) are reproduced, "
-        r"(\d+) are misprints, (\d+) differ",
+        r"(\d+) statements of the paper: of the (\d+) that could have come out otherwise "
+        r"(\d+) are reproduced, (\d+) are misprints, (\d+) differ",
         text,
     )
     assert [int(n) for n in stated.groups()] == counts

@@ -142,7 +142,7 @@ def test_transients_become_named_numbers(tmp_path: Path) -> None:
          "axes.mu1 must have a name of its own"),
         ({"axes": {"epsilon": {"values": (0.1,)}, "a/b": {"zip": {"K": (1e5, 3e5)}}}},
          "letters, digits and underscores, got 'a/b'"),
-        ({"seed": -1}, "seed must be greater than or equal to 0, got -1"),
+        ({"seed": -1}, "seed must be at least 0, got -1"),
     ],
 )  # fmt: skip
 def test_mistakes_are_told_before_anything_is_written(
