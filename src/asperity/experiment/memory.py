@@ -25,6 +25,7 @@ from asperity.parameters.arguments import instance, switch
 from asperity.parameters.parameter import Displayed, SummaryLine, number_line
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.named import slider_values
+from asperity.slider.problem import flatten
 from asperity.transients.batch import End
 from asperity.transients.hold_and_step import SETTLED, HoldResponse, Settling, hold, settle, step
 
@@ -250,7 +251,7 @@ def hold_response(
         )
     V = obeying(velocity, "hold_response.velocity", "velocity", "positive")
     follow = switch(settling, "hold_response.settling")
-    (flat, V, time), shape = _flat((slider, V, time), "hold_response")
+    (flat, V, time), shape = flatten((slider, V, time), "hold_response")
 
     def run(slider: Slider, V: jax.Array, time: jax.Array, runaway: jax.Array) -> tuple:
         found, extremum = hold(slider, V, time)
@@ -317,7 +318,7 @@ def step_response(
     first = obeying(velocity_before, "step_response.velocity_before", "velocity", "positive")
     V = obeying(velocity, "step_response.velocity", "velocity", "positive")
     follow = switch(settling, "step_response.settling")
-    (flat, first, V), shape = _flat((slider, first, V), "step_response")
+    (flat, first, V), shape = flatten((slider, first, V), "step_response")
     if np.any(first == V):
         raise InputError(
             f"step_response.velocity must differ from the one before, got {V[first == V][0]:g} m/s "
@@ -370,20 +371,6 @@ def _slider(slider: Any, stiffness: Any) -> Slider:
             f"law must depend on the velocity, got {slider.law.name}; it has no memory to test"
         )
     return slider
-
-
-def _flat(tree: Any, name: str) -> tuple[Any, tuple[int, ...]]:
-    leaves = jax.tree.leaves(tree)
-    try:
-        shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
-    except ValueError:
-        shapes = sorted({str(np.shape(leaf)) for leaf in leaves if np.shape(leaf)})
-        raise InputError(
-            f"{name} must have arguments of shapes that broadcast, got {', '.join(shapes)}; "
-            "give arrays of one shape, or add axes of length 1"
-        ) from None
-    flat = jax.tree.map(lambda a: np.ravel(np.broadcast_to(np.asarray(a, float), shape)), tree)
-    return flat, shape
 
 
 def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float) -> Any:

@@ -5,7 +5,7 @@ The equation of motion follows from law, inertia and damping.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import jax
 import numpy as np
@@ -21,6 +21,8 @@ from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic
 from asperity.slider.radiating import Radiating
 from asperity.slider.slider import Slider
+
+T = TypeVar("T")
 
 
 def equation_of_motion(
@@ -158,15 +160,33 @@ def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation
     return checked_modulation(modulation)
 
 
-def flatten(problem: Problem) -> tuple[Problem, tuple[int, ...]]:
-    """Broadcast all parameters against each other and lay the points out along one axis."""
+def flatten(problem: T, name: str = "parameters") -> tuple[T, tuple[int, ...]]:
+    """Broadcast all arrays of a problem against each other, the points along one axis.
+
+    Parameters
+    ----------
+    problem : pytree of arrays
+    name : str
+        What messages call its arrays.
+
+    Returns
+    -------
+    flat : as `problem`
+        With arrays of shape (points,).
+    shape : tuple of int
+
+    Raises
+    ------
+    InputError
+        If the shapes do not broadcast.
+    """
     leaves = jax.tree.leaves(problem)
     try:
         shape = np.broadcast_shapes(*(np.shape(leaf) for leaf in leaves))
     except ValueError:
         shapes = sorted({str(np.shape(leaf)) for leaf in leaves if np.shape(leaf)})
         raise InputError(
-            f"parameters must have shapes that broadcast, got {', '.join(shapes)}; "
+            f"{name} must have shapes that broadcast, got {', '.join(shapes)}; "
             "give arrays of one shape, or add axes of length 1"
         ) from None
     return (

@@ -45,24 +45,16 @@ def figure_2(laboratory: Laboratory, name: str) -> Numbers:
     }
 
 
-@check("peak-height")
-def peak_height(laboratory: Laboratory) -> Numbers:
-    found = {letter: float(up_and_down(laboratory, n).direct[0]) for n, letter in LAWS.items()}
-    stiff = {
-        f"{letter}, stiff": float(up_and_down(laboratory, n, _STIFF).direct[0])
-        for n, letter in LAWS.items()
-    }
-    return found | stiff
+@check("peak-height", "direct")
+@check("peak-to-end", "evolution")
+def size_of_change(laboratory: Laboratory, name: str) -> Numbers:
+    """Of each law at the printed stiffness and at one that does not matter."""
 
+    def change(law: str, *stiffness: float) -> float:
+        return float(getattr(up_and_down(laboratory, law, *stiffness), name)[0])
 
-@check("peak-to-end")
-def peak_to_end(laboratory: Laboratory) -> Numbers:
-    found = {letter: float(up_and_down(laboratory, n).evolution[0]) for n, letter in LAWS.items()}
-    stiff = {
-        f"{letter}, stiff": float(up_and_down(laboratory, n, _STIFF).evolution[0])
-        for n, letter in LAWS.items()
-    }
-    return found | stiff
+    printed = {letter: change(law) for law, letter in LAWS.items()}
+    return printed | {f"{letter}, stiff": change(law, _STIFF) for law, letter in LAWS.items()}
 
 
 @check("end-level")
