@@ -106,8 +106,17 @@ def sourced_numbers(
     return offered | numbers
 
 
-def numbers_for(law_name: str, numbers: Mapping[str, SourcedNumber]) -> dict[str, SourcedNumber]:
+def numbers_for(
+    law_name: str, numbers: Mapping[str, SourcedNumber], *, modulated: bool = True
+) -> dict[str, SourcedNumber]:
     """The numbers of a point with this law, selected from `numbers`.
+
+    Parameters
+    ----------
+    law_name : str
+    numbers : mapping of str to SourcedNumber
+    modulated : bool
+        Whether the point has a modulation, with its amplitude and frequency.
 
     Raises
     ------
@@ -116,14 +125,16 @@ def numbers_for(law_name: str, numbers: Mapping[str, SourcedNumber]) -> dict[str
     """
     law = get_law(law_name)
     known = point_parameters(law)
-    missing = [name for name in required(law) if name not in numbers]
+    of_modulation = () if modulated else ("epsilon", "frequency", *MODULATION)
+    needed = [name for name in required(law) if name not in of_modulation]
+    missing = [name for name in needed if name not in numbers]
     if missing:
         example = f"{missing[0]}={known[missing[0]].example}"
         raise InputError(
             f"{law_name} must have all its numbers, got none for {', '.join(missing)}; "
             f"name a material that has them or give each one, like '{example}'"
         )
-    return {name: numbers[name] for name in known if name in numbers}
+    return {n: numbers[n] for n in known if n in numbers and n not in of_modulation}
 
 
 def refuse_foreign(law_name: str, given: Mapping[str, Any]) -> None:

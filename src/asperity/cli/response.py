@@ -21,6 +21,8 @@ Examples:
   asperity response --law elasto-plastic --material bureau2000 \\
       -V "1 um/s" -e 0.24 -f "120 Hz" --set epsilon2=0.02 --set tilt=0.03
   asperity response --table points.csv --out responses.csv --material bureau2000
+  asperity response --stick-slip --law rice-ruina --material bureau2000 \\
+      -V "1 um/s" --set "K=10 N/m" --set "M=0.1 kg" --inertia
 
 \b
 Convention: w(t) = W/W0 = 1 + eps cos wt,
@@ -48,6 +50,11 @@ _SHOWN = (
 
 @click.command(epilog=_EPILOG)
 @point_options
+@click.option(
+    "--stick-slip",
+    is_flag=True,
+    help="Without a modulation: period, drop and durations of stick-slip, if there is any.",
+)
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
 @click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
@@ -56,6 +63,7 @@ def response(
     law: str | None,
     material: str | None,
     given: dict[str, str],
+    stick_slip: bool,
     table: Path | None,
     out: Path | None,
     resume: bool,
@@ -66,6 +74,13 @@ def response(
     Mean friction, harmonics of the force and Floquet multipliers of the periodic orbit, be it
     stable or not; without inertia unless it is asked for.
     """
+    if stick_slip:
+        if table is not None:
+            raise InputError(
+                "--stick-slip must go with one point, got a table; leave --table out, or take "
+                "asperity.experiment.stick_slip_response with arrays"
+            )
+        return _stick_slip(law, material, given, as_json)
     if table is not None:
         if out is None:
             raise InputError("--out must be given with --table, got nothing; name the output file")
@@ -102,17 +117,47 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
     return 0 if result.converged else 1
 
 
-def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> str:
+def _stick_slip(law: str | None, material: str | None, given: dict[str, str], as_json: bool) -> int:
+    from asperity._version import __version__
+    from asperity.cli.report import to_json
+    from asperity.experiment import stick_slip_response
     from asperity.laws import get_law
-    from asperity.outputs.tables import aligned
-    from asperity.parameters import OUTPUTS, point_parameters
-    from asperity.units import format_si
+    from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
+    from asperity.slider.named import slider_from
 
-    kinds = point_parameters(get_law(law))
-    inputs = [
-        (name, format_si(number.value, kinds[name].kind, 6), number.origin)
-        for name, number in numbers.items()
-    ]
+    law = law_named(law)
+    refuse_foreign(law, given)
+    for name in ("epsilon", "frequency"):
+        if name in given:
+            raise InputError(
+                f"--stick-slip must come without a modulation, got {name} = {given[name]}; leave "
+                "it out, or leave --stick-slip out"
+            )
+    sourced = sourced_numbers(given, material_named(material), "command line", law)
+    numbers = numbers_for(law, sourced, modulated=False)
+    values = {name: number.value for name, number in numbers.items()}
+    result = stick_slip_response(
+        slider_from(get_law(law), values), velocity=values["V"],
+        inertia=bool(values.get("inertia", 0.0)), radiation_damping=values.get("eta"),
+    )  # fmt: skip
+    rows = result.values()
+    if as_json:
+        record = {name: value for name, value, _, _ in rows}
+        record |= {"result": str(result.result), "asperity_version": __version__, "law": law}
+        click.echo(to_json({**record, "parameters": values}))
+    else:
+        texts = [
+            (name, f"{value:.9g} {unit}".removesuffix(" 1"), meaning)
+            for name, value, unit, meaning in rows
+            if result.slips or name in ("steady", "stable")
+        ]
+        click.echo(_words(law, numbers, str(result.result), texts))
+    return 0 if result.slips or result.steady else 1
+
+
+def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> str:
+    from asperity.parameters import OUTPUTS
+
     outputs = []
     for name in _SHOWN:
         value = getattr(result, name)[()]
@@ -120,7 +165,26 @@ def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber])
         if isinstance(value, float):
             text = f"{value:.9g} {OUTPUTS[name].unit}".removesuffix(" 1")
         outputs.append((name, text, OUTPUTS[name].meaning))
-    return f"{law}\n{aligned(inputs, '  ')}\nresponse\n{aligned(outputs, '  ')}"
+    return _words(law, numbers, "response", outputs)
+
+
+def _words(
+    law: str,
+    numbers: dict[str, SourcedNumber],
+    title: str,
+    outputs: list[tuple[str, str, str]],
+) -> str:
+    from asperity.laws import get_law
+    from asperity.outputs.tables import aligned
+    from asperity.parameters import point_parameters
+    from asperity.units import format_si
+
+    kinds = point_parameters(get_law(law))
+    inputs = [
+        (name, format_si(number.value, kinds[name].kind, 6), number.origin)
+        for name, number in numbers.items()
+    ]
+    return f"{law}\n{aligned(inputs, '  ')}\n{title}\n{aligned(outputs, '  ')}"
 
 
 def _table(

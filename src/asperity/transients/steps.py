@@ -23,6 +23,7 @@ import numpy as np
 from jax import Array
 from jax.experimental.xla_metadata import set_xla_metadata
 
+from asperity.slider import ReversingInertial, StiffInertial
 from asperity.transients.dense_output import GOING_ON, STEPS, UNDERFLOW, StepChunk
 from asperity.transients.equations import SegmentEquations
 
@@ -105,6 +106,9 @@ def _primitives(jaxpr: Any) -> Iterator[str]:
 
 #: Factor by which a rejected step is shortened at least.
 _SAFETY = 0.9
+
+#: Shortest step (s) where the clock does not matter.
+_SHORTEST = 1e-200
 
 #: Steps that a compiled program tries before it returns, so that Ctrl-C is heard.
 _TRIALS = 4 * STEPS
@@ -199,6 +203,10 @@ def run_steps(
         Passed to the first step.
     limits : LengthLimits
     """
+    # Where a slip ends, the logarithm of the velocity changes within times far below the resolution
+    # of the clock, over which load and drive stay as they are.
+    by_rest = isinstance(system.motion, StiffInertial | ReversingInertial)
+    shortest = _SHORTEST if by_rest else 0.0
 
     def unfinished(run: AcceptedSteps) -> Array:
         tried = run.taken + run.rejected
@@ -217,7 +225,7 @@ def run_steps(
         factor = jnp.where(jnp.isfinite(trial.error), factor, limits.shrink)
         h_next = h * jnp.where(good, factor, jnp.minimum(factor, _SAFETY))
         # Neither does a length that is no number go on.
-        lost = ~good & ~(t + h_next > t)
+        lost = ~good & ~(h_next > shortest if shortest else t + h_next > t)
 
         def accepted(new: Array, old: Array) -> Array:
             return jnp.where(good, new, old)
