@@ -21,8 +21,7 @@ from asperity import materials
 from asperity.errors import InputError
 from asperity.outputs import Interrupted, UnfinishedOutput, output_file, require_disk, undisturbed
 from asperity.parameters.arguments import FilePath, typed
-from asperity.protocol.load import load_protocol
-from asperity.protocol.protocol import Protocol
+from asperity.protocol.protocol import Protocol, load_protocol
 from asperity.protocol.run_file import CHUNKS, append, describe
 from asperity.theory import closed_forms as cf
 from asperity.transients import Checkpoint, Trajectory, integrate_blocks
@@ -30,7 +29,7 @@ from asperity.transients import Checkpoint, Trajectory, integrate_blocks
 if TYPE_CHECKING:
     import xarray
 
-    from asperity.protocol.protocol import Protocol
+    from asperity.protocol.protocol import Protocol, load_protocol
 
 
 #: Growth per slipped metre (1/m) that counts as zero: far below that of any interface.
