@@ -1,4 +1,4 @@
-"""Normal equations of a lock-in: its columns, their sums over blocks of samples, and the solution.
+"""Normal equations of a lock-in: basis columns, their sums over blocks of samples, the solution.
 
 A reading is least squares on
 
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 Complex = NDArray[np.complex128]
 
-#: Samples that are summed at a time: their products fit into the second-level cache.
+#: Samples of a chunk: their products fit into the second-level cache.
 _CHUNK = 8192
 #: Largest deviation (rad) from an even clock for which the series is used.
 _NEAR = 0.1
@@ -80,7 +80,7 @@ class Basis:
         return self.drift + 4 * self.harmonics
 
     def columns(self, time: Array, out: Array | None = None) -> Array:
-        """Columns at some times.
+        """Columns of the basis at the times `time`.
 
         Parameters
         ----------

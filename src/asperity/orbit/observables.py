@@ -1,4 +1,4 @@
-"""The record of what every method evaluates on an orbit."""
+"""Observables of periodic orbits, common to all methods."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ class Observables(NamedTuple):
 
 
 class PeriodicOrbit(Protocol):
-    """What observables ask of an orbit, however it is represented.
+    """Interface of an orbit, independent of its representation.
 
     Two representations have it. `FourierOrbit` keeps the mean of each state apart from the rest on
     a grid, so that a rest 1e-9 of the mean keeps its digits, and is small enough for hundreds of

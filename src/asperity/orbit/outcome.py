@@ -1,4 +1,4 @@
-"""What became of the solve of an operating point, as data and as a sentence."""
+"""Outcome of the solve of an operating point, as a code and as a sentence."""
 
 from __future__ import annotations
 
@@ -78,7 +78,7 @@ _SENTENCES = {
 _GROUP = (
     "the rate of steady sliding per radian, about the larger of V/(omega D0) and V K/(omega W0 A),"
 )
-#: Of points out of range.
+#: Sentences of points out of range.
 _UNLOADED = (
     "not searched: epsilon (the largest share of W0 taken off the contacts) must be at most "
     f"{LARGEST_UNLOADING:g}, got {{detail:.9g}}; lower epsilon"
@@ -96,7 +96,7 @@ _NO_RATE = (
     "nearer to V0"
 )
 
-#: Where no branch was followed at all.
+#: Outcomes without an attempt to follow a branch.
 _NOT_FOUND = (
     "no periodic orbit found by any method that was tried; allow all methods, lower epsilon or "
     "stiffen the spring"
@@ -108,7 +108,7 @@ _LOST = (
 
 
 def sentence(outcome: int, detail: float) -> str:
-    """The sentence that a user reads."""
+    """The sentence of an outcome with its number."""
     if outcome == Outcome.NOT_RESOLVED and not math.isfinite(detail):
         return _LOST
     if outcome == Outcome.NO_ORBIT and detail == 0:

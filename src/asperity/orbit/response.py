@@ -98,7 +98,7 @@ class PeriodicResponse(Drawn):
     motion : Motion
         Equation of motion, with the slider.
     load : Modulation
-        What is modulated.
+        The modulation of the load.
     slider, velocity, epsilon, frequency
         The operating point, in SI; epsilon is the amplitude of the load's first harmonic.
     """
@@ -216,7 +216,7 @@ class PeriodicResponse(Drawn):
 
     @property
     def mode(self) -> NDArray[np.object_]:
-        """Bifurcation that the leading multiplier stands for, whether it has crossed or not.
+        """Bifurcation by the argument of the leading multiplier, stable or not.
 
         "fold", "period doubling" or "Neimark-Sacker"; "" where not converged or not known.
         """
@@ -244,7 +244,7 @@ class PeriodicResponse(Drawn):
 
     @property
     def result(self) -> NDArray[np.object_]:
-        """Of each point: converged, or the reason why not."""
+        """For each point "converged", or the reason of the failure."""
         return sentences(np.asarray(self.outcome), np.asarray(self.detail))
 
     @property

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+
 from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters, canonical_name
 from asperity.parameters.arguments import shown

@@ -81,7 +81,7 @@ def _visit(
 
 
 class _DamagedError(Exception):
-    """Whatever is wrong with an element."""
+    """An invalid element."""
 
 
 class _Element(NamedTuple):
@@ -93,7 +93,7 @@ class _Element(NamedTuple):
 
 
 def _refuse_unsound(path: Path, raw: bytes) -> None:
-    """Refuse a version 5 file whose elements do not lie within those that hold them."""
+    """Refuse a version 5 file with an element that exceeds the element around it."""
     order = {b"IM": "<", b"MI": ">"}.get(raw[126:128])
     if order is None:
         why = "which is cut within its header" if len(raw) < _HEADER else "whose header is damaged"

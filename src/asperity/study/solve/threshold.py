@@ -17,8 +17,8 @@ from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.study.threshold import require_scan, search_thresholds
 
-#: Smallest and largest number of points of a chunk: they share the fixed costs of a search, and take
-#: at most some seconds.
+#: Smallest and largest number of points of a chunk: enough to share the fixed costs of a search,
+#: and at most some seconds of work.
 _FEWEST, _MOST = 24, 480
 #: Codes of the bifurcations, in the order of `flag_meanings`.
 KINDS = ("fold", "period doubling", "Neimark-Sacker")

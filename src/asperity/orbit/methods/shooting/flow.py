@@ -1,4 +1,4 @@
-"""Shooting over one period: a third method, for equations that are not stiff but do oscillate.
+"""Integration over one period for shooting, for equations that are not stiff but oscillate.
 
 With inertia on elastic asperities the slider swings at a few times the frequency of the modulation.
 The states and their derivatives to the first states are integrated over the period by the explicit
@@ -47,7 +47,7 @@ class Steps(NamedTuple):
 
 
 class PeriodIntegration(NamedTuple):
-    """What a pass over the period tells of the orbit through given first states."""
+    """Result of an integration over the period from given initial states."""
 
     step: Array  # (size, points): Newton's, to be added to the first states
     leap: Array  # (points,): what it does to the slip exponent and logarithmic states
