@@ -1,4 +1,4 @@
-"""Kepler's equation, which inverts the grading of a grid or mesh."""
+"""Kepler's equation, the inverse of the grading theta = tau + g sin(tau) of a mesh."""
 
 from __future__ import annotations
 

@@ -27,7 +27,7 @@ from asperity.slider.motion import Motion
 
 
 class _Damped(Motion):
-    """Adds the radiation damping to what the slider and the drive give.
+    """A motion with radiation damping.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Parameters of equations of motion by name: which there are, their values, and other values."""
+"""Parameters of equations of motion by name: their list, their values, and replacing a value."""
 
 from __future__ import annotations
 

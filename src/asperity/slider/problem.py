@@ -43,7 +43,7 @@ def equation_of_motion(
     inertia : bool
         Whether the mass of the slider counts.
     eta : array, optional
-        Radiation damping (N s/m); None for none.
+        Radiation damping (N s/m), or None.
 
     Returns
     -------
@@ -110,7 +110,7 @@ def checked_problem(
     inertia: bool = False,
     radiation_damping: Any = None,
 ) -> Problem:
-    """Equations and load of what is asked, parameters of any shapes.
+    """Equations and load from the arguments of a response, parameters of any shapes.
 
     Raises
     ------
@@ -124,13 +124,13 @@ def checked_problem(
     load = chosen_modulation(epsilon, modulation)
     eta = None
     if radiation_damping is not None:
-        # Zero is no damping in a table; as an argument it would be a mistake.
+        # In a table 0 means no damping; as an argument 0 is a mistake.
         eta = obeying(radiation_damping, MACHINE["eta"].label, "damping", "positive")
     return Problem(equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta), load)
 
 
 def checked_slider(slider: Any) -> Slider:
-    """A slider, and nothing in its place.
+    """Check that an argument is a slider.
 
     Raises
     ------
@@ -141,7 +141,7 @@ def checked_slider(slider: Any) -> Slider:
 
 
 def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation:
-    """The modulation asked for, as an amplitude or as a programme.
+    """The modulation of an amplitude `epsilon`, or the checked `modulation`.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def flatten(problem: T, name: str = "parameters") -> tuple[T, tuple[int, ...]]:
     ----------
     problem : pytree of arrays
     name : str
-        What messages call its arrays.
+        Name of the arrays in messages.
 
     Returns
     -------

@@ -56,10 +56,10 @@ class Slider(Displayed, eqx.Module):
         Raises
         ------
         InputError
-            If a value breaks its rule or has a unit of another kind, or a law of one's own breaks
-            one of `asperity.laws.consistency.checked_law`.
+            If a value breaks its rule or has a unit of another kind, or a user's law fails
+            `asperity.laws.consistency.checked_law`.
         """
-        # A law whose fields are traced is still an instance of its class.
+        # A law with traced fields is an instance of its class, too.
         advice = "build one such as material.law('elasto-plastic')"
         self.law = checked_law(instance(law, Law, "slider.law", advice))
         self.K = jnp.asarray(MACHINE["K"].check(spring))

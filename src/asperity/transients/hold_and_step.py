@@ -1,4 +1,4 @@
-"""The two tests of an interface's memory, from steady sliding: a hold, and a step of the velocity.
+"""Slide-hold-slide and velocity-step tests of an interface, from steady sliding.
 
 In both the spring force has an extremum where the plastic velocity equals that of the drive, since
 dF/dt = K (V - v_pl) up to a positive factor. That instant is located, not sampled.
@@ -14,23 +14,23 @@ from jax import Array
 from asperity.slider import QuasiStatic, Slider
 from asperity.transients.batch import ConstantDrive, Drive, End, Reached, drive_many
 
-#: Share of the way from the extremum to steady sliding within which sliding counts as steady.
+#: Sliding counts as steady within this share of the change of force from the extremum.
 SETTLED = 0.05
 #: Logarithms within which a motion that never reached the velocity of the drive counts as over.
 _OVER = 1e-9
 
 
 class Settling(NamedTuple):
-    """The way from an extremum to steady sliding; arrays of shape (points,).
+    """Settling from an extremum to steady sliding; arrays of shape (points,).
 
     Attributes
     ----------
     end : array
         `End` of the motion.
     distance, slip : array
-        Way of the drive and of the slider (m) from the beginning of reloading, or from the step, to
-        where the force stays within `SETTLED` of the change from its extremum. NaN where the
-        motion does not come there.
+        Displacement of the drive and of the slider (m) from the beginning of reloading, or from the
+        step, to the point from which the force stays within `SETTLED` of the change from its
+        extremum. NaN if the motion does not reach this point.
     """
 
     end: Array
@@ -46,13 +46,13 @@ class HoldResponse(NamedTuple):
     level, minimum, maximum : array
         F/W0 in steady sliding, at the end of the hold, and at the maximum after it.
     hold_slip : array
-        Way of the slider in the hold (m).
+        Displacement of the slider in the hold (m).
     velocity, velocity_at_maximum : array
         Plastic velocity at the end of the hold and at the maximum, over that of the drive.
     states, states_at_maximum : array, shape (points, size)
         States of the quasi-static motion at the end of the hold and at the maximum.
     distance, slip : array
-        Way of the drive and of the slider (m) from the end of the hold to the maximum.
+        Displacement of the drive and of the slider (m) from the end of the hold to the maximum.
     end : array
         `End`: CROSSING where there is a maximum; STEADY where the force rises to its steady value
         without one, which is then the supremum.
@@ -126,7 +126,7 @@ class StepResponse(NamedTuple):
         F/W0 in steady sliding before the step, at its first extremum after it, and in steady
         sliding at the new velocity.
     distance, slip : array
-        Way of the drive and of the slider (m) from the step to the extremum.
+        Displacement of the drive and of the slider (m) from the step to the extremum.
     states_at_extremum : array, shape (points, size)
     end : array
         `End`: CROSSING where there is an extremum.

@@ -47,7 +47,7 @@ def integrate_blocks(
     """Motion of a slider under a programme, block by block.
 
     After an interruption, by Ctrl-C or otherwise, the blocks already yielded stay valid, and
-    `resume` continues from the `checkpoint` of the last one.
+    `resume` continues from the `checkpoint` of the last block.
 
     Parameters
     ----------
@@ -121,21 +121,21 @@ class _BlockWriter:
 
     @property
     def room(self) -> int:
-        """Samples that the block can still take."""
+        """Free samples of the block."""
         return self._rows - self._count
 
     def write(self, part: SegmentPart, times: np.ndarray) -> None:
         """Evaluate a segment part at `times` (s of the programme)."""
         none, over = len(part.dense_output.begin) == 0, part.termination
-        # At a break point that takes the contact away there is no motion to evaluate.
+        # There is no motion at a break point with a loss of contact.
         if len(times) == 0 or (none and over is not None and over.kind == "loss of contact"):
             return
         checkpoint, (W0, K, V) = part.checkpoint, self._scales
         t = np.clip(times - part.start, 0.0, part.end)
-        # Where no step was accurate there is the state before it.
+        # Without an accurate step the state before the step is evaluated.
         Y = checkpoint.states[:, None] if none else part.dense_output.evaluate(t)
         now = motion_samples(part.system, t, Y)
-        # Of a slider that runs away the velocity may leave the range of doubles.
+        # The velocity of a slider that runs away may overflow.
         with np.errstate(over="ignore"):
             columns = [
                 times,
@@ -258,7 +258,7 @@ def transient(
     programme = instance(programme, Programme, "programme", advice)
     rows = planned_rows(sampling, programme.duration)
     if rows is not None:
-        # Twice: the blocks, and the trajectory that they are joined to.
+        # The factor 2: the blocks, and the joined trajectory.
         size = 2 * rows * row_bytes(len(slider.law.state_names))
         require_memory(
             size, "sampling", f"{rows:.6g} rows",

@@ -112,7 +112,7 @@ TEXT_STEP = UNEQUAL.replace("np.arange(4.0))]", "np.arange(3.0))], step='1 ms'")
         (RAISES, "could not read it .RuntimeError: no."),
         (NOTHING, "must be a reader that returns a RawRecording"),
         (UNEQUAL, "RawRecording.columns must be of one length, got .3, 4. rows"),
-        (LISTS, "must be an array of one dimension, got another thing in 'F'"),
+        (LISTS, "must be an array of one dimension, got something else in 'F'"),
         (TEXT_STEP, "step must be a positive number of seconds, got '1 ms'"),
         (NUMBER_UNIT, "could not read it .TypeError: label and unit .* texts, got 'F' and 3"),
         (BARE, "could not read it .TypeError: columns of a RawRecording are RawColumns"),
