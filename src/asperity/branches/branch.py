@@ -199,7 +199,7 @@ class Branch(Displayed):
         -------
         xarray.Dataset
             Along the dimensions `point` and `bifurcation`; every variable has `units` and
-            `long_name`, real and imaginary parts are variables of their own.
+            `long_name`, real and imaginary parts are separate variables.
         """
         import xarray
 

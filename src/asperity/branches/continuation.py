@@ -214,6 +214,6 @@ def continuation(
 def _no_orbit(moving: ContinuedParameter) -> InputError:
     unit = f" {moving.unit}" if moving.unit else ""
     return InputError(
-        f"span must start where there is a periodic orbit, found none at {moving.name} = "
+        f"span must start where there is a periodic orbit, got none at {moving.name} = "
         f"{moving.start:g}{unit}; start elsewhere, such as at a small epsilon"
     )

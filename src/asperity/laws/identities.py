@@ -182,7 +182,7 @@ def derivatives(law: Law) -> None:
     middle = law.friction(v, state, w)
 
     def changed(logs: dict[str, Array]) -> Law:
-        """The law with its parameters multiplied: steps in units of their own."""
+        """The law with its parameters multiplied by e^log: relative steps."""
         return type(law)(**{n: getattr(law, n) * jnp.exp(logs[n]) for n in names})
 
     def friction(logs: Any, log_v: Array, state: Any, w: Array) -> Array:

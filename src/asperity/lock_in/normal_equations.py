@@ -6,7 +6,7 @@ A reading is least squares on
 
 with u = (t - centre)/half_width and phi = omega (t - centre). The last 2n columns are the
 derivatives with respect to the frequency. The set is closed under a shift of time, so a block of
-evenly sampled data needs no sine or cosine of its own: one table serves all blocks, each rotated
+evenly sampled data needs no separate sines and cosines: one table serves all blocks, each rotated
 by its phase. The sums of each block are kept, so that the residual near any harmonic follows from
 them without a second pass over the samples.
 

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 #: prefer a settling, in white and in AR(1) noise, and 99 of 100 keep their uncertainty to 10 %.
 _ODDS = (0.005, 0.0005)
 #: Time constants beyond this share of the window have no end in it: with a linear drift next to it
-#: the level that is settled to is an extrapolation.
+#: the final level is an extrapolation.
 OPEN = 1 / 3
 #: Longest time constant, in windows; time constants tried at once; and the shortest of a harmonic,
 #: in periods: next to it other harmonics are no longer apart.

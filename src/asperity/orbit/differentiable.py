@@ -158,7 +158,7 @@ class ResponseFunction:
         -------
         values : ResponseValues
         derivatives : dict of str to ResponseValues
-            By parameter, of the shapes of `values`: at each point to that point's own value. The
+            By parameter, of the shapes of `values`: at each point to the value of that point. The
             derivative to a parameter that all points share is the sum over the points.
         """
         padded, points = self._padded(parameters)
@@ -316,7 +316,7 @@ def response_function(
     Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). With D the equations of an orbit
     Y for parameters p, D(p, Y) = 0, its derivative is -D_Y^-1 D_p.
 
-    Where the search is needed within `jax.jit`, a process of its own does it, which takes some
+    Where the search is needed within `jax.jit`, a separate process does it, which takes some
     seconds to start. Multipliers with inertia or radiation damping need it at every point.
     Derivatives at its orbits are those of collocation on 216, 648 or 1,944 intervals, the fewest on
     which mean and harmonics agree with those of the search to 1e-10: within some 1e-7 of the
@@ -479,7 +479,7 @@ def _differentiate(
     *,
     program: Program,
 ) -> tuple[ResponseValues, Array]:
-    """Values, and derivatives at each point to its own parameters.
+    """Values, and derivatives at each point to the parameters of that point.
 
     The derivatives are of shape (parameters, points, columns), with a column for the mean, columns
     for the real and the imaginary parts of the harmonics, and the same for the multipliers.

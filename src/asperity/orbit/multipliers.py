@@ -24,7 +24,7 @@ from asperity.orbit.solution import Solution
 from asperity.slider.problem import Problem
 
 #: Agreement between two meshes, relative, at which the finer one is trusted to 1e-8: with three
-#: times the intervals its own error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
+#: times the intervals the error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
 AGREEMENT = 2e-7
 
 #: Each interval is cut into 3, 9, 27... parts for finer transfer maps, up to these numbers in all:

@@ -45,7 +45,7 @@ _SENTENCES = {
     Outcome.CONVERGED: "converged",
     Outcome.NO_ORBIT: (
         "no periodic orbit found: followed from steady sliding the branch stops at "
-        "{detail:.4g} of the amplitude asked for; lower epsilon or stiffen the spring"
+        "{detail:.4g} of the requested amplitude; lower epsilon or stiffen the spring"
     ),
     Outcome.NOT_RESOLVED: (
         "an orbit was found but not resolved: refining the mesh still changes it by {detail:.1e} "
@@ -56,23 +56,20 @@ _SENTENCES = {
         "still changes them by {detail:.1e} relative, above 1e-8"
     ),
     Outcome.FOLDED: (
-        "the branch from steady sliding folds back at epsilon = {detail:.3g}, below the amplitude "
-        "asked for; lower epsilon or stiffen the spring"
+        "the branch from steady sliding folds back at epsilon = {detail:.3g}, below the requested "
+        "amplitude; lower epsilon or stiffen the spring"
     ),
     Outcome.RUNAWAY: (
         "on the branch from steady sliding slip runs away: before epsilon = {detail:.3g} its "
         "pulses become faster than e^13 V, without inertia nothing bounds them; lower epsilon or "
-        "let inertia or radiation damping count"
+        "include inertia or radiation damping"
     ),
     Outcome.SENSITIVE: (
         "the branch from steady sliding is lost at epsilon = {detail:.3g}: sliding is so unstable "
         "for part of the period that a disturbance grows by more than e^15, which neither a mesh "
         "nor an experiment can hold; lower epsilon or stiffen the spring"
     ),
-    Outcome.INVALID: (
-        "a parameter breaks its rule, so that there is nothing to solve; keep every parameter in "
-        "its range"
-    ),
+    Outcome.INVALID: ("a parameter breaks its rule; keep every parameter in its range"),
 }
 
 _GROUP = (
@@ -98,8 +95,7 @@ _NO_RATE = (
 
 #: Outcomes without an attempt to follow a branch.
 _NOT_FOUND = (
-    "no periodic orbit found by any method that was tried; allow all methods, lower epsilon or "
-    "stiffen the spring"
+    "no method found a periodic orbit; allow all methods, lower epsilon or stiffen the spring"
 )
 _LOST = (
     "an orbit was found on a coarse mesh but lost on every finer one, so it may not exist; "

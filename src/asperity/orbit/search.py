@@ -8,8 +8,8 @@ than the range that is tested (`docs/theory/numerical_method.md`). A point outsi
 `Outcome.OUT_OF_RANGE` at once: a search there takes up to a minute and fails, or gives a stability
 that is round-off.
 
-On several cores each has a process of its own, since XLA's programs do not share one well. Worker
-processes are started once and kept; each loads the compiled programs from the cache.
+On several cores each core runs a process, since an XLA program gains little from several cores.
+Worker processes are started once and kept; each loads the compiled programs from the cache.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def find_orbits(
 #: Points handed to a process at a time: a fraction of a second of work.
 _SLICE = 20_000
 
-#: Below this many points the start of the processes, a second or two, is not worth it.
+#: With fewer points than this, starting processes (a second or two) takes longer than it saves.
 WORTHWHILE = 200_000
 
 

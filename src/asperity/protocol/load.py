@@ -1,4 +1,4 @@
-"""Protocol files."""
+"""Reading protocols from TOML files."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def load_protocol(path: str | os.PathLike[str]) -> Protocol:
 
 
 def protocol_of(content: Mapping[str, Any], source: str = "") -> Protocol:
-    """The protocol that the content of a file describes, with the rules of a file.
+    """The protocol of the content of a file, in which every quantity carries its unit.
 
     Parameters
     ----------

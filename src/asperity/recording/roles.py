@@ -128,7 +128,7 @@ def words(name: str) -> list[str]:
     ``"Normal_stress"`` and ``"NormalStress"`` agree.
     """
     if not name.isascii():
-        # The micro sign becomes the Greek letter, and an accent a mark of its own, left out here.
+        # The micro sign becomes the Greek letter; accents become separate marks and are dropped.
         apart = unicodedata.normalize("NFKD", name)
         name = "".join(c for c in apart if not unicodedata.combining(c))
     return [w.lower() for w in _WORD.findall(name)]

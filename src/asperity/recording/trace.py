@@ -145,7 +145,7 @@ class Trace(Displayed):
         Parameters
         ----------
         start, end : float, str or None
-            Seconds on the trace's own clock, or texts such as ``"10 s"``; None is no limit.
+            Seconds on the clock of the trace, or texts such as ``"10 s"``; None is no limit.
 
         Raises
         ------

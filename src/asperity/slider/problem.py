@@ -52,9 +52,9 @@ def equation_of_motion(
     Raises
     ------
     InputError
-        If inertia is asked for without a mass, damping is not positive where nothing else
+        If inertia is included without a mass, damping is not positive where nothing else
         would be left of it, a batch mixes points with and without elastic asperities, or either is
-        asked of a law that does not depend on the velocity.
+        combined with a law that does not depend on the velocity.
     """
     if not inertia and eta is None:
         return QuasiStatic(slider, V, omega)

@@ -69,5 +69,7 @@ class Slider(Displayed, eqx.Module):
     def summary(self) -> tuple[str, list[SummaryLine]]:
         """Law and parameters."""
         law, lines = self.law.summary()
-        own = [parameter_line(MACHINE[name], getattr(self, name)) for name in ("K", "W0", "M")]
-        return f"Slider, {law}", lines + own
+        of_machine = [
+            parameter_line(MACHINE[name], getattr(self, name)) for name in ("K", "W0", "M")
+        ]
+        return f"Slider, {law}", lines + of_machine

@@ -43,7 +43,7 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
     Raises
     ------
     InputError
-        If steady sliding is asked for at rest, states have the wrong number, they or their rates
+        If the start is steady sliding at rest, states have the wrong number, they or their rates
         are not finite, the interface force is negative and the law is not defined there, or there
         is no contact at the beginning.
     """

@@ -203,7 +203,7 @@ def transient(
         Steady sliding under the load and velocity before the first step, or states of the
         equation of motion, such as the last row of another trajectory's `states`.
     sampling : float, str or array, optional
-        Rate (Hz) or times (s) at which to write; by default the integrator's own steps, which
+        Rate (Hz) or times (s) at which to write; by default the steps of the integrator, which
         are short where much happens. The solution is a polynomial on every step, so that the
         rate costs next to nothing and does not change it.
     inertia : bool

@@ -1,7 +1,7 @@
 """Steps of controlled length, one after the other, whatever the method that makes them.
 
 Loops over small arrays are compiled as one kernel of the processor. XLA runs every operation of the
-body of a loop as a kernel of its own. Where the arrays hold a few numbers, calling the kernels
+body of a loop as a separate kernel. For arrays of a few numbers, calling the kernels
 takes several times as long as what they compute. A call that carries the attributes below is
 compiled to a single kernel, control flow included; compilers that do not know them run it as they
 run any call.

@@ -26,7 +26,7 @@ Scalar: TypeAlias = Any
 
 def number(default: float) -> Any:
     """Declare an optional number of a segment."""
-    # Arrays, and never Python numbers: those would have programs of their own.
+    # Arrays, not Python numbers: each Python number would need another compiled program.
     return eqx.field(converter=jnp.asarray, default=default)
 
 

@@ -70,8 +70,8 @@ class ParametrisedProblem:
     def names(self) -> tuple[str, ...]:
         """Names of all parameters: of the law, K, W0, M, V, frequency, eta, and of the load."""
         eta = ("eta",) if self.damped else ()
-        own = law_parameters(self.law)
-        return (*own, "K", "W0", "M", "V", "frequency", *eta, *self.load_names)
+        of_law = law_parameters(self.law)
+        return (*of_law, "K", "W0", "M", "V", "frequency", *eta, *self.load_names)
 
     @property
     def load_names(self) -> tuple[str, ...]:
@@ -167,7 +167,7 @@ def coefficients_of(load: Modulation) -> tuple[int, int, int] | None:
         return None
     if not isinstance(load, Periodic):
         raise InputError(
-            "modulation must be given by its Fourier coefficients where derivatives are asked for, "
+            "modulation must be given by its Fourier coefficients for derivatives, "
             f"got {type(load).__name__}; give its samples to asperity.loads.sampled"
         )
     return len(load.load), len(load.shear), len(load.pull)
@@ -194,7 +194,7 @@ class ResponseValues(NamedTuple):
     harmonics : complex array, shape (points, count)
         c_1, c_2, ...
     log_multipliers : complex array, shape (points, states)
-        ln|m| + i arg m, by falling modulus; of shape (points, 0) where not asked for.
+        ln|m| + i arg m, by falling modulus; of shape (points, 0) if not requested.
     outcome : int array, shape (points,)
         `asperity.orbit.Outcome` of each point. Where it is not `Outcome.CONVERGED`, all numbers
         and their derivatives are NaN.

@@ -178,12 +178,12 @@ class DirectSearch:
 
     def _from_motions(self, index: Indices) -> None:
         """Solve the points `index` from motions, up to the first motion without convergence."""
-        guess, settled = settled_orbits(
+        guess, periodic = settled_orbits(
             self.equations, self.parameters, self.problem, index, COARSER, every=self.every
         )
         wanted = len(index) if self.every else 1
-        if len(settled) >= wanted:
-            self._follow(guess, settled)
+        if len(periodic) >= wanted:
+            self._follow(guess, periodic)
 
 
 #: Numbers of intervals of the meshes for derivatives; an orbit uses the first that is accurate.

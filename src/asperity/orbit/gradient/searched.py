@@ -129,7 +129,7 @@ def _response(
 ) -> tuple[Float, NDArray[np.int64], Float]:
     """Real columns (points, count) of the response, the outcome, and derivatives of the columns.
 
-    The derivatives are of shape (parameters, points, count), without parameters if not asked for.
+    The derivatives are of shape (parameters, points, count), without parameters if not requested.
     """
     equations, points, count = program.equations, len(wanted), _count(program)
     orbits = search_orbits(equations, program.harmonics, parameters, wanted)

@@ -113,6 +113,18 @@ class Orbit(NamedTuple):
         return self.centre[:, None, None] + self.stage_deviations
 
 
+#: Newton steps for Kepler's equation; quadratic convergence needs fewer for a grading below 0.9.
+_KEPLER_STEPS = 60
+
+
+def eccentric_phase(theta: Float, grading: float) -> Float:
+    """Tau with tau + g sin(tau) = theta (Kepler's equation), 0 <= g < 1, by Newton's method."""
+    tau = np.array(theta, float)
+    for _ in range(_KEPLER_STEPS):
+        tau = tau - (tau + grading * np.sin(tau) - theta) / (1 + grading * np.cos(tau))
+    return tau
+
+
 def graded_mesh(intervals: int, points: int, grading: float) -> Float:
     """Mesh theta = tau + g sin(tau), finest at the weakest contact theta = pi."""
     tau = np.linspace(0.0, 2 * np.pi, intervals + 1)[:, None]

@@ -57,6 +57,6 @@ class Method(ABC):
         Returns
         -------
         Solution
-            Converged points have passed the method's own checks; of the others `outcome` and
+            Converged points have passed the checks of the method; for the others `outcome` and
             `detail` say what was learnt.
         """

@@ -274,12 +274,12 @@ class LaggedProducts:
         """Go on to the next order."""
         m = len(self.table)
         first, last = self._first[:, :m][:, ::-1], self._last[:, :m]
-        beside = self.table[-1] - last[:, -1] @ last
+        first_row = self.table[-1] - last[:, -1] @ last
         inner = self.table - first.T @ first
         self.table = np.empty((m + 1, m + 1))
         self.table[:m, :m] = inner
         self.table[m, 0] = self.sums[m]
-        self.table[m, 1:] = beside
+        self.table[m, 1:] = first_row
         self.table[:m, m] = self.table[m, :m]
 
 

@@ -118,7 +118,7 @@ def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
             f"{name}, row {level.rows[0]}, t = {time[level.rows[0]]:.10g} s",
             f"{level.rows.size} of {values.size} samples of '{name}' stand at exactly its "
             f"{level.side} value, {level.value:.6g}, and at most {level.usual} at any value next "
-            "to it: saturated, or held there by a command.",
+            "to it: saturated, or kept there by a command.",
         )
         for level in saturated(values)
     ]

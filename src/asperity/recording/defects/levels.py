@@ -31,7 +31,7 @@ _AWAY = 5.0
 
 
 class Saturated(NamedTuple):
-    """An extreme at which a channel is cut off, or held by a command.
+    """An extreme at which a channel is cut off, or kept by a command.
 
     Attributes
     ----------

@@ -41,14 +41,14 @@ def find_lines(x: Float, step: float, lowest: float) -> list[float]:
     for k in np.argsort(-height):
         if height[k] < _HEIGHT or len(result) >= _LINES:
             break
-        beside = power[k - 1 : k + 2]
+        around = power[k - 1 : k + 2]
         if (
-            beside.size < 3
-            or beside.argmax() != 1
+            around.size < 3
+            or around.argmax() != 1
             or any(abs(frequency[k] - f) < 1 for f in result)
         ):
             continue
-        low, top, high = np.log(beside)
+        low, top, high = np.log(around)
         result.append(
             float(frequency[k] + frequency[1] * (low - high) / 2 / (low - 2 * top + high))
         )

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: A spike stands out of both samples so far before and behind it. Next neighbours see it beside a
+#: A spike stands out of both samples at these distances. Next neighbours detect it next to a
 #: fast modulation; those farther off see spikes that last longer than a sample.
 _APART = (1, 3)
 #: How far it stands out, in usual differences of samples so far apart. White noise of 1e8 samples

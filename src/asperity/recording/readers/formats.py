@@ -24,7 +24,7 @@ from asperity.recording.readers.raw import RawRecording
 
 GROUP = "asperity.readers"
 #: The formats of this package, each a module next to this one, in the order in which they are
-#: asked: those with a signature first.
+#: tried: formats with a signature first.
 FORMATS = ("hdf5", "tdms", "look", "matlab", "text")
 
 

@@ -66,7 +66,7 @@ def read(
         A reduction file with any of these arguments; what is given here goes before it, and
         mappings are joined.
     rate : float or str, optional
-        Samples per second (Hz, or a text such as ``"10 kHz"``), in place of the file's own times.
+        Samples per second (Hz, or a text such as ``"10 kHz"``), in place of the times in the file.
     group : str, optional
         The group of an HDF5, MATLAB (a struct) or TDMS file to read, where groups differ in length.
     delimiter, decimal : str, optional

@@ -405,7 +405,7 @@ def layout_of(
     Raises
     ------
     InputError
-        If no table of numbers is found.
+        If the text has no table of numbers.
     """
     written = [line for line in lines if not line.blank and not line.comment]
     # The sample excludes headings and the last line, which may be cut.

@@ -8,27 +8,18 @@ import uuid
 from pathlib import Path
 
 
-def sync_file(path: Path) -> None:
-    """Wait until the contents of a file are on the disk."""
-    _sync(path, os.O_RDWR)
-
-
 def sync_folder(path: Path) -> None:
     """Wait until the directory entries of a folder are on the disk; Windows needs no call."""
     if os.name == "posix":
-        _sync(path, os.O_RDONLY)
-
-
-def _sync(path: Path, flags: int) -> None:
-    descriptor = os.open(path, flags)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+        descriptor = os.open(path, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)
 
 
 def put(file: Path, content: bytes) -> None:
-    """Write a file by renaming a complete one; `sync_file` then makes it durable."""
+    """Write a file by renaming a complete one; `outputs.written.to_disk` makes it durable."""
     make_way(file)
     file.parent.mkdir(parents=True, exist_ok=True)
     fresh = file.with_name(f"{file.name}.{uuid.uuid4().hex}.partial")

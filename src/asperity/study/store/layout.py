@@ -20,6 +20,7 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.storage import MemoryStore
 
 from asperity.errors import InputError
+from asperity.outputs.written import to_disk
 from asperity.study.axes import TEXTS
 from asperity.study.grid import SweepGrid
 from asperity.study.outcome import SweepOutcome, flag_attributes
@@ -92,7 +93,7 @@ def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[
             checksums.setdefault(array, checksum()).update(content)
         if not _holds(file, content):
             durable.put(file, content)
-            durable.sync_file(file)
+            to_disk(file)
             durable.sync_folder(file.parent)
             written.append(name)
     for folder in {(path / name).parents[1] for name in written}:

@@ -17,6 +17,7 @@ from typing import Any
 
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
+from asperity.outputs.written import to_disk
 from asperity.study.grid import SweepGrid
 from asperity.study.record import ATTRIBUTES
 from asperity.study.store import durable
@@ -92,7 +93,7 @@ def _group(attributes: Any, arrays: Any = None) -> dict[str, Any]:
 def _write(folder: Path, content: Mapping[str, Any]) -> None:
     file = folder / "zarr.json"
     durable.put(file, json.dumps(content, indent=2).encode())
-    durable.sync_file(file)
+    to_disk(file)
     durable.sync_folder(folder)
     durable.sync_folder(folder.parent)
 

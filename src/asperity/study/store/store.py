@@ -16,6 +16,7 @@ import zarr
 
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
+from asperity.outputs.written import to_disk
 from asperity.study.outcome import Answers
 from asperity.study.record import OF_CHUNKS, OF_POINTS
 from asperity.study.store import durable
@@ -182,7 +183,7 @@ class SweepStore:
 
     def _sync(self, files: list[Path]) -> None:
         for file in files:
-            durable.sync_file(file)
+            to_disk(file)
         for folder in self._folders(files):
             durable.sync_folder(folder)
 

@@ -1,6 +1,6 @@
 """Orbits followed in frequency, from a modulation so fast that the averaged limit holds.
 
-Each point takes its own steps along its path: longer after a success, shorter after a failure.
+Each point has a step length: it grows after a success and shrinks after a failure.
 """
 
 from __future__ import annotations

@@ -194,7 +194,7 @@ def _gaps(before: _Compared | None, now: _Compared) -> tuple[float, float]:
     if before is None or not all(np.all(np.isfinite(a)) for a in now[:2]):
         return np.inf, np.inf
     mean = abs(now.mean - before.mean) / abs(now.mean)
-    # Round-off bounds what a harmonic that vanishes beside the first, or beside the mean, can mean.
+    # Harmonics that vanish relative to the first, or to the mean, are compared up to round-off.
     floor = (1e-14 * abs(now.harmonics[0]) + 1e-17 * abs(now.mean)) / AGREEMENT
     scale = np.abs(now.harmonics) + floor
     # Harmonics beyond the second are compared relative to the first.

@@ -9,7 +9,7 @@ The states are split into means and zero-mean parts. One step of the iteration
 It is a linear iteration that contracts by about the change of the slip exponent in a period, a few
 hundredths in the regime of Bureau et al.; where it does not contract, the orbit is left to
 `asperity.orbit.methods.collocation`. The means need to contract no faster than the rest, so their
-Newton matrix stays that of the averaged limit. The zero-mean part is carried on its own, so the
+Newton matrix stays that of the averaged limit. The zero-mean part is a separate unknown, so the
 harmonics keep their relative accuracy however small they are.
 
 Grid: theta = tau + g sin(tau) puts the nodes where the load is lightest and the slip pulse narrow.
@@ -33,9 +33,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.algebra.kepler import eccentric_phase
 from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.loads import Excitation, Harmonic, Modulation
+from asperity.orbit.mesh.mesh import eccentric_phase
 from asperity.orbit.observables import Observables
 from asperity.slider import QuasiStatic
 from asperity.theory.averaged import averaged_limit
