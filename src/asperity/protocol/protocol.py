@@ -1,4 +1,4 @@
-"""A protocol: law, numbers and what an experimenter does, as a file and as an object."""
+"""`Protocol`: law, numbers and steps of an experiment."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ from asperity.transients import Trajectory, transient
 from asperity.transients.inputs import MOST_STEPS, require_contact
 from asperity.transients.trajectory import planned_rows, row_bytes
 
-#: Segments whose values are listed one by one, so that two protocols can be compared.
+#: Segments whose values are part of the comparison of two protocols.
 _COMPARED = 100
 
 
@@ -52,7 +52,7 @@ def numbers_of(
     law_name : str
     stated : mapping of str to float or str
     material : str
-        Name, or file relative to `folder`; empty for none.
+        Name, or file relative to `folder`; may be empty.
     folder : Path
     inertia : bool
         Whether a mass is needed.
@@ -74,7 +74,7 @@ def numbers_of(
 
 
 def slider_of(law_name: str, values: Mapping[str, float]) -> Slider:
-    """The slider that SI values by name describe."""
+    """The slider with these SI values, by name."""
     return slider_from(get_law(law_name), values)
 
 
@@ -85,7 +85,7 @@ class ProtocolError(MistakesError):
 
 
 def _each_step_once(steps: Any, fill: Callable[[Any], Any]) -> Any:
-    """The steps; a wrong one is one mistake, which pydantic reports for each kind of step."""
+    """The steps; a wrong step is one mistake, which pydantic would report for each kind of step."""
     try:
         return fill(steps)
     except ValidationError as error:
@@ -110,7 +110,7 @@ def _wrong_step(number: Any, reported: Any) -> InputError:
 
 
 class Repeat(Record):
-    """Steps done several times, one round after the other.
+    """Repeated steps.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class ProtocolStart(Record):
     Attributes
     ----------
     velocity : float or str
-        Pulling velocity (m/s): the slider slides steadily at it, unless states are given.
+        Pulling velocity (m/s); without `states` the slider is in steady sliding at this velocity.
     load : float or str, optional
         Normal load (N), W0 by default.
     states : tuple of float, optional
@@ -143,20 +143,20 @@ class ProtocolStart(Record):
 
 
 class SolverSettings(Record):
-    """How the motion is integrated and written.
+    """Settings of the integration and of the output.
 
     Attributes
     ----------
     inertia : bool
         Whether the mass of the slider counts.
     sampling : float or str, optional
-        Samples per second (Hz); the integrator's own steps by default.
+        Samples per second (Hz); the integrator's steps by default.
     rtol : float
         Tolerated relative error of a step.
     method : str
         "auto", "explicit" or "implicit".
     most_steps : float
-        Number of steps at which the integration stops and says so.
+        Largest number of steps of the integration.
     """
 
     inertia: bool = False
@@ -167,7 +167,7 @@ class SolverSettings(Record):
 
 
 class Protocol(Question):
-    """An experiment: what slides, how it begins, and the steps.
+    """An experiment: slider, initial state, and steps.
 
     Attributes
     ----------
@@ -177,12 +177,12 @@ class Protocol(Question):
         Lines such as ``"hold 10 s"``, steps of `asperity.loads`, or blocks of them.
     start : ProtocolStart
     material : str
-        Where numbers come from that `parameters` does not have.
+        Material whose numbers apply where `parameters` has none.
     parameters : mapping of str to float or str
         Numbers of the law, and K, W0, M and eta (radiation damping), by the names of tables.
     solver : SolverSettings
     tribometer : mapping, optional
-        What a recording of the run is made with: fields of `Recorder`, ``seed``, and ``sensors``.
+        Recording of the run: fields of `Recorder`, ``seed``, and ``sensors``.
     title : str
     folder : Path
         Where files that steps name lie.
@@ -220,7 +220,7 @@ class Protocol(Question):
         )
         mistakes += wrong
         try:
-            self._numbers.update(self._found_numbers())
+            self._numbers.update(self._sourced_numbers())
             level = self._level()
         except InputError as error:
             mistakes.append(error)
@@ -232,11 +232,11 @@ class Protocol(Question):
             mistakes.append(error)
         if mistakes:
             raise ProtocolError(mistakes)
-        # What concerns the programme as a whole, such as steps that take no time.
+        # Mistakes of the programme as a whole, such as steps without duration.
         require_contact(self.programme, self._numbers["W0"].value)
         return self
 
-    def _found_numbers(self) -> dict[str, SourcedNumber]:
+    def _sourced_numbers(self) -> dict[str, SourcedNumber]:
         return numbers_of(
             self.law, self.parameters, self.material, self.folder, self.solver.inertia
         )
@@ -247,7 +247,7 @@ class Protocol(Question):
 
     @property
     def numbers(self) -> dict[str, SourcedNumber]:
-        """Parameters in SI by name, with where each comes from."""
+        """Parameters in SI by name, with their origins."""
         return dict(self._numbers)
 
     @cached_property
@@ -259,7 +259,7 @@ class Protocol(Question):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Each step as it was written, repetitions written out."""
+        """The lines of the steps, with repetitions expanded."""
         return tuple(one.text for one in self._planned)
 
     @cached_property
@@ -269,15 +269,15 @@ class Protocol(Question):
 
     @cached_property
     def setup(self) -> RecordingSetup | None:
-        """What a recording of the run is made with, None without a tribometer."""
+        """Sensors and recorder of the run, None without a tribometer."""
         if self.tribometer is None:
             return None
-        K = self._numbers.get("K")  # none where another mistake has left no numbers
+        K = self._numbers.get("K")  # missing if another mistake prevents the numbers
         return setup_of(self.tribometer, self.solver.sampling, np.nan if K is None else K.value)
 
     @property
     def integration(self) -> dict[str, Any]:
-        """Keyword arguments for `asperity.transients.transient` besides slider and programme."""
+        """Keyword arguments of `asperity.transients.transient` except slider and programme."""
         eta = self._numbers.get("eta")
         states = self.start.states
         return {
@@ -292,7 +292,7 @@ class Protocol(Question):
 
     @property
     def rows(self) -> float | None:
-        """Number of rows that a run writes, None where the integrator's steps decide."""
+        """Number of rows of a run; None for the steps of the integrator."""
         return planned_rows(self.solver.sampling, self.programme.duration)
 
     @property
@@ -301,12 +301,12 @@ class Protocol(Question):
         return row_bytes(len(self.slider.law.state_names))
 
     def trajectory(self) -> Trajectory:
-        """The motion, all of it in memory; `run_protocol` writes it to a file block by block."""
+        """The whole motion in memory; `run_protocol` writes it to a file block by block."""
         return transient(self.slider, self.programme, **self.integration)
 
     @cached_property
     def inputs(self) -> dict[str, Any]:
-        """Everything that the motion depends on besides the version, as JSON values by name."""
+        """Everything that determines the motion except the version, as JSON values by name."""
         import jax
 
         digest = hashlib.sha256()
@@ -316,7 +316,7 @@ class Protocol(Question):
             for path, leaf in jax.tree_util.tree_leaves_with_path(segment):
                 values = np.asarray(leaf, float)
                 digest.update(values.tobytes())
-                # Recordings may have millions of samples: the digest covers them.
+                # A digest represents recordings, which may have millions of samples.
                 if values.ndim == 0 and number <= _COMPARED:
                     segments[f"segment {number}{jax.tree_util.keystr(path)}"] = float(values)
         return {

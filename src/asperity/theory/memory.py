@@ -1,4 +1,4 @@
-"""Closed forms of an interface's memory: velocity steps, holds, healing, critical stiffness.
+"""Closed forms for velocity steps, holds, healing and critical stiffness.
 
 Lengths in m, stiffness over the normal load, k = K/W0, in 1/m. Phi is the age, D0 the memory
 length, V the velocity, u the slip at constant V. With x = V Phi/D0 three laws have closed forms:
@@ -37,7 +37,7 @@ from asperity.slider import QuasiStatic, Slider
 
 Float = NDArray[np.float64]
 
-#: Stiffnesses at which stability is looked at, over the scale of the law: decades and points.
+#: Stiffnesses of the stability scan, over the scale of the law: decades and number of points.
 _DECADES, _POINTS = 8, 400
 _BISECTIONS = 60
 _DECADE = math.log(10)
@@ -124,7 +124,7 @@ def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) ->
     Parameters
     ----------
     law : RiceRuina, RuinaSlip or PerrinRiceZheng
-        Others have no closed form here.
+        RiceRuina (ageing), RuinaSlip or PerrinRiceZheng.
     ratio : array
         New velocity over the old one, positive.
     slip : array or str
@@ -142,14 +142,14 @@ def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) ->
 
 
 class LongHold(NamedTuple):
-    """Healing after a long hold of the ageing law, and what it leaves out.
+    """Healing of the ageing law after a long hold: leading and next order.
 
     Attributes
     ----------
     leading : array
         Of contacts that only age in the hold.
     renewal : array
-        Next order: what the slip in the hold takes off, negative. It falls with the hold time as
+        Next order: reduction by the slip in the hold, negative. It falls with the hold time as
         t^(-(B - A)/A) if B > A, slowly where A and B are close.
     """
 
@@ -158,7 +158,7 @@ class LongHold(NamedTuple):
 
     @property
     def healing(self) -> Array:
-        """Both."""
+        """Sum of both orders."""
         return self.leading + self.renewal
 
 
