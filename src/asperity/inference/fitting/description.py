@@ -8,9 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi_squared
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import chdtri, ndtri, stdtrit
 
 from asperity.inference.fitting.intervals import (
     LEVELS,
@@ -215,7 +213,7 @@ def _ends(
     ends = []
     for level in LEVELS:
         # By how much estimated noise widens an interval under known noise.
-        wider = float(student.ppf((1 + level) / 2, at.freedom[i]) / norm.ppf((1 + level) / 2))
+        wider = float(stdtrit(at.freedom[i], (1 + level) / 2) / ndtri((1 + level) / 2))
         wider *= float(at.se[i] / at.sd[i])
         if along is not None:
             ends.append(along.interval(level, wider))
@@ -432,7 +430,7 @@ def _hull(
         Coordinates and rise of chi-squared above the lowest minimum.
     """
     low, high = interval
-    threshold = float(chi_squared.ppf(level, 1))
+    threshold = float(chdtri(1, 1 - level))
     bounds = objective.unknowns[i].bounds
     for v, rise in rivals:
         if rise >= threshold:
