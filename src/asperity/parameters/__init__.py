@@ -4,8 +4,8 @@ Command line, tables, maps, sweeps, continuation, materials, JSON and the page o
 every name from here.
 """
 
-from asperity.parameters.names import NAMES, Names, display_name, in_names, symbol_of
-from asperity.parameters.parameter import RULES, Output, Parameter, Rule, obeying
+from asperity.parameters.names import display_name, in_names, symbol_of
+from asperity.parameters.parameter import NAMES, RULES, Names, Output, Parameter, Rule, obeying
 from asperity.parameters.table import (
     DRIVE,
     EXPERIMENT,

@@ -7,14 +7,10 @@ from __future__ import annotations
 
 import re
 from functools import cache
-from typing import Any, Literal
+from typing import Any
 
-from asperity.parameters.parameter import Parameter
+from asperity.parameters.parameter import Names, Parameter
 from asperity.parameters.table import EXPERIMENT, INTERFACE, law_parameters, plain_name
-
-Names = Literal["friction", "geophysics"]
-#: Sets of names. "friction": the letters of Bureau, Baumberger and Caroli (2000).
-NAMES: tuple[Names, ...] = ("friction", "geophysics")
 
 #: Decorations of a formula that a plain name goes without.
 _DECORATIONS = re.compile(r"\\bar|[\\{}]")
@@ -67,6 +63,21 @@ def in_names(text: str, names: Names = "friction", law: Any = None) -> str:
         return word[0] if word["kept"] else known.get(word[0], word[0])
 
     return _WORDS.sub(renamed, text)
+
+
+#: Symbols of figures in geophysics, besides those of `INTERFACE`.
+_SYMBOLS = {"F": r"\tau", "W": r"\sigma_n", "W_0": r"\bar\sigma_n", "K": "k"}
+
+
+def in_symbols(text: str) -> str:
+    """A label of a figure with the symbols of its formulas as geophysics writes them."""
+    known = {p.symbol: symbol_of(p, "geophysics") for p in INTERFACE.values()} | _SYMBOLS
+    word = re.compile(r"(?<![\\\w{])[A-Z](?:_0)?(?![\w}])")
+
+    def formula(match: re.Match[str]) -> str:
+        return word.sub(lambda symbol: known.get(symbol[0], symbol[0]), match[0])
+
+    return re.sub(r"\$[^$]*\$", formula, text)
 
 
 @cache

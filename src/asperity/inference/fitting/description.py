@@ -27,6 +27,7 @@ from asperity.inference.objective import Objective, Residuals, log_density
 from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
+from asperity.units import quantity_text
 
 Float = NDArray[np.float64]
 
@@ -476,10 +477,10 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
         said.append(_why_undetermined(fit, name))
     for name, estimate in fit.parameters.items():
         if estimate.at_bound:
-            said.append(f"{name} is at its bound {estimate.value:.4g} {estimate.unit}".rstrip())
+            said.append(f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}")
     for other in fit.optima:
         at = ", ".join(
-            f"{n} {other.values[n]:.4g} {p.unit}".rstrip() for n, p in fit.parameters.items()
+            f"{n} {quantity_text(other.values[n], p.unit)}" for n, p in fit.parameters.items()
         )
         said.append(
             f"another minimum of chi-squared lies {other.chi2 - fit.chi2:.3g} higher, at {at}: "
