@@ -10,7 +10,11 @@ from numpy.typing import NDArray
 
 from asperity.errors import Argument, InputError
 from asperity.measurement.samples import about_channels
-from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
+from asperity.measurement.sliding.signals import (
+    SlidingSignals,
+    sliding_signals,
+    with_normalised_force,
+)
 from asperity.measurement.stick_slip.detection import Falls, find_falls
 from asperity.measurement.stick_slip.events import SlipEvents, read_events
 from asperity.measurement.stick_slip.noise import estimate, without_impulses
@@ -229,6 +233,8 @@ def _with_load(trace: Trace, load: float) -> Trace:
     try:
         trace.channel("W")
     except InputError:
+        # A lone F/(m g) is known by its name before it has company.
+        trace = with_normalised_force(trace)
         constant = Channel(np.full(len(trace), load), "force", "N", "load", "N")
         return replace(trace, channels={**trace.channels, "load": constant})
     return trace
