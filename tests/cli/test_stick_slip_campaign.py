@@ -1,4 +1,4 @@
-"""From recordings at several stiffnesses and velocities to the numbers of a law, in two commands."""
+"""From recordings at several K and V to the numbers of a law, in two commands."""
 
 import csv
 import json
