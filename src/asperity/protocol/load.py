@@ -16,6 +16,7 @@ from asperity.questions.record import without_unit
 _KINDS = {
     "start": {"velocity": "velocity", "load": "force"},
     "solver": {"sampling": "frequency"},
+    "track": {"length": "length", "origin": "length"},
 }
 
 

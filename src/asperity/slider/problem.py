@@ -12,6 +12,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError
+from asperity.laws.uneven_track import POSITION
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.parameters import DRIVE, MACHINE, obeying
@@ -118,6 +119,13 @@ def checked_problem(
         If a value breaks its rule; as `equation_of_motion`.
     """
     checked_slider(slider)
+    if POSITION in slider.law.state_names:
+        raise InputError(
+            "slider.law",
+            "be the same everywhere for a periodic response",
+            "one on an uneven track",
+            "integrate it as a transient",
+        )
     inertia = switch(inertia, "inertia")
     V = DRIVE["V"].check(velocity)
     f = DRIVE["frequency"].check(frequency)
