@@ -27,7 +27,8 @@ Array = NDArray[np.float64]
 CONVENTIONS = (
     "forces are F/W; drop = force_before - force_after; recurrence and stick_duration run from the "
     "onset and the end of the event before to the onset; creep is what the force at onset lacks to "
-    "the line of the first half of the stick; slip_velocity = V - dF/dt/K; uncertainties are "
+    "the line of the first half of the stick; slip and slip_velocity are those of the slider's "
+    "displacement where it is recorded, else slip_velocity = V - dF/dt/K; uncertainties are "
     "standard uncertainties"
 )
 #: Columns of the catalogue: unit and meaning.
