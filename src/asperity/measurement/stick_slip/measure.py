@@ -329,8 +329,8 @@ def _spring(events: SlipEvents, machine: Machine) -> tuple[Array, Array, Array]:
 def _recorded_slip(time: Array, displacement: Array, events: SlipEvents) -> tuple[Array, Array]:
     """Slip and largest slip velocity of each event from the displacement of the slider.
 
-    Means over the duration of the slip, before the onset and after the end, tell the slip; the
-    slider creeps by less than the noise in so short a time.
+    Means over a quarter of its duration, before the onset and after the end, tell the slip: a
+    slider creeps ever faster before its onset.
     """
     step = float(time[-1] - time[0]) / (time.size - 1)
     forward = displacement * np.sign(displacement[-1] - displacement[0])
@@ -342,7 +342,7 @@ def _recorded_slip(time: Array, displacement: Array, events: SlipEvents) -> tupl
         stop = np.clip(np.rint(high).astype(np.intp), first + 1, time.size)
         return np.asarray((total[stop] - total[first]) / (stop - first))
 
-    width = np.maximum(end - onset, 1.0)
+    width = np.maximum((end - onset) / 4, 1.0)
     slip = mean(end + 1, end + 1 + width) - mean(onset - width, onset)
     return slip, steepest_fall(-forward, onset, end, slip) / step
 
