@@ -110,11 +110,23 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
 
 def _growth(law: Law, V: float, k: Float) -> Float:
     """Growth rate of a small disturbance of steady sliding, at stiffnesses `k`."""
-    wide = jax.tree.map(lambda a: jnp.broadcast_to(jnp.asarray(a, float), k.shape), law)
-    motion = QuasiStatic(Slider(wide, spring=k, load=np.ones_like(k)), jnp.full(k.shape, V), 1.0)
-    at = Excitation(jnp.ones(k.shape))
+    wide = jax.tree.map(lambda a: np.broadcast_to(np.asarray(a, float), k.shape), law)
+    slider = Slider(wide, spring=k, load=np.ones_like(k))
+    return np.asarray(steady_growth(slider, np.full(k.shape, V)))
+
+
+@jax.jit
+def steady_growth(slider: Slider, V: Array) -> Array:
+    """Growth rate of a small disturbance of steady sliding without inertia, over its phase.
+
+    Parameters
+    ----------
+    slider : Slider
+        Parameters of shape (points,), as `V` (m/s).
+    """
+    motion, at = QuasiStatic(slider, V, 1.0), Excitation(jnp.ones_like(V))
     _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), motion.steady())
-    return np.asarray(spectral_abscissa(jnp.stack(columns, axis=1)))
+    return spectral_abscissa(jnp.stack(columns, axis=1))
 
 
 def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) -> Array:
