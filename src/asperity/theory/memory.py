@@ -39,7 +39,7 @@ Float = NDArray[np.float64]
 
 #: Stiffnesses at which stability is looked at, over the scale of the law: decades and points.
 _DECADES, _POINTS = 8, 400
-_BISECTIONS = 60
+_REFINEMENTS = 8
 _DECADE = math.log(10)
 
 
@@ -98,14 +98,14 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
             "its sliding has no critical stiffness"
         )
     k = scale * np.logspace(-_DECADES, _DECADES, _POINTS)
-    unstable = np.flatnonzero(_growth(law, V, k) > 0)
-    if not unstable.size:
-        return 0.0
-    low, high = k[unstable[-1]], k[min(unstable[-1] + 1, _POINTS - 1)]
-    for _ in range(_BISECTIONS):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if _growth(law, V, np.array([middle]))[0] > 0 else (low, middle)
-    return float(low)
+    low = 0.0
+    for _ in range(_REFINEMENTS):
+        unstable = np.flatnonzero(_growth(law, V, k) > 0)
+        if not unstable.size:
+            break
+        low, high = (float(k[i]) for i in (unstable[-1], min(unstable[-1] + 1, _POINTS - 1)))
+        k = np.geomspace(low, high, _POINTS)
+    return low
 
 
 def _growth(law: Law, V: float, k: Float) -> Float:
