@@ -30,10 +30,11 @@ export function series(index) {
  *
  * `columns()` returns what the CSV holds: arrays by name. `options` are elements beside the title.
  * `ownLabel` says what the keyboard does on the chart where that is not reading values.
+ * `onSpan(from, to)` is called with the ends, in units of x, of what is dragged over with the mouse.
  */
 export class Figure {
-  constructor({ name, title, height = 240, columns, options, caption = "", ownLabel = "" }) {
-    Object.assign(this, { name, title, height, columns, ownLabel });
+  constructor({ name, title, height = 240, columns, options, caption = "", ownLabel = "", onSpan = null }) {
+    Object.assign(this, { name, title, height, columns, ownLabel, onSpan });
     this.readout = el("div", { class: "readout", "aria-hidden": "true" });
     this.spoken = el("div", { class: "visually-hidden", "aria-live": "polite" });
     this.plot = el("div", {
@@ -61,6 +62,7 @@ export class Figure {
       this.note,
       caption && el("p", { class: "note caption" }, caption),
     );
+    if (onSpan) this.#spans();
     figures.add(this);
   }
 
@@ -93,14 +95,46 @@ export class Figure {
     return beside ? PRINTED / 2 - 20 : PRINTED;
   }
 
-  /** Position of an event on the first row, in units of the axes; null outside. */
+  /** Position of an event in units of the axes of its row; null outside. */
   at(event) {
     const box = this.plot.getBoundingClientRect();
-    const frame = this.frames?.[0];
-    if (!frame) return null;
     const [px, py] = [event.clientX - box.left, event.clientY - box.top];
-    if (px < frame.left || px > frame.right || py < frame.top || py > frame.bottom) return null;
-    return [frame.x.back(px), frame.y.back(py)];
+    const frame = this.frames?.find((f) => px >= f.left && px <= f.right && py >= f.top && py <= f.bottom);
+    return frame ? [frame.x.back(px), frame.y.back(py)] : null;
+  }
+
+  /** Let the mouse drag over a stretch of x. A finger scrolls the page. */
+  #spans() {
+    const band = el("div", { class: "span", hidden: true });
+    let from = null;
+    const inside = (event) => {
+      const { left, right } = this.frames[0];
+      return Math.max(left, Math.min(right, event.clientX - this.plot.getBoundingClientRect().left));
+    };
+    const show = (event) => {
+      const ends = [from, inside(event)].sort((a, b) => a - b);
+      band.hidden = ends[1] - ends[0] < 4;
+      band.style.left = `${ends[0]}px`;
+      band.style.width = `${ends[1] - ends[0]}px`;
+      return ends;
+    };
+    this.plot.classList.add("spans");
+    this.plot.after(band);
+    this.plot.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "touch" || event.button || !this.at(event)) return;
+      from = inside(event);
+      this.plot.setPointerCapture(event.pointerId);
+    });
+    this.plot.addEventListener("pointermove", (event) => { if (from !== null) show(event); });
+    this.plot.addEventListener("pointerup", (event) => {
+      if (from === null) return;
+      const ends = show(event);
+      const wide = !band.hidden;
+      from = null;
+      band.hidden = true;
+      if (wide) this.onSpan(...ends.map((px) => Number(this.frames[0].x.back(px).toPrecision(6))));
+    });
+    this.plot.addEventListener("pointercancel", () => { from = null; band.hidden = true; });
   }
 
   #hover(event) {

@@ -7,6 +7,7 @@ import { Machine } from "../lib/machine.js";
 import { copyText } from "../lib/save.js";
 import { get, Latest, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
+import { capital } from "../lib/words.js";
 
 export const name = "explore";
 export const title = "Explore";
@@ -433,8 +434,4 @@ export function create(page) {
       changed();
     },
   };
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

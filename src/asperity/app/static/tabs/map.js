@@ -7,6 +7,7 @@ import { el, fill } from "../lib/dom.js";
 import { copyText } from "../lib/save.js";
 import { ask, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
+import { capital } from "../lib/words.js";
 
 export const name = "map";
 export const title = "Map";
@@ -357,8 +358,4 @@ export function create(page) {
 /** A number of the address, or its text where it has a unit. */
 function number(text) {
   return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

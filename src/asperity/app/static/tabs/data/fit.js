@@ -5,7 +5,9 @@ import { choice, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
 import { copyText, csv, saveFile } from "../../lib/save.js";
 import { Refused, run } from "../../lib/server.js";
+import { table } from "../../lib/tables.js";
 import { digits } from "../../lib/units.js";
+import { capital } from "../../lib/words.js";
 
 /** What a fit begins with, by the kind of data; without free parameters, all that the data may show. */
 const DEFAULTS = {
@@ -405,14 +407,4 @@ function fitTables(fit) {
 function priorText({ kind, ...numbers }) {
   const given = Object.entries(numbers).filter(([, v]) => typeof v === "number").map(([n, v]) => `${n} ${digits(v, 3)}`);
   return `Prior: ${kind}${given.length ? `, ${given.join(", ")}` : ""}.`;
-}
-
-function table(head, rows, label) {
-  return el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": label }, el("table", {},
-    el("thead", {}, el("tr", {}, head.map((t) => (t ? el("th", { scope: "col" }, t) : el("td", {}))))),
-    el("tbody", {}, rows.map(([first, ...rest]) => el("tr", {}, el("th", { scope: "row" }, first), rest.map((t) => el("td", {}, t)))))));
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }
