@@ -463,7 +463,8 @@ def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(visit, saw
         page.get_by_role("button", name="Catalogue as CSV").click()
     waited.value.save_as(tmp_path / "events.csv")
     head, *rows = (tmp_path / "events.csv").read_text().splitlines()
-    assert head.startswith("onset (s),end (s)") and len(rows) == count
+    assert head.startswith("onset (s),end (s)")
+    assert len(rows) == count
     plot = page.locator(".panel.whole .plot")
     plot.scroll_into_view_if_needed()
     box = plot.bounding_box()

@@ -52,8 +52,14 @@ FIT_OPTIONS: Mapping[str, str] = {
 
 #: Units of fields that are numbers in SI.
 _UNITS = {
-    **{"frequency": "Hz", "gauge": "Hz", "velocities": "m/s", "area": "m^2"},
-    **{"stiffness": "N/m", "velocity": "m/s", "mass": "kg", "normal_load": "N"},
+    "frequency": "Hz",
+    "gauge": "Hz",
+    "velocities": "m/s",
+    "area": "m^2",
+    "stiffness": "N/m",
+    "velocity": "m/s",
+    "mass": "kg",
+    "normal_load": "N",
 }
 
 

@@ -69,6 +69,12 @@ function changeTheme() {
   }
 }
 
+/** Full screen, with letters for a lecture. */
+function changeScreen() {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else document.documentElement.requestFullscreen();
+}
+
 let resized = 0;
 
 async function start() {
@@ -87,6 +93,11 @@ async function start() {
     },
   }, t.title))));
   document.getElementById("theme").addEventListener("click", changeTheme);
+  document.getElementById("full").addEventListener("click", changeScreen);
+  document.addEventListener("fullscreenchange", () => {
+    document.documentElement.classList.toggle("lecture", Boolean(document.fullscreenElement));
+    redrawAll();
+  });
   addEventListener("hashchange", show);
   addEventListener("resize", () => {
     clearTimeout(resized);

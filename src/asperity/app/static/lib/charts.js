@@ -20,6 +20,9 @@ const TOP = 10;
 const BOTTOM = 42;
 const GAP = 16;
 
+/** Size of letters over that for which the room is. */
+const letters = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 15;
+
 /** Class of the colour of a series, counted from 0. */
 export function series(index) {
   return `s${(index % 6) + 1}`;
@@ -79,11 +82,12 @@ export class Figure {
   draw(chart, description = "") {
     this.chart = chart;
     this.description = description;
-    this.plot.style.minHeight = `${this.height}px`;
+    const height = this.height * letters();
+    this.plot.style.minHeight = `${height}px`;
     if (!this.ownLabel) this.plot.setAttribute("aria-label", `${this.heading.textContent}: arrow keys read its values`);
     const width = printing ? this.#printedWidth() : this.plot.clientWidth;
     if (!width) return;
-    const drawn = drawChart(chart, width, this.height, description);
+    const drawn = drawChart(chart, width, height, description);
     this.plot.innerHTML = drawn.svg;
     this.frames = drawn.frames;
     if (this.cursor) this.#showCursor();
@@ -305,13 +309,15 @@ export function redrawAll(onPaper = false) {
 
 function drawChart(chart, width, height, description) {
   const { rows } = chart;
-  const each = (height - TOP - BOTTOM - GAP * (rows.length - 1)) / rows.length;
+  const size = letters();
+  const below = BOTTOM * size;
+  const each = (height - TOP - below - GAP * (rows.length - 1)) / rows.length;
   const frames = [];
   const parts = [];
   const yRanges = rows.map((row) => row.y.range || extent(itemsOf(row).flatMap((i) => i.y), row.y.log, 0.06));
   const longest = Math.max(2, ...rows.flatMap((row, k) =>
-    ticks(scale(yRanges[k], 1, 0, row.y.log), row.y, each / 30).map((t) => t.label.length)));
-  const LEFT = Math.min(0.4 * width, LABEL + CHARACTER * longest);
+    ticks(scale(yRanges[k], 1, 0, row.y.log), row.y, each / 30 / size).map((t) => t.label.length)));
+  const LEFT = Math.min(0.4 * width, size * (LABEL + CHARACTER * longest));
   let xRange = chart.x.range || extent(rows.flatMap((r) => itemsOf(r).flatMap((i) => i.x)), chart.x.log, 0);
   rows.forEach((row, k) => {
     const top = TOP + k * (each + GAP);
@@ -321,11 +327,11 @@ function drawChart(chart, width, height, description) {
     frame.x = scale(xRange, frame.left, frame.right, chart.x.log);
     frame.y = scale(yRange, frame.bottom, frame.top, row.y.log);
     frames.push(frame);
-    parts.push(drawRow(row, frame, chart.x, k === rows.length - 1));
+    parts.push(drawRow(row, frame, chart.x, k === rows.length - 1, size));
   });
   const foot = frames[frames.length - 1];
   // A label that is longer than its axis has the whole width.
-  const long = 6.4 * chart.x.label.length > foot.right - foot.left;
+  const long = 6.4 * size * chart.x.label.length > foot.right - foot.left;
   parts.push(text(long ? width / 2 : (foot.left + foot.right) / 2, height - 6, chart.x.label, "axis-label", "middle"));
   return {
     frames,
@@ -337,20 +343,20 @@ function itemsOf(row) {
   return [...(row.lines || []), ...(row.points || []), ...(row.bars || [])];
 }
 
-function drawRow(row, frame, x, last) {
+function drawRow(row, frame, x, last, size) {
   const { left, right, top, bottom } = frame;
   const parts = [];
   const clip = fresh("clip");
   parts.push(`<clipPath id="${clip}"><rect x="${left}" y="${top - 1}" width="${right - left}" height="${bottom - top + 2}"/></clipPath>`);
-  for (const t of ticks(frame.y, row.y, (bottom - top) / 30)) {
+  for (const t of ticks(frame.y, row.y, (bottom - top) / 30 / size)) {
     const y = round(frame.y.to(t.value));
     parts.push(`<path class="grid" d="M${left} ${y}H${right}"/>`);
     parts.push(text(left - 7, y + 4, t.label, "tick-label", "end"));
   }
-  for (const t of ticks(frame.x, x, (right - left) / 70)) {
+  for (const t of ticks(frame.x, x, (right - left) / 70 / size)) {
     const px = round(frame.x.to(t.value));
     parts.push(`<path class="grid" d="M${px} ${top}V${bottom}"/>`);
-    if (last) parts.push(text(px, bottom + 17, t.label, "tick-label", "middle"));
+    if (last) parts.push(text(px, bottom + 17 * size, t.label, "tick-label", "middle"));
   }
   parts.push(`<g clip-path="url(#${clip})">`);
   if (row.image?.url) parts.push(drawImage(row.image, frame));
@@ -384,7 +390,7 @@ function drawRow(row, frame, x, last) {
   }
   parts.push("</g>", `<path class="frame" d="M${left} ${top}V${bottom}H${right}"/>`);
   const middle = (top + bottom) / 2;
-  parts.push(`<text class="axis-label" text-anchor="middle" transform="translate(14 ${round(middle)}) rotate(-90)">${escape(row.y.label)}</text>`);
+  parts.push(`<text class="axis-label" text-anchor="middle" transform="translate(${round(14 * size)} ${round(middle)}) rotate(-90)">${escape(row.y.label)}</text>`);
   if (row.text) parts.push(text((left + right) / 2, middle, row.text, "nothing", "middle"));
   return parts.join("");
 }

@@ -8,6 +8,7 @@ import { copyText } from "../lib/save.js";
 import { get, Latest, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
 import { capital } from "../lib/words.js";
+import { MotionPanel } from "./explore/motion.js";
 
 export const name = "explore";
 export const title = "Explore";
@@ -23,6 +24,7 @@ export function create(page) {
   const view = fresh();
   let figures = null;
   let machine = null;
+  let motion = null;
   let searching = null;
   let resting = 0;
   let answer = null;
@@ -103,6 +105,7 @@ export function create(page) {
   }
 
   function stopSearch() {
+    motion.stop();
     clearTimeout(resting);
     if (searching) searching.abort();
     searching = null;
@@ -124,7 +127,9 @@ export function create(page) {
       performance.clearMeasures("slider to picture");
     }
     const open = !found.point.searched || Object.values(found.curves).some((c) => c.left.length);
-    if (open && !more && !latest.pending && !found.preparing) resting = setTimeout(search, REST);
+    if (more || latest.pending || found.preparing) return;
+    if (open) resting = setTimeout(search, REST);
+    if (found.point.searched) motion.ask(question(), found.point);
   }
 
   function refused(error) {
@@ -139,8 +144,11 @@ export function create(page) {
     try {
       await run("explore/search", question(), (part) => {
         if (signal.aborted) return;
-        if (part.point) answer.point = part.point;
-        else if (part.curve) {
+        if (part.point) {
+          const known = answer.point.searched;
+          answer.point = part.point;
+          if (!known) motion.ask(question(), answer.point);
+        } else if (part.curve) {
           const curve = answer.curves[part.curve];
           part.rows.forEach((row, i) => {
             for (const n of ["mean_friction", "mu1", "mu2", "phase1", "phase2"]) {
@@ -424,8 +432,10 @@ export function create(page) {
       if (!figures) {
         figures = makeFigures();
         machine = new Machine();
+        motion = new MotionPanel((moved) => machine.follow(moved));
         results.append(el("div", { class: "summary" }, sentence, readings, onPaper, message, copies),
-          el("div", { class: "panels" }, Object.values(figures).map((f) => f.element), machine.element),
+          el("div", { class: "panels" }, figures.period.element, figures.amplitude.element, machine.element, motion.element,
+            figures.harmonics.element, figures.multipliers.element, figures.air.element),
           el("section", { class: "law", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
       }
       fromParameters(parameters);
