@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time as clock
 from collections.abc import Callable, Mapping
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -184,7 +185,7 @@ def stick_slip(whole: Any, velocity: float, window: float) -> Cycles | None:
     sticks = np.append(np.flatnonzero(state == -1), count)
     stops = sticks[np.searchsorted(sticks, turns)]
     at = np.searchsorted(time, edges[turns])
-    drops = [np.ptp(whole.force[a:b]) for a, b in zip(at[:-1], at[1:], strict=True)]
+    drops = [np.ptp(whole.force[a:b]) for a, b in pairwise(at)]
     return Cycles(
         edges[turns],
         float(np.mean(np.diff(edges[turns])[-_ENOUGH:])),
