@@ -41,6 +41,7 @@ from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law, registered
 from asperity.materials import Material
 from asperity.parameters import law_parameters
+from asperity.parameters.parameter import Drawn, SummaryLine
 
 #: Called with how many laws are done, parts of one included.
 Report = Callable[[float], None]
@@ -81,8 +82,8 @@ class Judged:
     cross_validation: CrossValidation | None = None
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Drawn):
     """Laws fitted to the same data.
 
     Attributes
@@ -100,12 +101,22 @@ class Comparison:
         Laws of which no fit could be made, and why.
     """
 
+    _drawn_by = "asperity.fit_report.comparison:draw_comparison"
+
     laws: Mapping[str, Judged]
     decided: bool
     best: str
     verdict: str
     left_out: tuple[str, ...] = ()
     not_compared: Mapping[str, str] = field(default_factory=dict)
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """The verdict, and where each law stands."""
+        lines = [SummaryLine("verdict", self.verdict)]
+        for name in self.laws:
+            word, number = self.standing(name)
+            lines.append(SummaryLine(name, "lowest AICc" if name == self.best else word, number))
+        return "Comparison of laws", lines
 
     def standing(self, name: str) -> Standing:
         """Where a law stands on the scale of verdicts, and by which number."""
