@@ -3,6 +3,7 @@
 // print need no redrawing.
 
 import { el, fresh } from "./dom.js";
+import { worded } from "./names.js";
 import { csv, saveFile } from "./save.js";
 import { digits } from "./units.js";
 
@@ -52,7 +53,7 @@ export class Figure {
     const button = (text, what, act) => el("button", {
       type: "button", class: "quiet small", "aria-label": `${title}: save ${what}`, click: act,
     }, text);
-    this.heading = el("h3", { id: label }, title);
+    this.heading = el("h3", { id: label }, worded(title));
     this.element = el(
       "figure",
       { class: `panel ${name}`, "aria-labelledby": label },
@@ -332,7 +333,7 @@ function drawChart(chart, width, height, description) {
   const foot = frames[frames.length - 1];
   // A label that is longer than its axis has the whole width.
   const long = 6.4 * size * chart.x.label.length > foot.right - foot.left;
-  parts.push(text(long ? width / 2 : (foot.left + foot.right) / 2, height - 6, chart.x.label, "axis-label", "middle"));
+  parts.push(text(long ? width / 2 : (foot.left + foot.right) / 2, height - 6, worded(chart.x.label), "axis-label", "middle"));
   return {
     frames,
     svg: `<svg width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" role="img" aria-label="${escape(description)}">${parts.join("")}</svg>`,
@@ -390,7 +391,7 @@ function drawRow(row, frame, x, last, size) {
   }
   parts.push("</g>", `<path class="frame" d="M${left} ${top}V${bottom}H${right}"/>`);
   const middle = (top + bottom) / 2;
-  parts.push(`<text class="axis-label" text-anchor="middle" transform="translate(${round(14 * size)} ${round(middle)}) rotate(-90)">${escape(row.y.label)}</text>`);
+  parts.push(`<text class="axis-label" text-anchor="middle" transform="translate(${round(14 * size)} ${round(middle)}) rotate(-90)">${escape(worded(row.y.label))}</text>`);
   if (row.text) parts.push(text((left + right) / 2, middle, row.text, "nothing", "middle"));
   return parts.join("");
 }

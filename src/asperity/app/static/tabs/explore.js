@@ -4,6 +4,7 @@ import { Figure, series } from "../lib/charts.js";
 import { choice, Dock, group, Quantity, tick } from "../lib/controls.js";
 import { el, fill, formula } from "../lib/dom.js";
 import { Machine } from "../lib/machine.js";
+import { worded } from "../lib/names.js";
 import { copyText } from "../lib/save.js";
 import { get, Latest, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
@@ -250,7 +251,7 @@ export function create(page) {
         ["μ₂", digits(point.mu2, 4)], ["ε on the contacts", digits(answer.epsilon, 4)],
       ]
       : [["ε on the contacts", digits(answer.epsilon, 4)]];
-    fill(readings, shown.map(([label, value]) => el("div", {}, el("dt", {}, label), el("dd", {}, value))));
+    fill(readings, shown.map(([label, value]) => el("div", {}, el("dt", {}, worded(label)), el("dd", {}, value))));
   }
 
   function drawPeriod() {
@@ -428,6 +429,7 @@ export function create(page) {
 
   return {
     element,
+    renamed() { buildControls(); changed(); },
     show(parameters) {
       if (!figures) {
         figures = makeFigures();

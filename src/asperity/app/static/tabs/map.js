@@ -4,6 +4,7 @@ import { Figure } from "../lib/charts.js";
 import { bar, picture } from "../lib/colours.js";
 import { choice, Entry, group, tick } from "../lib/controls.js";
 import { el, fill } from "../lib/dom.js";
+import { nameOf } from "../lib/names.js";
 import { copyText } from "../lib/save.js";
 import { ask, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
@@ -262,7 +263,7 @@ export function create(page) {
   }, "Cancel");
 
   function buildControls() {
-    const names = parametersOf(view.law).map((p) => [p.name, `${p.name} – ${p.meaning}`]);
+    const names = parametersOf(view.law).map((p) => [p.name, `${nameOf(p.name)} – ${p.meaning}`]);
     const rebuild = () => { buildControls(); changed(); };
     const axisControls = (side, label) => {
       const p = parameter(view[side].name);
@@ -321,6 +322,7 @@ export function create(page) {
 
   return {
     element,
+    renamed() { buildControls(); draw(); },
     show(parameters) {
       if (!figure) {
         figure = new Figure({
