@@ -3,7 +3,7 @@
 /** A sentence with a capital at its beginning, unless it begins with the name of a number or a law. */
 export function capital(text) {
   const [first, second] = text.split(" ", 2);
-  const isName = !/^[a-z]+[,:]?$/.test(first) || second === "must";
+  const isName = !/^[a-z]{2,}[,:]?$/.test(first) || second === "must";
   return isName ? text : text.charAt(0).toUpperCase() + text.slice(1);
 }
 

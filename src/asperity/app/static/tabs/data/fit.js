@@ -9,6 +9,7 @@ import { Refused, run } from "../../lib/server.js";
 import { sections } from "../../lib/tables.js";
 import { digits } from "../../lib/units.js";
 import { capital } from "../../lib/words.js";
+import { ByHand } from "./by_hand.js";
 
 /** What a fit begins with, by the kind of data; without free parameters, all that the data may show. */
 const DEFAULTS = {
@@ -33,12 +34,13 @@ export class FitPanel {
     this.status = el("p", { class: "sentence", role: "status" });
     this.message = el("p", { class: "message", role: "alert" });
     this.results = el("div", { class: "card-body" });
+    this.byHand = new ByHand(page, (start) => this.start(start));
     this.fitButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Fit");
     this.cancel = el("button", { type: "button", click: () => this.work?.abort() }, "Cancel");
     this.cancel.hidden = true;
     this.bar = el("progress", { max: 1, "aria-label": "Progress of the draws", hidden: true });
     this.element = el("section", { class: "recording fit", "aria-label": "Fit and compare" },
-      el("h3", {}, "Fit and compare"), this.data, this.form,
+      el("h3", {}, "Fit and compare"), this.data, this.form, this.byHand.element,
       el("div", { class: "actions" }, this.fitButton, this.cancel), this.status, this.bar, this.message, this.results);
     this.element.hidden = true;
     this.#build();
@@ -71,7 +73,13 @@ export class FitPanel {
     this.runOptions.hidden = !runs;
     this.#begin(runs && !rows && !tables ? "runs" : "tables");
     const parts = [rows && `${rows} measured ${rows === 1 ? "amplitude" : "amplitudes"}`, tables && `${tables} ${tables === 1 ? "table" : "tables"}`, runs && `${runs} whole ${runs === 1 ? "recording" : "recordings"}`].filter(Boolean);
+    this.#hand();
     this.data.textContent = `Data: ${parts.join(" and ")}.`;
+  }
+
+  #hand() {
+    const runs = this.runs();
+    this.byHand.use(runs.length === 1 ? runs[0].recording : null, this.settings.laws[0]);
   }
 
   /** The defaults of another kind of data, where those of the earlier one were left as they are. */
@@ -93,6 +101,7 @@ export class FitPanel {
     const toggle = (key, n, order) => (on) => {
       settings[key] = order.filter((m) => (m === n ? on : settings[key].includes(m)));
       this.#free();
+      if (settings.laws.length) this.#hand();
       this.fitButton.textContent = settings.laws.length > 1 ? "Compare" : "Fit";
       this.changed();
     };
@@ -155,7 +164,8 @@ export class FitPanel {
     return free.length ? free : null;
   }
 
-  async start() {
+  /** Fit or compare, of one law from start values if there are some. */
+  async start(start = {}) {
     this.work?.abort();
     this.work = new AbortController();
     const { signal } = this.work;
@@ -173,7 +183,7 @@ export class FitPanel {
     }
     const asked = {
       laws: settings.laws, free: this.#freed(),
-      rows: this.rows(), tables: this.tables(), fixed,
+      rows: this.rows(), tables: this.tables(), fixed, start,
       runs: this.runs().map((r) => r.asked),
       trend: settings.trend, drift: settings.drift, initial: settings.initial, gauge: settings.gauge || null,
       fit_rate: settings.fit_rate || null,
@@ -244,9 +254,10 @@ export class FitPanel {
       el("button", { type: "button", click: () => saveFile(fit ? "fit.json" : "comparison.json", JSON.stringify(posterior ? { ...record, posterior } : record, null, 2), "application/json") }, "JSON"),
       report && el("button", { type: "button", click: () => saveFile("report.zip", fromBase64(report)) }, "Report folder (ZIP)"),
       el("button", { type: "button", click: () => this.#saveCsv(fit ? { [fit.law]: fit } : comparison.laws) }, "CSV"));
+    if (fit?.converged) this.byHand.take(fit);
     // What the fit says first stands beside the button, then its picture, then its numbers.
     const [first, ...others] = described;
-    this.status.textContent = first.sentences.length ? `${capital(first.sentences.join(". "))}.` : first.title;
+    this.status.textContent = first.sentences.length ? `${first.sentences.join(". ")}.` : first.title;
     const ofLaws = Object.entries(laws || {}).map(([n, own]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(own)));
     fill(this.results, ...this.#runs(runs), ...this.#bands(bands), buttons,
       ...sections([{ ...first, sentences: [] }, ...others]), ...ofLaws, ...this.#posterior(posterior), this.#residuals(residuals));

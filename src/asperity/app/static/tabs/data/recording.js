@@ -52,8 +52,10 @@ export class RecordingCard {
   run() {
     const { key, name, source, options } = this.state;
     if (this.result?.measured?.record.mode !== "sliding" || !this.fitted) return null;
+    const { record, curves } = this.result.measured;
+    this.traced ||= { curve: curves.friction, segments: record.segments, level: record.friction.value, load: record.load?.value ?? 1 };
     return {
-      name, python: this.recording?.python || "",
+      name, python: this.recording?.python || "", recording: this.traced,
       asked: { recording: key, source, window: options.window || null, steps: options.steps || null },
     };
   }
@@ -106,6 +108,7 @@ export class RecordingCard {
       }, signal, `r${this.number}`);
       if (signal.aborted || !last.result) return;
       this.result = last.result;
+      this.traced = null;
       this.chosen.clear();
       this.bar.hidden = true;
       this.#draw();
