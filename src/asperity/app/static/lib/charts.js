@@ -20,6 +20,8 @@ const CHARACTER = 6.6;
 const TOP = 10;
 const BOTTOM = 42;
 const GAP = 16;
+/** Room (px) for a colour bar with its numbers. */
+const BAR = 92;
 
 /** Size of letters over that for which the room is. */
 const letters = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 15;
@@ -76,8 +78,9 @@ export class Figure {
    * `chart.x` is an axis and `chart.rows` are panels above each other, each with an axis `y`. An
    * axis has `label`, `log`, `range` (else that of the data) and `format`, from a number to a text.
    * A row has `lines` and `points` ({x, y, cls, name, title}), `bars` ({x, y, cls, name}), `marks`
-   * (x of vertical lines), `circle` (its radius), `image` ({url, x, y}: corners), `equal` (both axes
-   * in one scale) and `text` (in the middle).
+   * (x of vertical lines), `circle` (its radius), `image` ({url, x, y}: corners), `words` ([text, x, y]
+   * in shares of the axes), `colours` ({stops, low, high, label}: a colour bar), `equal` (both axes in
+   * one scale) and `text` (in the middle). A line may be `thick`, `dashed` or `smooth`.
    * `description` says in words what there is to see.
    */
   draw(chart, description = "") {
@@ -274,7 +277,7 @@ export class Figure {
     const gone = [];
     copy.querySelectorAll("*").forEach((node, i) => {
       const style = getComputedStyle(from[i]);
-      for (const property of ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linecap", "font-size", "font-family", "opacity"]) {
+      for (const property of ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linecap", "paint-order", "font-size", "font-family", "opacity"]) {
         const value = style.getPropertyValue(property);
         if (value) node.setAttribute(property, value);
       }
@@ -322,7 +325,7 @@ function drawChart(chart, width, height, description) {
   let xRange = chart.x.range || extent(rows.flatMap((r) => itemsOf(r).flatMap((i) => i.x)), chart.x.log, 0);
   rows.forEach((row, k) => {
     const top = TOP + k * (each + GAP);
-    const frame = { left: LEFT, right: width - RIGHT, top, bottom: top + each };
+    const frame = { left: LEFT, right: width - RIGHT - (row.colours ? BAR * size : 0), top, bottom: top + each };
     let yRange = yRanges[k];
     if (row.equal) [xRange, yRange] = equal(frame, xRange, yRange);
     frame.x = scale(xRange, frame.left, frame.right, chart.x.log);
@@ -392,11 +395,51 @@ function drawRow(row, frame, x, last, size) {
   parts.push("</g>", `<path class="frame" d="M${left} ${top}V${bottom}H${right}"/>`);
   const middle = (top + bottom) / 2;
   parts.push(`<text class="axis-label" text-anchor="middle" transform="translate(${round(14 * size)} ${round(middle)}) rotate(-90)">${escape(worded(row.y.label))}</text>`);
+  for (const [word, sx, sy] of row.words || []) parts.push(text(left + sx * (right - left), bottom - sy * (bottom - top) + 4, word, "region", "middle"));
+  if (row.colours) parts.push(drawColours(row.colours, frame, size));
   if (row.text) parts.push(text((left + right) / 2, middle, row.text, "nothing", "middle"));
   return parts.join("");
 }
 
+/** A colour bar to the right of a frame. */
+function drawColours({ stops, low, high, label }, { right, top, bottom }, size) {
+  const id = fresh("colours");
+  const x = right + 14;
+  const to = scale([low, high], bottom, top);
+  const marks = ticks(to, {}, (bottom - top) / 45 / size)
+    .map((t) => `<path class="frame" d="M${x + 14} ${round(to.to(t.value))}h4"/>${text(x + 21, to.to(t.value) + 4, t.label, "tick-label", "start")}`);
+  return `<defs><linearGradient id="${id}" x1="0" y1="1" x2="0" y2="0">${stops.map((s) => `<stop offset="${s.offset}" stop-color="${s.colour}"/>`).join("")}</linearGradient></defs>`
+    + `<rect x="${x}" y="${top}" width="14" height="${bottom - top}" fill="url(#${id})"/>${marks.join("")}`
+    + `<text class="axis-label" text-anchor="middle" transform="translate(${round(right + (BAR - 4) * size)} ${round((top + bottom) / 2)}) rotate(-90)">${escape(label)}</text>`;
+}
+
+/** Cubic curves through points that rise and fall where the points do (Fritsch and Carlson, 1980). */
+function smoothPath(points) {
+  const n = points.length;
+  const slope = points.slice(1).map(([x, y], i) => (y - points[i][1]) / (x - points[i][0]));
+  const at = points.map((_, i) => {
+    if (i === 0) return slope[0];
+    if (i === n - 1) return slope[n - 2];
+    return slope[i - 1] * slope[i] <= 0 ? 0 : (2 * slope[i - 1] * slope[i]) / (slope[i - 1] + slope[i]);
+  });
+  return points.map(([x, y], i) => {
+    if (i === 0) return `M${round(x)} ${round(y)}`;
+    const [px, py] = points[i - 1];
+    const third = (x - px) / 3;
+    return `C${round(px + third)} ${round(py + third * at[i - 1])} ${round(x - third)} ${round(y - third * at[i])} ${round(x)} ${round(y)}`;
+  }).join("");
+}
+
 function drawLine(line, frame) {
+  if (line.smooth) {
+    const runs = [[]];
+    line.x.forEach((x, i) => {
+      if (isKnown(line.y[i])) runs.at(-1).push([frame.x.to(x), clampPixel(frame.y.to(line.y[i]))]);
+      else if (runs.at(-1).length) runs.push([]);
+    });
+    const d = runs.filter((r) => r.length > 1).map(smoothPath).join("");
+    return d ? `<path class="line ${line.cls} ${line.thick ? "thick" : ""} ${line.dashed ? "dashed" : ""}" d="${d}"/>` : "";
+  }
   let path = "";
   let pen = "M";
   for (let i = 0; i < line.x.length; i += 1) {

@@ -310,16 +310,17 @@ export function create(page) {
     const rows = shown.map(([label, key]) => ({
       y: { label },
       marks: [answer.epsilon],
+      // Dashed over full lines: curves that coincide show both.
       lines: curves.map(([law, curve], k) => ({
-        x: answer.amplitudes, y: curve[key], cls: series(k), name: law, thick: law === view.law,
-      })),
+        x: answer.amplitudes, y: curve[key], cls: series(k), name: law, thick: law === view.law, dashed: law !== view.law, smooth: true,
+      })).sort((a, b) => b.thick - a.thick),
       points: curves.filter(([, curve]) => curve.lost?.row > 0).map(([law, curve]) => ({
         x: [answer.amplitudes[curve.lost.row - 1]], y: [curve[key][curve.lost.row - 1]], cross: true,
         cls: series(curves.findIndex(([n]) => n === law)), title: `${law}: ${curve.lost.why}`,
       })),
     }));
     fill(figures.amplitude.note,
-      curves.map(([law, curve], k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), law,
+      curves.map(([law, curve], k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)} ${law === view.law ? "" : "dashed"}` }), law,
         curve.lost ? el("span", { class: "lost" }, ` – lost at ε = ${digits(curve.lost.at, 3)}: ${curve.lost.why}`)
           : curve.left.length ? " …" : "")));
     const high = Math.max(answer.amplitudes.at(-1), answer.epsilon * 1.03);
@@ -389,7 +390,7 @@ export function create(page) {
       choice("Law", laws.map((n) => [n, n]), view.law, (value) => { view.law = value; rebuild(); }).element,
       group("Drive and machine", false,
         FIRST.filter((n) => byName[n]).map((n) => sliderOf(byName[n])),
-        tick("The mass counts (inertia)", Boolean(view.numbers.inertia),
+        tick("With the mass of the slider (inertia)", Boolean(view.numbers.inertia),
           (on) => { if (on) view.numbers.inertia = 1; else delete view.numbers.inertia; changed(); }).element),
       group("Law", false, own.map(sliderOf)),
       group("Air layer", false,
