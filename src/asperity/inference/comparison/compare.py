@@ -41,6 +41,7 @@ from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law, registered
 from asperity.materials import Material
 from asperity.parameters import law_parameters
+from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import Drawn, SummaryLine
 
 #: Called with how many laws are done, parts of one included.
@@ -134,6 +135,7 @@ class Comparison(Drawn):
         )
 
 
+@typed
 def compare(
     data: Data | Iterable[Data],
     laws: Sequence[str],

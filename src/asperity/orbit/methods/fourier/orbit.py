@@ -4,12 +4,12 @@ The states are split into means and zero-mean parts. One step of the iteration
 
 1. evaluates the rates on a uniform grid in tau,
 2. moves the means by a Newton step, so that the mean rates vanish,
-3. integrates the zero-mean rest spectrally, which gives the new zero-mean part.
+3. integrates the zero-mean part of the rates spectrally, which gives the new zero-mean part.
 
 It is a linear iteration that contracts by about the change of the slip exponent in a period, a few
 hundredths in the regime of Bureau et al.; where it does not contract, the orbit is left to
 `asperity.orbit.methods.collocation`. The means need to contract no faster than the rest, so their
-Newton matrix stays that of the averaged limit. The zero-mean part is carried on its own, so the
+Newton matrix stays that of the averaged limit. The zero-mean part is a separate unknown, so the
 harmonics keep their relative accuracy however small they are.
 
 Grid: theta = tau + g sin(tau) puts the nodes where the load is lightest and the slip pulse narrow.
@@ -33,16 +33,16 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from asperity.algebra.kepler import eccentric_phase
 from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.loads import Excitation, Harmonic, Modulation
+from asperity.orbit.mesh.mesh import eccentric_phase
 from asperity.orbit.observables import Observables
 from asperity.slider import QuasiStatic
 from asperity.theory.averaged import averaged_limit
 
 States = tuple[Array, ...]
 
-#: A change this small is round-off of the slip exponent: it no longer shrinks, and need not.
+#: Round-off of the slip exponent; changes do not fall below this value.
 _ROUND_OFF = 1e-12
 
 #: The averaged limit is itself no closer to the orbit than this.
@@ -161,7 +161,7 @@ def advance(
         Change of the rates with the states, to first order.
     """
     half = len(cycle.theta) // 2
-    # Mirror images first: what is odd in theta then cancels exactly, however large it is.
+    # Sum mirror images first: odd functions of theta then cancel exactly.
     residual = [cycle.share[:half] @ (r[:half] + r[half:]) for r in rates]
     change = tuple(-sum(a * r for a, r in zip(row, residual, strict=True)) for row in inverse)
     follow = push(*(c + jnp.zeros_like(r) for c, r in zip(change, rates, strict=True)))
@@ -233,11 +233,11 @@ def fourier_orbit(
         rates, push = jax.linearize(rates_of, *together(mean, rest))
         mean, new, moved = advance(cycle, inverse, mean, rates, push)
         change = _largest_change(moved, new, rest, system.kappa)
-        # A contraction by r leaves r / (1 - r) of the last change; none is assumed at first.
+        # The error of a contraction by r is r / (1 - r) times the last change.
         contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
         error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
         error = jnp.where(change < _ROUND_OFF, change, error)
-        # Settled points stay so while others need more steps: their changes are round-off.
+        # Further steps change converged points by round-off only.
         error = jnp.where(reached <= tolerance, reached, error)
         return mean, new, change, error, steps + 1
 
@@ -266,7 +266,7 @@ def fourier_observables(
     Parameters
     ----------
     system, load
-        As given to `fourier_orbit`.
+        As for `fourier_orbit`.
     orbit : FourierOrbit
     harmonics : int
         Their number.
@@ -318,7 +318,7 @@ def force_spectrum(
 def spectrum(
     cycle: LoadCycle, constant: Array, force: Array, harmonics: int
 ) -> tuple[Array, Array]:
-    """The same of a constant, shape (points,), plus a rest on the grid, (nodes, points)."""
+    """Spectrum of a constant, (points,), plus a zero-mean part on the grid, (nodes, points)."""
     angle = np.arange(harmonics + 1)[:, None] * cycle.theta
     # One product for all: a mean, cosines and sines.
     waves = (np.concatenate([np.cos(angle), -np.sin(angle[1:])]) * cycle.share) @ force
