@@ -25,7 +25,6 @@ from asperity.parameters import (
     canonical_name,
     known_name,
     point_parameters,
-    required,
 )
 from asperity.parameters.arguments import shown
 from asperity.slider.named import slider_from
@@ -107,7 +106,10 @@ def sourced_numbers(
 
 
 def numbers_for(
-    law_name: str, numbers: Mapping[str, SourcedNumber], *, modulated: bool = True
+    law_name: str,
+    numbers: Mapping[str, SourcedNumber],
+    among: Mapping[str, Parameter] | None = None,
+    needed: tuple[str, ...] = (),
 ) -> dict[str, SourcedNumber]:
     """The numbers of a point with this law, selected from `numbers`.
 
@@ -115,8 +117,10 @@ def numbers_for(
     ----------
     law_name : str
     numbers : mapping of str to SourcedNumber
-    modulated : bool
-        Whether the point has a modulation, with its amplitude and frequency.
+    among : mapping of str to Parameter, optional
+        Parameters that count; by default all of a point with this law.
+    needed : tuple of str
+        Those that must be there, besides the ones without a default.
 
     Raises
     ------
@@ -124,17 +128,19 @@ def numbers_for(
         If the law is unknown or numbers are missing; the message lists all of them.
     """
     law = get_law(law_name)
-    known = point_parameters(law)
-    of_modulation = () if modulated else ("epsilon", "frequency", *MODULATION)
-    needed = [name for name in required(law) if name not in of_modulation]
-    missing = [name for name in needed if name not in numbers]
+    known = point_parameters(law) if among is None else among
+    missing = [
+        name
+        for name, parameter in known.items()
+        if name not in numbers and (parameter.default is None or name in needed)
+    ]
     if missing:
         example = f"{missing[0]}={known[missing[0]].example}"
         raise InputError(
             f"{law_name} must have all its numbers, got none for {', '.join(missing)}; "
             f"name a material that has them or give each one, like '{example}'"
         )
-    return {n: numbers[n] for n in known if n in numbers and n not in of_modulation}
+    return {name: numbers[name] for name in known if name in numbers}
 
 
 def refuse_foreign(law_name: str, given: Mapping[str, Any]) -> None:

@@ -7,12 +7,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import json_option, law_named, material_named, point_options
+from asperity.cli.options import (
+    json_option,
+    law_named,
+    material_named,
+    names_option,
+    plot_option,
+    point_options,
+)
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
+    from asperity.parameters import Names
 
 _EPILOG = """\b
 Examples:
@@ -55,6 +63,8 @@ _SHOWN = (
     is_flag=True,
     help="Without a modulation: period, drop and durations of stick-slip, if there is any.",
 )
+@plot_option()
+@names_option()
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
 @click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
@@ -67,6 +77,8 @@ def response(
     table: Path | None,
     out: Path | None,
     resume: bool,
+    plot: Path | None,
+    names: Names,
     as_json: bool,
 ) -> int:
     """Periodic response to a modulated normal load.
@@ -75,25 +87,34 @@ def response(
     stable or not; without inertia unless it is asked for.
     """
     if stick_slip:
-        if table is not None:
+        if table is not None or out is not None or plot is not None or resume:
             raise InputError(
-                "--stick-slip must go with one point, got a table; leave --table out, or take "
-                "asperity.experiment.stick_slip_response with arrays"
+                "--stick-slip must go with one point and alone, got --table, --out, --resume or "
+                "--plot; leave it out, or take asperity.experiment.stick_slip_response with arrays"
             )
-        return _stick_slip(law, material, given, as_json)
+        return _stick_slip(law, material, given, as_json, names)
     if table is not None:
         if out is None:
             raise InputError("--out must be given with --table, got nothing; name the output file")
+        if plot is not None:
+            raise InputError("--plot must go with one point, got a table; leave one of them out")
         return _table(table, out, law, material, given, resume, as_json)
     if out is not None or resume:
         raise InputError(
             "--out and --resume must go with --table, got no table; name it or leave them out"
         )
-    return _point(law, material, given, as_json)
+    return _point(law, material, given, as_json, plot, names)
 
 
-def _point(law: str | None, material: str | None, given: dict[str, str], as_json: bool) -> int:
-    from asperity.cli.report import response_record, to_json
+def _point(
+    law: str | None,
+    material: str | None,
+    given: dict[str, str],
+    as_json: bool,
+    plot: Path | None,
+    names: Names,
+) -> int:
+    from asperity.cli.report import require_picture, response_record, to_json, write_picture
     from asperity.laws import get_law
     from asperity.operating_point import (
         numbers_for,
@@ -103,6 +124,7 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
     )
 
     law = law_named(law)
+    require_picture(plot)
     refuse_foreign(law, given)
     numbers = numbers_for(
         law, sourced_numbers(given, material_named(material), "command line", law)
@@ -111,18 +133,23 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
     if as_json:
         click.echo(to_json(response_record(result, numbers)))
     elif result.converged:
-        click.echo(_text(law, result, numbers))
+        click.echo(_text(law, result, numbers, names))
+    if result.converged:
+        write_picture(result, plot, names)
     if not result.converged:
         click.echo(f"asperity: {result.result[()]}", err=True)
     return 0 if result.converged else 1
 
 
-def _stick_slip(law: str | None, material: str | None, given: dict[str, str], as_json: bool) -> int:
+def _stick_slip(
+    law: str | None, material: str | None, given: dict[str, str], as_json: bool, names: Names
+) -> int:
     from asperity._version import __version__
     from asperity.cli.report import to_json
     from asperity.experiment import stick_slip_response
     from asperity.laws import get_law
     from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
+    from asperity.parameters import MODULATION, point_parameters
     from asperity.slider.named import slider_from
 
     law = law_named(law)
@@ -134,7 +161,9 @@ def _stick_slip(law: str | None, material: str | None, given: dict[str, str], as
                 "it out, or leave --stick-slip out"
             )
     sourced = sourced_numbers(given, material_named(material), "command line", law)
-    numbers = numbers_for(law, sourced, modulated=False)
+    modulation = ("epsilon", "frequency", *MODULATION)
+    among = {n: p for n, p in point_parameters(get_law(law)).items() if n not in modulation}
+    numbers = numbers_for(law, sourced, among)
     values = {name: number.value for name, number in numbers.items()}
     result = stick_slip_response(
         slider_from(get_law(law), values), velocity=values["V"],
@@ -151,11 +180,13 @@ def _stick_slip(law: str | None, material: str | None, given: dict[str, str], as
             for name, value, unit, meaning in rows
             if result.slips or name in ("steady", "stable")
         ]
-        click.echo(_words(law, numbers, str(result.result), texts))
+        click.echo(_words(law, numbers, str(result.result), texts, names))
     return 0 if result.slips or result.steady else 1
 
 
-def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> str:
+def _text(
+    law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber], names: Names
+) -> str:
     from asperity.parameters import OUTPUTS
 
     outputs = []
@@ -165,26 +196,33 @@ def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber])
         if isinstance(value, float):
             text = f"{value:.9g} {OUTPUTS[name].unit}".removesuffix(" 1")
         outputs.append((name, text, OUTPUTS[name].meaning))
-    return _words(law, numbers, "response", outputs)
+    return _words(law, numbers, "response", outputs, names)
 
 
 def _words(
     law: str,
     numbers: dict[str, SourcedNumber],
-    title: str,
+    heading: str,
     outputs: list[tuple[str, str, str]],
+    names: Names,
 ) -> str:
     from asperity.laws import get_law
     from asperity.outputs.tables import aligned
-    from asperity.parameters import point_parameters
+    from asperity.parameters import display_name, point_parameters
     from asperity.units import format_si
 
-    kinds = point_parameters(get_law(law))
+    chosen = get_law(law)
+    kinds = point_parameters(chosen)
     inputs = [
-        (name, format_si(number.value, kinds[name].kind, 6), number.origin)
+        (
+            display_name(name, names, chosen),
+            format_si(number.value, kinds[name].kind, 6),
+            number.origin,
+        )
         for name, number in numbers.items()
     ]
-    return f"{law}\n{aligned(inputs, '  ')}\n{title}\n{aligned(outputs, '  ')}"
+    title = f"{law}, of forces per square metre: N for Pa" if names == "geophysics" else law
+    return f"{title}\n{aligned(inputs, '  ')}\n{heading}\n{aligned(outputs, '  ')}"
 
 
 def _table(

@@ -15,10 +15,10 @@ from asperity.errors import InputError
 from asperity.experiment.labelled import Shaped, labelled
 from asperity.loads import Excitation
 from asperity.parameters import MACHINE, obeying
-from asperity.parameters.arguments import number, switch
+from asperity.parameters.arguments import number, typed
 from asperity.parameters.parameter import Displayed, SummaryLine, number_line
 from asperity.slider import Motion, Slider, equation_of_motion
-from asperity.slider.problem import checked_slider, flatten
+from asperity.slider.problem import flatten
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ class StickSlip(Displayed):
         return labelled(self, _MEANINGS, {"velocity": ("m/s", self.velocity)}, dims)
 
 
+@typed
 def stick_slip_response(
     slider: Slider,
     *,
@@ -144,14 +145,12 @@ def stick_slip_response(
     after up to eight slips; `drop`, `peak` and `period` are accurate to about 1e-8 relatively. One
     point after the other takes some hundredths of a second each.
     """
-    slider = checked_slider(slider)
     if not slider.law.rate_dependent:
         raise InputError(
             f"law must depend on the velocity, got {slider.law.name}; asperity.theory has the "
             "cycle of constant static and dynamic friction"
         )
     V = obeying(velocity, "stick_slip_response.velocity", "velocity", "positive")
-    inertia = switch(inertia, "inertia")
     if spring is not None:
         slider = Slider(slider.law, spring=spring, load=slider.W0, mass=slider.M)
     eta = None

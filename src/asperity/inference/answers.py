@@ -26,7 +26,7 @@ from asperity.laws import Law, get_law, known_law, registered
 from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
 from asperity.outputs.targets import require_rereadable
 from asperity.parameters import DRIVE, MACHINE
-from asperity.parameters.arguments import file_path, shown
+from asperity.parameters.arguments import FilePath, typed
 from asperity.questions import fit as questions
 from asperity.recording import Trace
 from asperity.recording.readers.from_file import read_source
@@ -41,6 +41,8 @@ _TRENDS = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
 
 #: Sets of data of any kind.
 AnyData = LockInTable | HealingTable | AveragedCycle | RecordedRun
+#: These, and what is read as one of them.
+Data = AnyData | Trace | FilePath
 
 
 def default_law(data: Sequence[AnyData]) -> str:
@@ -279,13 +281,13 @@ def answer_comparison(
     return compare(read_data(question, read), laws, question.free, **options)
 
 
-def _loaded(data: Any, fixed: Mapping[str, Any] | None) -> list[Any]:
+def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> list[Any]:
     """Sets of data as they are, files as what they hold."""
     several = data if isinstance(data, list | tuple) else [data]
     loaded: list[Any] = []
     for one in several:
         if isinstance(one, str | os.PathLike):
-            file = questions.Data(file=Path(file_path(one, "data")))
+            file = questions.Data(file=Path(one))
             question = questions.Fit(data=(file,), fixed=dict(fixed or {}))
             loaded += read_data(question)
         else:
@@ -293,8 +295,12 @@ def _loaded(data: Any, fixed: Mapping[str, Any] | None) -> list[Any]:
     return loaded
 
 
+@typed
 def fit_data(
-    data: Any, law: str | type[Law] | None = None, free: Sequence[str] | None = None, **options: Any
+    data: Data | Sequence[Data],
+    law: str | type[Law] | None = None,
+    free: Sequence[str] | None = None,
+    **options: Any,
 ) -> Fit:
     """Fit a law to files or to data at hand, as ``asperity fit`` does.
 
@@ -318,8 +324,12 @@ def fit_data(
     return fit(loaded, default_law(loaded) if law is None else law, free, **options)
 
 
+@typed
 def compare_data(
-    data: Any, laws: str | Sequence[str] = "all", free: Sequence[str] | None = None, **options: Any
+    data: Data | Sequence[Data],
+    laws: str | Sequence[str] = "all",
+    free: Sequence[str] | None = None,
+    **options: Any,
 ) -> Comparison:
     """Compare laws on files or on data at hand, as ``asperity compare`` does.
 
@@ -339,8 +349,6 @@ def compare_data(
         As of `asperity.inference.compare`, or if a file cannot be read.
     """
     listed = laws.split(",") if isinstance(laws, str) else laws
-    if not isinstance(listed, list | tuple) or not all(isinstance(law, str) for law in listed):
-        raise InputError("laws", "be names of laws", shown(laws), "write 'all' or ['rice-ruina']")
     names = compared_laws([law.strip() for law in listed])
     return compare(_loaded(data, options.get("fixed")), names, free, **options)
 
