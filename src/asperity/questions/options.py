@@ -36,6 +36,7 @@ MEASURE_OPTIONS: Mapping[str, str] = {
     "velocity": "--set V",
     "mass": "--set M",
     "normal_load": "--set W0",
+    "conditions": "--conditions",
 }
 
 FIT_OPTIONS: Mapping[str, str] = {
