@@ -292,7 +292,7 @@ def _campaign(
     from asperity.measurement.campaign import run_campaign
 
     rows_of = FileRows(source, question)
-    with bar("files") as update:
+    with bar("file", "measurements") as update:
         done = run_campaign(
             recordings,
             rows_of,
