@@ -35,7 +35,7 @@ _MOST_NARROW = 2
 
 
 def write_comparison(folder: Path, comparison: Comparison) -> None:
-    """Write everything that a comparison says into a folder, completely or not at all.
+    """Write the report of a comparison into a folder, completely or not at all.
 
     Parameters
     ----------
@@ -57,18 +57,18 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
         record = json.dumps(comparison_record(comparison), indent=2)
         (staging / "comparison.json").write_text(record + "\n", encoding="utf-8")
         (staging / "report.html").write_text(page(comparison, fits), encoding="utf-8")
-        for name, own in fits.items():
-            (staging / f"{name}.toml").write_text(material_text(own), encoding="utf-8")
+        for name, fit in fits.items():
+            (staging / f"{name}.toml").write_text(material_text(fit), encoding="utf-8")
 
 
 def page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
-    """The page as text, with its figures in it and nothing to fetch.
+    """The page as text, with embedded figures and without external resources.
 
     Parameters
     ----------
     comparison : Comparison
     fits : mapping of str to Fit
-        Those that converged.
+        The converged fits.
     """
     first = next(iter(fits.values()))
     names = " and ".join(term.name for term in first.objective.terms)
@@ -76,11 +76,11 @@ def page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
         "Verdict": as_html(comparison_report(comparison, reasons=True)),
         "Data and laws": _figures(fits),
         "Estimates": "".join(
-            f"<h3>{escape(name)}</h3>{as_html([estimates(own)])}" for name, own in fits.items()
+            f"<h3>{escape(name)}</h3>{as_html([estimates(fit)])}" for name, fit in fits.items()
         ),
         "Data": data_tables(first),
         "Provenance": "".join(
-            f"<h3>{escape(name)}</h3>{provenance(own)}" for name, own in fits.items()
+            f"<h3>{escape(name)}</h3>{provenance(fit)}" for name, fit in fits.items()
         ),
     }
     return document(f"Laws compared on {names}", "A comparison", f"Laws on {names}", sections)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -10,23 +9,25 @@ from asperity.errors import Argument, ConstantLoadError, InputError
 from asperity.measurement.measure import Measurement, measure, measure_amplitudes
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
 from asperity.measurement.stick_slip.measure import (
+    SLIDER,
     Machine,
     StickSlipMeasurement,
     measure_stick_slip,
 )
+from asperity.parameters.arguments import FilePath, typed
 from asperity.questions.recording import Measurement as Question
 from asperity.recording import Trace
 from asperity.recording.readers import read
 
 Read = TypeVar("Read")
 
-#: Share of the displacement in the slips above which it is the slider's, and slip events for each
-#: velocity step or hold above which these are read within stick-slip.
-_SLIDER, _EVENTS = 0.5, 10
+#: Slip events for each velocity step or hold above which these are read within stick-slip.
+_EVENTS = 10
 
 
+@typed
 def measure_recording(
-    recording: Trace | str | os.PathLike[str],
+    recording: Trace | FilePath,
     *,
     modulated: bool | None = None,
     load: str = "W",
@@ -286,7 +287,7 @@ def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
     """
     if not events.clear:
         return False
-    if not changes or events.slip_share > _SLIDER:
+    if not changes or events.slip_share > SLIDER:
         return True
     return any(r.sticks for r in events.regimes) and len(events.events) > _EVENTS * changes
 

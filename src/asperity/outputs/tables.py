@@ -1,4 +1,4 @@
-"""Sections of a report, once described: as text for a terminal and as HTML for a page."""
+"""Sections of a report, rendered as text for a terminal and as HTML for a page."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Section(NamedTuple):
     warnings: tuple[str, ...] = ()
 
     def record(self) -> dict[str, Any]:
-        """Texts as JSON has them."""
+        """The section as JSON values."""
         return self._asdict()
 
     def worded(self, words: Callable[[str], str]) -> Section:
@@ -91,7 +91,7 @@ def as_html(sections: Iterable[Section], *, level: int = 3) -> str:
 
 
 def rounded(value: float, doubt: float) -> tuple[str, str]:
-    """A number and its uncertainty, with as many digits as two uncertain ones allow.
+    """A number and its uncertainty, rounded to two uncertain digits.
 
     The uncertainty is empty where it is unknown or zero.
     """

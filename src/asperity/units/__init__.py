@@ -1,4 +1,4 @@
-"""Units at the door: text with a unit in, SI floats inside, readable text out.
+"""Units of inputs and outputs: text with a unit to SI floats, and SI floats to readable text.
 
 Conversion is decimal, so ``"0.4 um"`` is exactly the double nearest to 4e-7.
 """

@@ -1,4 +1,4 @@
-"""The kinds of quantity that cross the door, with the unit each is kept in and displayed in."""
+"""Kinds of quantities of inputs and outputs, with their SI unit and display units."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from asperity.errors import InputError, closest
 
 @dataclass(frozen=True)
 class Kind:
-    """A physical dimension as the interface knows it.
+    """A kind of quantity: dimension, units and examples.
 
     Attributes
     ----------
     noun : str
-        What a message calls it, with its article.
+        Noun in messages, with its article.
     si : str
         SI unit in pint's spelling; empty for a pure number.
     example : str
@@ -32,7 +32,7 @@ class Kind:
     ladder: tuple[tuple[str, int], ...]
 
 
-#: Every kind of quantity that crosses the door.
+#: All kinds of quantities.
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "velocity": Kind(
