@@ -20,6 +20,9 @@ from asperity.recording.readers.raw import (
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
+#: Attribute of the datasets of a group that are its recording; without one, all are.
+_ROLE = "recording_role"
+
 #: Place of a group: the place of its parent, and its name; None for the root.
 _Place = tuple[Any, str] | None
 
@@ -160,6 +163,9 @@ def _contents(file: Any, path: Path, matlab: bool) -> _Contents:
                 attributes[key] = dict(item.attrs)
                 intervals.append(interval_of(attributes[key]))
         intervals.append(interval_of(dict(node.attrs)))
+        # A file of a computed motion marks what an instrument would have recorded of it.
+        recorded = [key for key, about in attributes.items() if _ROLE in about]
+        arrays = {key: arrays[key] for key in recorded} or arrays
         columns, step = group_columns(arrays, attributes)
         if columns:
             groups[_path(place)] = columns
