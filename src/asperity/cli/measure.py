@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, set_option, settings_of
+from asperity.cli.options import Count, json_option, set_option, settings_of
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.words import in_options
 from asperity.errors import InputError, naming
@@ -105,7 +105,7 @@ in place of numbers; 2: bad input.
 )  # fmt: skip
 @click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
 @click.option(
-    "--harmonics", metavar="N", type=click.IntRange(1, 64), default=4, show_default=True,
+    "--harmonics", metavar="N", type=Count(), default=4, show_default=True,
     help="How many.",
 )  # fmt: skip
 @click.option(
