@@ -24,7 +24,7 @@ from asperity.slider import Slider
 from asperity.slider.named import equation_parameters, value_of, with_value
 from asperity.slider.problem import Problem, checked_problem, flatten
 
-#: Spans of a larger ratio than this are continued by equal factors.
+#: Spans with a larger ratio of their ends than this are continued on a logarithmic scale.
 _LOGARITHMIC = 2.0
 
 
@@ -36,10 +36,10 @@ class ContinuedParameter:
     ----------
     name : str
     unit : str
-        SI unit of the values; "" for none.
+        SI unit of the values; "" for a pure number.
     start, end : float
     logarithmic : bool
-        Whether it moves by equal factors.
+        Whether the scale is logarithmic.
     """
 
     name: str
@@ -70,12 +70,12 @@ class ContinuedParameter:
 def moving_parameter(
     problem: Problem, name: str, span: Any, field: str = "span"
 ) -> ContinuedParameter:
-    """A parameter of `problem` with the span it shall move over.
+    """A parameter of `problem` with its span.
 
     Raises
     ------
     InputError
-        If there is no such parameter, or the span is not two different values it may have.
+        If there is no such parameter, or the span is not two different valid values.
     """
     name = continued_name(type(problem.system.slider.law), name)
     known = equation_parameters(*problem)
@@ -97,12 +97,12 @@ def moving_parameter(
 
 
 def continued_name(law: type[Law], name: str) -> str:
-    """The one name of a parameter that can be continued in.
+    """The canonical name of a parameter that can be continued.
 
     Raises
     ------
     InputError
-        If neither the law nor the experiment has one of that name.
+        If neither the law nor the experiment has a parameter of that name.
     """
     if name in MODULATION:
         raise InputError(
@@ -123,7 +123,7 @@ def line_through(
     problem : Problem
         The other parameters, NumPy arrays of shape (1,).
     parameters : tuple of ContinuedParameter
-        Different ones.
+        Different parameters.
     at, direction : sequence of float
     """
     known = equation_parameters(*problem)
@@ -142,15 +142,15 @@ def line_through(
 
 
 def fixed_as_text(law: type[Law], fixed: Mapping[str, float]) -> str:
-    """The parameters that were kept, with their units."""
+    """The constant parameters with their units."""
     known = point_parameters(law)
     return "; ".join(f"{n} = {value!r} {known[n].unit}".rstrip() for n, value in fixed.items())
 
 
 def _end(parameter: Parameter, value: Any, field: str) -> float:
-    """An end of a span, which the parameter must be able to have."""
+    """An end of a span, checked by the rule of the parameter."""
     checked = number(value, field, parameter.kind, parameter.rule)
-    # What can be 0 in a table, for not being there, has to be there to be continued in.
+    # 0 in a table means "not included"; a continued parameter must be part of the equations.
     if parameter.name in ("M", "eta") and not checked > 0:
         raise InputError(
             f"{field} must be positive for {parameter.name}, got {checked:g} {parameter.unit}; "
@@ -221,7 +221,7 @@ def one_problem(
 
 
 def starting_orbit(problem: Problem, intervals: int) -> Orbit | None:
-    """An orbit of the one point of `problem` on a mesh of `intervals`; None where there is none."""
+    """An orbit of the single point of `problem` on a mesh of `intervals`; None without one."""
     solution = find_orbits(
         jax.tree.map(np.asarray, problem),
         1,
@@ -234,7 +234,7 @@ def starting_orbit(problem: Problem, intervals: int) -> Orbit | None:
 
 
 def held_parameters(problem: Problem, *moving: str) -> dict[str, float]:
-    """Parameters of the operating point, SI, but for those that move."""
+    """Parameters of the operating point, SI, without those that move."""
     named = equation_parameters(*problem)
     values = {name: value_of(problem, p) for name, p in named.items() if name not in moving}
     return {name: float(np.ravel(value)[0]) for name, value in values.items()}

@@ -1,4 +1,4 @@
-"""Checks of a modulation on samples of its period: what the equations assume of it."""
+"""Checks of a modulation on samples of its period, for what the equations assume."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from asperity.loads.modulation import Excitation, Harmonic, Modulation
 from asperity.loads.periodic import Periodic
 from asperity.parameters.arguments import shown
 
-#: Samples of the period; more are taken where fewer find a fault, which may be their own.
+#: Numbers of samples of the period; a fault counts if it remains with more samples.
 _SAMPLES = (64, 1024, 16384)
 
 #: Values of one evaluation: points times samples.
@@ -35,7 +35,7 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
         Numbers or arrays of any shapes that broadcast. `Harmonic` and `Periodic` agree by their
         construction.
     name : str
-        What messages call it.
+        Name of the modulation in messages.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
         fault = _first_fault(structure, flat, int(np.prod(shape)), name)
     except InputError:
         raise
-    except Exception as error:  # code of others may raise anything
+    except Exception as error:  # a user's code may raise anything
         text = printable(" ".join(str(error).split()), 200)
         raise InputError(
             f"{name} must have members that work on arrays of jax.numpy, got "
@@ -81,7 +81,7 @@ def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modu
 def _first_fault(
     structure: Any, leaves: list[Array], points: int, name: str, samples: int = _SAMPLES[0]
 ) -> str:
-    """A fault that more samples do not take away; empty where there is none."""
+    """A fault that remains with more samples; empty without a fault."""
     at_once = _VALUES // samples
     for first in range(0, points, at_once):
         part = [leaf[first : first + at_once] for leaf in leaves]
@@ -95,7 +95,7 @@ def _first_fault(
 
 
 def _fault(modulation: Modulation, samples: int, name: str) -> str:
-    """What is wrong with the first point that has a fault; empty where there is none."""
+    """The fault of the first faulty point; empty without a fault."""
     theta = 2 * np.pi * np.arange(samples) / samples
     at = modulation.at(theta[:, None])
     amplitude = np.atleast_1d(np.asarray(modulation.amplitude, float))

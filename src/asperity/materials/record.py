@@ -49,7 +49,7 @@ class Material(Question):
         for name, number in numbers.items():
             if not name.isidentifier() or name.startswith("_") or hasattr(cls, name):
                 raise InputError(
-                    f"numbers must have names that can follow a dot and are not taken, got "
+                    f"numbers must have names that are Python attributes and not in use, got "
                     f"'{name}'; rename that number"
                 )
             if number.value is not None:
@@ -62,12 +62,12 @@ class Material(Question):
             return self.numbers[_plain(name)]
         except KeyError:
             raise InputError(
-                f"{self.name} must have the number asked for, got {shown(name)}; "
+                f"{self.name} must have the number, got {shown(name)}; "
                 f"{closest(name, self.numbers)}"
             ) from None
 
     def __getattr__(self, name: str) -> float:
-        # Underscored names are Python's and pydantic's own probes.
+        # Python and pydantic probe for names with underscores.
         if name.startswith("_") or _plain(name) not in self.numbers:
             raise AttributeError(
                 f"material '{self.name}' has no number '{name}'; {closest(name, self.numbers)}"
@@ -130,10 +130,10 @@ class Material(Question):
             if number is None:
                 raise InputError(
                     f"{owner}.{parameter} must be given, got nothing and '{self.name}' has no "
-                    f"such number; write {parameter}=... beside the law's name"
+                    f"such number; write {parameter}=... after the law's name"
                 )
             return number.si
-        if number is None:  # of which only the law's own declaration knows the unit and the rule
+        if number is None:  # the declaration of the law's field checks unit and rule
             return given[parameter]
         value = to_si(given[parameter], number.dimension, f"{owner}.{parameter}")
         _check_rule(parameter, value, number.dimension, owner)
@@ -143,7 +143,7 @@ class Material(Question):
 def _check_rule(name: str, value: Any, dimension: str, owner: str) -> None:
     """Refuse a value that breaks the rule of the parameter of that name and dimension.
 
-    Other numbers may have any value.
+    A number that is no known parameter may have any value.
     """
     known = {**INTERFACE, **EXPERIMENT}.get(name)
     if known is not None and known.kind == dimension:

@@ -17,7 +17,7 @@ from asperity.parameters.arguments import typed
 
 Float = NDArray[np.float64]
 
-#: Newton steps for the state. Friction is affine in it for most laws, and nearly so for the others.
+#: Newton steps for the state; friction is affine in the state for most laws.
 _STEPS = 12
 
 

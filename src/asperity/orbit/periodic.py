@@ -52,7 +52,7 @@ def periodic_response(
     """Periodic response to W = W0 (1 + eps cos wt), stable or not.
 
     Arrays may stand wherever a number does, the parameters of the slider included; they
-    broadcast as NumPy's do, and every operating point is solved on its own.
+    broadcast as NumPy's do, and every operating point is solved independently.
 
     Parameters
     ----------

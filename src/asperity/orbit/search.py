@@ -1,4 +1,4 @@
-"""The search for periodic orbits: a list of methods, each given the points that are left.
+"""The search for periodic orbits: methods in order, each for the points not solved so far.
 
 `METHODS` is the order in which methods are tried, fast ones first; what each does is in its own
 module.
@@ -8,8 +8,8 @@ than the range that is tested (`docs/theory/numerical_method.md`). A point outsi
 `Outcome.OUT_OF_RANGE` at once: a search there takes up to a minute and fails, or gives a stability
 that is round-off.
 
-On several cores each has a process of its own, since XLA's programs do not share one well. Worker
-processes are started once and kept; each loads the compiled programs from the cache.
+On several cores each core runs a process, since an XLA program gains little from several cores.
+Worker processes are started once and kept; each loads the compiled programs from the cache.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ METHODS: tuple[Method, ...] = (
     FrequencyPath(),
 )
 
-#: What a user may choose among.
+#: Names that a user may choose.
 CHOICES = tuple(dict.fromkeys(method.choice for method in METHODS))
 
 #: Earlier names of choices.
@@ -150,7 +150,7 @@ def find_orbits(
 #: Points handed to a process at a time: a fraction of a second of work.
 _SLICE = 20_000
 
-#: Below this many points the start of the processes, a second or two, is not worth it.
+#: With fewer points than this, starting processes (a second or two) takes longer than it saves.
 WORTHWHILE = 200_000
 
 
@@ -171,19 +171,19 @@ def find_orbits_on_cores(
     progress: Callable[[int], None],
     methods: tuple[Method, ...],
 ) -> Solution:
-    """`find_orbits` with the points dealt out to `workers` processes; same results, same order."""
+    """`find_orbits` with the points divided among `workers` processes; same results and order."""
     from loky import get_reusable_executor
 
     solution = Solution.unsolved(problem, points, SearchOptions(harmonics, phases, progress))
     options = {"harmonics": harmonics, "phases": phases, "methods": methods}
-    # One thread of XLA in each process, or they fight for the cores.
+    # One thread of XLA for each process; more threads than cores would slow all of them.
     executor = get_reusable_executor(max_workers=workers, env={"NPROC": "1"})
     waiting: list[tuple[np.ndarray, Any]] = []
     try:
         for start in range(0, points, _SLICE):
             index = np.arange(start, min(start + _SLICE, points))
             waiting.append((index, executor.submit(_search, take(problem, index), options)))
-            if len(waiting) > 2 * workers:  # bounds the results that wait in memory
+            if len(waiting) > 2 * workers:  # bounds the results in memory
                 _collect(solution, *waiting.pop(0), progress)
         while waiting:
             _collect(solution, *waiting.pop(0), progress)

@@ -33,7 +33,7 @@ class Sensitivities:
     outcome : int array, shape (...)
         `Outcome` of each point.
     converged : bool array, shape (...)
-        False where no orbit was found, or not resolved; the derivatives there are NaN.
+        False where there is no resolved orbit; the derivatives are NaN there.
     mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
         d(output)/d(parameter) in SI; phases in rad.
     log_multipliers : complex array, shape (..., states, parameters)

@@ -1,4 +1,4 @@
-"""A protocol: law, numbers and what an experimenter does, as a file and as an object."""
+"""`Protocol`: law, numbers and steps of an experiment."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from pydantic import PositiveInt, PrivateAttr, ValidationError, WrapValidator, m
 from asperity import materials
 from asperity.errors import InputError, MistakesError
 from asperity.laws import get_law, registered
+from asperity.laws.uneven_track import on_uneven_track
 from asperity.loads import Programme, ProgrammeStep
 from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.operating_point import (
@@ -34,7 +35,7 @@ from asperity.transients import Trajectory, transient
 from asperity.transients.inputs import MOST_STEPS, require_contact
 from asperity.transients.trajectory import planned_rows, row_bytes
 
-#: Segments whose values are listed one by one, so that two protocols can be compared.
+#: Segments whose values are part of the comparison of two protocols.
 _COMPARED = 100
 
 
@@ -52,7 +53,7 @@ def numbers_of(
     law_name : str
     stated : mapping of str to float or str
     material : str
-        Name, or file relative to `folder`; empty for none.
+        Name, or file relative to `folder`; may be empty.
     folder : Path
     inertia : bool
         Whether a mass is needed.
@@ -74,7 +75,7 @@ def numbers_of(
 
 
 def slider_of(law_name: str, values: Mapping[str, float]) -> Slider:
-    """The slider that SI values by name describe."""
+    """The slider with these SI values, by name."""
     return slider_from(get_law(law_name), values)
 
 
@@ -85,7 +86,7 @@ class ProtocolError(MistakesError):
 
 
 def _each_step_once(steps: Any, fill: Callable[[Any], Any]) -> Any:
-    """The steps; a wrong one is one mistake, which pydantic reports for each kind of step."""
+    """The steps; a wrong step is one mistake, which pydantic would report for each kind of step."""
     try:
         return fill(steps)
     except ValidationError as error:
@@ -110,7 +111,7 @@ def _wrong_step(number: Any, reported: Any) -> InputError:
 
 
 class Repeat(Record):
-    """Steps done several times, one round after the other.
+    """Repeated steps.
 
     Attributes
     ----------
@@ -129,7 +130,7 @@ class ProtocolStart(Record):
     Attributes
     ----------
     velocity : float or str
-        Pulling velocity (m/s): the slider slides steadily at it, unless states are given.
+        Pulling velocity (m/s); without `states` the slider is in steady sliding at this velocity.
     load : float or str, optional
         Normal load (N), W0 by default.
     states : tuple of float, optional
@@ -142,21 +143,42 @@ class ProtocolStart(Record):
     states: tuple[float, ...] | None = None
 
 
+class Track(Record):
+    """A friction level that varies along the track; see `asperity.laws.uneven_track`.
+
+    Attributes
+    ----------
+    amplitude : float
+        Standard deviation of mu0.
+    length : float or str
+        Over which mu0 forgets itself (m).
+    exponent : float
+        Of the power law of its spectrum beyond one over that length.
+    origin : float or str
+        Where on the track the slider begins (m).
+    """
+
+    amplitude: float
+    length: quantity("length")  # type: ignore[valid-type]
+    exponent: float = 2.0
+    origin: quantity("length") = 0.0  # type: ignore[valid-type]
+
+
 class SolverSettings(Record):
-    """How the motion is integrated and written.
+    """Settings of the integration and of the output.
 
     Attributes
     ----------
     inertia : bool
         Whether the mass of the slider counts.
     sampling : float or str, optional
-        Samples per second (Hz); the integrator's own steps by default.
+        Samples per second (Hz); the integrator's steps by default.
     rtol : float
         Tolerated relative error of a step.
     method : str
         "auto", "explicit" or "implicit".
     most_steps : float
-        Number of steps at which the integration stops and says so.
+        Largest number of steps of the integration.
     """
 
     inertia: bool = False
@@ -167,7 +189,7 @@ class SolverSettings(Record):
 
 
 class Protocol(Question):
-    """An experiment: what slides, how it begins, and the steps.
+    """An experiment: slider, initial state, and steps.
 
     Attributes
     ----------
@@ -177,12 +199,14 @@ class Protocol(Question):
         Lines such as ``"hold 10 s"``, steps of `asperity.loads`, or blocks of them.
     start : ProtocolStart
     material : str
-        Where numbers come from that `parameters` does not have.
+        Material whose numbers apply where `parameters` has none.
     parameters : mapping of str to float or str
         Numbers of the law, and K, W0, M and eta (radiation damping), by the names of tables.
     solver : SolverSettings
+    track : Track, optional
+        By default mu0 is the same everywhere.
     tribometer : mapping, optional
-        What a recording of the run is made with: fields of `Recorder`, ``seed``, and ``sensors``.
+        Recording of the run: fields of `Recorder`, ``seed``, and ``sensors``.
     title : str
     folder : Path
         Where files that steps name lie.
@@ -202,6 +226,7 @@ class Protocol(Question):
     material: str = ""
     parameters: Mapping[str, Given] = {}
     solver: SolverSettings = SolverSettings()
+    track: Track | None = None
     tribometer: Mapping[str, Any] | None = None
     title: str = ""
     folder: Path = Path()
@@ -220,8 +245,9 @@ class Protocol(Question):
         )
         mistakes += wrong
         try:
-            self._numbers.update(self._found_numbers())
+            self._numbers.update(self._sourced_numbers())
             level = self._level()
+            _ = self.slider
         except InputError as error:
             mistakes.append(error)
         else:
@@ -232,11 +258,11 @@ class Protocol(Question):
             mistakes.append(error)
         if mistakes:
             raise ProtocolError(mistakes)
-        # What concerns the programme as a whole, such as steps that take no time.
+        # Mistakes of the programme as a whole, such as steps without duration.
         require_contact(self.programme, self._numbers["W0"].value)
         return self
 
-    def _found_numbers(self) -> dict[str, SourcedNumber]:
+    def _sourced_numbers(self) -> dict[str, SourcedNumber]:
         return numbers_of(
             self.law, self.parameters, self.material, self.folder, self.solver.inertia
         )
@@ -247,7 +273,7 @@ class Protocol(Question):
 
     @property
     def numbers(self) -> dict[str, SourcedNumber]:
-        """Parameters in SI by name, with where each comes from."""
+        """Parameters in SI by name, with their origins."""
         return dict(self._numbers)
 
     @cached_property
@@ -259,25 +285,29 @@ class Protocol(Question):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Each step as it was written, repetitions written out."""
+        """The lines of the steps, with repetitions expanded."""
         return tuple(one.text for one in self._planned)
 
     @cached_property
     def slider(self) -> Slider:
         """The law with its parameters, spring, mass and mean load."""
-        return slider_of(self.law, {name: n.value for name, n in self._numbers.items()})
+        even = slider_of(self.law, {name: n.value for name, n in self._numbers.items()})
+        if self.track is None:
+            return even
+        law = on_uneven_track(even.law, **self.track.model_dump())
+        return Slider(law, spring=even.K, load=even.W0, mass=even.M)
 
     @cached_property
     def setup(self) -> RecordingSetup | None:
-        """What a recording of the run is made with, None without a tribometer."""
+        """Sensors and recorder of the run, None without a tribometer."""
         if self.tribometer is None:
             return None
-        K = self._numbers.get("K")  # none where another mistake has left no numbers
+        K = self._numbers.get("K")  # missing if another mistake prevents the numbers
         return setup_of(self.tribometer, self.solver.sampling, np.nan if K is None else K.value)
 
     @property
     def integration(self) -> dict[str, Any]:
-        """Keyword arguments for `asperity.transients.transient` besides slider and programme."""
+        """Keyword arguments of `asperity.transients.transient` except slider and programme."""
         eta = self._numbers.get("eta")
         states = self.start.states
         return {
@@ -292,7 +322,7 @@ class Protocol(Question):
 
     @property
     def rows(self) -> float | None:
-        """Number of rows that a run writes, None where the integrator's steps decide."""
+        """Number of rows of a run; None for the steps of the integrator."""
         return planned_rows(self.solver.sampling, self.programme.duration)
 
     @property
@@ -301,12 +331,12 @@ class Protocol(Question):
         return row_bytes(len(self.slider.law.state_names))
 
     def trajectory(self) -> Trajectory:
-        """The motion, all of it in memory; `run_protocol` writes it to a file block by block."""
+        """The whole motion in memory; `run_protocol` writes it to a file block by block."""
         return transient(self.slider, self.programme, **self.integration)
 
     @cached_property
     def inputs(self) -> dict[str, Any]:
-        """Everything that the motion depends on besides the version, as JSON values by name."""
+        """Everything that determines the motion except the version, as JSON values by name."""
         import jax
 
         digest = hashlib.sha256()
@@ -316,7 +346,7 @@ class Protocol(Question):
             for path, leaf in jax.tree_util.tree_leaves_with_path(segment):
                 values = np.asarray(leaf, float)
                 digest.update(values.tobytes())
-                # Recordings may have millions of samples: the digest covers them.
+                # A digest represents recordings, which may have millions of samples.
                 if values.ndim == 0 and number <= _COMPARED:
                     segments[f"segment {number}{jax.tree_util.keystr(path)}"] = float(values)
         return {
@@ -324,6 +354,7 @@ class Protocol(Question):
             "parameters": {name: number.value for name, number in self._numbers.items()},
             "start": {**self._level()._asdict(), "states": self.start.states},
             "solver": self.solver.model_dump(),
+            "track": None if self.track is None else self.track.model_dump(),
             **segments,
             "programme": digest.hexdigest(),
         }

@@ -1,4 +1,4 @@
-"""The recording that a laboratory would have of a run: a protocol's ``[tribometer]``."""
+"""The simulated recording of a run, from the protocol's table ``[tribometer]``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from asperity.tribometer.sensors import (
 )
 from asperity.tribometer.tribometer import Recorder, Tribometer
 
-#: Sensors by the names that files give them, each with what it can measure, the usual first.
+#: Sensors by their names in files, each with its possible quantities, the usual one first.
 SENSORS: Mapping[str, tuple[type[Sensor], tuple[str, ...]]] = {
     "spring gauge": (SpringGauge, ("shear force",)),
     "load cell": (LoadCell, ("normal load", "shear force")),
@@ -30,7 +30,7 @@ SENSORS: Mapping[str, tuple[type[Sensor], tuple[str, ...]]] = {
     "displacement gauge": (DisplacementGauge, ("slider displacement", "load-point displacement")),
 }
 
-#: Variable of the motion for what a sensor measures; the load point is made of two.
+#: Variable of the motion for each quantity of a sensor; the load point needs two variables.
 _SIGNALS = {
     "shear force": "force",
     "normal load": "load",
@@ -38,13 +38,13 @@ _SIGNALS = {
     "load-point displacement": "load point",
 }
 
-#: Role that a channel's name may claim, with what plays it.
+#: Quantity that a channel must have whose name is that of a role.
 _CLAIMS = {"F": "shear force", "W": "normal load"}
 
 
 @dataclasses.dataclass(frozen=True)
 class RecordingSetup:
-    """What a protocol says of its recording.
+    """The recording of a protocol: tribometer, quantities and seed.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class RecordingSetup:
 def setup_of(
     table: Mapping[str, Any], sampling: float | None, stiffness: float = np.nan
 ) -> RecordingSetup:
-    """The tribometer that a table of a protocol describes.
+    """The tribometer of a table of a protocol.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def setup_of(
 
 
 def record_run(setup: RecordingSetup, run: str | Path) -> Trace:
-    """Record the motion of a run; all of it is in memory.
+    """Record the motion of a run; the whole motion is in memory.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def record_run(setup: RecordingSetup, run: str | Path) -> Trace:
         stretched = (motion["force"] - motion["force"][:1]) / setup.stiffness
         motion["load point"] = motion["displacement"] + stretched
     signals = {channel: motion[name] for channel, name in setup.exposed.items()}
-    # A motion that has ended early ends between two samples of its clock.
+    # A motion that ends early may end between two samples.
     even = time.size - 1 if time.size > 3 and _last_is_odd(time) else time.size
     signals = {channel: values[:even] for channel, values in signals.items()}
     return setup.tribometer.record(time[:even], signals, seed=setup.seed, provenance=provenance)
@@ -158,7 +158,7 @@ def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
             f"{place}.measures",
             f"be given for a {name} in a channel of this name",
             "nothing",
-            f"it measures the {measured} unless it says measures = '{claimed}'",
+            f"it measures the {measured} without measures = '{claimed}'",
         )
     return _made(made, options, place), _SIGNALS[measured]
 
@@ -178,7 +178,7 @@ def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
 
 
 def _check_sampling(rate: float | None, recorder: Recorder, sensors: Mapping[str, Sensor]) -> None:
-    """Before anything is computed: what the tribometer will ask of the motion."""
+    """Check, before the computation, the sampling that the tribometer needs of the motion."""
     wanted = max(recorder.rate, *(2 * sensor.bandwidth for sensor in sensors.values()))
     if rate is None or rate < wanted:
         shown = "none" if rate is None else f"{rate:g} Hz"

@@ -1,8 +1,8 @@
-"""A protocol from its first step to its last, into a NetCDF file.
+"""Running a protocol into a NetCDF file, with resumption after an interruption.
 
 The state of an unfinished run is saved with its finished blocks, from which it is resumed.
 
-A run that begins with unstable steady sliding says so.
+A run that begins with unstable steady sliding reports this.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ if TYPE_CHECKING:
     from asperity.protocol.protocol import Protocol, load_protocol
 
 
-#: Growth per slipped metre (1/m) that counts as zero: far below that of any interface.
+#: Growth per slip distance (1/m) that counts as zero, far below that of any interface.
 _ROUND_OFF = 1e-3
 
 
 def stability_statement(protocol: Protocol) -> str:
-    """A sentence where the run begins with steady sliding that is unstable; empty where not.
+    """A sentence if the run begins with unstable steady sliding, else empty.
 
     Without a perturbation such sliding goes on until rounding errors have grown: what the run
     shows before is no stable state.
@@ -53,7 +53,9 @@ def stability_statement(protocol: Protocol) -> str:
     """
     numbers: dict[str, Any] = {name: number.value for name, number in protocol.numbers.items()}
     level, heavy = protocol.programme.level, protocol.solver.inertia
-    if protocol.start.states is not None or not level.velocity > 0:
+    # An uneven track perturbs the sliding from the beginning.
+    even = protocol.track is None
+    if protocol.start.states is not None or not level.velocity > 0 or not even:
         return ""
     lambda_ = numbers.get("lambda", 0.0)
     kc = cf.critical_stiffness_form(protocol.law, elastic=lambda_ != 0, inertia=heavy)
@@ -106,7 +108,7 @@ def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
     )
 
 
-#: Rows integrated and written at a time: at most so many are lost by an interruption.
+#: Rows of a block, the most that an interruption loses.
 _ROWS = 20_000
 
 
@@ -121,7 +123,7 @@ class RunProgress:
     time : float
         Time of the last row (s); NaN without one.
     checkpoint : Checkpoint or None
-        Where the integration goes on.
+        State from which the integration continues.
     steady_segment : int
         Segment of the last event "steady", -1 without one.
     steps, rejected : int
@@ -131,7 +133,7 @@ class RunProgress:
     methods : list of str
         Methods of integration that have been used.
     stopped : str
-        Why the motion ended before the programme; empty where it did not.
+        Reason why the motion ended before the programme; empty if it did not.
     finished : bool
         Whether nothing follows.
     """
@@ -148,7 +150,7 @@ class RunProgress:
     finished: bool = False
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values; doubles are read back as they are."""
+        """Return JSON values, from which doubles are restored exactly."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         if self.checkpoint is not None:
             state = {f.name: getattr(self.checkpoint, f.name) for f in fields(self.checkpoint)}
@@ -183,7 +185,7 @@ class RunSummary:
     time : float
         Time of the last row (s).
     stopped : str or None
-        Why the motion ended before the programme, in a sentence; None where it did not.
+        Sentence why the motion ended before the programme; None if it did not.
     out : Path
     unstable_start : str
         A sentence where the run begins with steady sliding that is unstable; empty where not.
@@ -217,7 +219,7 @@ def run_protocol(
         NetCDF file, written when the run is finished. Until then the finished blocks are in
         ``OUT.partial``, which can be read.
     resume : bool
-        Continue an interrupted run; without one, start from the beginning.
+        Whether to continue an interrupted run, if there is one.
     progress : callable, optional
         Called now and then with the time reached and the end of the programme (s).
     rows : int
@@ -250,7 +252,7 @@ def run_protocol(
             attributes["unstable_start"] = unstable
         undisturbed(partial(_close, output, attributes))
     except InputError as error:
-        # A protocol calls the argument `initial` of a transient otherwise.
+        # The argument `initial` of a transient is `start.states` of a protocol.
         if not str(error).startswith("initial "):
             raise
         raise InputError(f"start.states{str(error).removeprefix('initial')}") from None
@@ -309,7 +311,7 @@ def _one_block(
         progress=progress,
         **protocol.integration,
     )
-    # After a last block that was filled exactly only the end remains.
+    # If the last block is exactly full, only the end of the motion remains.
     for block in islice(blocks, 1):
         new = not block.time.size or not block.time[0] <= done.time
         events, steady_segment = _new_events(protocol, block, done.steady_segment)
@@ -380,7 +382,7 @@ def _new_events(
 
 
 def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
-    """Attributes of the file besides those of the solver."""
+    """Attributes of the file in addition to those of the solver."""
     numbers = protocol.numbers
     works = materials.cited_works(protocol.slider.law.source)
     if protocol.material:

@@ -12,6 +12,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError
+from asperity.laws.uneven_track import POSITION
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.parameters import DRIVE, MACHINE, obeying
@@ -42,7 +43,7 @@ def equation_of_motion(
     inertia : bool
         Whether the mass of the slider counts.
     eta : array, optional
-        Radiation damping (N s/m); None for none.
+        Radiation damping (N s/m), or None.
 
     Returns
     -------
@@ -51,9 +52,9 @@ def equation_of_motion(
     Raises
     ------
     InputError
-        If inertia is asked for without a mass, damping is not positive where nothing else
+        If inertia is included without a mass, damping is not positive where nothing else
         would be left of it, a batch mixes points with and without elastic asperities, or either is
-        asked of a law that does not depend on the velocity.
+        combined with a law that does not depend on the velocity.
     """
     if not inertia and eta is None:
         return QuasiStatic(slider, V, omega)
@@ -109,25 +110,32 @@ def checked_problem(
     inertia: bool = False,
     radiation_damping: Any = None,
 ) -> Problem:
-    """Equations and load of what is asked, parameters of any shapes.
+    """Equations and load from the arguments of a response, parameters of any shapes.
 
     Raises
     ------
     InputError
         If a value breaks its rule; as `equation_of_motion`.
     """
+    if POSITION in slider.law.state_names:
+        raise InputError(
+            "slider.law",
+            "be the same everywhere for a periodic response",
+            "one on an uneven track",
+            "integrate it as a transient",
+        )
     V = DRIVE["V"].check(velocity)
     f = DRIVE["frequency"].check(frequency)
     load = chosen_modulation(epsilon, modulation)
     eta = None
     if radiation_damping is not None:
-        # Zero is no damping in a table; as an argument it would be a mistake.
+        # In a table 0 means no damping; as an argument 0 is a mistake.
         eta = obeying(radiation_damping, MACHINE["eta"].label, "damping", "positive")
     return Problem(equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta), load)
 
 
 def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation:
-    """The modulation asked for, as an amplitude or as a programme.
+    """The modulation of an amplitude `epsilon`, or the checked `modulation`.
 
     Raises
     ------
@@ -153,7 +161,7 @@ def flatten(problem: T, name: str = "parameters") -> tuple[T, tuple[int, ...]]:
     ----------
     problem : pytree of arrays
     name : str
-        What messages call its arrays.
+        Name of the arrays in messages.
 
     Returns
     -------

@@ -57,8 +57,8 @@ class Slider(Displayed, eqx.Module):
         Raises
         ------
         InputError
-            If a value breaks its rule or has a unit of another kind, or a law of one's own breaks
-            one of `asperity.laws.consistency.checked_law`.
+            If a value breaks its rule or has a unit of another kind, or a user's law fails
+            `asperity.laws.consistency.checked_law`.
         """
         self.law = checked_law(law)
         self.K = jnp.asarray(MACHINE["K"].check(spring))
@@ -68,5 +68,7 @@ class Slider(Displayed, eqx.Module):
     def summary(self) -> tuple[str, list[SummaryLine]]:
         """Law and parameters."""
         law, lines = self.law.summary()
-        own = [parameter_line(MACHINE[name], getattr(self, name)) for name in ("K", "W0", "M")]
-        return f"Slider, {law}", lines + own
+        of_machine = [
+            parameter_line(MACHINE[name], getattr(self, name)) for name in ("K", "W0", "M")
+        ]
+        return f"Slider, {law}", lines + of_machine

@@ -231,7 +231,7 @@ def _expand(system: Motion) -> PerturbationResponse:
 
 
 def _rate_independent(system: Motion) -> PerturbationResponse:
-    """F = mu0 w: proportional to the load, whatever the spring and the frequency."""
+    """F = mu0 w: proportional to the load for any spring and frequency."""
     omega = jnp.asarray(system.omega)
     mu = system.slider.law.mu_ss(system.V)
     return PerturbationResponse(

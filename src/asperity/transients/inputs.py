@@ -1,4 +1,4 @@
-"""Arguments of a transient, checked and converted to SI, and the states it starts from."""
+"""Checked arguments of a transient in SI, and its initial states."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from jax import Array
 from asperity.algebra.small_systems import jacobian_columns, solve_points
 from asperity.errors import InputError
 from asperity.laws import Law, State
+from asperity.laws.uneven_track import POSITION
 from asperity.loads import Excitation, Programme
 from asperity.parameters.arguments import number, typed
 from asperity.slider import Motion, Slider, equation_of_motion, reversing
@@ -19,7 +20,7 @@ from asperity.transients.equations import SegmentEquations, states_after_jump
 from asperity.transients.events import EventThresholds
 from asperity.transients.integration import NO_LOAD, Checkpoint, Integration, Tolerances
 
-#: Newton steps for the states of the law under another load, and the longest of them.
+#: Number and largest length of the Newton steps for the states of the law under another load.
 _STEPS, _LEAP = 30, 2.0
 
 
@@ -42,7 +43,7 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
     Raises
     ------
     InputError
-        If steady sliding is asked for at rest, states have the wrong number, they or their rates
+        If the start is steady sliding at rest, states have the wrong number, they or their rates
         are not finite, the interface force is negative and the law is not defined there, or there
         is no contact at the beginning.
     """
@@ -77,7 +78,7 @@ def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) ->
             f"initial must be states whose rates are numbers, got {_listed(states)}, of which that "
             f"of {lost[0]} is not finite; begin nearer to steady sliding, at {steady}"
         )
-    # Where ln v is a state the slider goes forwards whatever the law says of so small a velocity.
+    # With ln v as a state the slider always moves forwards, even at the smallest velocity.
     if friction < 0 and not (motion.signed or "log_velocity" in motion.mechanical):
         raise InputError(
             f"initial must leave an interface force that is not negative, got {_listed(states)} "
@@ -121,7 +122,7 @@ def require_contact(programme: Programme, W0: float) -> None:
 
 
 def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
-    """States after steady sliding under the load and at the velocity before the programme.
+    """States of steady sliding under the load and at the velocity before the programme.
 
     With x K / W0 as the last; a step of the load at the very beginning is included.
     """
@@ -153,8 +154,11 @@ def _steady_state(law: Law, v: Array, w: Array) -> State:
     """States of the law at `v` under the load `w`, by Newton's method from those under w = 1."""
     start = jnp.stack([jnp.asarray(s, float) for s in law.steady_state(v)])
 
+    moves = np.array([name == POSITION for name in law.state_names])
+
     def rates(packed: Array) -> Array:
-        return jnp.stack(law.state_rate(v, v, tuple(packed), w))
+        # A position has no steady value: it stays where it is.
+        return jnp.where(moves, packed - start, jnp.stack(law.state_rate(v, v, tuple(packed), w)))
 
     def step(_: int, packed: Array) -> Array:
         value, columns = jacobian_columns(rates, packed)
@@ -166,7 +170,7 @@ def _steady_state(law: Law, v: Array, w: Array) -> State:
     return tuple(jnp.where(w == 1, start, result))
 
 
-#: A slider slips when it is so many times faster than the fastest drive.
+#: A slider slips if its velocity exceeds this multiple of the fastest drive.
 _SLIPS = 30.0
 
 #: Without inertia: a velocity, and a multiple of the fastest drive, that only a runaway reaches.
@@ -191,7 +195,7 @@ def checked_integration(
     method: Literal["auto", "explicit", "implicit"] = "auto",
     most_steps: float = MOST_STEPS,
 ) -> Integration:
-    """An integration at its beginning; parameters as in `transient`.
+    """An integration before its first step; parameters as in `transient`.
 
     Raises
     ------

@@ -46,7 +46,7 @@ def integrate_blocks(
     """Motion of a slider under a programme, block by block.
 
     After an interruption, by Ctrl-C or otherwise, the blocks already yielded stay valid, and
-    `resume` continues from the `checkpoint` of the last one.
+    `resume` continues from the `checkpoint` of the last block.
 
     Parameters
     ----------
@@ -120,21 +120,21 @@ class _BlockWriter:
 
     @property
     def room(self) -> int:
-        """Samples that the block can still take."""
+        """Free samples of the block."""
         return self._rows - self._count
 
     def write(self, part: SegmentPart, times: np.ndarray) -> None:
         """Evaluate a segment part at `times` (s of the programme)."""
         none, over = len(part.dense_output.begin) == 0, part.termination
-        # At a break point that takes the contact away there is no motion to evaluate.
+        # There is no motion at a break point with a loss of contact.
         if len(times) == 0 or (none and over is not None and over.kind == "loss of contact"):
             return
         checkpoint, (W0, K, V) = part.checkpoint, self._scales
         t = np.clip(times - part.start, 0.0, part.end)
-        # Where no step was accurate there is the state before it.
+        # Without an accurate step the state before the step is evaluated.
         Y = checkpoint.states[:, None] if none else part.dense_output.evaluate(t)
         now = motion_samples(part.system, t, Y)
-        # Of a slider that runs away the velocity may leave the range of doubles.
+        # The velocity of a slider that runs away may overflow.
         with np.errstate(over="ignore"):
             columns = [
                 times,
@@ -203,7 +203,7 @@ def transient(
         Steady sliding under the load and velocity before the first step, or states of the
         equation of motion, such as the last row of another trajectory's `states`.
     sampling : float, str or array, optional
-        Rate (Hz) or times (s) at which to write; by default the integrator's own steps, which
+        Rate (Hz) or times (s) at which to write; by default the steps of the integrator, which
         are short where much happens. The solution is a polynomial on every step, so that the
         rate costs next to nothing and does not change it.
     inertia : bool
@@ -255,7 +255,7 @@ def transient(
     """
     rows = planned_rows(sampling, programme.duration)
     if rows is not None:
-        # Twice: the blocks, and the trajectory that they are joined to.
+        # The factor 2: the blocks, and the joined trajectory.
         size = 2 * rows * row_bytes(len(slider.law.state_names))
         require_memory(
             size, "sampling", f"{rows:.6g} rows",

@@ -1,4 +1,4 @@
-"""Programmes of load and drive: what an experimenter does, one step after the other."""
+"""Programmes of load and drive: the steps of an experiment in order."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Programme:
     level : LoadAndVelocity
         Load (N) and pulling velocity (m/s) before the first step.
     segments : tuple of ProgrammeSegment
-        What the steps amount to.
+        The steps as segments in time.
     starts : ndarray, shape (segments + 1,)
         Break points (s): beginning of every segment, and the end.
     last : LoadAndVelocity
@@ -55,7 +55,7 @@ class Programme:
         velocity: float | str,
         name: str = "programme",
     ) -> None:
-        """Lay the steps out one after the other.
+        """Convert steps to segments.
 
         Parameters
         ----------
@@ -67,7 +67,7 @@ class Programme:
             Pulling velocity (m/s) before the first step; 0 for a slider at rest, which needs
             its initial states given.
         name : str
-            What messages call the programme.
+            Name of the programme in messages.
 
         Raises
         ------
@@ -119,7 +119,7 @@ class Programme:
         return self._evaluate(t, _pull)
 
     def position(self, t: ArrayLike) -> np.ndarray:
-        """Way of the far end of the spring since t = 0 (m) at times `t` (s)."""
+        """Displacement of the far end of the spring since t = 0 (m) at times `t` (s)."""
         ways = [float(_position(s, s.duration)) for s in self.segments]
         return self._evaluate(t, _position, np.concatenate([[0.0], np.cumsum(ways)]))
 

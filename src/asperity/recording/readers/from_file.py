@@ -1,4 +1,4 @@
-"""A file to a checked `Trace`: one door for all formats."""
+"""`read`: a file of any format to a checked `Trace`."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
 
-#: Characters of a message.
+#: Largest length of a message.
 _LONGEST = 1200
 
 
@@ -66,7 +66,7 @@ def read(
         A reduction file with any of these arguments; what is given here goes before it, and
         mappings are joined.
     rate : float or str, optional
-        Samples per second (Hz, or a text such as ``"10 kHz"``), in place of the file's own times.
+        Samples per second (Hz, or a text such as ``"10 kHz"``), in place of the times in the file.
     group : str, optional
         The group of an HDF5, MATLAB (a struct) or TDMS file to read, where groups differ in length.
     delimiter, decimal : str, optional
@@ -96,7 +96,7 @@ def read(
     with _quiet() as warned:
         clock = [name for name in expressions if role_of(name) == "time"]
         if clock and rate is None:
-            # The file's own clock is a column as any other until the new one is made of it.
+            # The recorded clock is an ordinary column until the expression for time is evaluated.
             rate = "1 Hz"
         recorded = raw_recording(
             _with_content(file),
@@ -120,7 +120,7 @@ def read(
 
 
 def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
-    """Read a recording as a question says.
+    """Read a recording with the settings of a question.
 
     Parameters
     ----------
@@ -153,7 +153,7 @@ def _with_content(file: Path) -> Path:
 
 @contextmanager
 def _quiet() -> Iterator[list[warnings.WarningMessage]]:
-    """Collect the warnings of libraries, and make an error that quotes a file fit for a line."""
+    """Collect the warnings of libraries, and shorten errors that quote a file to one line."""
     with warnings.catch_warnings(record=True) as caught, np.errstate(all="ignore"):
         warnings.simplefilter("always")
         try:
@@ -163,7 +163,7 @@ def _quiet() -> Iterator[list[warnings.WarningMessage]]:
 
 
 def _library_warnings(caught: list[warnings.WarningMessage]) -> list[Finding]:
-    """What a library has warned of while a file was read, once for each text."""
+    """Findings of the warnings of a library, one for each text."""
     texts = dict.fromkeys(str(w.message) for w in caught)
     return [
         Finding("library warning", "warning", 1.0, "the file", f"While it was read: {text}")

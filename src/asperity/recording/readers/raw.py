@@ -1,4 +1,4 @@
-"""What a file holds, before units and roles are looked at: the common ground of all formats.
+"""Raw columns of a file, before units and roles are determined: common to all formats.
 
 HDF5, MATLAB and TDMS files hold named arrays in groups; which of them are the columns of one
 recording is decided here.
@@ -26,7 +26,7 @@ _INTERVALS = frozenset({"dt", "sampleinterval", "samplinginterval", "timestep", 
 _NAMES = frozenset({"columns", "columnnames", "names", "channels", "channelnames", "labels"})
 _NAMES |= {"headers", "header", "varnames", "variablenames"}
 _UNITS = frozenset({"units", "unit", "columnunits", "channelunits", "unitnames"})
-#: Columns of a matrix.
+#: Largest number of columns of a matrix.
 _MOST_COLUMNS = 256
 #: Bytes that show the format of a file.
 _HEAD = 4096
@@ -125,7 +125,7 @@ def beginning(path: Path) -> bytes:
 
 
 def truncated(path: Path, number: float, where: str, sentence: str, sure: bool = True) -> Finding:
-    """The finding of a file that ends, or may end, too early, what is whole being read."""
+    """The finding of a file that is or may be cut; the complete rows are read."""
     whole = f"{path.name} {'is' if sure else 'may be'} cut short: {sentence}"
     return Finding("truncated", "error" if sure else "warning", number, where, whole)
 
@@ -257,7 +257,7 @@ def one_table(
     chosen: str | None,
     noticed: Sequence[Finding] = (),
 ) -> tuple[list[RawColumn], list[Finding]]:
-    """The columns of one length that make the recording, and what was left out of it.
+    """The columns of one length that make the recording, and findings about other columns.
 
     Parameters
     ----------
