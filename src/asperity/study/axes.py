@@ -300,7 +300,7 @@ def law_name(law: Any, folder: Path) -> str:
 
 def checked_value(parameter: Parameter, value: Any) -> float:
     """One number of a plan in SI."""
-    number = parameter.check(value)
+    number = parameter.check(value, parameter.name)
     if np.ndim(number):
         raise InputError(f"{parameter.name} must be one number, got {shown(value)}")
     return float(number)
