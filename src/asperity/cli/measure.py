@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,14 +37,18 @@ class FileRows:
     ----------
     source : Source
     question : Question
+    conditions : dict of Path to dict
+        Fields of the question that are those of one file.
     """
 
     source: Source
     question: Question
+    conditions: dict[Path, dict[str, Any]] = field(default_factory=dict)
 
     def __call__(self, path: Path) -> Rows:
         """Rows of a file; one row with the reason if it cannot be measured."""
         from asperity.measurement.campaign import failed_row, modulated_rows, sliding_rows
+        from asperity.measurement.conditions import MACHINE_FIELDS
         from asperity.measurement.from_file import measured_parts
         from asperity.measurement.stick_slip.catalogue import stick_slip_row
         from asperity.measurement.stick_slip.measure import StickSlipMeasurement
@@ -52,17 +56,27 @@ class FileRows:
 
         with naming(in_options):
             try:
-                result = measured_parts(read_source(path, self.source), self.question)
-                if isinstance(result, list):
-                    return modulated_rows(path, result)
+                question = self.question_of(path)
+                result = measured_parts(read_source(path, self.source), question)
                 if isinstance(result, StickSlipMeasurement):
                     return [stick_slip_row(path, result)]
-                return sliding_rows(path, result)
+                modulated = isinstance(result, list)
+                rows: Any = modulated_rows if modulated else sliding_rows
+                known = {n: getattr(question, f) for n, f in MACHINE_FIELDS.items()}
+                known = {name: value for name, value in known.items() if value is not None}
+                return [{**known, **row} for row in rows(path, result)]
             except InputError as error:
                 return [failed_row(path, 1, str(error))]
             except Exception as error:  # one damaged file must not cost the others
                 reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
                 return [failed_row(path, 1, f"the recording could not be measured ({reason})")]
+
+    def question_of(self, path: Path) -> Question:
+        """The question with the conditions of a file."""
+        own = self.conditions.get(path)
+        return (
+            type(self.question)(**{**self.question.model_dump(), **own}) if own else self.question
+        )
 
     def inputs(self) -> dict[str, Any]:
         """All that rows depend on besides the files, as JSON values.
@@ -79,7 +93,9 @@ class FileRows:
             from asperity.questions.recording import ReadingRecipe
 
             source["recipe"] = ReadingRecipe.from_file(self.source.recipe).model_dump()
-        return {"source": source, "options": self.question.model_dump(mode="json")}
+        options = self.question.model_dump(mode="json")
+        conditions = {str(path): fields for path, fields in self.conditions.items()}
+        return {"source": source, "options": options, "conditions": conditions}
 
 
 _EPILOG = """\b
@@ -92,6 +108,8 @@ Examples:
   asperity measure stick_slip.mat --set "K=168 N/m" --set "V=42 um/s" \\
       --set "M=30.7 g" --events events.csv --plot events.png
   asperity measure day1/*.csv --out campaign.csv
+  asperity measure run_*.csv --stick-slip --set "W0=7 N" --out campaign.csv \\
+      --conditions "run_k{K N/m}_v{V um/s}" --thresholds bifurcation.csv
 
 \b
 Convention: W/W0 = 1 + epsilon cos phi, phi from the measured load,
@@ -152,6 +170,12 @@ in place of numbers; 2: bad input.
 )
 @set_option('--set "K=168 N/m" --set "V=42 um/s"', "K, V, M or W0 of the machine, for slip events")
 @click.option(
+    "--conditions",
+    metavar="CSV|PATTERN",
+    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
+    'names like "run_k{K N/m}_v{V um/s}".',
+)
+@click.option(
     "--events",
     type=Path,
     metavar="CSV|NC|JSON",
@@ -165,6 +189,12 @@ in place of numbers; 2: bad input.
     type=Path,
     metavar="CSV|NC",
     help="Measure all recordings into one table: a row for each amplitude, step and hold.",
+)
+@click.option(
+    "--thresholds",
+    type=Path,
+    metavar="CSV",
+    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
 )
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
 @click.option(
@@ -188,9 +218,11 @@ def measure(
     holds: str | None,
     stick_slip: bool,
     settings: tuple[str, ...],
+    conditions: str | None,
     events: Path | None,
     amplitudes: bool,
     out: Path | None,
+    thresholds: Path | None,
     resume: bool,
     jobs: int | None,
     as_json: bool,
@@ -227,17 +259,20 @@ def measure(
                 "--plot, --events, --steps and --holds must go with one recording without --out, "
                 "got both; measure that recording by itself"
             )
-        return _campaign(recordings, source, question, out, resume, jobs, as_json)
+        rows_of = _file_rows(recordings, source, question, conditions)
+        return _campaign(recordings, rows_of, out, thresholds, resume, jobs, as_json)
     if len(recordings) > 1:
         raise InputError(
             f"--out must be given with several recordings, got {len(recordings)} without; name "
             "the table, like --out campaign.csv"
         )
-    if resume or jobs is not None:
+    if resume or jobs is not None or thresholds is not None:
         raise InputError(
-            "--resume and --jobs must go with --out, got no table; name it or leave them out"
+            "--resume, --jobs and --thresholds must go with --out, got no table; name it or leave "
+            "them out"
         )
     (recording,) = recordings
+    question = _file_rows(recordings, source, question, conditions).question_of(recording)
     if amplitudes:
         if no_modulation or plot is not None:
             raise InputError(
@@ -276,11 +311,33 @@ def _amplitudes(recording: Path, source: Source, question: Question, as_json: bo
     return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
 
 
+def _file_rows(
+    recordings: tuple[Path, ...], source: Source, question: Question, conditions: str | None
+) -> FileRows:
+    """What measures each file, its conditions checked before anything is read."""
+    from asperity.measurement.conditions import MACHINE_FIELDS, conditions_of
+
+    if conditions is None:
+        return FileRows(source, question)
+    rows_of = FileRows(source, question, conditions_of(recordings, conditions))
+    for path, fields in rows_of.conditions.items():
+        twice = [n for n, f in MACHINE_FIELDS.items() if f in fields and getattr(question, f)]
+        if twice:
+            raise InputError(
+                f"{twice[0]} must be given once, got it by --set and by --conditions; leave one out"
+            )
+        try:
+            rows_of.question_of(path)
+        except InputError as error:
+            raise InputError(f"{error} (--conditions, '{path.name}')") from None
+    return rows_of
+
+
 def _campaign(
     recordings: tuple[Path, ...],
-    source: Source,
-    question: Question,
+    rows_of: FileRows,
     out: Path,
+    thresholds: Path | None,
     resume: bool,
     jobs: int | None,
     as_json: bool,
@@ -290,8 +347,21 @@ def _campaign(
     from asperity.cli.progress import bar
     from asperity.cli.report import to_json
     from asperity.measurement.campaign import run_campaign
+    from asperity.measurement.stick_slip.threshold import thresholds as ends_of_stick_slip
+    from asperity.measurement.stick_slip.threshold import write_thresholds
+    from asperity.outputs import output_files, written_file
 
-    rows_of = FileRows(source, question)
+    question = rows_of.question
+    if thresholds is not None:
+        if not question.stick_slip:
+            raise InputError(
+                "--thresholds must go with --stick-slip, got it without; add it: where stick-slip "
+                "ends, steady sliding counts too"
+            )
+        output_files(
+            {"--thresholds": thresholds, "--out": out},
+            inputs={f"recording '{f}'": f for f in recordings},
+        )
     with bar("files") as update:
         done = run_campaign(
             recordings,
@@ -305,7 +375,17 @@ def _campaign(
     if as_json:
         numbers = {"files": done.files, "rows": done.rows, "failed": done.failed}
         click.echo(to_json({**numbers, "out": str(out)}))
-    if done.sliding and question.modulated is None:
+    untold = []
+    if thresholds is not None:
+        ends = ends_of_stick_slip(done.table)
+        untold = [end.reason for end in ends if end.reason]
+        if not ends:
+            untold = ["no row has a regime, K, V and W0; give them by --set or --conditions"]
+        with written_file(thresholds, "--thresholds") as file:
+            write_thresholds(file, ends)
+        for reason in untold:
+            click.echo(f"asperity: cannot tell where stick-slip ends: {reason}", err=True)
+    if done.sliding and question.modulated is None and not question.stick_slip:
         click.echo(
             f"asperity: {done.sliding} of {done.files} files have a constant load: their velocity "
             "steps and holds are in the table, as with --no-modulation",
@@ -317,7 +397,7 @@ def _campaign(
             f"{out} says why",
             err=True,
         )
-    return int(done.failed > 0)
+    return int(done.failed > 0 or bool(untold))
 
 
 def _check_catalogue(path: Path, recording: Path) -> None:
