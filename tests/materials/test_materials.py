@@ -244,8 +244,8 @@ def test_own_file(tmp_path: Path) -> None:
         ('"kN/m"', '"kN"', "numbers.K must have a unit of the dimension stiffness, got 'kN'"),
         ('"stiffness"', '"stifness"', "got 'stifness'; did you mean 'stiffness'?"),
         ('"assumed"', '"guessed"', "numbers.K.kind must be published, fitted or assumed"),
-        ("numbers.K", "numbers.'K c'", "names that can follow a dot and are not taken, got 'K c'"),
-        ("numbers.K", "numbers.law", "names that can follow a dot and are not taken, got 'law'"),
+        ("numbers.K", "numbers.'K c'", "Python attributes and not in use, got 'K c'"),
+        ("numbers.K", "numbers.law", "names that are Python attributes and not in use, got 'law'"),
         ("numbers.K", "number.K", "mistakes"),
     ],
 )

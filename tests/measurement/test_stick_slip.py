@@ -144,7 +144,7 @@ DEFECTS = {
         "sampling",
     ),
     "a drift larger than the drops": (lambda: saw(0, wave=20).force, "drift"),
-    "saturated": (lambda: np.minimum(saw(0, noise=0.02).force, 0.32), "saturation"),
+    "saturated": (lambda: np.minimum(saw(0, events=50, noise=0.02).force, 0.32), "saturation"),
 }
 
 

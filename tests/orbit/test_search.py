@@ -120,4 +120,4 @@ def test_a_point_whose_branch_was_not_followed_is_not_said_to_have_one():
         methods=("fourier",),
     )
     assert not response.converged
-    assert "no periodic orbit found by any method that was tried" in str(response.result)
+    assert "no method found a periodic orbit" in str(response.result)

@@ -32,16 +32,16 @@ _CLOSE = 1e-8
 
 @dataclass(frozen=True)
 class InverseResult:
-    """What gives the measured fraction, or why nothing does.
+    """Values that give the measured fraction, or the reason why there are none.
 
     Parameters
     ----------
     solutions : tuple of float
-        All values (m) within the bracket, ascending; empty when there is none.
+        All values (m) within the bracket, ascending; may be empty.
     reachable_min, reachable_max : float
         Smallest and largest eps_eff/eps within the bracket.
     result : str
-        "found", or one sentence that says what can be reached.
+        "found", or a sentence with the fractions in reach.
     """
 
     solutions: tuple[float, ...]

@@ -36,7 +36,7 @@ def as_real(field: str, value: ArrayLike, unit: str, advice: str, *, zero: bool 
     unit : str
         Unit of the message, empty when dimensionless.
     advice : str
-        What to do instead, the last clause of the message.
+        Advice, the last clause of the message.
     zero : bool
         Whether zero is allowed too.
 
@@ -68,7 +68,7 @@ def check_shapes(field: str, *values: ArrayLike) -> tuple[int, ...]:
     Raises
     ------
     InputError
-        When they have none.
+        If they do not broadcast.
     """
     shapes = [np.shape(v) for v in values]
     try:

@@ -1,4 +1,4 @@
-"""The fraction of a normal-load modulation that the micro-contacts bear.
+"""The fraction of a normal-load modulation that the micro-contacts carry.
 
 Source: Bureau, Baumberger and Caroli (2000), Appendix, Eqs. (39) and (40). The slider
 (mass M) moves normally on the contacts' spring kappa_z and the air layer, in parallel:
@@ -133,7 +133,7 @@ def air_vacuum_ratio(
     Raises
     ------
     InputError
-        Also when no layer is given.
+        Also if `layer` is None.
     """
     if layer is None:
         raise InputError("air_vacuum_ratio.layer must be an AirLayer, got None; give the layer")

@@ -1,1 +1,1 @@
-"""Linear algebra of many small systems at once, one an operating point."""
+"""Numerical methods for many operating points at once: linear systems, tableaux, continuation."""

@@ -1,4 +1,4 @@
-"""Predictor-corrector continuation: one driver for every curve of solutions that is followed.
+"""Predictor-corrector continuation: the driver of all curves of solutions.
 
 From a point of a curve the next one is predicted at a distance along it and corrected. A step
 counts if the corrector has converged, the curve turns little and the corrected point lies near the
@@ -21,29 +21,29 @@ from numpy.typing import NDArray
 Float = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
-#: Factors on the length of a step that has failed, and after one that was hard to correct.
+#: Factors on the length of a step after a failure, and after many corrector iterations.
 _SHRINKAGE, _SLOWDOWN = 0.4, 0.7
-#: Why a curve is left where it has not ended.
+#: Reasons why a curve is abandoned.
 STUCK, STEPS = "stuck", "steps"
 
 
 class StepControl(NamedTuple):
-    """Which steps count, and how long the next ones are.
+    """Criteria for accepting steps, and control of their length.
 
     Attributes
     ----------
     shortest, longest : float
-        Length of a failed step below which a curve is left, and the longest step.
+        Length of a failed step below which a curve is abandoned, and the longest step.
     growth : float
         Factor on the length after a step that was easy to correct.
     easy, hard : int
         Iterations of the corrector up to which a step is easy, and above which it is hard.
     sharpest_turn : float
-        Cosine of the turn of the tangent below which a step may have left its curve.
+        A step whose tangent turns by a smaller cosine may have left its curve and is rejected.
     farthest : float
-        Distance from the predicted point, in steps, above which it may.
+        A step further than this from the predicted point (in steps) is rejected, too.
     most_failures : int
-        Failures in a row after which a curve is left.
+        Number of consecutive failures after which a curve is abandoned.
     """
 
     shortest: float
@@ -57,7 +57,7 @@ class StepControl(NamedTuple):
 
 
 class Attempt(NamedTuple):
-    """Steps that were tried from the present points of some curves, one entry a curve.
+    """Trial steps from the present points of curves, one entry for each curve.
 
     Attributes
     ----------
@@ -91,13 +91,13 @@ class Attempt(NamedTuple):
         turn: float = 1.0,
         miss: float = 0.0,
     ) -> Attempt:
-        """Of one curve; `point` is None where the corrector failed."""
+        """The attempt of a single curve; `point` is None if the corrector failed."""
         numbers = (np.array([float(x)]) for x in (iterations, turn, miss, length))
         return cls(point, np.array([point is not None]), *numbers)
 
 
 class Curves(ABC):
-    """Curves that are followed together, each with steps of its own length.
+    """Curves that are followed together, each with its own step length.
 
     Attributes
     ----------
@@ -107,13 +107,13 @@ class Curves(ABC):
     control: StepControl
 
     def aimed(self, length: Float, failures: NDArray[np.int_]) -> Float:
-        """Lengths of the next steps in place of those proposed; negative ones lead back.
+        """Lengths of the next steps, from the proposed ones; negative lengths lead back.
 
         Parameters
         ----------
         length : array, shape (curves,)
         failures : int array, shape (curves,)
-            In a row, so far.
+            Number of consecutive failures so far.
         """
         return length
 
@@ -133,7 +133,7 @@ class Curves(ABC):
         Returns
         -------
         list of str
-            Why each curve ends there; empty where it goes on.
+            Reason why each curve ends there; empty if it continues.
         """
 
 
@@ -151,7 +151,7 @@ def follow(
     rows : array of int, optional
         Curves that are followed; all by default.
     most : int, optional
-        Steps that are tried on each, failed ones included.
+        Largest number of steps of each curve, with failed ones.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Linear systems solved by repeating a contraction."""
+"""Linear systems solved by a fixed-point iteration."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from jax import Array
 
 #: Largest last change of a solution, relative to its size.
 _TOLERANCE = 1e-8
-#: Times that the steps are taken.
+#: Largest number of rounds of steps.
 _PASSES = 12
 
 

@@ -51,7 +51,7 @@ class ExplicitTableau(NamedTuple):
 
 @cache
 def dormand_prince_8() -> ExplicitTableau:
-    """The coefficients, from a file: SciPy's integrators, which have them too, load slowly."""
+    """The coefficients, from a file, because SciPy's integrators load slowly."""
     table = tomllib.loads(files(__package__).joinpath("dormand_prince_8.toml").read_text())
     change, first, last = _rows([table["B"]], 16)[0], np.eye(16)[0], np.eye(16)[12]
     F = np.vstack([change, first - change, 2 * change - last - first, _rows(table["D"], 16)])
@@ -67,7 +67,7 @@ def dormand_prince_8() -> ExplicitTableau:
 
 
 def _rows(rows: list[list[float]], columns: int) -> Float:
-    """Rows of a table, filled up with zeros."""
+    """Rows of a table, padded with zeros."""
     table = np.zeros((len(rows), columns))
     for row, values in zip(table, rows, strict=True):
         row[: len(values)] = values

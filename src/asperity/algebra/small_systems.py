@@ -23,7 +23,7 @@ Matrix = list[list[Array]]
 def inverse_points(matrix: Matrix) -> Matrix:
     """Inverse of a small matrix for every operating point; not finite where it is singular.
 
-    Entries come and go one by one, so that XLA does not write a stack to memory in between.
+    Entries are separate arrays, so that XLA writes no stacked matrix to memory.
     """
     n = len(matrix)
     if n == 1:
@@ -132,8 +132,8 @@ def solve_columns(matrix: Array, rhs: Array) -> Array:
         (a, b), (c, d) = matrix
         return jnp.stack([d * rhs[0] - b * rhs[1], a * rhs[1] - c * rhs[0]]) / (a * d - b * c)
     rest = jnp.concatenate([matrix, rhs], axis=1)
-    # Reflections mix rows: one that outweighs the others by more than 1e16, as those of fast
-    # motions do, would leave nothing of them.
+    # Reflections mix rows: a row larger than the others by 1e16, as in fast motions, would lose
+    # the digits of the others.
     size = jax.lax.stop_gradient(jnp.abs(matrix).max(1, keepdims=True))
     rest = rest / jnp.where(size > 0, size, 1.0)
     diagonal, rows = [], []
@@ -209,8 +209,8 @@ def scaled_product(maps: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDAr
     log_scale : array, shape (points,)
     """
     n, _, intervals, points = maps.shape
-    # The root of their number next to each other, and then the products of these: an error that
-    # grows with the root only.
+    # Products of about sqrt(count) neighbours, then the product of these: the error grows with the
+    # square root of the number only.
     length = math.isqrt(intervals - 1) + 1
     blocks = -(-intervals // length)
     added = (n, n, blocks * length - intervals, points)

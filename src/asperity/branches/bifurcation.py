@@ -1,4 +1,4 @@
-"""Bifurcations of periodic orbits: which there are, and where on a branch they lie.
+"""Bifurcations of periodic orbits: their kinds, and their location on a branch.
 
 At a fold a branch turns back in the parameter and a multiplier passes +1; at a period doubling one
 passes -1; at a Neimark-Sacker bifurcation a complex pair passes the unit circle, and a slow
@@ -52,7 +52,7 @@ class LocatedBifurcation(NamedTuple):
 def bifurcations_between(
     follower: BranchFollower, start: BranchOrbit, length: float, end: BranchOrbit
 ) -> Iterator[LocatedBifurcation]:
-    """All bifurcations that show between two neighbouring orbits."""
+    """All bifurcations between two neighbouring orbits."""
     before, after = start.unstable, end.unstable
     turned = start.direction * end.direction < 0
     if turned:
@@ -85,7 +85,7 @@ def kind_of(log: complex) -> Kind:
 
 
 def criterion(kind: Kind, index: int) -> Callable[[BranchOrbit], float]:
-    """Vanishes at the bifurcation."""
+    """The test function of a bifurcation, which vanishes there."""
     return _direction if kind == "fold" else _log_modulus(index)
 
 
@@ -100,7 +100,7 @@ def _log_modulus(index: int) -> Callable[[BranchOrbit], float]:
 def polished(
     follower: BranchFollower, located: LocatedBifurcation, intervals: int
 ) -> BranchOrbit | None:
-    """The bifurcation solved again on a mesh of `intervals`, by the secant method."""
+    """The bifurcation located again on a mesh of `intervals`, by the secant method."""
     return root_near(
         follower,
         follower.finer(located.branch_orbit.point, intervals),
@@ -111,7 +111,7 @@ def polished(
 def root_near(
     follower: BranchFollower, start: BranchOrbit | None, function: Callable[[BranchOrbit], float]
 ) -> BranchOrbit | None:
-    """The orbit at which `function` vanishes, near `start` on its branch; None where lost."""
+    """The orbit near `start` on its branch at which `function` vanishes; None on failure."""
     if start is None:
         return None
     before, value_before = 0.0, function(start)

@@ -1,4 +1,4 @@
-"""A branch of periodic orbits as it was followed: points, stability and bifurcations."""
+"""A branch of periodic orbits: points, stability and bifurcations."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class Bifurcation:
 
     @property
     def stability_change(self) -> int:
-        """+1 where the branch becomes stable here, -1 where it ceases to be, 0 for neither."""
+        """+1 if the branch becomes stable here, -1 if it becomes unstable, else 0."""
         return int(self.unstable_after == 0) - int(self.unstable_before == 0)
 
     def __str__(self) -> str:
@@ -111,18 +111,18 @@ class Branch(Displayed):
     name, unit : str
         The parameter and its SI unit.
     parameter : array, shape (points,)
-        Values along the branch; not monotonic where it folds.
+        Values along the branch; not monotonic at folds.
     mean_friction : array, shape (points,)
     harmonics : complex array, shape (points, count)
         c_1, c_2, ...
     log_multipliers : complex array, shape (points, states)
         ln|m| + i arg m by falling modulus.
     periods : int
-        Periods of the modulation in one of the orbit.
+        Periods of the modulation in a period of the orbit.
     bifurcations : tuple of Bifurcation
         In the order of the branch.
     result : str
-        Why the branch ends where it does.
+        Reason why the branch ends.
     completed : bool
         Whether it ended at an end of the span.
     motion : Motion
@@ -151,7 +151,7 @@ class Branch(Displayed):
     last: ContinuationPoint = field(repr=False)
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
-        """The parameter followed, and the bifurcations met."""
+        """The parameter, and the bifurcations of the branch."""
         law = self.motion.slider.law.name
         points = count_text(len(self.parameter), "point")
         lines = [
@@ -199,7 +199,7 @@ class Branch(Displayed):
         -------
         xarray.Dataset
             Along the dimensions `point` and `bifurcation`; every variable has `units` and
-            `long_name`, real and imaginary parts are variables of their own.
+            `long_name`, real and imaginary parts are separate variables.
         """
         import xarray
 

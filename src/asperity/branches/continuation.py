@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jax.typing import ArrayLike
@@ -22,11 +22,12 @@ from asperity.branches.parameters import (
 from asperity.branches.steps import BranchFollower, BranchOrbit, ParameterBranch
 from asperity.errors import InputError
 from asperity.loads import Modulation
-from asperity.parameters.arguments import counted, function, whole_number
+from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider import Slider
-from asperity.slider.problem import Problem, checked_slider
+from asperity.slider.problem import Problem
 
-#: Mesh for a branch of simple period; bifurcations are solved again on three times as many.
+#: Intervals of the mesh of a branch of simple period; a bifurcation is solved on three times as
+#: many.
 INTERVALS = 216
 
 _RESULTS = {
@@ -44,7 +45,7 @@ _RESULTS = {
 
 
 class BranchRecorder:
-    """Stations and bifurcations gathered along a branch."""
+    """Collects orbits and bifurcations along a branch."""
 
     def __init__(
         self,
@@ -79,7 +80,7 @@ class BranchRecorder:
         self.report(1)
 
     def branch(self, why: str, problem: Problem) -> Branch:
-        """The recorder as the user reads it."""
+        """The branch so far, as a result."""
         values = self.moving.value(np.array([s.t for s in self.branch_orbits]))
         unit = f" {self.moving.unit}" if self.moving.unit else ""
         steps = len(self.branch_orbits) - 1
@@ -123,6 +124,7 @@ class BranchRecorder:
         )
 
 
+@typed
 def continuation(
     slider: Slider,
     *,
@@ -134,8 +136,8 @@ def continuation(
     modulation: Modulation | None = None,
     inertia: bool = False,
     radiation_damping: ArrayLike | str | None = None,
-    harmonics: int = 8,
-    most_steps: int = 1000,
+    harmonics: Annotated[int, at_least(2)] = 8,
+    most_steps: Annotated[int, at_least(1)] = 1000,
     progress: Callable[[int, int], None] | None = None,
 ) -> Branch:
     """Follow the periodic response along one parameter, through folds.
@@ -148,7 +150,7 @@ def continuation(
         "epsilon", "frequency", "V", "K", "W0", "M", "eta", or a parameter of the law, such as
         "alpha" or "lambda"; as in `asperity.parameters`.
     span : pair of float or str
-        Where the branch starts, and where it ends if it gets there. Positive parameters whose ends
+        Start of the branch, and its end if the branch reaches it. Positive parameters whose ends
         differ by more than a factor of 2 are continued by equal factors.
     velocity : float or str
         Pulling velocity V (m/s). This, epsilon and frequency may be left out where they are the
@@ -165,7 +167,7 @@ def continuation(
     harmonics : int
         Number of harmonics of the force, at least 2.
     most_steps : int
-        Steps after which the branch is left where it is.
+        Largest number of steps.
     progress : callable, optional
         Called after each step with the number of steps and `most_steps`.
 
@@ -186,10 +188,6 @@ def continuation(
     Collocation with the arclength condition of Keller (1977), see
     `asperity.orbit.methods.branch_following.arclength`.
     """
-    harmonics = whole_number(harmonics, "harmonics", least=2)
-    most_steps = whole_number(most_steps, "most_steps", least=1)
-    progress = function(progress, "progress")
-    checked_slider(slider)
     problem = one_problem(
         slider,
         start_of(slider, parameter, span),
@@ -213,6 +211,6 @@ def continuation(
 def _no_orbit(moving: ContinuedParameter) -> InputError:
     unit = f" {moving.unit}" if moving.unit else ""
     return InputError(
-        f"span must start where there is a periodic orbit, found none at {moving.name} = "
+        f"span must start where there is a periodic orbit, got none at {moving.name} = "
         f"{moving.start:g}{unit}; start elsewhere, such as at a small epsilon"
     )

@@ -1,4 +1,4 @@
-"""Switching onto the branch of doubled period at a period doubling, and following it.
+"""Branch switching at a period doubling, and continuation of the branch of doubled period.
 
 An orbit of two periods of the modulation is an orbit of one period of a modulation repeated twice
 in it, at half the frequency. Where a multiplier of the simple orbit is -1 its eigenvector v changes
@@ -10,6 +10,7 @@ Source: R. Seydel, Practical Bifurcation and Stability Analysis, section 7.6.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Annotated
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -31,10 +32,10 @@ from asperity.orbit.methods.branch_following.arclength import (
     slip_units,
     weighted_row,
 )
-from asperity.parameters.arguments import counted, function, instance, whole_number
+from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider.problem import Problem
 
-#: Distances at which the doubled branch is sought, in units of the exponent of the slip rate.
+#: Distances from the bifurcation at which a doubled orbit is searched (exponent of the slip rate).
 _DISTANCES = (0.05, 0.02, 0.1, 0.2)
 
 
@@ -55,12 +56,12 @@ class Repeated(Modulation):
 
     @property
     def amplitude(self) -> ArrayLike:
-        """That of the modulation."""
+        """As for the simple modulation."""
         return self.load.amplitude
 
     @property
     def formula(self) -> str:
-        """That of the modulation."""
+        """As for the simple modulation."""
         return self.load.formula
 
     def scaled(self, share: ArrayLike) -> Repeated:
@@ -68,11 +69,12 @@ class Repeated(Modulation):
         return Repeated(self.load.scaled(share))
 
 
+@typed
 def doubled_branch(
     branch: Branch,
     bifurcation: Bifurcation,
     *,
-    most_steps: int = 1000,
+    most_steps: Annotated[int, at_least(1)] = 1000,
     progress: Callable[[int, int], None] | None = None,
 ) -> Branch:
     """Follow the branch of doubled period that leaves a branch at a period doubling.
@@ -82,7 +84,7 @@ def doubled_branch(
     branch : Branch
         Of simple period.
     bifurcation : Bifurcation
-        One of its period doublings.
+        A period doubling of the branch.
     most_steps : int
     progress : callable, optional
         Called after each step with the number of steps and `most_steps`.
@@ -97,27 +99,22 @@ def doubled_branch(
     Raises
     ------
     InputError
-        If the bifurcation is no period doubling, the branch is itself one of doubled period,
+        If the bifurcation is no period doubling, the branch has a doubled period already,
         or there is no doubled orbit next to it.
     """
-    branch = instance(branch, Branch, "branch", "follow one with continuation")
-    advice = "take one of the branch's bifurcations"
-    bifurcation = instance(bifurcation, Bifurcation, "bifurcation", advice)
-    most_steps = whole_number(most_steps, "most_steps", least=1)
-    progress = function(progress, "progress")
     if bifurcation.kind != "period doubling":
         raise InputError(
             f"bifurcation must be a period doubling, got a {bifurcation.kind}; choose another one"
         )
     if branch.periods != 1:
         raise InputError(
-            f"branch must have the period of the modulation, got one of {branch.periods} periods; "
+            f"branch must have the period of the modulation, got {branch.periods} periods; "
             "follow further doublings in the multipliers of this branch"
         )
     follower, moving, problem = branch.origin
     simple = follower.finer(bifurcation.critical.point, INTERVALS)
     twice = BranchFollower(_doubled_line(follower.line), 2 * follower.harmonics)
-    start = None if simple is None else _beside(follower, twice, simple)
+    start = None if simple is None else _doubled_orbit_near(follower, twice, simple)
     if start is None:
         raise InputError(
             "bifurcation must have a doubled orbit next to it, got none by Newton's method; "
@@ -139,7 +136,7 @@ def _doubled_line(line: ParameterLine) -> ParameterLine:
     )
 
 
-def _beside(
+def _doubled_orbit_near(
     follower: BranchFollower, twice: BranchFollower, simple: BranchOrbit
 ) -> BranchOrbit | None:
     """A doubled orbit near the critical simple one."""
@@ -153,7 +150,7 @@ def _beside(
 
 
 def _alternating(line: ParameterLine, orbit: Orbit, t: NDArray[np.float64]) -> ContinuationPoint:
-    """The simple orbit twice, and the unit direction that changes sign in between."""
+    """The simple orbit twice, and the unit direction (v, -v), which changes sign in between."""
     problem = line.at(t)
     equations = condensed(problem, orbit)
     maps = np.asarray(transfer_maps(equations.response, orbit.widths, orbit.scheme.b))

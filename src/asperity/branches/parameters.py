@@ -19,12 +19,12 @@ from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.methods.branch_following.arclength import ParameterLine, still
 from asperity.orbit.search import find_orbits
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
-from asperity.parameters.arguments import number, pair, shown
+from asperity.parameters.arguments import number
 from asperity.slider import Slider
 from asperity.slider.named import equation_parameters, value_of, with_value
 from asperity.slider.problem import Problem, checked_problem, flatten
 
-#: Spans of a larger ratio than this are continued by equal factors.
+#: Spans with a larger ratio of their ends than this are continued on a logarithmic scale.
 _LOGARITHMIC = 2.0
 
 
@@ -36,10 +36,10 @@ class ContinuedParameter:
     ----------
     name : str
     unit : str
-        SI unit of the values; "" for none.
+        SI unit of the values; "" for a pure number.
     start, end : float
     logarithmic : bool
-        Whether it moves by equal factors.
+        Whether the scale is logarithmic.
     """
 
     name: str
@@ -70,12 +70,12 @@ class ContinuedParameter:
 def moving_parameter(
     problem: Problem, name: str, span: Any, field: str = "span"
 ) -> ContinuedParameter:
-    """A parameter of `problem` with the span it shall move over.
+    """A parameter of `problem` with its span.
 
     Raises
     ------
     InputError
-        If there is no such parameter, or the span is not two different values it may have.
+        If there is no such parameter, or the span is not two different valid values.
     """
     name = continued_name(type(problem.system.slider.law), name)
     known = equation_parameters(*problem)
@@ -84,7 +84,7 @@ def moving_parameter(
             f"parameter must be one that the equations have, got '{name}'; {closest(name, known)}"
         )
     parameter = known[name]
-    ends = [_end(parameter, end, field) for end in pair_of(span, name, field)]
+    ends = [_end(parameter, end, field) for end in span]
     start, end = ends
     if start == end:
         raise InputError(
@@ -97,17 +97,13 @@ def moving_parameter(
 
 
 def continued_name(law: type[Law], name: str) -> str:
-    """The one name of a parameter that can be continued in.
+    """The canonical name of a parameter that can be continued.
 
     Raises
     ------
     InputError
-        If neither the law nor the experiment has one of that name.
+        If neither the law nor the experiment has a parameter of that name.
     """
-    if not isinstance(name, str):
-        raise InputError(
-            f"parameter must be the name of a parameter, got {shown(name)}; write it like 'epsilon'"
-        )
     if name in MODULATION:
         raise InputError(
             f"parameter must be one that continuation can change, got '{name}'; give it as "
@@ -115,17 +111,6 @@ def continued_name(law: type[Law], name: str) -> str:
         )
     known = {n: p for n, p in point_parameters(law).items() if p.path}
     return known_name(name, known)
-
-
-def pair_of(span: Any, name: str, field: str) -> tuple[Any, Any]:
-    """The two ends of a span.
-
-    Raises
-    ------
-    InputError
-        If there are not two.
-    """
-    return pair(span, field)
 
 
 def line_through(
@@ -138,7 +123,7 @@ def line_through(
     problem : Problem
         The other parameters, NumPy arrays of shape (1,).
     parameters : tuple of ContinuedParameter
-        Different ones.
+        Different parameters.
     at, direction : sequence of float
     """
     known = equation_parameters(*problem)
@@ -157,15 +142,15 @@ def line_through(
 
 
 def fixed_as_text(law: type[Law], fixed: Mapping[str, float]) -> str:
-    """The parameters that were kept, with their units."""
+    """The constant parameters with their units."""
     known = point_parameters(law)
     return "; ".join(f"{n} = {value!r} {known[n].unit}".rstrip() for n, value in fixed.items())
 
 
 def _end(parameter: Parameter, value: Any, field: str) -> float:
-    """An end of a span, which the parameter must be able to have."""
+    """An end of a span, checked by the rule of the parameter."""
     checked = number(value, field, parameter.kind, parameter.rule)
-    # What can be 0 in a table, for not being there, has to be there to be continued in.
+    # 0 in a table means "not included"; a continued parameter must be part of the equations.
     if parameter.name in ("M", "eta") and not checked > 0:
         raise InputError(
             f"{field} must be positive for {parameter.name}, got {checked:g} {parameter.unit}; "
@@ -182,7 +167,7 @@ def start_of(slider: Slider, parameter: str, span: Any, field: str = "span") -> 
     InputError
         If there is no such parameter or a span is not a pair.
     """
-    return {continued_name(type(slider.law), parameter): pair_of(span, parameter, field)[0]}
+    return {continued_name(type(slider.law), parameter): span[0]}
 
 
 def one_problem(
@@ -236,7 +221,7 @@ def one_problem(
 
 
 def starting_orbit(problem: Problem, intervals: int) -> Orbit | None:
-    """An orbit of the one point of `problem` on a mesh of `intervals`; None where there is none."""
+    """An orbit of the single point of `problem` on a mesh of `intervals`; None without one."""
     solution = find_orbits(
         jax.tree.map(np.asarray, problem),
         1,
@@ -249,7 +234,7 @@ def starting_orbit(problem: Problem, intervals: int) -> Orbit | None:
 
 
 def held_parameters(problem: Problem, *moving: str) -> dict[str, float]:
-    """Parameters of the operating point, SI, but for those that move."""
+    """Parameters of the operating point, SI, without those that move."""
     named = equation_parameters(*problem)
     values = {name: value_of(problem, p) for name, p in named.items() if name not in moving}
     return {name: float(np.ravel(value)[0]) for name, value in values.items()}

@@ -1,7 +1,7 @@
 """Stability boundaries in the plane of two parameters: continuation of the bifurcation condition.
 
 A point of a boundary is the zero of a test function on a line through the plane of the two
-parameters. From a known point the next is sought on the line across the boundary's own direction a
+parameters. From a known point the next is searched on the line across the boundary's direction a
 step ahead, so that boundaries may turn back in either parameter. On that line folds, period
 doublings and Neimark-Sacker points are located like those of any branch.
 """
@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from jax.typing import ArrayLike
@@ -43,17 +43,17 @@ from asperity.branches.parameters import (
 from asperity.branches.steps import BranchFollower, BranchOrbit, ParameterBranch
 from asperity.errors import InputError
 from asperity.loads import Modulation
-from asperity.parameters.arguments import counted, function, whole_number
+from asperity.parameters.arguments import at_least, counted, typed
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion, Slider
-from asperity.slider.problem import Problem, checked_slider
+from asperity.slider.problem import Problem
 
 if TYPE_CHECKING:
     import xarray
 
 Float = NDArray[np.float64]
 
-#: First step along a boundary, in parts of the span.
+#: First step along a boundary, as a share of the span.
 _FIRST = 0.005
 _MOST_STEPS = 2000
 
@@ -89,7 +89,7 @@ class TracedBoundary(NamedTuple):
     kind : str
     points : list of BoundaryPoint
     result : tuple of str
-        Why it ends, at its first and at its last point.
+        Reasons why the boundary ends, at its first and at its last point.
     """
 
     kind: Kind
@@ -98,7 +98,7 @@ class TracedBoundary(NamedTuple):
 
 
 class ParameterPlane(NamedTuple):
-    """Two parameters of an operating point, and what to read off each orbit."""
+    """Two parameters of an operating point, and the observables of each orbit."""
 
     problem: Problem
     parameters: tuple[ContinuedParameter, ContinuedParameter]
@@ -220,8 +220,8 @@ def critical_point(
     """The point of a boundary on the line through `guess`, from the orbit of a point nearby."""
     guess, direction = np.asarray(guess, float), np.asarray(direction, float)
     follower = plane.follower(guess, direction)
-    # At a fold the orbit does not depend regularly on the parameters: it keeps its distance from
-    # the plane across the branch instead of its parameters.
+    # At a fold the orbit is no regular function of the parameters. There the orbit is fixed by the
+    # plane across the branch, and the parameters are unknowns.
     start = follower.at(known.point, 0.0) if kind != "fold" else follower.across(known.point, 0.0)
     if start is None:
         return None
@@ -279,7 +279,7 @@ def _on_edge(
     return critical_point(plane, kind, inside.branch_orbit, guess, direction)
 
 
-#: A bifurcation this close to a boundary, in parts of the span, belongs to it.
+#: A bifurcation this close to a boundary (share of the span) belongs to the boundary.
 _SAME = 2e-3
 _SCAN_STEPS = 400
 
@@ -382,6 +382,7 @@ class StabilityBoundary(Displayed):
         return xarray.Dataset(data, attrs=attributes)
 
 
+@typed
 def stability_boundary(
     slider: Slider,
     *,
@@ -395,7 +396,7 @@ def stability_boundary(
     modulation: Modulation | None = None,
     inertia: bool = False,
     radiation_damping: ArrayLike | str | None = None,
-    lines: int = 5,
+    lines: Annotated[int, at_least(2)] = 5,
     progress: Callable[[int, int], None] | None = None,
 ) -> StabilityBoundary:
     """Curves on which the periodic response changes its stability, in two parameters.
@@ -434,9 +435,6 @@ def stability_boundary(
     Without modulation the curves end at the closed forms of linear stability: K = Kc for a
     slider without inertia, critical frequency (V/D0) sqrt((B - A)/A) for the ageing law.
     """
-    lines = whole_number(lines, "lines", least=2)
-    progress = function(progress, "progress")
-    checked_slider(slider)
     problem = one_problem(
         slider,
         start_of(slider, x, x_span, "x_span") | start_of(slider, y, y_span, "y_span"),

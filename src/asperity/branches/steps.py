@@ -26,10 +26,10 @@ from asperity.orbit.methods.branch_following.arclength import (
 
 Float = NDArray[np.float64]
 
-#: A step counts when Newton's method has converged to this: its error is about the square.
+#: A step is accepted if Newton's last change is below this; the error is about its square.
 _CONVERGED = 1e-6
 _NEWTON_STEPS = 10
-#: First step, and the largest part of the span in any.
+#: First step, and longest step, as shares of the span.
 _FIRST, _LARGEST_PART = 1e-3, 0.04
 
 
@@ -64,7 +64,7 @@ class BranchOrbit(NamedTuple):
 
 
 class BranchFollower(NamedTuple):
-    """A line of parameters, and what to read off each orbit on it."""
+    """A line of parameters, and the observables of each orbit on the line."""
 
     line: ParameterLine
     harmonics: int
@@ -80,7 +80,7 @@ class BranchFollower(NamedTuple):
         return self.branch_orbit(step.orbit, step.next), step
 
     def branch_orbit(self, orbit: Orbit, point: ContinuationPoint) -> BranchOrbit:
-        """Read off an orbit."""
+        """Evaluate the observables of an orbit."""
         read = read_orbit(self.line.at(point.t), orbit, self.harmonics)
         logs = log_multipliers(read.monodromy, read.log_scale, read.log_determinant)
         return BranchOrbit(
@@ -96,7 +96,7 @@ class BranchFollower(NamedTuple):
         self, start: BranchOrbit, length: float, function: Callable[[BranchOrbit], float]
     ) -> tuple[BranchOrbit, float] | None:
         """The orbit within `length` of `start` at which a function vanishes, and its distance."""
-        # Loading SciPy's optimisation would slow the start of a process that continues nothing.
+        # SciPy's optimisation loads slowly, and only continuation needs it.
         from scipy.optimize import brentq
 
         seen: dict[float, BranchOrbit] = {}

@@ -8,13 +8,20 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, set_option, settings_of
+from asperity.cli.options import (
+    json_option,
+    names_option,
+    plot_option,
+    set_option,
+    settings_of,
+)
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.words import in_options
 from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
     from asperity.measurement.verdicts.verdict import Check
+    from asperity.parameters import Names
     from asperity.questions.recording import Measurement as Question
     from asperity.questions.recording import Source
 
@@ -83,12 +90,12 @@ class FileRows:
         """
         source = self.source.model_dump(mode="json")
         if self.source.recipe is not None:
-            from asperity.recording.recipe import load_recipe
+            from asperity.questions.recording import ReadingRecipe
 
-            source["recipe"] = load_recipe(self.source.recipe).model_dump()
+            source["recipe"] = ReadingRecipe.from_file(self.source.recipe).model_dump()
         options = self.question.model_dump(mode="json")
-        own = {str(path): fields for path, fields in self.conditions.items()}
-        return {"source": source, "options": options, "conditions": own}
+        conditions = {str(path): fields for path, fields in self.conditions.items()}
+        return {"source": source, "options": options, "conditions": conditions}
 
 
 _EPILOG = """\b
@@ -116,6 +123,8 @@ in place of numbers; 2: bad input.
 
 @click.command(epilog=_EPILOG)
 @click.argument("recordings", type=Path, nargs=-1, required=True)
+@plot_option()
+@names_option()
 @source_options
 @click.option(
     "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
@@ -195,7 +204,6 @@ in place of numbers; 2: bad input.
     help="Processes of a table; as many as cores if not given.",
 )
 @json_option()
-@click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
@@ -219,12 +227,14 @@ def measure(
     jobs: int | None,
     as_json: bool,
     plot: Path | None,
+    names: Names,
 ) -> int:
     """Harmonics of the friction force against the measured load, with uncertainties and verdicts.
 
     RECORDINGS are files of a laboratory: CSV or other text, HDF5, MATLAB, TDMS or LOOK. Several
     are measured into one table with --out.
     """
+    from asperity.cli.report import require_picture, write_picture
     from asperity.questions.recording import Measurement as Question
 
     fields: dict[str, Any] = {
@@ -269,8 +279,7 @@ def measure(
                 "--amplitudes must go without --no-modulation and --plot, got both; leave one out"
             )
         return _amplitudes(recording, source, question, as_json)
-    if plot is not None:
-        _check_picture(plot, recording)
+    require_picture(plot, recording)
     if events is not None:
         _check_catalogue(events, recording)
     from asperity.measurement.from_file import answer_measurement
@@ -282,9 +291,8 @@ def measure(
         click.echo(f"asperity: {why}", err=True)
     if events is not None:
         _catalogue(result, events)
-    _print(result, recording, trace.provenance, as_json)
-    if plot is not None:
-        _plot(result, plot)
+    _print(result, recording, trace.provenance, as_json, names)
+    write_picture(result, plot, names)
     return _verdict(result.checks)
 
 
@@ -392,15 +400,6 @@ def _campaign(
     return int(done.failed > 0 or bool(untold))
 
 
-def _check_picture(path: Path, recording: Path) -> None:
-    """Check the picture's path before anything is read."""
-    from asperity.outputs import output_files
-
-    if path.suffix.lower() != ".png":
-        raise InputError(f"--plot must be a PNG file, got '{path}'; write it like --plot out.png")
-    output_files({"--plot": path}, inputs={"recording": recording})
-
-
 def _check_catalogue(path: Path, recording: Path) -> None:
     from asperity.measurement.stick_slip.catalogue import check_catalogue
     from asperity.outputs import output_files
@@ -433,7 +432,9 @@ def _machine(settings: tuple[str, ...]) -> dict[str, str]:
     return {fields[name]: text for name, text in given.items()}
 
 
-def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
+def _print(
+    result: Any, recording: Path, provenance: dict[str, Any], as_json: bool, names: Names
+) -> None:
     from asperity._version import __version__
     from asperity.cli.measurement_text import modulated_text, sliding_text, stick_slip_text
     from asperity.cli.report import to_json
@@ -452,20 +453,7 @@ def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bo
         provenance_record = {"recording": str(recording), "version": __version__, **provenance}
         click.echo(to_json({**record_of(result), "provenance": provenance_record}))
     else:
-        click.echo(text_of(result, recording.name))
-
-
-def _plot(result: Any, path: Path) -> None:
-    from asperity.figures.recording import draw_modulated, draw_sliding
-    from asperity.figures.stick_slip import draw_stick_slip
-    from asperity.figures.style import style
-    from asperity.outputs import written_file
-
-    draw: Any = draw_modulated if hasattr(result, "reading") else draw_sliding
-    if hasattr(result, "regimes"):
-        draw = draw_stick_slip
-    with style(), written_file(path, "--plot") as file:
-        draw(result).savefig(file, metadata={"Software": None})
+        click.echo(text_of(result, recording.name, names))
 
 
 def _verdict(checks: tuple[Check, ...]) -> int:

@@ -1,4 +1,4 @@
-"""Experiments on a simulated slider, recorded by the virtual tribometer and read as any other."""
+"""Experiments on a simulated slider, recorded by the virtual tribometer and measured."""
 
 from asperity.experiment.amplitudes import (
     AmplitudeMotion,

@@ -1,4 +1,4 @@
-"""The paper's protocol: modulate, read, switch off, measure F(0) again, next amplitude.
+"""Amplitude protocol of Bureau et al. (2000): modulate, measure, switch off, measure F(0) again.
 
 Bureau et al. (2000), Sec. II: the slider slides steadily; for each amplitude the modulation is
 switched on, the mean force and its harmonics are read, and after switching off the unmodulated
@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class AmplitudePoint:
-    """One amplitude of the protocol.
+    """An amplitude of the protocol.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class AmplitudePoint:
 
     @property
     def drift(self) -> float:
-        """F(0) after over F(0) before, less 1; NaN where either was not found."""
+        """F(0) after over F(0) before, minus 1; NaN if one of them is unknown."""
         before, after = self.measurement.before, self.measurement.after
         if before is None or after is None:
             return np.nan
@@ -65,7 +65,7 @@ class AmplitudeSeries:
     Attributes
     ----------
     trace : Trace
-        The whole recording, as the tribometer made it.
+        The whole recording of the tribometer.
     points : tuple of AmplitudePoint
     velocity, frequency : float
         SI.
@@ -223,7 +223,7 @@ def amplitude_motion(
     Parameters
     ----------
     rate : float
-        Samples of the motion per second (Hz), as `motion_rate` has it for a tribometer.
+        Samples of the motion per second (Hz), from `motion_rate` for a tribometer.
 
     Raises
     ------

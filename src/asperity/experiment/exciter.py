@@ -1,4 +1,4 @@
-"""The vibration exciter: what it applies, and what of it the contacts bear."""
+"""The vibration exciter: the applied load modulation, and the part that the contacts carry."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from asperity.units import to_si
 
 @dataclass(frozen=True)
 class Exciter:
-    """A harmonic load of one frequency, part of which an air layer takes.
+    """A harmonic load, of which an air layer may carry a part.
 
     Attributes
     ----------
@@ -62,14 +62,14 @@ class Exciter:
     def steps(
         self, epsilon: float, duration: float, rise: float, velocity: float | None = None
     ) -> tuple[Modulate, Modulate]:
-        """The step as it is applied, and as the contacts feel it.
+        """The applied modulation, and that of the load on the contacts.
 
         Parameters
         ----------
         epsilon : float
             Applied relative amplitude.
         duration, rise : float
-            Seconds; the amplitude comes and goes within `rise` each.
+            Seconds; the amplitude rises and falls within `rise` each.
         velocity : float, optional
             Pulling velocity (m/s) from now on.
 

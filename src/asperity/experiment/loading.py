@@ -24,16 +24,16 @@ from asperity.units import to_si
 
 Array = NDArray[np.float64]
 
-#: Share of each branch that is left out at either end: what turns there is filtered.
+#: Share of each branch that is left out at both ends, because filters smooth the turning points.
 _TRIM = 0.1
 
-#: A turn of the force counts when it goes back by this share of its whole range.
+#: A turning point counts if the force then changes back by this share of its range.
 _TURN = 0.3
 
 
 @dataclass(frozen=True, eq=False)
 class ElasticLength:
-    """What a loading-unloading test says.
+    """Result of a loading-unloading test.
 
     Attributes
     ----------
@@ -63,7 +63,7 @@ def loading_recording(
     seed: int = 0,
     **options: Any,
 ) -> Trace:
-    """Record the test on a simulated slider, which comes from steady sliding.
+    """Record the test on a simulated slider, from steady sliding.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def elastic_length(
     Raises
     ------
     InputError
-        If fewer than two pairs of loading and unloading are found.
+        If there are fewer than two pairs of loading and unloading.
 
     Notes
     -----

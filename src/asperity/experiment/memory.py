@@ -1,4 +1,4 @@
-"""Holds and velocity steps of a simulated slider: what they do to friction, for many at once.
+"""Holds and velocity steps of many simulated sliders at once.
 
 Static friction, healing and its rate, what happens in the hold, the extremum after a step, and the
 way back to steady sliding. The extremum is located, not sampled.
@@ -15,32 +15,38 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity._version import __version__
-from asperity.algebra.small_systems import jacobian_columns, spectral_abscissa
 from asperity.errors import InputError
 from asperity.laws import Law
-from asperity.loads import Excitation
 from asperity.orbit.response import dimension_names
 from asperity.parameters import MACHINE, law_parameters, obeying
-from asperity.parameters.arguments import instance, switch
+from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import Displayed, SummaryLine, number_line
-from asperity.slider import QuasiStatic, Slider
+from asperity.slider import Slider
 from asperity.slider.named import slider_values
 from asperity.slider.problem import flatten
+from asperity.theory.memory import steady_growth
 from asperity.transients.batch import End
-from asperity.transients.hold_and_step import SETTLED, HoldResponse, Settling, hold, settle, step
+from asperity.transients.hold_and_step import (
+    SETTLED,
+    HoldResponse,
+    SettlingDistance,
+    hold,
+    settle,
+    step,
+)
 
 if TYPE_CHECKING:
     import xarray
 
 Float = NDArray[np.float64]
 
-#: Velocity (m/s) to which a slider without inertia can only run away, and that over the drive's.
+#: Velocity (m/s), and ratio to the drive's, that a slider without inertia reaches by runaway only.
 _RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
-#: Longest hold (s): beyond it squares of times would leave the range of doubles.
+#: Longest hold (s); the square of a longer time might overflow.
 _LONGEST = 1e20
-#: Points in a call of the compiled program; the smallest that is enough.
+#: Numbers of points in a call of the compiled program; a call uses the smallest sufficient one.
 _SHAPES = (64, 1024)
-#: Distance of the points of a difference in ln(hold time): its error is that of a step.
+#: Step of the finite difference in ln(hold time); its error is that of an integration step.
 _STEP = 0.02
 
 _SENTENCES = {
@@ -61,7 +67,7 @@ _UNSTABLE = (
 
 @dataclass(frozen=True, repr=False)
 class Holds(Displayed):
-    """Slide, hold, slide: static friction and what leads to it; arrays of one shape.
+    """Slide-hold-slide tests: static friction, healing and relaxation; arrays of one shape.
 
     Attributes
     ----------
@@ -86,10 +92,10 @@ class Holds(Displayed):
     states, states_at_maximum : array, shape (..., size)
         Of the quasi-static motion: spring force (with that of the asperities), then the law's.
     distance, slip : array
-        Way of the drive and of the slider from the end of the hold to the maximum (m).
+        Displacement of the drive and of the slider from the end of the hold to the maximum (m).
     settling_distance, settling_slip : array
         The same to where the force stays within 5 % of the healing from its steady value; NaN where
-        it does not come there or was not asked for.
+        the motion does not reach it or `settling` is False.
     stable : bool array
         Whether steady sliding is stable: K above the critical stiffness.
     has_maximum : bool array
@@ -120,12 +126,12 @@ class Holds(Displayed):
 
     @property
     def healing(self) -> Float:
-        """Static friction less the level of sliding before the hold."""
+        """Static friction minus sliding friction before the hold."""
         return self.maximum - self.level
 
     @property
     def relaxation(self) -> Float:
-        """What the force falls by in the hold, over W0."""
+        """Decrease of the force in the hold, over W0."""
         return self.level - self.minimum
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
@@ -156,7 +162,7 @@ class VelocityStepResponse(Displayed):
     evolution : array
         extremum - after: B ln(V/V_before) of a stiff spring.
     distance, slip : array
-        Way of the drive and of the slider from the step to the extremum (m).
+        Displacement of the drive and of the slider from the step to the extremum (m).
     settling_distance, settling_slip : array
         The same to where the force stays within 5 % of `evolution` from its steady value; NaN where
         it does not come there.
@@ -164,7 +170,7 @@ class VelocityStepResponse(Displayed):
     stable, has_extremum : bool array
     result : str array
     slider : Slider
-        As of `Holds`.
+        As for `Holds`.
     """
 
     velocity_before: Float
@@ -184,12 +190,12 @@ class VelocityStepResponse(Displayed):
 
     @property
     def direct(self) -> Float:
-        """What the step changes at once."""
+        """Immediate change of friction (direct effect)."""
         return self.extremum - self.before
 
     @property
     def evolution(self) -> Float:
-        """What is lost again on the way to steady sliding."""
+        """Change of friction from the extremum to steady sliding (evolution effect)."""
         return self.extremum - self.after
 
     def summary(self) -> tuple[str, list[SummaryLine]]:
@@ -205,6 +211,7 @@ class VelocityStepResponse(Displayed):
         return _dataset(self, drive, dims)
 
 
+@typed
 def hold_response(
     slider: Slider | Law,
     *,
@@ -250,44 +257,45 @@ def hold_response(
             "asperity.theory.memory has the limits of long holds"
         )
     V = obeying(velocity, "hold_response.velocity", "velocity", "positive")
-    follow = switch(settling, "hold_response.settling")
     (flat, V, time), shape = flatten((slider, V, time), "hold_response")
 
     def run(slider: Slider, V: jax.Array, time: jax.Array, runaway: jax.Array) -> tuple:
-        found, extremum = hold(slider, V, time)
-        after = settle(slider, V, extremum, runaway) if follow else None
+        response, extremum = hold(slider, V, time)
+        after = settle(slider, V, extremum, runaway) if settling else None
         # The derivative by differences of order 4 in ln(hold time).
-        others = [hold(slider, V, time * np.exp(n * _STEP))[0].maximum for n in (-2, -1, 1, 2)]
+        moved = (hold(slider, V, time * np.exp(n * _STEP))[0] for n in (-2, -1, 1, 2))
+        others = [np.asarray(there.maximum) for there in moved]
         slope = (others[0] - 8 * others[1] + 8 * others[2] - others[3]) / (12 * _STEP)
-        return found, after, np.log(10) * slope
+        return response, after, np.log(10) * slope
 
     runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
-    found, after, rate = _in_shapes(run, flat, V, time, runaway)
-    assert isinstance(found, HoldResponse)
+    response, after, rate = _in_shapes(run, flat, V, time, runaway)
+    assert isinstance(response, HoldResponse)
     stable = _stable(flat, V)
     shaped = _Shaped(shape)
-    crossing = found.end == End.CROSSING
+    crossing = response.end == End.CROSSING
     return Holds(
         hold_time=shaped(time),
         velocity=shaped(V),
-        level=shaped(found.level),
-        minimum=shaped(found.minimum),
-        maximum=shaped(found.maximum),
+        level=shaped(response.level),
+        minimum=shaped(response.minimum),
+        maximum=shaped(response.maximum),
         healing_rate=shaped(rate),
-        hold_slip=shaped(found.hold_slip),
-        end_velocity=shaped(found.velocity * V),
-        velocity_at_maximum=shaped(np.where(crossing, found.velocity_at_maximum * V, np.nan)),
-        states=shaped(found.states),
-        states_at_maximum=shaped(found.states_at_maximum),
-        distance=shaped(np.where(crossing, found.distance, np.nan)),
-        slip=shaped(np.where(crossing, found.slip, np.nan)),
-        **_settling(after, found.end, stable, shaped),
+        hold_slip=shaped(response.hold_slip),
+        end_velocity=shaped(response.velocity * V),
+        velocity_at_maximum=shaped(np.where(crossing, response.velocity_at_maximum * V, np.nan)),
+        states=shaped(response.states),
+        states_at_maximum=shaped(response.states_at_maximum),
+        distance=shaped(np.where(crossing, response.distance, np.nan)),
+        slip=shaped(np.where(crossing, response.slip, np.nan)),
+        **_settling(after, response.end, stable, shaped),
         stable=shaped(stable),
         has_maximum=shaped(crossing),
         slider=slider,
     )
 
 
+@typed
 def step_response(
     slider: Slider | Law,
     *,
@@ -317,7 +325,6 @@ def step_response(
     slider = _slider(slider, stiffness)
     first = obeying(velocity_before, "step_response.velocity_before", "velocity", "positive")
     V = obeying(velocity, "step_response.velocity", "velocity", "positive")
-    follow = switch(settling, "step_response.settling")
     (flat, first, V), shape = flatten((slider, first, V), "step_response")
     if np.any(first == V):
         raise InputError(
@@ -326,34 +333,32 @@ def step_response(
         )
 
     def run(slider: Slider, V: jax.Array, first: jax.Array, runaway: jax.Array) -> tuple:
-        found, extremum = step(slider, first, V)
-        return found, settle(slider, V, extremum, runaway) if follow else None
+        response, extremum = step(slider, first, V)
+        return response, settle(slider, V, extremum, runaway) if settling else None
 
     runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
-    found, after = _in_shapes(run, flat, V, first, runaway)
+    response, after = _in_shapes(run, flat, V, first, runaway)
     stable = _stable(flat, V)
     shaped = _Shaped(shape)
-    crossing = found.end == End.CROSSING
-    over = np.where(found.end == End.STEADY, found.after, found.extremum)
+    crossing = response.end == End.CROSSING
+    over = np.where(response.end == End.STEADY, response.after, response.extremum)
     return VelocityStepResponse(
         velocity_before=shaped(first),
         velocity=shaped(V),
-        before=shaped(found.before),
+        before=shaped(response.before),
         extremum=shaped(over),
-        after=shaped(found.after),
-        distance=shaped(np.where(crossing, found.distance, np.nan)),
-        slip=shaped(np.where(crossing, found.slip, np.nan)),
-        states_at_extremum=shaped(found.states_at_extremum),
-        **_settling(after, found.end, stable, shaped),
+        after=shaped(response.after),
+        distance=shaped(np.where(crossing, response.distance, np.nan)),
+        slip=shaped(np.where(crossing, response.slip, np.nan)),
+        states_at_extremum=shaped(response.states_at_extremum),
+        **_settling(after, response.end, stable, shaped),
         stable=shaped(stable),
         has_extremum=shaped(crossing),
         slider=slider,
     )
 
 
-def _slider(slider: Any, stiffness: Any) -> Slider:
-    advice = "give a law with stiffness, or asperity.Slider(law, spring=, load=)"
-    slider = instance(slider, (Slider, Law), "slider", advice)
+def _slider(slider: Slider | Law, stiffness: Any) -> Slider:
     if isinstance(slider, Law):
         if stiffness is None:
             raise InputError(
@@ -374,7 +379,7 @@ def _slider(slider: Any, stiffness: Any) -> Slider:
 
 
 def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float) -> Any:
-    """Run many points in calls of a few shapes; the last points of a call may be repetitions."""
+    """Run many points in calls of a few fixed shapes, padded by repetition."""
     size = next((n for n in _SHAPES if len(V) <= n), _SHAPES[-1])
     parts = []
     for i in range(0, max(len(V), 1), size):
@@ -387,10 +392,8 @@ def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float)
 
 def _stable(slider: Slider, V: Float) -> NDArray[np.bool_]:
     """Whether a small disturbance of steady sliding dies out."""
-    motion = QuasiStatic(slider, V, 1.0)
-    at = Excitation(jnp.ones(len(V)))
-    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), motion.steady())
-    return np.asarray(spectral_abscissa(jnp.stack(columns, axis=1)) < 0)
+    run = lambda *arguments: steady_growth(*arguments[:2])  # noqa: E731
+    return np.asarray(_in_shapes(run, slider, V, V, V) < 0)
 
 
 class _Shaped:
@@ -405,7 +408,7 @@ class _Shaped:
 
 
 def _settling(
-    after: Settling | None, end: Any, stable: NDArray[np.bool_], shaped: _Shaped
+    after: SettlingDistance | None, end: Any, stable: NDArray[np.bool_], shaped: _Shaped
 ) -> dict[str, Any]:
     none = np.full(len(stable), np.nan)
     ends = end if after is None else after.end
@@ -424,7 +427,7 @@ def _outcomes(result: NDArray[np.object_]) -> str:
     return f"{result.size} points" + (f", {lost} of which do not settle" if lost else "")
 
 
-#: Unit and meaning of what the records hold.
+#: Unit and meaning of the variables.
 _MEANINGS: dict[str, tuple[str, str]] = {
     "level": ("1", "F/W0 of steady sliding"),
     "minimum": ("1", "F/W0 at the end of the hold"),

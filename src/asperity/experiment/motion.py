@@ -20,13 +20,13 @@ Array = NDArray[np.float64]
 #: Channels that a tribometer may have of a simulated slider; the drive is the load point.
 FORCE, LOAD, DISPLACEMENT, DRIVE = "shear force", "normal force", "displacement", "drive position"
 
-#: Samples of the motion for one of the recorder's, at least: with half as many amplitudes would be
-#: 4e-5 too small.
+#: Smallest number of samples of the motion for each sample of the recorder; with half as many,
+#: amplitudes would be 4e-5 too small.
 _FINER = 8
 
 
 def motion_rate(tribometer: Tribometer) -> float:
-    """Rate (Hz) at which a motion has to be sampled for a tribometer: a multiple of its own."""
+    """Sampling rate (Hz) of a motion for a tribometer, a multiple of the recorder's rate."""
     recorder = float(tribometer.recorder.rate)
     fastest = max(float(sensor.bandwidth) for sensor in tribometer.sensors.values())
     return recorder * max(_FINER, int(np.ceil(4 * fastest / recorder)))
@@ -35,7 +35,7 @@ def motion_rate(tribometer: Tribometer) -> float:
 def signals(
     slider: Slider, programme: Programme, rate: float, names: tuple[str, ...], **options: Any
 ) -> tuple[dict[str, Array], Trajectory]:
-    """Time and columns of a transient, keeping nothing else of it.
+    """Time and selected columns of a transient.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def signals(
     Returns
     -------
     (dict of str to array, Trajectory)
-        The columns, ``time`` among them, and the last block, which knows why it ended.
+        The columns with ``time``, and the last block, which has the reason of the end.
     """
     kept: dict[str, list[Array]] = {name: [] for name in ("time", *names)}
     for block in integrate_blocks(slider, programme, sampling=rate, **options):
@@ -68,7 +68,7 @@ def recorded_motion(
     seed: int,
     options: Mapping[str, Any],
 ) -> Trace:
-    """Integrate a programme to its end, and record the channels that the tribometer has.
+    """Integrate a programme to its end, and record the channels of the tribometer.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Series of holds and of velocity steps, as steps of a programme and as recordings."""
+"""Slide-hold-slide and velocity-step series, as steps of a programme and as recordings."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class SlideHoldSlide(ProgrammeStep):
 
 @dataclass(frozen=True)
 class VelocitySteps(ProgrammeStep):
-    """Slide at one velocity after the other, the same length of load-point displacement at each.
+    """Slide at each velocity in order, over the same load-point displacement.
 
     Attributes
     ----------
@@ -102,7 +102,7 @@ def slide_hold_slide(
     holds : sequence of float or str
         Hold times (s).
     velocity : float or str
-        Of the drive where it slides (m/s).
+        Velocity of the drive in sliding (m/s).
     sliding : float or str
         Duration of sliding before, between and after the holds (s).
     seed : int

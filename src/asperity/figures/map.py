@@ -1,4 +1,4 @@
-"""A map as a picture: a quantity in colour, the stability boundary drawn by its kind."""
+"""Figure of a map: a quantity in colour, and the stability boundary by kind of bifurcation."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ _FAILED: dict[str, Any] = {
     "linewidth": 0,
 }
 
-#: Symbol of a quantity, and of one that is drawn.
+#: Symbol of a quantity, and of the quantity that is drawn.
 _SYMBOLS = {
     "epsilon": r"amplitude $\epsilon$",
     "K": r"spring stiffness $K$",
@@ -72,11 +72,11 @@ _SHOWN = {
 }
 _CYCLIC = ("phase1", "phase2")
 _SIGNED = ("log_multiplier", "growth_rate", "floquet_max")
-#: Ratio of its largest to its smallest values above which a positive quantity is shown in decades.
+#: Ratio of the largest to the smallest value above which the colour scale is logarithmic.
 _DECADES = 50.0
-#: Ratio of the ends of a logarithmic axis below which decades alone would leave it bare.
+#: Ratio of the ends of a logarithmic axis below which numbers between decades are written.
 _FEW_DECADES = 30.0
-#: Quantiles of a quantity that its colours span: a few extreme points must not take them all.
+#: Quantiles at the ends of the colour scale, so that few extreme points do not determine it.
 _SPAN = (0.02, 0.98)
 #: Smallest region, in parts of the shorter side, that has room for its name.
 _ROOM = 0.075
@@ -145,7 +145,7 @@ def draw_plane(
 
 
 def colours(dataset: xarray.Dataset, show: str) -> Normalize:
-    """How values become colours."""
+    """The colour scale."""
     values = dataset[show].values
     values = values[np.isfinite(values)]
     if show in _CYCLIC:
@@ -161,7 +161,7 @@ def colours(dataset: xarray.Dataset, show: str) -> Normalize:
 
 
 def keys(dataset: xarray.Dataset) -> list[Any]:
-    """Entries of the legend: kinds of bifurcation that occur, and whatever else is drawn."""
+    """Entries of the legend: the kinds of bifurcation in the map, and other lines."""
     kinds = _kinds(dataset)
     entries: list[Any] = [
         Line2D([], [], color=_LINE, linestyle=line, label=_KIND_NAMES.get(kind, kind))
@@ -192,7 +192,7 @@ def label(side: xarray.DataArray, unit: tuple[float, str]) -> str:
 
 
 def _write_numbers(axis: Axis, ratio: float) -> None:
-    """Plain numbers on a logarithmic axis; between the decades too where there are few."""
+    """Plain numbers on a logarithmic axis, also between decades if there are few decades."""
     few = ratio < _FEW_DECADES
 
     def text(value: float, position: int | None = None) -> str:
@@ -256,30 +256,42 @@ def _runs(kinds: NDArray[np.str_]) -> list[tuple[int, int, str]]:
     return [(a, b, str(kinds[a])) for a, b in zip(starts, ends, strict=True)]
 
 
-def _draw_unmodulated(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+def unmodulated(dataset: xarray.Dataset) -> tuple[Float, Float] | None:
+    """The line K = K_c of an unmodulated load, x and y in SI; None where it is not known."""
     if "critical_stiffness" not in dataset:
-        return
+        return None
     Kc = dataset["critical_stiffness"]
     other = str(Kc.dims[0])
-    sides = [dataset.attrs[s] for s in "xy"]
-    along = dataset[other].values / units[sides.index(other)][0]
-    stiffness = Kc.values / units[sides.index("K")][0]
-    pair = (along, stiffness) if sides[0] == other else (stiffness, along)
+    pair = dataset[other].values, Kc.values
+    return pair if dataset.attrs["x"] == other else pair[::-1]
+
+
+def _draw_unmodulated(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+    line = unmodulated(dataset)
+    if line is None:
+        return
+    pair = [values / unit[0] for values, unit in zip(line, units, strict=True)]
     halo = [patheffects.withStroke(linewidth=2.2, foreground="white", alpha=0.7)]
     axis.plot(*pair, zorder=3, path_effects=halo, **_UNMODULATED)
 
 
-def _name_regions(axis: Axes, dataset: xarray.Dataset) -> None:
-    """The words stable and unstable, each where its region is widest."""
+def region_names(dataset: xarray.Dataset) -> list[tuple[str, float, float]]:
+    """The words stable and unstable, each where its region is widest: shares of both axes."""
     solved = dataset["converged"].values.astype(bool)
     stable = dataset["stable"].values.astype(bool)
     room = _ROOM * min(stable.shape)
+    places = []
     for word, region in (("stable", solved & stable), ("unstable", solved & ~stable)):
         depth = np.asarray(distance_transform_edt(np.pad(region, 1)))[1:-1, 1:-1]
         if depth.max() < room:
             continue
         row, column = np.unravel_index(np.argmax(depth), depth.shape)
-        at = ((column + 0.5) / stable.shape[1], (row + 0.5) / stable.shape[0])
+        places.append((word, (column + 0.5) / stable.shape[1], (row + 0.5) / stable.shape[0]))
+    return places
+
+
+def _name_regions(axis: Axes, dataset: xarray.Dataset) -> None:
+    for word, *at in region_names(dataset):
         axis.text(
             *at, word, transform=axis.transAxes, ha="center", va="center", zorder=5,
             path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white", alpha=0.8)],

@@ -51,21 +51,21 @@ class Panel(_Part):
     x, y : str
         Columns of the table; ``"a/b"`` is a quotient of two.
     points_x : str
-        Column of the abscissa in the table of points, where it is another one.
+        Column of the abscissa in the table of points, if it has another name.
     x_scale, y_scale : float
-        Factors from SI to what the axes show.
+        Factors from SI to the units of the axes.
     x_kind : str
         Dimension of the abscissa, a key of `asperity.units.KINDS`.
     less : str
-        Column that is taken from the points of the panel, which shows residuals.
+        Column that is subtracted from the points of a panel of residuals.
     degrees : bool
         Whether the ordinate is an angle, drawn in degrees and without jumps.
     curve : str
-        What the name of a curve is put into, such as ``"lambda, {}"``.
+        Format of the name of a curve, such as ``"lambda, {}"``.
     mark : str
         Corner for the panel's letter: l and r are the upper, L and R the lower ones.
     title : str
-        In the colour of points: what nobody may overlook.
+        A remark in the colour of the points.
     set : mapping
         Of Matplotlib's `Axes.set`.
     ticks : tuple of (float, str)
@@ -98,7 +98,7 @@ class Panel(_Part):
 
 
 class Item(_Part):
-    """What is drawn on panels, and its entry in a legend.
+    """An element of panels, and its entry in a legend.
 
     Attributes
     ----------
@@ -178,7 +178,7 @@ class Plot(_Part):
         Raises
         ------
         InputError
-            If a curve or a number is not there.
+            If a curve or a number is missing.
         """
         return _Drawing(self, data, numbers, points).figure
 
@@ -232,8 +232,8 @@ class _Drawing:
         """A number, or the computed number of that name, of the panel's curve if there is one."""
         if not isinstance(value, str):
             return float(value)
-        own = panel.curve.replace("{}", value)
-        name = own if own in self.numbers else value
+        of_curve = panel.curve.replace("{}", value)
+        name = of_curve if of_curve in self.numbers else value
         if name not in self.numbers:
             raise InputError(
                 f"a figure's numbers must be computed, got '{value}'; "

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Columns of a long curve: more than pixels show nothing.
+#: Number of columns of a long curve, about the number of pixels.
 _COLUMNS = 1200
 _POINTS = 20_000
 _MEASURED, _FITTED, _LOAD = GREY, ELASTO_PLASTIC, "#9DB7D5"
@@ -79,7 +79,7 @@ def draw_sliding(measurement: SlidingMeasurement) -> Figure:
             label=None if labelled else "steady level and drift",
         )
         labelled = True
-        # A velocity that would run into its neighbours is left out.
+        # A label that would overlap its neighbours is left out.
         if np.isfinite(s.velocity) and s.end - s.start > 0.15 * length:
             axis.text(
                 middle, high + 0.75 * room, f"{1e6 * s.velocity:.3g} µm/s", va="top", ha="center"
@@ -174,7 +174,7 @@ def _since(start: float) -> str:
 
 
 def band(axis: Axes, x: Array, y: Array, *, color: str, lines: bool = False) -> None:
-    """A curve; of more points than can be seen, the extremes in columns of equal width.
+    """A curve; a long curve is reduced to its extremes in columns of equal width.
 
     Nothing is drawn between samples that are far apart.
     """
@@ -201,7 +201,7 @@ def _extremes(x: Array, y: Array, width: float) -> NDArray[np.intp]:
 
 
 def _gaps(time: Array) -> list[int]:
-    """Samples that follow a gap: a step far longer than those before and after, and to be seen."""
+    """Samples that follow a visible gap, a step far longer than the steps around it."""
     steps = np.diff(time)
     if steps.size < 3:
         return []

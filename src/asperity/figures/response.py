@@ -1,4 +1,4 @@
-"""A periodic response as a picture: one cycle of a point, or curves over what varies."""
+"""Figure of a periodic response: one cycle of a point, or curves over the varying parameter."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from asperity.orbit import PeriodicResponse
 
-#: Curves that can be told apart in one panel.
+#: Largest number of curves in a panel.
 _MOST_CURVES = 8
 
 
@@ -34,7 +34,7 @@ def draw_response(response: PeriodicResponse) -> Figure:
     Raises
     ------
     InputError
-        If there are more than two axes, or more curves than can be told apart.
+        If there are more than two axes, or too many curves.
     """
     if response.mean_friction.size == 1:
         return _cycle(response)
@@ -43,7 +43,7 @@ def draw_response(response: PeriodicResponse) -> Figure:
     if data.mean_friction.ndim > 2 or count > _MOST_CURVES:
         shape = "x".join(map(str, response.mean_friction.shape))
         raise InputError(
-            f"plot must be asked of one point, a row of points or up to {_MOST_CURVES} rows, got "
+            f"plot must have one point, a row of points or up to {_MOST_CURVES} rows, got "
             f"{shape} points; draw grids with asperity.map"
         )
     return _curves(data, response.slider.law.name)

@@ -1,4 +1,4 @@
-"""A slice of a store of a sweep as a picture, in one call."""
+"""Figure of a slice of a sweep's store."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def plot_slice(
     x, y : str
         Axes of the picture; a curve without `y`.
     at : mapping of str to float or int, optional
-        Where the other axes are: the nearest value of an axis with labels, the number of the row
+        Positions on the other axes: the nearest value of an axis with labels, the number of the row
         of another; the first row by default.
 
     Raises

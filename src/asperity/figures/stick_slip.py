@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
-#: Events at close range.
+#: Number of enlarged events.
 _CLOSE = 8
 _LETTER: dict[str, Any] = {"va": "top", "ha": "left", "fontsize": 10}
 

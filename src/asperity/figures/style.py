@@ -1,4 +1,4 @@
-"""What a colour and a line mean, the same in every figure, and how figures are saved.
+"""Common style of all figures: meaning of colours and lines, and file formats.
 
 The colour is the law (Okabe and Ito's palette, which all common kinds of colour vision can
 distinguish), near-black the law with the mass of the slider; the dashes are the velocity as in the
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-#: Twelve digits: more than any method here is good for, and no noise of the last bit.
+#: Twelve digits: more than the accuracy of any method, and less than round-off.
 _DIGITS = "%.12g"
 
 
@@ -47,7 +47,7 @@ def save_picture(figure: Figure, stem: Path) -> tuple[Path, Path]:
         layout.execute(figure)
         figure.set_layout_engine("none")
     figure.savefig(png, metadata={"Software": None})
-    # The date, and the versions of what wrote the file, would make equal figures differ.
+    # Without date and versions, equal figures give equal files.
     figure.savefig(pdf, metadata={"CreationDate": None, "Creator": None, "Producer": None})
     return png, pdf
 
@@ -80,7 +80,7 @@ ELASTO_PLASTIC = "#00805B"
 STATED = "#8A5A00"
 STATED_FILL = "#E9C46A"
 GREY = "#767676"
-#: Curves that count the mass of the slider, beside the same law without it.
+#: Curves with inertia, together with curves of the same law without it.
 INERTIA = "#2B2B33"
 
 #: A variant of a law, or of the machine.
@@ -90,7 +90,7 @@ POINTS = "#B3261E"
 
 SLOW, FAST = "solid", "dashed"
 
-#: The same by name, for figures that are described in a file.
+#: Styles by name, for figures that are described in a file.
 COLOURS = {
     "rice-ruina": RICE_RUINA,
     "linker-dieterich": LINKER_DIETERICH,
@@ -108,12 +108,12 @@ DASHES = {"slow": SLOW, "fast": FAST}
 
 @contextmanager
 def style() -> Iterator[None]:
-    """The project's style, for making and for saving figures; the user's own is left as it was."""
+    """The project's style for drawing and saving; the user's style is restored."""
     import matplotlib as mpl
 
     with as_file(files("asperity.figures") / "asperity.mplstyle") as path:
         settings = mpl.rc_params_from_file(path, use_default_template=True)
-    # The template holds the backend and would switch it; files are written by the figure itself.
+    # The default parameters include the backend, which must not change here.
     chosen = {name: value for name, value in settings.items() if not name.startswith("backend")}
     with mpl.rc_context(chosen):
         yield

@@ -14,10 +14,10 @@ if TYPE_CHECKING:
     from asperity.protocol import RunOutline
     from asperity.transients import Trajectory
 
-#: Events that are marked; more of them than fit are counted instead.
+#: Largest number of marked events; more events are only counted.
 _MARKED = {"slip start": LINKER_DIETERICH, "steady": GREY}
 _MOST_MARKS = 60
-#: Stretches of a trajectory whose extremes are drawn: more than a figure has pixels.
+#: Number of intervals of a trajectory whose extremes are drawn; more than a figure has pixels.
 _STRETCHES = 2000
 
 

@@ -1,4 +1,4 @@
-"""A fit or a comparison as a folder: one page that shows everything, draws, and materials."""
+"""The report folder of a fit or a comparison: page, JSON, materials and posterior draws."""
 
 from asperity.fit_report.comparison import write_comparison
 from asperity.fit_report.folder import write_report

@@ -13,7 +13,7 @@ from asperity.orbit import Outcome
 
 Float = NDArray[np.float64]
 
-#: Amplitudes of a curve, and sets of parameters that a band is made of.
+#: Number of amplitudes of a curve, and of parameter sets of a band.
 _AMPLITUDES, _SETS = 24, 100
 
 
@@ -34,12 +34,12 @@ class Band(NamedTuple):
 
 
 class Series(NamedTuple):
-    """Rows of a table that differ in their amplitude alone, and what is predicted between them.
+    """Rows of a table that differ only in amplitude, and the predictions between them.
 
     Attributes
     ----------
     label : str
-        What tells it from the others, at least the velocity.
+        Operating numbers that differ from those of other series, at least the velocity.
     rows : bool array, shape (rows of the table,)
     bands : dict of str to Band
         Of mean_friction, delta_mu, mu1 and mu2.

@@ -61,7 +61,7 @@ def document(title: str, kicker: str, heading: str, sections: Mapping[str, str])
 
 
 def figure(svg: str, caption: str, *, wide: bool = False) -> str:
-    """A figure with its caption, a plain text, beside it or, of a wide one, below."""
+    """A figure with its caption, a plain text, on its right or, for a wide figure, below."""
     shape = ' class="wide"' if wide else ""
     return f"<figure{shape}>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
 
@@ -73,7 +73,7 @@ RUN_CAPTION = (
 
 
 def write_report(folder: Path, fit: Fit, posterior: Posterior | None = None) -> None:
-    """Write everything that a fit says into a folder, completely or not at all.
+    """Write the report of a fit into a folder, completely or not at all.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def material_text(fit: Fit) -> str:
 
 
 def page(fit: Fit, posterior: Posterior | None) -> str:
-    """The page as text, with its figures in it and nothing to fetch."""
+    """The page as text, with embedded figures and without external resources."""
     name = fit.objective.terms[0].name
     sampled = as_html(posterior_sections(posterior)) if posterior else ""
     sections = {
@@ -188,16 +188,16 @@ def _recording(term: RunTerm) -> str:
         (f"{begin:.6g}", f"{end:.6g}", f"{1e6 * v:.6g}" if v else "hold")
         for begin, end, v in zip(ends[:-1], ends[1:], run.velocities, strict=True)
     ]
-    said = (
+    text = (
         f"{run.name}: {noise['samples']} samples, of which {noise['effective_samples']:.4g} are "
         f"independent; noise {noise['model']}, whiteness p = {noise['whiteness_p']:.2g}."
         + (f" {noise['averaged']}." if noise["averaged"] else "")
     )
-    return f"<p>{escape(said)}</p>" + html_table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
+    return f"<p>{escape(text)}</p>" + html_table(("from (s)", "to (s)", "V (\u00b5m/s)"), rows)
 
 
 def provenance(fit: Fit) -> str:
-    """What was fixed, when and by which program, and where the law is from."""
+    """Fixed parameters, date, version of the program, and source of the law."""
     fixed = [
         (n, f"{np.min(v):.6g}" + ("" if np.ptp(v) == 0 else f" to {np.max(v):.6g}"))
         for n, v in fit.objective.fixed.items()

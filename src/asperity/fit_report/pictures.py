@@ -20,7 +20,7 @@ from asperity.inference.tables.term import LockInTerm
 
 Float = NDArray[np.float64]
 
-#: Samples of a recording that a figure shows, about.
+#: Approximate number of samples of a recording in a figure.
 _DRAWN = 2000
 _LABELS = {
     "mean_friction": r"$\bar\mu$",
@@ -98,7 +98,7 @@ def laws_figure(table: LockInTable, predicted: Mapping[str, Sequence[Series]]) -
 
 
 def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> Figure:
-    """Friction of a recording with the motion of laws, and what is left.
+    """Friction of a recording with the motions of laws, and the residuals.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> Figure:
         for k, (law, curve) in enumerate(curves.items()):
             above.plot(run.time[thin], curve[thin], color=f"C{k}", lw=1, label=law)
             below.plot(run.time[thin], (run.friction - curve)[thin], color=f"C{k}", lw=0.5)
-        above.set_ylabel("F/W")
+        above.set_ylabel("friction $F/W$")
         above.legend(fontsize=8)
         below.set_ylabel("data - law")
         below.set_xlabel("time (s)")
@@ -152,13 +152,13 @@ def draw_fit(fit: Fit) -> Figure:
         If the fit has not converged, or is one of another kind of data.
     """
     if not fit.converged:
-        raise InputError(f"plot must be asked of a fit that converged, got one with: {fit.message}")
+        raise InputError(f"plot must have a fit that converged, got one with: {fit.message}")
     for recording, _ in fit.parts(RunTerm):
         return run_figure(recording.run, {fit.law: recording.fitted_friction(fit.values)})
     for table, _ in fit.parts(LockInTerm):
         return data_figure(table.table, bands_of(fit, table, None))
     raise InputError(
-        "plot must be asked of a fit to a recording or a table of readings, got another kind of "
+        "plot must have a fit to a recording or a table of readings, got another kind of "
         "data; plot its residuals yourself"
     )
 

@@ -1,4 +1,4 @@
-"""Friction laws, one a file, and the registry that the command line and tables look them up in."""
+"""Friction laws, one in each file, and their registry by name."""
 
 from asperity.laws.amontons import Amontons
 from asperity.laws.cut_off import CutOff

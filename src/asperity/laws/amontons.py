@@ -1,6 +1,6 @@
 """Amontons-Coulomb friction, F = mu0 W: the null model of Bureau et al. (2000), section I.
 
-A load modulation changes the force in proportion and leaves the mean where it was. The law has
+A load modulation changes the force in proportion and does not change its mean. The law has
 neither rate nor state, hence no dynamics and no Floquet multipliers.
 """
 

@@ -1,4 +1,4 @@
-"""Checks of a law of one's own: what the solvers assume of it, before they are asked anything.
+"""Checks of a user's law, for what the solvers assume of a law.
 
 The laws of the package have the suite of identities, `asperity.laws.identities`, in its tests.
 """
@@ -19,7 +19,7 @@ from asperity.laws.law import Law
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import shown
 
-#: Velocities (m/s) at which a law is tried: arguments of one shape.
+#: Velocities (m/s) at which a law is evaluated.
 _SPEEDS = (1e-8, 1e-6, 1e-5, 1e-3)
 
 #: Rates in steady sliding over those at twice the velocity: a law may solve for its steady state.
@@ -29,18 +29,18 @@ _PAGE = "see the page 'Write your own law'"
 
 
 def checked_class(law: type[Law], where: str) -> type[Law]:
-    """A law whose name, source, states and parameters can be used.
+    """Check name, source, states and parameters of a law.
 
     Parameters
     ----------
     law : type of Law
     where : str
-        What messages call its place.
+        Place of the law in messages.
 
     Raises
     ------
     InputError
-        If one is missing, is no text, or has a name that is taken.
+        If one of them is missing or no text, or a name is in use.
     """
     for attribute, wanted in (("name", "a text"), ("source", "a text"), ("state_names", "names")):
         if not hasattr(law, attribute):
@@ -73,7 +73,7 @@ def checked_class(law: type[Law], where: str) -> type[Law]:
 
 
 def checked_law(law: Law) -> Law:
-    """A law whose methods take arrays and give what the solvers take them to give.
+    """Check shapes and values of the methods of a law.
 
     Laws of the package are returned as they are, and those with traced parameters are checked for
     shapes only.
@@ -121,7 +121,7 @@ def _check_shapes(kind: type[Law], law: Law) -> None:
             result = jax.eval_shape(function, one, *arguments)
         except InputError:
             raise
-        except Exception as error:  # code of others may raise anything
+        except Exception as error:  # a user's code may raise anything
             text = printable(" ".join(str(error).split()), 200)
             raise InputError(
                 f"{name} must work on arrays of jax.numpy, got {type(error).__name__} "
@@ -151,7 +151,7 @@ def _require_shape(result: Any, shape: tuple[int, ...], name: str, kind: type[La
 
 @cache
 def _probe(kind: type[Law]) -> Callable[[Law], dict[str, Array]]:
-    """What a law gives at some velocities, by one compiled program."""
+    """A compiled program that evaluates all methods of a law at the test velocities."""
 
     def probe(law: Law) -> dict[str, Array]:
         v, one = jnp.array(_SPEEDS), jnp.ones(len(_SPEEDS))
@@ -176,7 +176,7 @@ def _probe(kind: type[Law]) -> Callable[[Law], dict[str, Array]]:
 
 
 def _fault(kind: type[Law], result: dict[str, Array]) -> str:
-    """What is wrong with the numbers of a law; empty where nothing is."""
+    """The fault in the numbers of a law; empty without a fault."""
     at = {name: np.asarray(values) for name, values in result.items()}
     finite = np.isfinite(at["friction"]) & np.isfinite(at["rates"]).all(0)
     if not finite.any():

@@ -1,4 +1,4 @@
-"""Laws from outside the package: installed ones by entry points, others by their place.
+"""Laws from outside the package: by entry point, module or file.
 
 A package makes its laws known in its ``pyproject.toml``::
 
@@ -48,7 +48,7 @@ def load_installed(point: EntryPoint) -> type[Law]:
     except Exception as error:  # code of others may raise anything
         raise InputError(
             f"law must be importable, got {where} ({type(error).__name__}: {error}); "
-            "mend or uninstall the package that has it"
+            "repair or uninstall the package that has it"
         ) from error
     law = _checked(result, where)
     if law.name != point.name:
@@ -107,8 +107,8 @@ def _module(where: str, place: str) -> ModuleType:
 
 def _from_file(path: Path) -> ModuleType:
     file = path.resolve(strict=True)
-    # One module for one file, so that naming it twice gives the same class; a file that was edited
-    # since gives another one.
+    # One module for each file, so that the same file gives the same class; an edited file gives a
+    # new module.
     content = hashlib.sha256(str(file).encode() + b"\0" + file.read_bytes())
     name = f"asperity_law_{content.hexdigest()[:16]}"
     if name in sys.modules:

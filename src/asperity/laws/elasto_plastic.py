@@ -1,4 +1,4 @@
-"""The elasto-plastic extension ("EXT"): the rate term feels only the plastic velocity.
+"""The elasto-plastic extension ("EXT"): the rate term depends on the plastic velocity only.
 
 Bureau et al. (2000), section III.C, Eqs. (26)-(29). Asperities of shear stiffness W / lambda carry
 the interface force F_i; sliding at dx/dt strains them elastically and the joint plastically::

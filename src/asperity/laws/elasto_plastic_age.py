@@ -1,4 +1,4 @@
-"""Variant of the elasto-plastic law in which the age, too, feels the plastic velocity.
+"""Variant of the elasto-plastic law in which the age law, too, has the plastic velocity.
 
 Not printed in Bureau et al. (2000), which keeps dx/dt in the age law; the variant states that only
 irreversible slip renews contacts::

@@ -30,7 +30,7 @@ from asperity.parameters import law_parameters
 #: Round-off, with room for the cancellation of terms some 1e3 times the result.
 EXACT = 1e-12
 
-#: Velocities (m/s) at which the identities are tried.
+#: Velocities (m/s) at which the identities are checked.
 SPEEDS = (1e-9, 1e-6, 2e-5, 1e-3)
 
 #: Exponents of (length, time, force) in the units of a parameter.
@@ -68,7 +68,7 @@ class BrokenIdentityError(AssertionError):
     Attributes
     ----------
     broken : dict of str to str
-        What was found, by the name of the identity.
+        Deviation of each broken identity, by its name.
     """
 
     def __init__(self, law: Law, broken: dict[str, str]) -> None:
@@ -121,7 +121,7 @@ def check_law(
             check()
         except AssertionError as error:
             broken[name] = str(error)
-        except Exception as error:  # a law may fail in any way
+        except Exception as error:  # a user's code may raise anything
             broken[name] = f"{type(error).__name__}: {error}"
     if broken:
         raise BrokenIdentityError(law, broken)
@@ -164,7 +164,7 @@ def inverse(law: Law) -> None:
 
 
 def element_wise(law: Law) -> None:
-    """Each element of an array gives what it gives alone."""
+    """An array argument gives element by element the results of its elements."""
     v, state, w = sample(law)
     friction, rates = law.friction(v, state, w), law.state_rate(v, v, state, w)
     for i in range(len(SPEEDS)):
@@ -182,7 +182,7 @@ def derivatives(law: Law) -> None:
     middle = law.friction(v, state, w)
 
     def changed(logs: dict[str, Array]) -> Law:
-        """The law with its parameters multiplied: steps in units of their own."""
+        """The law with its parameters multiplied by e^log: relative steps."""
         return type(law)(**{n: getattr(law, n) * jnp.exp(logs[n]) for n in names})
 
     def friction(logs: Any, log_v: Array, state: Any, w: Array) -> Array:
@@ -242,8 +242,8 @@ def units(law: Law) -> None:
 
 
 def exchange(law: Law) -> None:
-    """Parameters that are declared exchangeable change nothing, in some order of the states."""
-    # One of them may be positive by its rule, and the other of either sign.
+    """Exchanging declared exchangeable parameters changes nothing but the order of the states."""
+    # One of the two may have to be positive while the other may have either sign.
     values = {f.name: jnp.abs(jnp.asarray(getattr(law, f.name))) for f in dataclasses.fields(law)}
     law = type(law)(**values)
     v, state, w = sample(law)
@@ -273,7 +273,7 @@ def exchange(law: Law) -> None:
 
 
 def slope_of_steady_friction(law: Law, slope: Slope) -> None:
-    """Derivative of mu_ss to ln v is what the publication says."""
+    """The derivative of mu_ss with respect to ln v agrees with the publication."""
     for v in SPEEDS:
         result = jax.grad(lambda log_v: law.mu_ss(jnp.exp(log_v)))(jnp.log(v))
         np.testing.assert_allclose(result, slope(v), rtol=1e-10, atol=EXACT)

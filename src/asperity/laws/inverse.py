@@ -21,7 +21,7 @@ from jax.typing import ArrayLike
 if TYPE_CHECKING:
     from asperity.laws.law import Law
 
-#: Where the search begins: a micrometre per second.
+#: Initial guess of the search: ln of a micrometre per second.
 _START = math.log(1e-6)
 
 #: Bounds on ln v, next to where e^(ln v) leaves the range of doubles.
@@ -30,7 +30,7 @@ _LOWEST, _HIGHEST = -700.0, 700.0
 #: Longest Newton step: where friction saturates its slope vanishes, and steps grow without bound.
 _LEAP = 30.0
 
-#: Error of ln v at which the search hands over; two Newton steps more reach round-off.
+#: Error of ln v at which the search ends; two further Newton steps reach round-off.
 _HAND_OVER = 1e-6
 
 #: Bisection alone halves 1400 units of ln v to `_HAND_OVER` in 31 steps.
@@ -47,7 +47,7 @@ def invert_friction(law: Law, friction: ArrayLike, state: tuple[Array, ...], w: 
     law : Law
         Its friction must not decrease with the velocity at constant state.
     friction, state, w
-        As `Law.log_velocity` takes them.
+        As for `Law.log_velocity`.
 
     Returns
     -------
@@ -68,12 +68,12 @@ def invert_friction(law: Law, friction: ArrayLike, state: tuple[Array, ...], w: 
 
 
 def _constant(leaf: object) -> object:
-    """The same without derivatives."""
+    """A leaf without derivatives."""
     return jax.lax.stop_gradient(leaf) if eqx.is_array_like(leaf) else leaf
 
 
 def _residual(law: Law, friction: ArrayLike, state: tuple[Array, ...], w: ArrayLike) -> Tangent:
-    """Excess of the law's friction over the given one, and its slope, as functions of ln v."""
+    """Friction of the law minus `friction`, and its slope, as functions of ln v."""
 
     def excess(log_v: Array) -> Array:
         return law.friction(jnp.exp(log_v), state, w) - friction
@@ -96,7 +96,7 @@ def _search(residual: Tangent, start: Array) -> Array:
         step = jnp.where(slope > 0, -value / slope, -_LEAP * jnp.sign(value))
         step = jnp.clip(step, -_LEAP, _LEAP)
         aim = log_v + step
-        # Newton's method has to stay between the bounds, and to halve its steps.
+        # A Newton step is used if it stays between the bounds and is half of the last one.
         astray = (aim < low) | (aim > high) | (jnp.abs(step) > 0.5 * jnp.abs(last))
         change = jnp.where(astray, 0.5 * (low + high) - log_v, step)
         change = jnp.where(jnp.abs(last) > _HAND_OVER, change, 0.0)

@@ -1,4 +1,4 @@
-"""What a friction law is: parameters, a friction coefficient, and the rates of its states.
+"""The interface of a friction law: parameters, friction coefficient, rates of the states.
 
 A law does not contain springs, masses or load programmes. Its methods are pure, element-wise
 functions of arrays: every argument may be a number or a JAX array of any shape, and
@@ -41,13 +41,13 @@ class Law(Displayed, eqx.Module):
         and logarithmic where the physical quantity is positive (ln of an age, not the age), so
         that no step of a solver can make them cross zero.
     equations : tuple of str
-        The equations in LaTeX, for people to read; () for none.
+        The equations in LaTeX for documentation; may be ().
     exchangeable : tuple of tuple of str
         Sets of parameters that may be exchanged, with their states, without a change of the law,
         such as (("D0", "B"), ("D2", "B2")); () for none. A fit reports them by rising first
         parameter.
     rate_dependent : bool
-        False for a law whose force does not depend on velocity; it then has no dynamics of its own.
+        False for a law whose force does not depend on velocity; such a law has no dynamics.
     """
 
     name: ClassVar[str]

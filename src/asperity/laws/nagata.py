@@ -64,7 +64,7 @@ class Nagata(RiceRuina):
         return super().friction(v, state, w) / (1 + self.c * w)
 
     def log_velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
-        """The same solved for the velocity."""
+        """`friction` solved for the velocity."""
         return super().log_velocity(friction * (1 + self.c * w), state, w)
 
     def state_rate(self, v: ArrayLike, v_plastic: ArrayLike, state: State, w: ArrayLike) -> State:

@@ -27,7 +27,7 @@ def parameter(
     Parameters
     ----------
     name : str
-        What messages call it, as ``law.D0``.
+        Name in messages, such as ``law.D0``.
     kind : str
         Kind of quantity, a key of `asperity.units.KINDS`.
     rule : {"positive", "not negative", "finite"}
@@ -35,7 +35,7 @@ def parameter(
         In LaTeX; by default that of `asperity.parameters.INTERFACE` for the same quantity, else
         the name.
     meaning, geophysics : str
-        In one line; by default as for the symbol.
+        In one line; by default that of the symbol.
 
     Returns
     -------

@@ -67,7 +67,7 @@ class PrakashClifton(RiceRuina):
         return super().friction(v, state, w) * jnp.exp(state[1]) / w
 
     def log_velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
-        """The same solved for the velocity."""
+        """`friction` solved for the velocity."""
         return super().log_velocity(friction * w * jnp.exp(-state[1]), state, w)
 
     def state_rate(self, v: ArrayLike, v_plastic: ArrayLike, state: State, w: ArrayLike) -> State:

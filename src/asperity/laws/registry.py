@@ -10,13 +10,13 @@ from asperity.errors import InputError, closest
 from asperity.laws.consistency import checked_class
 from asperity.laws.discovery import installed, law_at, load_installed
 from asperity.laws.law import Law
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import shown, typed
 
 _LAWS: dict[str, type[Law]] = {}
 
 
 def register(law: type[Law]) -> type[Law]:
-    """Make `law` known by its `name`; returns it, so that it serves as a class decorator.
+    """Register `law` under its `name`; returns the law, for use as a class decorator.
 
     A file that is loaded again replaces the law that it gave before.
 
@@ -40,7 +40,7 @@ def register(law: type[Law]) -> type[Law]:
 
 
 def _same_source(known: type[Law], law: type[Law]) -> bool:
-    """Whether two classes are one definition, loaded twice from its file."""
+    """Whether two classes have the same definition, loaded twice from its file."""
     files = [getattr(sys.modules.get(c.__module__), "__file__", None) for c in (known, law)]
     if known.__qualname__ != law.__qualname__ or None in files:
         return False
@@ -48,7 +48,7 @@ def _same_source(known: type[Law], law: type[Law]) -> bool:
 
 
 def registered() -> dict[str, type[Law]]:
-    """All known laws by name, those of installed packages among them.
+    """All known laws by name, with those of installed packages.
 
     An installed law that cannot be imported is left out with a warning.
     """
@@ -61,6 +61,7 @@ def registered() -> dict[str, type[Law]]:
     return dict(_LAWS)
 
 
+@typed
 def get_law(name: str) -> type[Law]:
     """Look a law up by name: one of the package, registered, or of an installed package.
 
@@ -69,11 +70,6 @@ def get_law(name: str) -> type[Law]:
     InputError
         If no law has that name; the message gives the nearest one.
     """
-    if not isinstance(name, str):
-        raise InputError(
-            f"law must be the name of a registered law, got {shown(name)}; "
-            f"choose one of {', '.join(sorted(_LAWS))}"
-        )
     if name not in _LAWS and name in installed():
         register(load_installed(installed()[name]))
     if name not in _LAWS:
@@ -84,7 +80,7 @@ def get_law(name: str) -> type[Law]:
 
 
 def known_law(text: str) -> str:
-    """Name of a law that is given by its name or by its place, and is then registered.
+    """Name of a law from its name or its place; a law at a place is registered.
 
     Parameters
     ----------

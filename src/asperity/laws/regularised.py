@@ -21,7 +21,7 @@ from jax.typing import ArrayLike
 from asperity.laws.law import State
 from asperity.laws.rice_ruina import RiceRuina
 
-#: Exponent up to which e^x is kept as a number.
+#: Largest exponent for which e^x is computed.
 _LARGEST = 700.0
 
 

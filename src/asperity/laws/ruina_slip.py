@@ -1,4 +1,4 @@
-"""Rice-Ruina friction with the slip law: the state moves only while the interface slips.
+"""Rice-Ruina friction with the slip law: the state changes only while the interface slips.
 
 Ruina (1983); friction as in Bureau et al. (2000), Eq. (1)::
 
@@ -31,11 +31,11 @@ class RuinaSlip(RiceRuina):
     )
 
     def state_rate(self, v: ArrayLike, v_plastic: ArrayLike, state: State, w: ArrayLike) -> State:
-        """The slip law, divided by Phi, on the velocity that friction takes the logarithm of."""
+        """The slip law, divided by Phi, with the velocity in the logarithm of friction."""
         return (self.approach(v_plastic, state[0], self.D0),)
 
     def approach(self, v: ArrayLike, log_age: Array, length: ArrayLike) -> Array:
-        """-(v / length) (phi - phi_ss) (1/s): the way to steady sliding over a slip of `length`."""
-        # Nothing moves at rest, where the logarithm has no value.
+        """-(v / length) (phi - phi_ss) (1/s): relaxation to steady sliding over a slip `length`."""
+        # At rest the rate is zero, and the logarithm, which has no value, is replaced.
         log_v = jnp.log(jnp.where(jnp.asarray(v) > 0, v, self.V0) / self.V0)
         return -(v / length) * (log_age + log_v)

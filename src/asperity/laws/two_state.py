@@ -65,7 +65,7 @@ class TwoState(RuinaSlip):
         return super().friction(v, state, w) + self.B2 * state[1]
 
     def log_velocity(self, friction: ArrayLike, state: State, w: ArrayLike) -> Array:
-        """The same solved for the velocity."""
+        """`friction` solved for the velocity."""
         return super().log_velocity(friction - self.B2 * state[1], state, w)
 
     def state_rate(self, v: ArrayLike, v_plastic: ArrayLike, state: State, w: ArrayLike) -> State:

@@ -1,6 +1,6 @@
 """Papers reproduced: claims, rules, verdicts and a report page for any paper.
 
-A paper is a package of its own that is found by an entry point; see `asperity.ledger.paper`.
+A paper is a separate package with an entry point; see `asperity.ledger.paper`.
 """
 
 from asperity.ledger.claims import (

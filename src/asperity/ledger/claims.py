@@ -1,4 +1,4 @@
-"""Claims of a paper: what is computed for each, and the verdict that its rule gives."""
+"""Claims of a paper: their computed numbers, and the verdicts of their rules."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from asperity.parameters.arguments import counted, shown
 Verdict: TypeAlias = Literal["reproduced", "misprint", "differs", "undecided"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
-#: What a check returns: numbers by name, and texts that stand for more than one number.
+#: Result of a check: numbers by name, and texts that represent several numbers.
 Computed: TypeAlias = Mapping[str, float | str]
 Check: TypeAlias = Callable[[Any], Computed]
 
@@ -66,7 +66,7 @@ def find_checks(module: ModuleType) -> dict[str, Check]:
     for part in modules:
         for value in vars(part).values():
             if getattr(value, "__module__", None) != part.__name__:
-                continue  # imported there, defined elsewhere
+                continue  # imported, not defined, in this module
             for claim, arguments in getattr(value, _MARK, ()):
                 if claim in checks:
                     raise InputError(
@@ -83,16 +83,16 @@ def _bound(function: Callable[..., Computed], arguments: tuple[Any, ...]) -> Che
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """What a claim becomes at the ends of the published uncertainty of one quantity.
+    """Results of a claim at the ends of the published uncertainty of a quantity.
 
     Attributes
     ----------
     quantity : str
-        What is varied.
+        The varied quantity.
     ends : (str, str)
-        The two values, with what changes along.
+        The two values, with the other numbers that change with them.
     numbers : mapping of str to (float, float)
-        The claim's numbers there.
+        Numbers of the claim at the two values.
     verdicts : (str, str)
     """
 
@@ -113,7 +113,7 @@ class Claim:
     place : str
         Section, equation, figure or appendix of the paper.
     statement : str
-        What the paper says.
+        Statement of the paper.
     stated : str
         The number, or the word that takes its place.
     kind : {"test", "fit", "arithmetic", "identity"}
@@ -121,22 +121,22 @@ class Claim:
         the quantity that is judged. "arithmetic": the paper's printed numbers alone decide.
         "identity": true of the model by construction.
     computed : str
-        What the checks give, with units.
+        Numbers of the check, with units.
     how : str
         Law or formula, parameters and method.
     rule : str
-        What would make it "reproduced", fixed beforehand.
+        Rule for "reproduced", fixed before the computation.
     verdict : {"reproduced", "misprint", "differs", "undecided"}
         "misprint": the printed formula fails where the one derived from the paper's own equations
         agrees with an integration of them. "undecided": the rule cannot be applied, as `rule` says.
     why : str
-        What to make of the verdict.
+        Discussion of the verdict.
     numbers : mapping of str to float
         The numbers that the rule was applied to.
     depends_on : tuple of str
-        Uncertain quantities that the numbers rest on.
+        Uncertain quantities from which the numbers follow.
     sensitivity : tuple of Sensitivity
-        One for each of `depends_on`; empty where it was not asked for.
+        One entry for each of `depends_on`; empty if not requested.
     """
 
     id: str
@@ -155,14 +155,14 @@ class Claim:
 
     @property
     def is_test(self) -> bool:
-        """Whether the statement could have been contradicted by the models."""
+        """Whether the models could contradict the statement."""
         return self.kind == "test"
 
     @property
     def decided(self) -> bool:
         """Whether the verdict is the same at the ends of all published uncertainties.
 
-        Never, where it rests on uncertain quantities and the sensitivity was not computed.
+        False for uncertain quantities without a computed sensitivity.
         """
         known = {ends.quantity for ends in self.sensitivity} >= set(self.depends_on)
         return known and all(v == self.verdict for ends in self.sensitivity for v in ends.verdicts)
@@ -173,7 +173,7 @@ class Claim:
 
 
 def judge(entry: Entry, computed: Computed, stated: Mapping[str, float]) -> Claim:
-    """The claim that an entry becomes with what was computed for it.
+    """The claim of an entry, with its computed numbers and its verdict.
 
     Parameters
     ----------
@@ -204,7 +204,7 @@ def judge(entry: Entry, computed: Computed, stated: Mapping[str, float]) -> Clai
 
 
 def judged_numbers(entry: Entry, computed: Computed) -> dict[str, float]:
-    """Those of the computed numbers that the entry's rule judges, in the order of the check."""
+    """The computed numbers that the rule of the entry judges, in the order of the check."""
     if not isinstance(computed, Mapping):
         raise InputError(
             f"the check of '{entry.id}' must be a function that returns numbers by name, got "
@@ -231,7 +231,7 @@ _FORMULA = ("printed", "derived", "independent")
 
 
 def verdict(entry: Entry, numbers: Mapping[str, float], stated: Mapping[str, float]) -> Verdict:
-    """The verdict that an entry's rule gives on the numbers computed for it."""
+    """The verdict of an entry's rule on the computed numbers."""
     if entry.rule.is_undecided:
         return "undecided"
     if entry.rule.is_formula:
@@ -267,7 +267,7 @@ def formula_verdict(
 ) -> Verdict:
     """The verdict on a printed formula, decided by an independent number.
 
-    "reproduced" if what is printed agrees with `independent`; "misprint" if only what is derived
+    "reproduced" if the printed formula agrees with `independent`; "misprint" if only the derived
     does; "differs" if neither does. A number that is not finite agrees with nothing.
 
     Parameters
@@ -302,13 +302,13 @@ def judge_claims(
     ----------
     contents : Contents
     checks : mapping of str to function
-        What computes each claim, by its id.
+        The function of each claim, by its id.
     numbers : Material
         The paper's numbers at their central values.
     model : function
-        From the paper's numbers to what the checks are given.
+        Maps the paper's numbers to the argument of the checks.
     sensitivity : bool
-        Whether to compute each claim at the ends of the uncertainties that it depends on too.
+        Whether to compute each claim also at the ends of the uncertainties that it depends on.
     progress : callable, optional
         Called with the number of claims computed so far and of all claims.
 
@@ -368,7 +368,7 @@ def printed_numbers(numbers: Material) -> dict[str, float]:
 
 
 def altered(numbers: Material, changes: Mapping[str, float]) -> Material:
-    """The paper's numbers with some values replaced, in the units that they are printed in."""
+    """The paper's numbers with the values `changes` replaced, in the printed units."""
     new = {
         name: numbers[name].model_copy(update={"value": value}) for name, value in changes.items()
     }
@@ -399,9 +399,9 @@ class Headline:
     Attributes
     ----------
     claim : str
-        What the paper concludes.
+        Conclusion of the paper.
     found : str
-        What was computed.
+        Summary of the computation.
     standing : str
         "holds": every claim is reproduced, at the ends of all published uncertainties too.
         "holds at the central values": every claim is reproduced there, not at all ends.

@@ -1,4 +1,4 @@
-"""What a paper's claims.toml holds."""
+"""Records of a paper's claims.toml."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 class RuleWords(_Table):
-    """A rule as claims.toml writes it: its name, what it is about, and its numbers.
+    """A rule as claims.toml writes it: its name, its subject, and its numbers.
 
     A number may be a word of `asperity.ledger.rules.WORDS` or the name of one of the paper's
     numbers.
@@ -45,7 +45,7 @@ class RuleWords(_Table):
 
     @property
     def is_formula(self) -> bool:
-        """Whether it judges a printed formula by an independent number."""
+        """Whether the rule judges a printed formula by an independent number."""
         return self.accept == "formula"
 
     def build(self, numbers: Mapping[str, float], claim: str) -> rules.AcceptanceRule:
@@ -74,13 +74,13 @@ class RuleWords(_Table):
 
 
 class Entry(_Table):
-    """A claim as claims.toml holds it; see `Claim` for the fields that both have.
+    """A claim in claims.toml; see `Claim` for the common fields.
 
     Attributes
     ----------
     rule : RuleWords
     computed : str
-        What is written of the numbers that the check computes, see `asperity.ledger.sentences`.
+        Sentence with the numbers of the check, see `asperity.ledger.sentences`.
     judged : tuple of str
         Names of the numbers that the rule judges, ``*`` standing for any text: every one of them
         has to pass. All by default. A rule on a formula judges ``printed``, ``independent`` and,
@@ -107,13 +107,13 @@ class About(_Table):
     ----------
     title, authors, journal : str
     short : str
-        Authors and year, as one would cite it.
+        Authors and year, as in a citation.
     source : str
         Key of the paper in the bibliography of `asperity.materials`; may be empty.
     numbers : str
         A material of the package by name, or a material file of the paper's folder.
     citations : tuple of str
-        Keys of what else the report cites.
+        Keys of further works that the report cites.
     method : str
         How the numbers were computed, for the end of the report.
     parameters : mapping of str to (str, str)
@@ -140,7 +140,7 @@ class Uncertainty(_Table):
     low, high : mapping of str to float
         The paper's numbers that differ there, in the units of the material file.
     note : str
-        Where the ends come from.
+        Source of the ends.
     """
 
     quantity: str
@@ -156,7 +156,7 @@ class HeadlineWords(_Table):
     ----------
     statement : str
     found : str
-        What was found; ``{id}`` stands for what was computed for that claim.
+        Result; ``{id}`` stands for the computed text of that claim.
     claims : tuple of str
         Ids of the claims whose verdicts decide.
     """
@@ -175,7 +175,7 @@ class SummaryWords(_Table):
     sentences : tuple of str
         ``{id}`` stands for what was computed for that claim.
     verdict : str
-        All claims of this verdict are listed below, with links; none by default.
+        Verdict whose claims are listed below the paragraph, with links; none by default.
     """
 
     title: str

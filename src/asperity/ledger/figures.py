@@ -28,12 +28,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Observable:
-    """A quantity that a figure shows, and where.
+    """A quantity of a figure, and its panel.
 
     Attributes
     ----------
     column : str
-        Of the figure's table, also what a file of points calls it.
+        Column of the figure's table, and name in a file of points.
     x : str
         Column of the abscissa.
     kind : str
@@ -42,7 +42,7 @@ class Observable:
     panel : int
         Index of the axes in the Matplotlib figure.
     x_scale, y_scale : float
-        Factors from SI to what the axes show.
+        Factors from SI to the units of the axes.
     """
 
     column: str
@@ -63,7 +63,7 @@ class FigureTable:
         Of the file, without its ending.
     data : DataFrame
     header : sequence of str
-        What the first lines of the file say.
+        First lines of the file.
     columns : mapping of str to str
         Unit and meaning of each column.
     """
@@ -111,7 +111,7 @@ class FigureNumbers:
         return self.data[self.data["curve"] == name]
 
     def last(self, curve: str, column: str) -> float:
-        """A quantity at the end of a curve."""
+        """A quantity at the last point of a curve."""
         return float(self.curve(curve)[column].iloc[-1])
 
     def at(self, curve: str, column: str, value: float, x: str) -> float:
@@ -137,14 +137,14 @@ class PaperFigure:
         The paper's number for it, such as "Figure 2".
     title, caption : str
     alt : str
-        What someone who cannot see the figure needs to know.
+        Alternative text for readers who cannot see the figure.
     draw : function
         Returns the Matplotlib figure.
     tables : sequence of FigureTable
     points : int
         Operating points that were solved for it.
     failed : int
-        Those of them that did not converge.
+        Number of operating points that did not converge.
     """
 
     name: str
@@ -159,7 +159,7 @@ class PaperFigure:
 
 
 class FigureWords(BaseModel):
-    """What figures.toml holds of a figure.
+    """A figure in figures.toml.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class FigureWords(BaseModel):
     numbers : tuple of str
         The paper's numbers that the figure rests on, with which the browser page moves it.
     plot : Plot
-        What is drawn; without it the paper's own function draws.
+        Description of the figure; without it a function of the paper draws.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -215,7 +215,7 @@ class FigureWords(BaseModel):
         ----------
         numbers : FigureNumbers
         tables : sequence of FigureTable
-            The first one is that of the curves, with which measured points are compared.
+            The first table has the curves, with which measured points are compared.
         draw : function, optional
             Draws in place of the plot.
         """
@@ -231,12 +231,12 @@ class FigureWords(BaseModel):
 
 
 def _minus(text: str) -> str:
-    """Negative numbers with the sign that printers use."""
+    """A text with typographic minus signs."""
     return re.sub(r"(?<=[ =])-(?=\d)", "−", text)
 
 
 class SectionWords(BaseModel):
-    """What figures.toml holds of a section of the report.
+    """A section of the report in figures.toml.
 
     Attributes
     ----------
@@ -276,7 +276,7 @@ class FiguresFile(BaseModel):
     ----------
     section : mapping of str to SectionWords
     label : mapping of str to str
-        What the browser page calls a column.
+        Names of columns on the browser page.
     slider : mapping of str to SliderWords
         By the name of the paper's number.
     """
@@ -295,7 +295,7 @@ class FiguresFile(BaseModel):
 
 
 def figure_words(package: str) -> FiguresFile:
-    """What the figures.toml of a paper's package holds.
+    """The content of a paper's figures.toml.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Plain text to HTML: Greek letters, subscripts and powers as a printer would set them."""
+"""Plain text to HTML, with Greek letters, subscripts and powers."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ _RULES: tuple[tuple[re.Pattern[str], str], ...] = tuple(
         (r"\+−|\+-", "±"),
         (r"\bsqrt\(", "√("),
         (r"(?<=\w)'", "’"),
-        # A number stays with its unit, and with the symbol that it is the value of.
+        # No line break between a number and its unit, or its symbol.
         (r"(?<=\d) (?=(?:%|[µmkc]?m\b|m?bar|atm|[kM]?Hz|N\b|kg|Pa|K\b|s\b))", "\u00a0"),
         (r"(?<=[\w>]) ([=≈×]) (?=[−\d])", "\u00a0\\1\u00a0"),
     )
@@ -74,7 +74,7 @@ def table(
     rows : iterable of sequence of str
         HTML of the cells.
     label : str
-        What the table is, for those who cannot see it.
+        Label of the table for screen readers.
     kind : str
         Class of the table.
     """
@@ -96,7 +96,7 @@ def table(
 
 
 def embedded_png(path: Path, alt: str) -> str:
-    """An image element that holds the whole picture."""
+    """An image element with embedded data."""
     content = path.read_bytes()
     pixels = struct.unpack(">II", content[16:24])
     data = base64.b64encode(content).decode("ascii")

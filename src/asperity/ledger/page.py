@@ -1,4 +1,4 @@
-"""The one page that shows everything, with nothing to fetch from elsewhere."""
+"""The report page of a paper: one HTML file without external resources."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ if TYPE_CHECKING:
     from asperity.ledger.contents import About, SummaryWords
     from asperity.ledger.paper import Paper
 
-#: Verdicts in the order of the page, with the sign that goes before each and what it means.
+#: Verdicts in the order of the page, with the sign and the meaning of each.
 VERDICT_TEXTS: Mapping[str, tuple[str, str]] = {
     "reproduced": ("✓", "the models give what the paper states"),
     "misprint": ("✎", "a printed formula fails, the one derived from the paper's equations holds"),
     "differs": ("≠", "the models do not give what the paper states"),
     "undecided": ("?", "a number that the rule needs is missing, or the rule does not fit"),
 }
-#: What each kind of claim is.
+#: Meaning of each kind of claim.
 KIND_TEXTS: Mapping[str, str] = {
     "test": "the models could have contradicted the statement",
     "fit": "a parameter was fitted to what is judged",
@@ -109,7 +109,7 @@ def build_page(
         f"{_header(about, claims)}\n"
         f'<nav aria-label="Sections">{links}</nav>\n<main>\n{sections}\n</main>\n'
         f"<footer>Written by asperity {__version__}. Figures (PNG, PDF), their numbers (CSV) and "
-        "the claims (JSON, CSV) lie beside this page.</footer>\n</body>\n</html>\n"
+        "the claims (JSON, CSV) are in the folder of this page.</footer>\n</body>\n</html>\n"
     )
 
 
@@ -145,7 +145,7 @@ def _agreement(agreement: Sequence[CurveComparison]) -> str:
 
 
 def _chip(kind: str, sign: str, word: str) -> str:
-    """A verdict as a coloured word with its sign, for eyes that do not see the colour."""
+    """A verdict as a coloured word with a sign, because some readers do not see the colour."""
     return f'<span class="chip {kind}"><span aria-hidden="true">{sign}</span> {word}</span>'
 
 
@@ -199,7 +199,7 @@ def _reference(entry: str) -> str:
     return f'{text} <a href="https://doi.org/{field["doi"]}">doi:{field["doi"]}</a>'
 
 
-# --- The head of the page: what the paper comes to ------------------------------------------------
+# --- The head of the page: summary and conclusions ------------------------------------------------
 
 
 def _brief(
@@ -257,7 +257,7 @@ def _standing(headline: Headline) -> str:
 
 
 def _basis(headline: Headline, claims: dict[str, Claim]) -> str:
-    """Links to the claims that decide."""
+    """Links to the claims that decide a conclusion."""
     links = ", ".join(
         f'<a href="#{escape(name)}" aria-label="claim {escape(name)}">{n}</a>'
         for n, name in enumerate((n for n in headline.claims if n in claims), 1)
@@ -269,7 +269,7 @@ def _basis(headline: Headline, claims: dict[str, Claim]) -> str:
 
 
 def counts(claims: Sequence[Claim]) -> dict[str, int]:
-    """Number of claims by verdict, zero included but for "undecided"."""
+    """Number of claims by verdict; a zero is left out for "undecided" only."""
     number = Counter[str](claim.verdict for claim in claims)
     return {v: number[v] for v in VERDICT_TEXTS if number[v] or v != "undecided"}
 
@@ -381,12 +381,12 @@ def sensitivity_text(claim: Claim) -> str:
 
 
 def _leading(numbers: Mapping[str, tuple[float, float]]) -> list[tuple[str, tuple[float, float]]]:
-    """The first and the last number: what lies between is in claims.json."""
+    """The first and the last number; claims.json has all of them."""
     items = list(numbers.items())
     return items if len(items) <= 2 else [items[0], items[-1]]
 
 
-# --- The numbers that the figures rest on --------------------------------------------------------
+# --- The numbers of the paper ---------------------------------------------------------------------
 
 
 def _parameters(paper: Paper) -> str:

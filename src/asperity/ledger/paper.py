@@ -1,4 +1,4 @@
-"""A published paper as a folder of claims, checks and figures, found by its name.
+"""A published paper as a folder of claims, checks and figures, with an entry point.
 
 A paper is a Python package, registered as an entry point of the group ``asperity.papers``,
 NAME = "package". It holds
@@ -41,7 +41,7 @@ from asperity.ledger.claims import (
 )
 from asperity.ledger.contents import Contents, read_contents
 from asperity.ledger.figures import FiguresFile, PaperFigure, Section, figure_words
-from asperity.parameters.arguments import instance, shown
+from asperity.parameters.arguments import of_type, shown
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -57,14 +57,14 @@ GROUP = "asperity.papers"
 class Paper:
     """A paper's claims, checks and figures.
 
-    What code of the paper raises becomes an `InputError` that names the code.
+    Exceptions of the paper's code are raised as `InputError` with the name of the code.
 
     Attributes
     ----------
     name : str
-        What `find_paper` knows it by.
+        Name of the entry point.
     package : str
-        The importable package that holds it.
+        The importable package of the paper.
     """
 
     name: str
@@ -72,7 +72,7 @@ class Paper:
 
     @cached_property
     def words(self) -> FiguresFile:
-        """What figures.toml holds; nothing if there is none."""
+        """The content of figures.toml; empty without this file."""
         self.module("")
         if not files(self.package).joinpath("figures.toml").is_file():
             return FiguresFile()
@@ -101,7 +101,7 @@ class Paper:
 
     @cached_property
     def contents(self) -> Contents:
-        """What claims.toml holds."""
+        """The content of claims.toml."""
         self.module("")
         return read_contents(files(self.package).joinpath("claims.toml"))
 
@@ -122,7 +122,7 @@ class Paper:
         ]
 
     def rule(self, claim: str) -> AcceptanceRule:
-        """The rule of one of the paper's claims, for what else is judged by it."""
+        """The rule of a claim of the paper, for further uses of the rule."""
         entry = next(entry for entry in self.contents.claim if entry.id == claim)
         return entry.rule.build(printed_numbers(self.numbers), claim)
 
@@ -151,7 +151,7 @@ class Paper:
 
     @contextmanager
     def sections(self) -> Iterator[Sequence[Section]]:
-        """The sections of its figures, in a context that ends what computes them."""
+        """The sections of the figures, in a context that ends their processes."""
         module, where = self.module("figures"), f"{self.package}.figures"
         if hasattr(module, "sections"):
             with module.sections() as sections:
@@ -184,7 +184,7 @@ def find_paper(name: str | None = None) -> Paper:
     Raises
     ------
     InputError
-        If there is no such paper, or none at all.
+        If there is no such paper, or no paper is installed.
     """
     papers = available()
     if not papers:
@@ -204,7 +204,7 @@ def find_paper(name: str | None = None) -> Paper:
 
 @contextmanager
 def _running(what: str) -> Iterator[None]:
-    """Run code of a paper; what it raises becomes an `InputError` that names it."""
+    """Run code of a paper; its exceptions become an `InputError` with the name of the code."""
     try:
         yield
     except InputError:
@@ -217,7 +217,7 @@ def _running(what: str) -> Iterator[None]:
 
 
 def _guarded(function: Callable[..., Any], what: str) -> Callable[..., Any]:
-    """A function of a paper, whose errors are sentences."""
+    """A function of a paper whose exceptions become `InputError`."""
 
     def run(*arguments: Any) -> Any:
         with _running(what):
@@ -227,8 +227,8 @@ def _guarded(function: Callable[..., Any], what: str) -> Callable[..., Any]:
 
 
 def _guarded_section(section: Any, where: str) -> Section:
-    """A section of a paper, whose figures are computed and drawn with their errors as sentences."""
-    checked: Section = instance(section, Section, where, "yield Sections")
+    """A section of a paper; exceptions of its computations and drawings become `InputError`."""
+    checked: Section = of_type(section, Section, where)
     return replace(checked, figures=tuple(_guarded_figure(f, where) for f in checked.figures))
 
 
@@ -238,7 +238,7 @@ def _guarded_figure(compute: Callable[[], Any], where: str) -> Callable[[], Pape
     def run() -> PaperFigure:
         with _running(name):
             made = compute()
-        figure: PaperFigure = instance(made, PaperFigure, name, "return a PaperFigure")
+        figure: PaperFigure = of_type(made, PaperFigure, name)
         return replace(figure, draw=_guarded(figure.draw, f"{name}, draw"))
 
     return run

@@ -33,9 +33,9 @@ from asperity.units import to_si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: A test fails a true curve once in twenty times.
+#: Probability that a test accepts a true curve.
 LEVEL = 0.05
-#: A curve that is wrong by this share must be found out, with the probability 1 - LEVEL.
+#: A test must reject a curve that is wrong by this share with the power LEVEL.
 WRONG_BY = 0.2
 
 #: The same in a sentence, for what is written.
@@ -74,14 +74,14 @@ class CurveComparison:
     Attributes
     ----------
     figure, observable : str
-        Empty where all points of a law are taken together.
+        Empty for all points of a law together.
     law : str
     points : int
     chi_squared : float
     p_value : float
         Probability of a chi^2 as large as this or larger if the curves are true.
     power : float
-        Probability that a curve 20 % off would be found out.
+        Power: the probability that a curve 20 % off is rejected.
     verdict : {"agrees", "disagrees", "undecided"}
     """
 
@@ -96,7 +96,7 @@ class CurveComparison:
 
     @property
     def text(self) -> str:
-        """The comparison in a line."""
+        """The comparison as a line of text."""
         where = f"{self.figure} {self.observable}, " if self.figure else "all points, "
         return (
             f"{where}{self.law}: {self.verdict}, chi^2 = {self.chi_squared:.4g} for "
@@ -246,7 +246,7 @@ def with_curves(
     Raises
     ------
     InputError
-        If there is no such curve, or x lies beyond its ends.
+        If the curve does not exist, or x lies outside of it.
     """
     by_name = {one.column: one for one in observables}
     rows = [_row(point, table, by_name[point.observable], name) for point in points]
@@ -370,7 +370,7 @@ def draw_points(figure: Figure, rows: pd.DataFrame, observables: Sequence[Observ
 
 @dataclass
 class MeasuredPoints:
-    """The points of a file; without a file, none, and nothing is drawn or written.
+    """The points of a file; without a file there are no points, and nothing is drawn or written.
 
     Attributes
     ----------
@@ -417,7 +417,7 @@ class MeasuredPoints:
         )  # fmt: skip
 
     def write(self, folder: Path) -> list[CurveComparison]:
-        """Write data/points.csv and agreement.json, and return what they say."""
+        """Write data/points.csv and agreement.json, and return the comparisons."""
         from asperity.figures.style import save_table
 
         if not self.compared:

@@ -1,4 +1,4 @@
-"""A paper's procedure from measurements to numbers: its tables, and what comes out of them."""
+"""A paper's procedure from measurements to parameters: input tables and results."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def read_columns(path: Path, columns: Sequence[str], row: str) -> dict[str, Floa
     path : Path
     columns : sequence of str
     row : str
-        What a row is, such as ``"a bifurcation"``.
+        Meaning of a row, such as ``"a bifurcation"``.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def _number(cell: str | None, column: str, row: int, name: str) -> float:
 
 @dataclass(frozen=True)
 class RecipeNumber:
-    """A number that a paper's procedure gives, and the paper's, in SI.
+    """A number from a paper's procedure, and the number in the paper, in SI.
 
     Attributes
     ----------
@@ -81,10 +81,10 @@ class RecipeNumber:
     value, se : float
         Estimate and standard error, with the errors of all earlier steps.
     se_own : float
-        Standard error by the readings of this step alone.
+        Standard error from the readings of this step only.
     step : int
     how : str
-        What it is read from.
+        The data of the number.
     published, published_uncertainty : float or None
     published_place : str
         Section of the paper.
@@ -106,7 +106,7 @@ class RecipeNumber:
 
     @property
     def deviation(self) -> float | None:
-        """Difference from the paper in standard errors of both together; None without either."""
+        """Difference from the paper over the combined standard error; None if one is unknown."""
         if self.published is None or self.upper_limit is not None:
             return None
         spread = math.hypot(self.se, self.published_uncertainty or 0.0)

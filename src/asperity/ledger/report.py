@@ -1,4 +1,4 @@
-"""A paper reproduced: figures, tables, the ledger of its claims, and a page that shows all."""
+"""`reproduce`: figures, tables and the ledger of a paper, and a page with all of them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from asperity.ledger.figures import PaperFigure, Section
     from asperity.ledger.paper import Paper
 
-#: Called with the steps done, all steps, and what is being done.
+#: Called with the number of finished steps, of all steps, and the name of the present step.
 Progress = Callable[[int, int, str], None]
 
 
@@ -43,7 +43,7 @@ class ReproductionSummary:
     points : int
         Operating points solved for them.
     failed : int
-        Those of them that did not converge; what is drawn leaves them out.
+        Number of points that did not converge; figures leave them out.
     claims : int
         Number of claims.
     tests : mapping of str to int
@@ -120,7 +120,7 @@ def reproduce(
     *,
     data: Path | None = None,
 ) -> ReproductionSummary:
-    """Write a paper's figures, their numbers, the ledger of its claims and the page that shows all.
+    """Write the figures of a paper, their numbers, the ledger of its claims and the report page.
 
     Parameters
     ----------
@@ -154,7 +154,7 @@ def reproduce(
         for name in ("figures", "data"):
             (folder / name).mkdir()
         shown = [_show(section, folder, steps, points) for section in sections[:1]]
-        # What the later sections show may be computed in another process meanwhile.
+        # Later sections may be computed in another process at the same time.
         steps.begin("claims")
         claims = paper.ledger(sensitivity=True)
         shown += [_show(section, folder, steps, points) for section in sections[1:]]
@@ -213,7 +213,7 @@ _FIELDS = (
 
 
 def _write_json(paper: Paper, claims: Sequence[Claim], path: Path) -> None:
-    """All claims with their numbers and sensitivities, and what they are about."""
+    """All claims with their numbers and sensitivities, and the paper."""
     about = paper.contents.paper
     record = {
         "paper": citation(about.source) if about.source else about.short,

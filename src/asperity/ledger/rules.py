@@ -1,4 +1,4 @@
-"""Acceptance rules: when a computed number counts as what the paper states.
+"""Acceptance rules: when a computed number agrees with a statement of the paper.
 
 The meaning of each word is fixed here, once, before anything is computed, and holds for every claim
 that uses the word. claims.toml names the rule and the word; nobody writes a tolerance next to
@@ -40,7 +40,7 @@ from asperity.errors import InputError, closest
 ABOUT = 0.05
 #: Decades to either side of "of order".
 HALF_A_DECADE = 0.5
-#: What the words mean that a rule may name as its limit.
+#: Numbers of the words that a rule may use as its limit.
 WORDS: Mapping[str, float] = {
     "negligible": 0.05,
     "weak": 0.10,
@@ -55,13 +55,13 @@ WORDS: Mapping[str, float] = {
     "nearly one, low": 0.9,
     "nearly one, high": 1.1,
 }
-#: A tie counts as inside, whatever its last bit: 0.485 rounds to 0.48 or 0.49.
+#: Tolerance at the limits: 0.485 counts as 0.48 and as 0.49, independent of round-off.
 _TIE = 1e-9
 
 
 @dataclass(frozen=True)
 class AcceptanceRule:
-    """A test of a number, and the sentence that says what it tests.
+    """A test of a number, and the sentence of the test.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""Sentences with places for numbers, as the TOML files of a paper hold them.
+"""Sentences with placeholders for numbers, from the TOML files of a paper.
 
 ``{name:spec}`` stands for the number ``name`` in Python's format ``spec``, ``{100*name:.1f}`` for a
 multiple of it. A name may hold blanks, commas and dots: ``{mu1, 10 um/s:.3g}``.
@@ -54,7 +54,7 @@ def fill(sentence: str, values: Mapping[str, Any], where: str) -> str:
     Raises
     ------
     InputError
-        If a number is not there, or cannot be written as the sentence asks.
+        If a number is missing, or cannot be formatted as in the sentence.
     """
     try:
         return _Filler().vformat(sentence, (), values)
@@ -66,5 +66,5 @@ def fill(sentence: str, values: Mapping[str, Any], where: str) -> str:
         ) from None
     except (ValueError, TypeError) as error:
         raise InputError(
-            f"{where} must be a sentence that numbers can be put into, got: {error}; correct it"
+            f"{where} must be a sentence with valid placeholders, got: {error}; correct it"
         ) from None

@@ -1,4 +1,4 @@
-"""Figures of a paper whose numbers can be moved on the browser page.
+"""Interactive figures of a paper on the browser page.
 
 A paper's module ``tab`` has ``FIGURES``, a `TabFigure` by the name of each; figures.toml says which
 of the paper's numbers a figure rests on (``numbers``) and how the page labels its columns.
@@ -22,7 +22,7 @@ Progress: TypeAlias = Callable[[int, int], None]
 
 @dataclass(frozen=True)
 class TabFigure:
-    """A figure that is computed again for other numbers of the paper.
+    """A figure that is computed for changed numbers of the paper.
 
     Attributes
     ----------
@@ -31,19 +31,19 @@ class TabFigure:
     rows : sequence of str
         Columns of the ordinates, one panel each.
     logarithmic : tuple of str
-        Those of the columns whose axis is logarithmic.
+        Columns with a logarithmic axis.
     lines : function
-        From the paper's numbers to the lines that take milliseconds each.
+        Maps the paper's numbers to the fast lines (milliseconds).
     marks : function
-        From the paper's numbers to what the text states, by the column of the ordinate.
+        Maps the paper's numbers to the statements of the text, by the column of the ordinate.
     python : function
         From the names and values of the moved numbers to code that computes the same.
     slow : tuple of str
-        Names of further lines, which take seconds each.
+        Names of slow lines (seconds).
     slow_line : function
-        From the paper's numbers, one of these names and a progress to that line.
+        Maps the paper's numbers, a name of `slow` and a progress function to this line.
     extras : function
-        From the paper's numbers to more that the answer holds.
+        Maps the paper's numbers to further fields of the answer.
     """
 
     x: str

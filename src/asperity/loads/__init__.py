@@ -1,4 +1,4 @@
-"""Modulation programmes: load, shear force and pulling velocity, knowing nothing of friction."""
+"""Modulations and programmes of normal load, shear force and pulling velocity."""
 
 from asperity.loads.modulated import modulated, sampled
 from asperity.loads.modulation import Excitation, Harmonic, Modulation

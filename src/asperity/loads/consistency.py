@@ -1,4 +1,4 @@
-"""Checks of a modulation on samples of its period: what the equations assume of it."""
+"""Checks of a modulation on samples of its period, for what the equations assume."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from asperity.errors import InputError, printable
 from asperity.loads.modulation import Excitation, Harmonic, Modulation
 from asperity.loads.periodic import Periodic
-from asperity.parameters.arguments import instance, shown
+from asperity.parameters.arguments import shown
 
-#: Samples of the period; more are taken where fewer find a fault, which may be their own.
+#: Numbers of samples of the period; a fault counts if it remains with more samples.
 _SAMPLES = (64, 1024, 16384)
 
 #: Values of one evaluation: points times samples.
@@ -26,28 +26,26 @@ _MEAN, _SLOPE = 1e-3, 2e-2
 Array = NDArray[np.float64]
 
 
-def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
+def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modulation:
     """A modulation whose members agree with each other.
 
     Parameters
     ----------
-    given : Modulation
+    modulation : Modulation
         Numbers or arrays of any shapes that broadcast. `Harmonic` and `Periodic` agree by their
         construction.
     name : str
-        What messages call it.
+        Name of the modulation in messages.
 
     Raises
     ------
     InputError
-        If it is no `Modulation`, or its fields are no numbers or arrays that broadcast; if over a
+        If its fields are no numbers or arrays that broadcast; if over a
         period a value is not finite, W does not stay positive, the mean of W/W0 or of the pull
         is not 1, `w_slope` is not the derivative of `w`, `amplitude` is not that of the first
         harmonic, `scaled(0)` is not steady sliding, a member fails, or the load is not `even` and
         says so.
     """
-    advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
-    modulation: Modulation = instance(given, Modulation, name, advice)
     leaves, structure = jax.tree.flatten(modulation)
     for leaf in leaves:
         if isinstance(leaf, str):
@@ -68,7 +66,7 @@ def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
         fault = _first_fault(structure, flat, int(np.prod(shape)), name)
     except InputError:
         raise
-    except Exception as error:  # code of others may raise anything
+    except Exception as error:  # a user's code may raise anything
         text = printable(" ".join(str(error).split()), 200)
         raise InputError(
             f"{name} must have members that work on arrays of jax.numpy, got "
@@ -83,7 +81,7 @@ def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
 def _first_fault(
     structure: Any, leaves: list[Array], points: int, name: str, samples: int = _SAMPLES[0]
 ) -> str:
-    """A fault that more samples do not take away; empty where there is none."""
+    """A fault that remains with more samples; empty without a fault."""
     at_once = _VALUES // samples
     for first in range(0, points, at_once):
         part = [leaf[first : first + at_once] for leaf in leaves]
@@ -97,7 +95,7 @@ def _first_fault(
 
 
 def _fault(modulation: Modulation, samples: int, name: str) -> str:
-    """What is wrong with the first point that has a fault; empty where there is none."""
+    """The fault of the first faulty point; empty without a fault."""
     theta = 2 * np.pi * np.arange(samples) / samples
     at = modulation.at(theta[:, None])
     amplitude = np.atleast_1d(np.asarray(modulation.amplitude, float))

@@ -1,4 +1,4 @@
-"""Modulations from what a user knows of them: amplitudes and phases, or a sampled period."""
+"""Modulations from amplitudes and phases, or from a sampled period."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from asperity.loads.periodic import Periodic, Series
 from asperity.parameters.arguments import shown
 from asperity.units import to_radians, to_si
 
-#: Phases of the period at which the load is held to be positive.
+#: Number of phases at which the load is checked to be positive.
 _PHASES = 2 * np.pi * np.arange(720) / 720
 
 #: Fourier coefficients of a sampled period below this share of the largest are left out.
@@ -98,7 +98,7 @@ def sampled(
 ) -> Periodic:
     """Modulation from evenly spaced samples of one period, the first at theta = 0.
 
-    Between the samples it is their trigonometric interpolation, as exact as the samples
+    Between the samples the signal is their trigonometric interpolation, as exact as the samples
     are for a signal without harmonics beyond half their number.
 
     Parameters
@@ -108,8 +108,8 @@ def sampled(
     velocity : array, shape (samples,), optional
         Pulling velocity; its mean counts as V.
     shear : array, shape (samples,), optional
-        Force on the slider along the pulling direction besides the spring's, over W0, of mean
-        zero.
+        Force on the slider along the pulling direction, in addition to the spring's, over W0, of
+        mean zero.
     harmonics : int, optional
         Harmonics to keep, all by default.
 

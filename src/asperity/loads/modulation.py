@@ -1,4 +1,4 @@
-"""What drives the slider at one instant, what solvers ask of a modulation, and the harmonic one."""
+"""Excitation of the slider at an instant, the interface of a modulation, and `Harmonic`."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from jax.typing import ArrayLike
 class Excitation(NamedTuple):
     """Values and slopes at a phase theta = omega t; slopes are derivatives with respect to theta.
 
-    What is not modulated keeps its default, a number that compiled programs fold away.
+    Constant quantities keep their default, a number that compiled programs fold away.
 
     Attributes
     ----------
     w, w_slope : array
         Normal load W/W0 and its slope.
     shear, shear_slope : array
-        Force on the slider along the pulling direction, besides the spring's, over W0, and its
-        slope: what an exciter at an angle adds.
+        Force on the slider along the pulling direction in addition to the spring's, over W0, and
+        its slope, such as from an exciter at an angle.
     pull : array
         Velocity of the far end of the spring over its mean V.
     """

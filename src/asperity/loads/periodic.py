@@ -1,4 +1,4 @@
-"""Any periodic modulation: of the load, of a shear force, of the pulling velocity, together.
+"""Periodic modulations of load, shear force and pulling velocity, by Fourier coefficients.
 
     w(theta)     = 1 + sum a_k cos k theta + b_k sin k theta,     theta = omega t,
 

@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 
 #: Approximate number of blocks of a window.
 BLOCKS = 1024
-#: From so many samples on, a pass over all of them is avoided.
+#: With more samples than this, an additional pass over all samples is avoided.
 _LONG = 1 << 17
 DRIFTS = {"none": 0, "linear": 1, "quadratic": 2}
 
@@ -72,8 +72,8 @@ def lock_in(
     refine : bool
         Fit the frequency. If not, `frequency` is taken to be exact.
     settles : bool
-        Let the force settle (`asperity.lock_in.settling`): its mean and harmonics are then those
-        that it settles to, with the uncertainty of that.
+        Model the settling of the force (`asperity.lock_in.settling`): mean and harmonics are then
+        the final values, with an uncertainty that includes the extrapolation.
 
     Returns
     -------
@@ -131,7 +131,7 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     gram, moments = blocks.totals()
     inner = inverted(gram[:linear, :linear])
     beta = inner @ moments[:linear]
-    selected = _own_columns(basis, beta[:, 0], refine)
+    selected = _load_columns(basis, beta[:, 0], refine)
     outer = inverted(selected.T @ gram @ selected)
     slope, change = np.zeros(linear), 0.0
     if refine:
@@ -168,7 +168,7 @@ def read(blocks: BlockSums, *, refine: bool = True, settles: bool = False) -> Lo
     )
 
 
-def _own_columns(basis: Basis, load: Array, refine: bool) -> Array:
+def _load_columns(basis: Basis, load: Array, refine: bool) -> Array:
     """Columns of the fit of the load, the frequency last; (size, linear + refine)."""
     selected = np.eye(basis.size)[:, : basis.linear + refine]
     if refine:

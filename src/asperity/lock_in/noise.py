@@ -1,4 +1,4 @@
-"""Noise of a reading, from the residual's own spectrum around each harmonic.
+"""Noise of a reading, from the spectrum of the residual around each harmonic.
 
 The error of the amplitude at a frequency is the noise at that frequency. The variance of the
 coefficient of a column is therefore the mean of the periodogram of the residual over the nearest
@@ -139,15 +139,15 @@ def noise_around(
 def _growth(lines: Array, turned: Complex) -> Array:
     """Ratio of the noise that acts on the mean to that of the lowest lines; (channels,).
 
-    1/f noise is stronger below the lowest line than in it. Its power law is extrapolated down to a
-    third of a line, which corresponds to noise that started a few windows ago.
+    1/f noise is stronger below the lowest line than at it. Its power law is extrapolated down to a
+    third of a line, as for noise that started three windows ago.
     """
     away = np.log(lines) - np.log(lines).mean()
     lever = max(float(away @ away), 1e-300)
     exponent = -(away @ np.log(np.maximum(np.abs(turned) ** 2, 1e-300))) / lever
     # The logarithm of a periodogram has standard deviation 1.28; half of the lines are independent.
     scatter = 1.28 * np.sqrt(2.0 / lever)
-    # Exponents of white noise are zero within scatter; steeper than 1/f is drift, not noise.
+    # The exponent is 0 for white noise, apart from scatter; steeper than 1/f is drift.
     exponent = np.where(exponent > 2.5 * scatter, np.minimum(exponent, 1.0), 0.0)
     lowest = lines[: 2 * _NEXT_TO_ZERO, None]
     return np.asarray((1 / 3.0) ** -exponent / np.mean(lowest**-exponent, axis=0))
@@ -177,8 +177,8 @@ def free_lines(
     reach = min(blocks / 8, 3.0 * wanted + (2.0 * basis.harmonics * periods if periods < 64 else 0))
     first = max(float(taken), k * periods - reach)
     last = min(samples / 2 - 1, k * periods + reach)
-    # Half-integer lines too: a distant line such as hum leaks into these or the integer ones just
-    # as it leaks into the harmonic or its derivative, and could vanish in either set alone.
+    # Integer and half-integer lines: a distant line such as hum leaks into one of these sets as it
+    # leaks into the harmonic or its derivative, and may vanish in the other set.
     away = np.arange(np.ceil(2 * (first - k * periods)), 2 * (last - k * periods) + 1e-9) / 2
     lines = k * periods + away
     nearest = np.clip(np.rint(lines / periods), 0, basis.harmonics)

@@ -1,4 +1,4 @@
-"""Normal equations of a lock-in: its columns, their sums over blocks of samples, and the solution.
+"""Normal equations of a lock-in: basis columns, their sums over blocks of samples, the solution.
 
 A reading is least squares on
 
@@ -6,7 +6,7 @@ A reading is least squares on
 
 with u = (t - centre)/half_width and phi = omega (t - centre). The last 2n columns are the
 derivatives with respect to the frequency. The set is closed under a shift of time, so a block of
-evenly sampled data needs no sine or cosine of its own: one table serves all blocks, each rotated
+evenly sampled data needs no separate sines and cosines: one table serves all blocks, each rotated
 by its phase. The sums of each block are kept, so that the residual near any harmonic follows from
 them without a second pass over the samples.
 
@@ -29,7 +29,7 @@ Array = NDArray[np.float64]
 
 Complex = NDArray[np.complex128]
 
-#: Samples that are summed at a time: their products fit into the second-level cache.
+#: Samples of a chunk: their products fit into the second-level cache.
 _CHUNK = 8192
 #: Largest deviation (rad) from an even clock for which the series is used.
 _NEAR = 0.1
@@ -80,7 +80,7 @@ class Basis:
         return self.drift + 4 * self.harmonics
 
     def columns(self, time: Array, out: Array | None = None) -> Array:
-        """Columns at some times.
+        """Columns of the basis at the times `time`.
 
         Parameters
         ----------

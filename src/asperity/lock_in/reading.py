@@ -124,7 +124,7 @@ class LockInReading:
     residual : complex array, (blocks, n + 1, 2)
         Sums of the residuals of load and force times e^(-ik phi), over each block.
     settlings : tuple of Settling
-        Of the force, where it was let settle: what may be there, most of all what is.
+        Possible settlings of the force, if the fit includes them.
     """
 
     W0: float
@@ -249,7 +249,7 @@ def reading_of(
     fitted: bool,
     settlings: tuple[Settling, ...] = (),
 ) -> LockInReading:
-    """The reading that follows from the coefficients of load and force.
+    """The reading from the coefficients of load and force.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The reference of the lock-in: frequency of the load's modulation, from the load itself.
+"""The reference of the lock-in: the modulation frequency, fitted to the load.
 
 An error of 1e-4 of the frequency is 0.38 rad after 10 s at 60 Hz, so the frequency is a parameter
 of the least-squares fit and not a setting. The fit starts from the strongest line of a spectrum,
@@ -219,7 +219,7 @@ def frequency_step(basis: Basis, gram: Array, moments: Array) -> float:
 
 
 def _scanned(time: Array, load: Array, omega: float, degree: int) -> float:
-    """The frequency around a start whose fit has the smallest residual."""
+    """The frequency near an initial guess whose fit has the smallest residual."""
     span = float(time[-1] - time[0])
     width = min(0.5 * omega, 2 * np.pi / span)
     tried = omega + np.linspace(-width, width, 41)
@@ -227,7 +227,7 @@ def _scanned(time: Array, load: Array, omega: float, degree: int) -> float:
     level = load - load.mean()
 
     def residual(w: float) -> float:
-        # The fundamental alone: with harmonics, half the frequency would fit as well.
+        # Without harmonics, because with them half the frequency would fit as well.
         basis = window_basis(time[thin], w, 1, degree)
         columns = basis.columns(time[thin])[: basis.linear]
         beta = np.linalg.lstsq(columns.T, level[thin])[0]
@@ -237,7 +237,7 @@ def _scanned(time: Array, load: Array, omega: float, degree: int) -> float:
 
 
 def _evenly(time: Array, values: Array, most: int) -> tuple[float, Array]:
-    """Step and values on an even grid of at most so many points, averaged where it is coarser."""
+    """Step and values on an even grid of at most `most` points; block means if it is coarser."""
     together = -(-time.size // most)
     if together > 1:
         whole = time.size // together * together
@@ -286,7 +286,7 @@ def _top(
 
 
 def _smooth(size: int) -> int:
-    """The largest length up to this one without prime factors above 5."""
+    """The largest length up to `size` without prime factors above 5."""
     best = 1
     for fives in range(12):
         for threes in range(18):

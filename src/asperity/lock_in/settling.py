@@ -1,7 +1,7 @@
-"""Settling of a channel: exponentials of unknown time constant, profiled in the least squares.
+"""Settling of a channel: exponentials of unknown time constant in the least-squares fit.
 
-Where a modulation begins, the mean of the force and its harmonics approach what they settle to.
-Over a window of a few time constants that is a part of the model and no noise::
+After a modulation begins, the mean of the force and its harmonics approach their final values.
+Over a window of a few time constants this settling is a part of the model::
 
     c_k(t) = drift or harmonic + amplitude e^(-(t - start)/tau),    k = 0, 1, ..., n
 
@@ -31,17 +31,17 @@ Array = NDArray[np.float64]
 #: prefer a settling, in white and in AR(1) noise, and 99 of 100 keep their uncertainty to 10 %.
 _ODDS = (0.005, 0.0005)
 #: Time constants beyond this share of the window have no end in it: with a linear drift next to it
-#: the level that is settled to is an extrapolation.
+#: the final level is an extrapolation.
 OPEN = 1 / 3
 #: Longest time constant, in windows; time constants tried at once; and the shortest of a harmonic,
 #: in periods: next to it other harmonics are no longer apart.
 _LONGEST, _TRIED, _SHORTEST = 2.0, 41, 4.0
-#: A gain below this many times the noise leaves everything as it is.
+#: Without a gain above this many times the noise nothing is corrected.
 _LEAST_GAIN = 4.0
 #: Log-likelihood below the best from which time constants count for nothing, and how many of those
 #: that count make the sum over them an integral.
 _NEGLIGIBLE, _ENOUGH = 12.0, 9
-#: Share of the noise of the step before that is no longer a fall.
+#: The iteration ends when the noise falls by less than to this share of its last value.
 _STILL = 0.8
 _MOST_ZOOMS = 16
 
@@ -66,16 +66,16 @@ class Settling:
     unfinished : float
         Probability that its time constant exceeds `OPEN` of the window, if there is one.
     shift : array, (linear,)
-        What is to be added to the coefficients: of the sums without `removed` if the odds are above
-        one, of the sums as they are if not.
+        Correction of the coefficients: those of the sums without `removed` if the odds are above
+        one, else those of the original sums.
     covariance : array, (linear, linear)
-        What is to be added to that of the coefficients.
+        Correction of the covariance of the coefficients.
     removed : array, (blocks, size)
         Sums of columns times the most likely settling.
     noise : float
         Variance of white noise as strong as that of this order.
     gain : float
-        Squares that it explains, in units of `noise`.
+        Sum of squares that the settling explains, in units of `noise`.
     """
 
     order: int
@@ -96,17 +96,17 @@ class Settling:
 
     @property
     def possible(self) -> bool:
-        """Whether it is worth a correction."""
+        """Whether the odds justify a correction."""
         return self.gain > _LEAST_GAIN
 
     @property
     def present(self) -> bool:
-        """Whether the odds are in favour of it."""
+        """Whether the settling is more probable than not."""
         return self.odds > 1
 
     @property
     def determined(self) -> bool:
-        """Whether its end lies in the window."""
+        """Whether the settling ends in the window."""
         return self.unfinished < 0.05
 
 
@@ -141,7 +141,7 @@ def find_settlings(
     """
     linear = blocks.basis.linear
     settlings: dict[int, Settling] = {}
-    # The onset of one order is broad enough to look like a short settling of the next.
+    # The onset of one order has a broad spectrum, like a short settling of the next order.
     sweep = list(range(blocks.basis.harmonics + 1))
     for _ in range(2):
         for order in sweep:
@@ -215,7 +215,7 @@ class _Profile:
             noise, dof = self._noise(self._left - removed + explained, settles=True)
             fits = _log_likelihood(gain[best] - gain, noise, dof, self._columns[0].size)
             counts = np.flatnonzero(fits > -_NEGLIGIBLE)
-            # What a coarse step leaves unexplained is taken for noise: it falls with the step.
+            # The residual of a coarse grid of time constants counts as noise; refine it.
             if counts.size >= _ENOUGH and noise > _STILL * before:
                 break
             before = noise
@@ -232,7 +232,7 @@ class _Profile:
         late = np.exp(logs) > OPEN * 2 * self._blocks.basis.half_width
         unfinished = float(weights[late].sum() / weights.sum())
         if odds < 1:
-            # What has no end in the window could be in any window.
+            # A settling that does not end in the window cannot be distinguished from drift.
             weights[late] = 0.0
         weights = np.append(weights, np.exp(none))
         weights /= weights.sum()

@@ -1,6 +1,6 @@
 """Published numbers, one file a paper: ``materials.load("bureau2000")``.
 
-A material file is TOML; `asperity.materials.number` says what it holds. Loading one loads
+A material file is TOML; `asperity.materials.number` describes its numbers. Loading one loads
 pydantic, importing this package does not.
 """
 
@@ -36,7 +36,7 @@ def available() -> tuple[str, ...]:
 
 
 def load_from(folder: Path, name: str) -> Material:
-    """Load the material that a file names: by its name, or by a path relative to the folder.
+    """Load a material by its name, or by a path relative to the folder.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def load_from(folder: Path, name: str) -> Material:
 
 
 def load(name: str | PathLike[str]) -> Material:
-    """Load a material by name, or a file of your own by its path.
+    """Load a material by name, or a material file by its path.
 
     Parameters
     ----------

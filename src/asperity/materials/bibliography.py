@@ -1,4 +1,4 @@
-"""BibTeX of the works that laws and materials name as their source."""
+"""BibTeX entries of the sources of laws and materials."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def citation(key: str) -> str:
 
 
 def cited_works(source: str) -> dict[str, str]:
-    """Works that a law names as its source, by citation key.
+    """Sources of a law, by citation key.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def cited_works(source: str) -> dict[str, str]:
 
 
 def available_citations() -> tuple[str, ...]:
-    """Keys that `citation` knows."""
+    """Keys of all BibTeX entries."""
     return tuple(sorted(_entries()))
 
 

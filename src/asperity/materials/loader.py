@@ -1,4 +1,4 @@
-"""Material files to `Material`, and what is wrong with one in one sentence."""
+"""Loading of material files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One number of a material file: what is printed, where, how sure, and its value in SI."""
+"""`Number` of a material file: printed value, unit, uncertainty, place, and value in SI."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ Finite = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
 class Number(Record):
-    """One number of a paper.
+    """A number of a paper.
 
     Attributes
     ----------
@@ -25,7 +25,8 @@ class Number(Record):
     dimension : str
         A key of `asperity.units.KINDS`.
     kind : {"published", "fitted", "assumed"}
-        Printed in the paper; printed there as the outcome of a fit; not in the paper.
+        "published": printed in the paper; "fitted": printed there as the result of a fit;
+        "assumed": not in the paper.
     relation : {"equal", "about", "order", "below", "above"}
         How the text qualifies the number.
     place : str
@@ -54,7 +55,7 @@ class Number(Record):
         return dimension
 
     @model_validator(mode="after")
-    def _says_something(self) -> Self:
+    def _has_value(self) -> Self:
         if self.value is None and self.range is None and not self.values:
             raise ValueError("have a value, a range or values, got none of them; add one")
         if self.uncertainty is not None and self.value is None:
@@ -118,5 +119,5 @@ class Number(Record):
         return " ".join([*parts, self.unit]).rstrip()
 
     def _to_si(self, value: float) -> float:
-        # Through text: the shortest text of a double is the decimal that the file holds.
+        # The shortest text of a double is the decimal in the file, which is converted exactly.
         return to_si(f"{value!r} {self.unit}", self.dimension, "number.value")

@@ -15,7 +15,7 @@ from pydantic import field_validator
 from asperity.errors import InputError, closest
 from asperity.materials.number import Number
 from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters, obeying
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import shown, typed
 from asperity.questions.record import Question
 from asperity.units import to_si
 
@@ -49,29 +49,25 @@ class Material(Question):
         for name, number in numbers.items():
             if not name.isidentifier() or name.startswith("_") or hasattr(cls, name):
                 raise InputError(
-                    f"numbers must have names that can follow a dot and are not taken, got "
+                    f"numbers must have names that are Python attributes and not in use, got "
                     f"'{name}'; rename that number"
                 )
             if number.value is not None:
                 _check_rule(name, number.si, number.dimension, "numbers")
         return numbers
 
+    @typed
     def __getitem__(self, name: str) -> Number:
-        if not isinstance(name, str):
-            raise InputError(
-                f"{self.name} must be asked for a number by its name, got {shown(name)}; "
-                "write it like material['K']"
-            )
         try:
             return self.numbers[_plain(name)]
         except KeyError:
             raise InputError(
-                f"{self.name} must have the number asked for, got {shown(name)}; "
+                f"{self.name} must have the number, got {shown(name)}; "
                 f"{closest(name, self.numbers)}"
             ) from None
 
     def __getattr__(self, name: str) -> float:
-        # Underscored names are Python's and pydantic's own probes.
+        # Python and pydantic probe for names with underscores.
         if name.startswith("_") or _plain(name) not in self.numbers:
             raise AttributeError(
                 f"material '{self.name}' has no number '{name}'; {closest(name, self.numbers)}"
@@ -91,6 +87,7 @@ class Material(Question):
         yield from super().__dir__()
         yield from (f"{n}_" if keyword.iskeyword(n) else n for n in self.numbers)
 
+    @typed
     def law(self, name: str, **overrides: Any) -> Law:
         """Build a friction law from the material's numbers.
 
@@ -133,10 +130,10 @@ class Material(Question):
             if number is None:
                 raise InputError(
                     f"{owner}.{parameter} must be given, got nothing and '{self.name}' has no "
-                    f"such number; write {parameter}=... beside the law's name"
+                    f"such number; write {parameter}=... after the law's name"
                 )
             return number.si
-        if number is None:  # of which only the law's own declaration knows the unit and the rule
+        if number is None:  # the declaration of the law's field checks unit and rule
             return given[parameter]
         value = to_si(given[parameter], number.dimension, f"{owner}.{parameter}")
         _check_rule(parameter, value, number.dimension, owner)
@@ -146,7 +143,7 @@ class Material(Question):
 def _check_rule(name: str, value: Any, dimension: str, owner: str) -> None:
     """Refuse a value that breaks the rule of the parameter of that name and dimension.
 
-    Other numbers may have any value.
+    A number that is no known parameter may have any value.
     """
     known = {**INTERFACE, **EXPERIMENT}.get(name)
     if known is not None and known.kind == dimension:

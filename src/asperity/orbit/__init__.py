@@ -1,6 +1,6 @@
 """Periodic orbits: several methods, Floquet multipliers, derivatives.
 
-Names are imported when first used: derivatives, with what they need, take a while to load.
+Names are imported when first used, because the modules of the derivatives load slowly.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from asperity.orbit.response import PeriodicResponse
     from asperity.orbit.sensitivity import Sensitivities, sensitivities
 
-#: Public names and their modules.
+#: Module of each public name.
 _HOMES = {
     "KnownOrbits": "gradient.known",
     "Outcome": "outcome",

@@ -1,8 +1,8 @@
 """Running a compiled function over many operating points in chunks of a fixed shape.
 
 One shape means one compilation, and bounded memory whatever the number of points. Chunks run one
-after the other: programs of XLA's CPU backend that are called from several threads at once can
-wait for each other for ever. More cores are used by more processes, see `asperity.orbit.search`.
+after the other: programs of XLA's CPU backend that are called from several threads may deadlock.
+Several cores are used by several processes, see `asperity.orbit.search`.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from asperity._jax import spare_mappings
 
 Indices = NDArray[np.intp]
 
-#: Points in a block of the fast method; no power of two, at which arrays share cache lines.
+#: Points in a block of the fast method; not a power of two, at which arrays share cache lines.
 FAST_BLOCK = 240
 
 #: Points in a chunk of orbits on meshes, for up to three states and for more: a few points that

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import partial
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -40,12 +40,12 @@ from asperity.orbit.gradient.search import search_orbits
 from asperity.orbit.gradient.searched import derivatives_of, searched_values, values_of
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
-from asperity.parameters.arguments import switch, whole_number
+from asperity.parameters.arguments import at_least, typed
 from asperity.slider import QuasiStatic
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.radiating import Radiating
 
-#: Smallest number of points that a program is compiled for; others are powers of two.
+#: Smallest number of points that a program is compiled for; larger numbers are powers of two.
 _FEWEST = 4
 
 
@@ -92,7 +92,7 @@ class ResponseFunction:
         return f"response_function of {', '.join(self.parameters)}"
 
     def compiled_points(self, points: int) -> int:
-        """Number of points of the program that a call with so many uses."""
+        """Number of points of the compiled program that a call with `points` points uses."""
         return 1 << (max(points, self._least_points, _FEWEST) - 1).bit_length()
 
     def __call__(
@@ -158,7 +158,7 @@ class ResponseFunction:
         -------
         values : ResponseValues
         derivatives : dict of str to ResponseValues
-            By parameter, of the shapes of `values`: at each point to that point's own value. The
+            By parameter, of the shapes of `values`: at each point to the value of that point. The
             derivative to a parameter that all points share is the sum over the points.
         """
         padded, points = self._padded(parameters)
@@ -245,7 +245,7 @@ def _laid_out(value: Any, *, count: int, size: int, module: Any) -> Any:
 
 
 def _cut(values: ResponseValues, points: int | None) -> ResponseValues:
-    """Without the points that fill the program up; NumPy arrays where nothing is traced."""
+    """Values without the padding points; NumPy arrays outside of traced functions."""
 
     def cut(a: Array) -> Any:
         whole = a if isinstance(a, jax.core.Tracer) else np.asarray(a)
@@ -254,16 +254,17 @@ def _cut(values: ResponseValues, points: int | None) -> ResponseValues:
     return jax.tree.map(cut, values)
 
 
+@typed
 def response_function(
     law: str | type[Law],
     *,
     inertia: bool = False,
     radiation_damping: bool = False,
-    harmonics: int = 2,
+    harmonics: Annotated[int, at_least(1)] = 2,
     multipliers: bool = False,
     modulation: Modulation | None = None,
     search: bool | Literal["direct"] = True,
-    least_points: int = _FEWEST,
+    least_points: Annotated[int, at_least(1)] = _FEWEST,
 ) -> ResponseFunction:
     """The periodic response as a function of named parameters, for fits, samplers and designs.
 
@@ -316,7 +317,7 @@ def response_function(
     Bureau et al. (2000), Eqs. (1), (2), (6), (8) and (26)-(29). With D the equations of an orbit
     Y for parameters p, D(p, Y) = 0, its derivative is -D_Y^-1 D_p.
 
-    Where the search is needed within `jax.jit`, a process of its own does it, which takes some
+    Where the search is needed within `jax.jit`, a separate process does it, which takes some
     seconds to start. Multipliers with inertia or radiation damping need it at every point.
     Derivatives at its orbits are those of collocation on 216, 648 or 1,944 intervals, the fewest on
     which mean and harmonics agree with those of the search to 1e-10: within some 1e-7 of the
@@ -327,12 +328,6 @@ def response_function(
     than 1e-8, the outcome is `Outcome.NOT_RESOLVED`.
     """
     law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
-    inertia = switch(inertia, "inertia")
-    radiation_damping = switch(radiation_damping, "radiation_damping")
-    multipliers = switch(multipliers, "multipliers")
-    search = search if search == "direct" else switch(search, "search")
-    harmonics = whole_number(harmonics, "harmonics", least=1)
-    least_points = whole_number(least_points, "least_points", least=1)
     if modulation is not None:
         modulation = checked_modulation(modulation)
     if not law_type.rate_dependent:
@@ -358,7 +353,7 @@ def _traced(parameters: Parameters) -> bool:
 def _traced_orbits(
     program: Program, parameters: Parameters
 ) -> tuple[FastOrbits | None, Array | None]:
-    """Orbits of the fast method within a program, and which points the search has to find.
+    """Orbits of the fast method within a program, and a mask of the points left to the search.
 
     None for a method that the program does not have.
     """
@@ -377,7 +372,7 @@ def _orbits(
     """Orbits of the first `points` points by the fast method and, of the others, by the search."""
     spare_mappings()
     fast, wanted = _fast_orbits(program, parameters)
-    # The others fill the program up.
+    # Further points are padding.
     rows = np.asarray(wanted) & (np.arange(len(wanted)) < points)
     if not program.search or not rows.any():
         return fast, None
@@ -396,7 +391,7 @@ def _orbits(
 
 
 def _fast_orbits(program: Program, parameters: Parameters) -> tuple[FastOrbits | None, Array]:
-    """Orbits of the fast method, if there is one, and which points are left to the search."""
+    """Orbits of the fast method (None without one), and a mask of the points left to the search."""
     if not has_fast_method(program):
         return None, program.equations.valid(parameters)
     fast = fast_orbits(parameters, program=_fast_part(program))
@@ -404,7 +399,7 @@ def _fast_orbits(program: Program, parameters: Parameters) -> tuple[FastOrbits |
 
 
 def _fast_part(program: Program) -> Program:
-    """What the programs without orbits of the search are compiled for."""
+    """The program without orbits of the search."""
     return program._replace(search=False)
 
 
@@ -431,7 +426,7 @@ def _add_searched_derivatives(
     program: Program,
     names: Collection[str] | None,
 ) -> None:
-    """Write derivatives at the orbits of the search into a table as of `_differentiate`."""
+    """Write derivatives at the orbits of the search into the result of `_differentiate`."""
     values = {n: np.asarray(v) for n, v in parameters.items()}
     for index, orbits in searched.by_mesh() if searched else []:
         part = {n: v[index] for n, v in values.items()}
@@ -462,7 +457,7 @@ def _values(
         values = values._replace(outcome=jnp.where(valid, values.outcome, outcome))
     if fast is not None:
         values = chosen(fast.converged, fast_values(parameters, fast, program), values)
-    # A product, so that the derivatives are NaN as well.
+    # Multiplication by NaN makes the derivatives NaN, too.
     known = jnp.where(values.outcome == Outcome.CONVERGED, 1.0, jnp.nan)
     mean, harmonics, logs = (by_point(known, a) * a for a in values[:3])
     return ResponseValues(mean, harmonics, logs, values.outcome)
@@ -479,7 +474,7 @@ def _differentiate(
     *,
     program: Program,
 ) -> tuple[ResponseValues, Array]:
-    """Values, and derivatives at each point to its own parameters.
+    """Values, and derivatives at each point to the parameters of that point.
 
     The derivatives are of shape (parameters, points, columns), with a column for the mean, columns
     for the real and the imaginary parts of the harmonics, and the same for the multipliers.
@@ -505,7 +500,7 @@ def _differentiate(
         tangents = jnp.concatenate(jax.vmap(push)(basis), axis=-1)
         columns = dict(zip(names, tangents, strict=True))
     known = jnp.where(values.outcome == Outcome.CONVERGED, 1.0, jnp.nan)
-    # In one array: each that leaves a compiled program costs time of its own.
+    # One array: every output of a compiled program costs time.
     return values, known[:, None] * jnp.stack([columns[n] for n in names])
 
 

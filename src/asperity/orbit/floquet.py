@@ -14,8 +14,8 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-#: Logarithm from which a multiplier overflows a double. Its argument, a small difference of large
-#: phases, is then not known either.
+#: Logarithm above which a multiplier overflows a double. Its argument, a small difference of large
+#: phases, is then unknown, too.
 LARGEST_LOG = 709.0
 
 Complex = NDArray[np.complex128]
@@ -51,9 +51,9 @@ def log_multipliers(monodromy: Float, log_scale: Float, log_determinant: Float) 
 
 
 def log_multipliers_of_exponent(exponent: Float, log_determinant: Float) -> Complex:
-    """The same from a matrix whose exponential is the monodromy matrix.
+    """Logarithms of the multipliers from a matrix whose exponential is the monodromy matrix.
 
-    Of multipliers near 1 the monodromy matrix knows the distance from 1 only to round-off of 1.
+    A multiplier near 1 has a distance from 1 that a monodromy matrix loses to round-off.
 
     Parameters
     ----------
@@ -105,12 +105,12 @@ def from_logs(logs: Complex) -> Complex:
         modulus = np.exp(logs.real)
         angle = np.where(np.isnan(logs.imag) & ~np.isnan(logs.real), 0.0, logs.imag)
         on_axis = (angle == 0) | (np.abs(angle) == np.pi)
-        # Not inf * 0: a real multiplier has no imaginary part however large it is.
+        # A real multiplier has no imaginary part; without this rule inf * 0 would give NaN.
         imaginary = np.where(on_axis, 0.0, modulus * np.sin(angle))
         return modulus * np.cos(angle) + 1j * imaginary
 
 
-#: What an orbit turns into where its leading multiplier leaves the unit circle.
+#: Bifurcations by the argument of the leading multiplier where it leaves the unit circle.
 FOLD, PERIOD_DOUBLING, NEIMARK_SACKER = "fold", "period doubling", "Neimark-Sacker"
 
 #: Arguments (rad) below this, and as close to pi, are real multipliers.
@@ -118,7 +118,7 @@ _REAL = 1e-12
 
 
 def kind_of_crossing(logs: Complex) -> NDArray[np.object_]:
-    """Bifurcation that a multiplier stands for, by its argument; "" where that is not known.
+    """Bifurcation at which a multiplier leaves the unit circle, by its argument; "" if unknown.
 
     Real and positive: a fold. Real and negative: period doubling, a response that repeats only
     after two periods. A complex pair: Neimark-Sacker, a slow oscillation on top of the modulation.
@@ -137,7 +137,7 @@ def kind_of_crossing(logs: Complex) -> NDArray[np.object_]:
 
 
 def without_lost_arguments(logs: Complex) -> Complex:
-    """The same with NaN for the argument of a multiplier that overflows."""
+    """Logarithms with NaN for the argument of a multiplier that overflows."""
     kept = logs.copy()
     kept.imag[logs.real > LARGEST_LOG] = np.nan
     return kept
@@ -196,7 +196,7 @@ def eigensystem(matrix: Array) -> tuple[Array, Array]:
 
 @eigensystem.defjvp
 def _eigensystem_rule(primals: tuple, tangents: tuple) -> tuple:
-    """First-order perturbation; it refers to itself, and so holds for higher orders."""
+    """First-order perturbation theory; the rule calls `eigensystem`, which gives higher orders."""
     values, vectors = eigensystem(*primals)
     turned = jnp.linalg.solve(vectors, tangents[0] @ vectors)
     n = values.shape[-1]

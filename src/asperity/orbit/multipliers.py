@@ -24,13 +24,13 @@ from asperity.orbit.solution import Solution
 from asperity.slider.problem import Problem
 
 #: Agreement between two meshes, relative, at which the finer one is trusted to 1e-8: with three
-#: times the intervals its own error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
+#: times the intervals the error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
 AGREEMENT = 2e-7
 
 #: Each interval is cut into 3, 9, 27... parts for finer transfer maps, up to these numbers in all:
 #: of all intervals at once, and of one after the other.
 _MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 40_000_000
-#: Up to so many intervals of all points, whole chunks of points are worked on, in some 200 MB.
+#: Largest number of intervals of all points for work on whole chunks of points (some 200 MB).
 _MOST_SIDE_BY_SIDE = 100_000
 
 #: Multipliers below this modulus are compared absolutely: no experiment sees them. Two have their
@@ -72,7 +72,7 @@ def resolve_multipliers(problem: Problem, solution: Solution, orbit: Orbit, inde
 def _resolve_by_splitting(
     problem: Problem, solution: Solution, orbit: Orbit, index: Indices
 ) -> None:
-    """By the maps of all intervals at once, as long as they fit into memory."""
+    """Resolve multipliers with the maps of all intervals in memory, as long as these fit."""
     intervals = orbit.mesh.shape[0] - 1
     splits = [3**k for k in range(1, 10) if intervals * 3**k <= _MOST_AT_ONCE]
     for parts in splits:
@@ -98,7 +98,7 @@ def _resolve_by_splitting(
 def _resolve_interval_by_interval(
     problem: Problem, solution: Solution, orbit: Orbit, index: Indices
 ) -> None:
-    """By transfer maps of one interval after the other, too many to be kept.
+    """Resolve multipliers with the transfer map of one interval at a time in memory.
 
     For slow modulation, under which a disturbance turns or grows by many thousand radians or
     factors of e in a period, and yet is about as large at its end as in the beginning.
@@ -133,7 +133,7 @@ def _monodromy_by_intervals(
         step, log_step = piece_map(problem, orbit.piece(k, k + 1), parts)
         maps.append(step)
         log_scales.append(log_step)
-    # Maps that miss growth within a part may lose the product; then no two agree.
+    # Maps that miss growth within a part may give no finite product; then no two meshes agree.
     with np.errstate(all="ignore"):
         whole, log_scale = scaled_product(np.stack(maps, axis=2))
     observables = read_orbit(problem, orbit, 1)

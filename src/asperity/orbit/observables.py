@@ -1,4 +1,4 @@
-"""The record of what every method evaluates on an orbit."""
+"""Observables of periodic orbits, common to all methods."""
 
 from __future__ import annotations
 
@@ -61,11 +61,11 @@ class Observables(NamedTuple):
 
 
 class PeriodicOrbit(Protocol):
-    """What observables ask of an orbit, however it is represented.
+    """Interface of an orbit, independent of its representation.
 
     Two representations have it. `FourierOrbit` keeps the mean of each state apart from the rest on
     a grid, so that a rest 1e-9 of the mean keeps its digits, and is small enough for hundreds of
-    points to be iterated in a core's cache. `Orbit` has polynomials on a mesh of its own for every
+    points to be iterated in a core's cache. `Orbit` has polynomials on a separate mesh for every
     point, which puts the intervals where an orbit is steep, and from whose equations the monodromy
     matrix follows. Neither could stand in for the other without a loss of digits or of range, and
     nothing beyond the method that made it needs to know which one it has.

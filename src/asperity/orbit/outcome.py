@@ -1,4 +1,4 @@
-"""What became of the solve of an operating point, as data and as a sentence."""
+"""Outcome of the solve of an operating point, as a code and as a sentence."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ _SENTENCES = {
     Outcome.CONVERGED: "converged",
     Outcome.NO_ORBIT: (
         "no periodic orbit found: followed from steady sliding the branch stops at "
-        "{detail:.4g} of the amplitude asked for; lower epsilon or stiffen the spring"
+        "{detail:.4g} of the requested amplitude; lower epsilon or stiffen the spring"
     ),
     Outcome.NOT_RESOLVED: (
         "an orbit was found but not resolved: refining the mesh still changes it by {detail:.1e} "
@@ -56,29 +56,26 @@ _SENTENCES = {
         "still changes them by {detail:.1e} relative, above 1e-8"
     ),
     Outcome.FOLDED: (
-        "the branch from steady sliding folds back at epsilon = {detail:.3g}, below the amplitude "
-        "asked for; lower epsilon or stiffen the spring"
+        "the branch from steady sliding folds back at epsilon = {detail:.3g}, below the requested "
+        "amplitude; lower epsilon or stiffen the spring"
     ),
     Outcome.RUNAWAY: (
         "on the branch from steady sliding slip runs away: before epsilon = {detail:.3g} its "
         "pulses become faster than e^13 V, without inertia nothing bounds them; lower epsilon or "
-        "let inertia or radiation damping count"
+        "include inertia or radiation damping"
     ),
     Outcome.SENSITIVE: (
         "the branch from steady sliding is lost at epsilon = {detail:.3g}: sliding is so unstable "
         "for part of the period that a disturbance grows by more than e^15, which neither a mesh "
         "nor an experiment can hold; lower epsilon or stiffen the spring"
     ),
-    Outcome.INVALID: (
-        "a parameter breaks its rule, so that there is nothing to solve; keep every parameter in "
-        "its range"
-    ),
+    Outcome.INVALID: ("a parameter breaks its rule; keep every parameter in its range"),
 }
 
 _GROUP = (
     "the rate of steady sliding per radian, about the larger of V/(omega D0) and V K/(omega W0 A),"
 )
-#: Of points out of range.
+#: Sentences of points out of range.
 _UNLOADED = (
     "not searched: epsilon (the largest share of W0 taken off the contacts) must be at most "
     f"{LARGEST_UNLOADING:g}, got {{detail:.9g}}; lower epsilon"
@@ -96,10 +93,9 @@ _NO_RATE = (
     "nearer to V0"
 )
 
-#: Where no branch was followed at all.
+#: Outcomes without an attempt to follow a branch.
 _NOT_FOUND = (
-    "no periodic orbit found by any method that was tried; allow all methods, lower epsilon or "
-    "stiffen the spring"
+    "no method found a periodic orbit; allow all methods, lower epsilon or stiffen the spring"
 )
 _LOST = (
     "an orbit was found on a coarse mesh but lost on every finer one, so it may not exist; "
@@ -108,7 +104,7 @@ _LOST = (
 
 
 def sentence(outcome: int, detail: float) -> str:
-    """The sentence that a user reads."""
+    """The sentence of an outcome with its number."""
     if outcome == Outcome.NOT_RESOLVED and not math.isfinite(detail):
         return _LOST
     if outcome == Outcome.NO_ORBIT and detail == 0:

@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from asperity.laws import Law, LinkerDieterich
 from asperity.loads import Harmonic
 from asperity.orbit.response import PeriodicResponse
-from asperity.parameters.arguments import instance
+from asperity.parameters.arguments import typed
 
 Float = NDArray[np.float64]
 
-#: Newton steps for the state. Friction is affine in it for most laws, and nearly so for the others.
+#: Newton steps for the state; friction is affine in the state for most laws.
 _STEPS = 12
 
 
@@ -49,6 +49,7 @@ class Period(NamedTuple):
     age: Float | None
 
 
+@typed
 def over_a_period(response: PeriodicResponse) -> Period:
     """Force, velocities and age over one period.
 
@@ -64,7 +65,6 @@ def over_a_period(response: PeriodicResponse) -> Period:
     what accelerates the slider and what it radiates; the state is the one at which the law carries
     that force at that slip velocity.
     """
-    instance(response, PeriodicResponse, "response", "give the result of periodic_response")
     motion, slider = response.motion, response.slider
     V, omega = float(np.ravel(motion.V)[0]), float(np.ravel(motion.omega)[0])
     K, W0, M = (float(np.ravel(getattr(slider, n))[0]) for n in ("K", "W0", "M"))

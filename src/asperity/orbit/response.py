@@ -98,7 +98,7 @@ class PeriodicResponse(Drawn):
     motion : Motion
         Equation of motion, with the slider.
     load : Modulation
-        What is modulated.
+        The modulation of the load.
     slider, velocity, epsilon, frequency
         The operating point, in SI; epsilon is the amplitude of the load's first harmonic.
     """
@@ -216,7 +216,7 @@ class PeriodicResponse(Drawn):
 
     @property
     def mode(self) -> NDArray[np.object_]:
-        """Bifurcation that the leading multiplier stands for, whether it has crossed or not.
+        """Bifurcation by the argument of the leading multiplier, stable or not.
 
         "fold", "period doubling" or "Neimark-Sacker"; "" where not converged or not known.
         """
@@ -244,7 +244,7 @@ class PeriodicResponse(Drawn):
 
     @property
     def result(self) -> NDArray[np.object_]:
-        """Of each point: converged, or the reason why not."""
+        """For each point "converged", or the reason of the failure."""
         return sentences(np.asarray(self.outcome), np.asarray(self.detail))
 
     @property
@@ -285,7 +285,7 @@ class PeriodicResponse(Drawn):
         -------
         xarray.Dataset
             Every variable has `units` and `long_name`; real and imaginary parts of complex ones
-            are variables of their own. All parameters are coordinates, those that vary along the
+            are separate variables. All parameters are coordinates, those that vary along the
             axes that they vary along; attributes hold the provenance.
 
         Raises
@@ -314,8 +314,8 @@ class PeriodicResponse(Drawn):
         coords = {}
         for name, (parameter, value) in values.items():
             array = np.asarray(value)
-            own = dims[len(dims) - array.ndim :]
-            long = [d for d, size in zip(own, array.shape, strict=True) if size > 1]
+            of_array = dims[len(dims) - array.ndim :]
+            long = [d for d, size in zip(of_array, array.shape, strict=True) if size > 1]
             coords[name] = (
                 long,
                 array.reshape([n for n in array.shape if n > 1]),
@@ -366,8 +366,10 @@ def dimension_names(
             "leave it out to have the axes named by what varies"
         )
     along: dict[str, list[int]] = {}
-    for name, own in shapes.items():
-        along[name] = [i + len(shape) - len(own) for i, size in enumerate(own) if size > 1]
+    for name, shape_of in shapes.items():
+        along[name] = [
+            i + len(shape) - len(shape_of) for i, size in enumerate(shape_of) if size > 1
+        ]
     names = []
     for axis in range(len(shape)):
         varying = [name for name, axes in along.items() if axis in axes]

@@ -1,4 +1,4 @@
-"""The search for periodic orbits: a list of methods, each given the points that are left.
+"""The search for periodic orbits: methods in order, each for the points not solved so far.
 
 `METHODS` is the order in which methods are tried, fast ones first; what each does is in its own
 module.
@@ -8,8 +8,8 @@ than the range that is tested (`docs/theory/numerical_method.md`). A point outsi
 `Outcome.OUT_OF_RANGE` at once: a search there takes up to a minute and fails, or gives a stability
 that is round-off.
 
-On several cores each has a process of its own, since XLA's programs do not share one well. Worker
-processes are started once and kept; each loads the compiled programs from the cache.
+On several cores each core runs a process, since an XLA program gains little from several cores.
+Worker processes are started once and kept; each loads the compiled programs from the cache.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.errors import InputError
 from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.methods.branch_following.from_steady_sliding import BranchFollowing
 from asperity.orbit.methods.collocation.frequency_path import FrequencyPath
@@ -38,7 +39,7 @@ from asperity.orbit.outcome import (
 )
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
-from asperity.parameters.arguments import some_of
+from asperity.parameters.arguments import one_of
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import adiabatic_growth
 
@@ -81,7 +82,7 @@ METHODS: tuple[Method, ...] = (
     FrequencyPath(),
 )
 
-#: What a user may choose among.
+#: Names that a user may choose.
 CHOICES = tuple(dict.fromkeys(method.choice for method in METHODS))
 
 #: Earlier names of choices.
@@ -96,8 +97,10 @@ def chosen_methods(choices: Sequence[str]) -> tuple[Method, ...]:
     InputError
         If there is no method of a name.
     """
-    given = some_of(choices, (*CHOICES, *_SYNONYMS), "methods")
-    names = {_SYNONYMS.get(name, name) for name in given}
+    if not choices:
+        raise InputError("methods", "name a method", "none", "leave it out for all")
+    known = (*CHOICES, *_SYNONYMS)
+    names = {_SYNONYMS.get(n, n) for n in (one_of(c, known, "methods") for c in choices)}
     return tuple(method for method in METHODS if method.choice in names)
 
 
@@ -147,7 +150,7 @@ def find_orbits(
 #: Points handed to a process at a time: a fraction of a second of work.
 _SLICE = 20_000
 
-#: Below this many points the start of the processes, a second or two, is not worth it.
+#: With fewer points than this, starting processes (a second or two) takes longer than it saves.
 WORTHWHILE = 200_000
 
 
@@ -168,19 +171,19 @@ def find_orbits_on_cores(
     progress: Callable[[int], None],
     methods: tuple[Method, ...],
 ) -> Solution:
-    """`find_orbits` with the points dealt out to `workers` processes; same results, same order."""
+    """`find_orbits` with the points divided among `workers` processes; same results and order."""
     from loky import get_reusable_executor
 
     solution = Solution.unsolved(problem, points, SearchOptions(harmonics, phases, progress))
     options = {"harmonics": harmonics, "phases": phases, "methods": methods}
-    # One thread of XLA in each process, or they fight for the cores.
+    # One thread of XLA for each process; more threads than cores would slow all of them.
     executor = get_reusable_executor(max_workers=workers, env={"NPROC": "1"})
     waiting: list[tuple[np.ndarray, Any]] = []
     try:
         for start in range(0, points, _SLICE):
             index = np.arange(start, min(start + _SLICE, points))
             waiting.append((index, executor.submit(_search, take(problem, index), options)))
-            if len(waiting) > 2 * workers:  # bounds the results that wait in memory
+            if len(waiting) > 2 * workers:  # bounds the results in memory
                 _collect(solution, *waiting.pop(0), progress)
         while waiting:
             _collect(solution, *waiting.pop(0), progress)

@@ -13,6 +13,7 @@ from asperity.loads import Modulation
 from asperity.orbit.differentiable import ResponseFunction
 from asperity.orbit.gradient.parametrised import ParametrisedProblem, ResponseValues
 from asperity.orbit.outcome import Outcome
+from asperity.parameters.arguments import typed
 from asperity.slider import Slider
 from asperity.slider.problem import checked_problem, flatten
 
@@ -32,7 +33,7 @@ class Sensitivities:
     outcome : int array, shape (...)
         `Outcome` of each point.
     converged : bool array, shape (...)
-        False where no orbit was found, or not resolved; the derivatives there are NaN.
+        False where there is no resolved orbit; the derivatives are NaN there.
     mean_friction, mu1, mu2, phase1, phase2 : array, shape (..., parameters)
         d(output)/d(parameter) in SI; phases in rad.
     log_multipliers : complex array, shape (..., states, parameters)
@@ -55,6 +56,7 @@ class Sensitivities:
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
 
+@typed
 def sensitivities(
     slider: Slider,
     *,

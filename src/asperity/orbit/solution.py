@@ -51,7 +51,7 @@ class Solution(NamedTuple):
 
     @classmethod
     def unsolved(cls, problem: Problem, points: int, options: SearchOptions) -> Solution:
-        """No orbit of a problem yet."""
+        """A solution of a problem in which every point is unsolved."""
         return cls.empty(problem.system.size, points, options, scheme_for(problem.system))
 
     @classmethod
@@ -62,7 +62,7 @@ class Solution(NamedTuple):
         options: SearchOptions,
         scheme: CollocationScheme = GAUSS,
     ) -> Solution:
-        """No orbit with `size` states yet."""
+        """A solution with `size` states in which every point is unsolved."""
         return cls(
             np.full(points, np.nan),
             np.full((options.harmonics, points), np.nan + 0j),
@@ -83,7 +83,7 @@ class Solution(NamedTuple):
 
     @property
     def informed(self) -> NDArray[np.bool_]:
-        """Of which points a method learnt something, be it why there is no orbit."""
+        """Points with an outcome of a method, an orbit or the reason of a failure."""
         return (self.outcome != Outcome.NO_ORBIT) | (self.detail > 0)
 
     def store(
@@ -114,7 +114,7 @@ class Solution(NamedTuple):
 
 
 class SearchOptions(NamedTuple):
-    """Which observables are wanted, and progress.
+    """Requested observables, and progress.
 
     Attributes
     ----------
@@ -123,7 +123,7 @@ class SearchOptions(NamedTuple):
     progress : callable
         Called with the number of points solved since the last call.
     intervals : int
-        Of the meshes on which orbits are kept; 0 to keep none.
+        Number of intervals of the stored orbits; 0 to store none.
     """
 
     harmonics: int

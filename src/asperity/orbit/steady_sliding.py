@@ -1,4 +1,4 @@
-"""Steady sliding and the load cycle, before an orbit is known: what chooses the method."""
+"""Stiffness and amplitude measures of steady sliding, from which the search chooses the method."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import even_phases
 from asperity.theory.averaged import slip_pulse
 
-#: Phases at which the extremes of a load that is not harmonic are looked for.
+#: Number of phases at which the extremes of a non-harmonic load are sampled.
 _PHASES = 64
 #: Points in a call.
 _CHUNK = 4096

@@ -1,4 +1,4 @@
-"""Files and folders that a computation writes: checked first, and complete or absent at the end.
+"""Output files and folders: checked before a computation, and complete or absent after it.
 
 `targets` checks where results go before anything is computed, `file` and `folder` write them in
 one piece, and `unfinished` keeps the finished blocks of a long computation so that it can go on

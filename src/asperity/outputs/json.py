@@ -1,4 +1,4 @@
-"""Strict JSON, in which arrays are lists and numbers that are not finite null, and its files."""
+"""Strict JSON: arrays as lists, and numbers that are not finite as null."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def to_json(value: Any, *, indent: int | None = None) -> str:
 
 
 def plain(value: Any) -> Any:
-    """A tree of what JSON knows.
+    """A tree of JSON types.
 
     Complex arrays become pairs of real and imaginary part along a last axis.
     """
@@ -41,7 +41,7 @@ def plain(value: Any) -> Any:
 
 
 def json_content(file: Path) -> Any:
-    """What a JSON file of this package holds; None where there is none or it is damaged.
+    """Content of a JSON file of this package; None if it is missing or damaged.
 
     Devices and pipes have no end, and count as damaged.
     """

@@ -1,9 +1,9 @@
-"""Sections of a report, once described: as text for a terminal and as HTML for a page."""
+"""Sections of a report, rendered as text for a terminal and as HTML for a page."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from html import escape
 from typing import Any, NamedTuple
 
@@ -31,8 +31,19 @@ class Section(NamedTuple):
     warnings: tuple[str, ...] = ()
 
     def record(self) -> dict[str, Any]:
-        """Texts as JSON has them."""
+        """The section as JSON values."""
         return self._asdict()
+
+    def worded(self, words: Callable[[str], str]) -> Section:
+        """The section with every text in other words."""
+
+        def texts(row: Iterable[str]) -> tuple[str, ...]:
+            return tuple(words(text) for text in row)
+
+        rows = tuple(texts(row) for row in self.rows)
+        return Section(
+            words(self.title), texts(self.sentences), texts(self.head), rows, texts(self.warnings)
+        )
 
 
 def aligned(rows: Iterable[Row], indent: str = "") -> str:
@@ -80,7 +91,7 @@ def as_html(sections: Iterable[Section], *, level: int = 3) -> str:
 
 
 def rounded(value: float, doubt: float) -> tuple[str, str]:
-    """A number and its uncertainty, with as many digits as two uncertain ones allow.
+    """A number and its uncertainty, rounded to two uncertain digits.
 
     The uncertainty is empty where it is unknown or zero.
     """

@@ -1,4 +1,4 @@
-"""Checks of where a result goes, made before anything is computed.
+"""Checks of output paths, disk space and memory before a computation.
 
 Room in memory and on disk is checked before anything large is computed.
 """
@@ -28,13 +28,13 @@ def size_text(count: float) -> str:
 
 
 def free_memory() -> float:
-    """Bytes of memory that can still be filled; infinite where the system does not tell."""
+    """Free memory (bytes); infinite if unknown."""
     free = [_available(), _left_in_group()]
     return min(value for value in (*free, float("inf")) if value is not None)
 
 
 def free_disk(folder: Path) -> float:
-    """Bytes that a folder's disk can still hold; infinite where the system does not tell."""
+    """Free space on the disk of a folder (bytes); infinite if unknown."""
     try:
         return float(shutil.disk_usage(folder).free)
     except OSError:
@@ -42,14 +42,14 @@ def free_disk(folder: Path) -> float:
 
 
 def require_memory(size: float, name: str, what: str, way_out: str) -> None:
-    """Refuse what memory cannot hold.
+    """Refuse a computation that does not fit in memory.
 
     Parameters
     ----------
     size : float
         Bytes.
     name, what, way_out : str
-        Parts of the message: the field, what would be held, and what to do instead.
+        Parts of the message: the field, the content, and advice.
 
     Raises
     ------
@@ -60,7 +60,7 @@ def require_memory(size: float, name: str, what: str, way_out: str) -> None:
 
 
 def require_disk(size: float, folder: Path, name: str, what: str, way_out: str) -> None:
-    """Refuse what a folder's disk cannot hold; parameters as in `require_memory`.
+    """Refuse an output that does not fit on the disk; parameters as in `require_memory`.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def _require(size: float, free: float, name: str, what: str, way_out: str, where
 
 
 def _available() -> float | None:
-    """Memory that the system can hand out without swapping."""
+    """Memory that is available without swapping (bytes)."""
     try:
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
             if line.startswith("MemAvailable:"):
@@ -93,7 +93,7 @@ def _available() -> float | None:
 
 
 def _left_in_group() -> float | None:
-    """Memory left to the control group that the process runs in, such as a container's."""
+    """Free memory of the control group of the process, such as a container (bytes)."""
     group = Path("/sys/fs/cgroup")
     try:
         limit = (group / "memory.max").read_text(encoding="ascii").strip()
@@ -122,21 +122,21 @@ def output_file(
     ----------
     path : str or path
     name : str
-        What messages call it, such as ``"--out"``.
+        Name in messages, such as ``"--out"``.
     example : str
         A file name for messages.
     inputs : mapping of str to path, optional
-        Files that are read, by what messages call them: the output must be none of them.
+        Input files, by their names in messages; the output must be none of them.
 
     Raises
     ------
     InputError
-        If the path, or one of the files that are written beside it until it is complete, is a
+        If the path, or a temporary file next to it, is a
         folder, a pipe or a device, if its folder does not exist or cannot be written, or if it
         is one of the inputs.
     """
     target = _resolved(path, name, example)
-    files = (target, *_beside(target))
+    files = (target, *_temporary_files(target))
     require_short(target, files, name)
     for file in files:
         kind = not_a_file(file)
@@ -145,7 +145,7 @@ def output_file(
                 f"{name} must be the name of a file, got '{path}', which is {kind}; "
                 f"add a file name such as '{example}'"
                 if file == target
-                else f"{name} must leave room for '{file.name}' beside it, got '{path}', where "
+                else f"{name} must leave room for '{file.name}' next to it, got '{path}', where "
                 f"that is {kind}; choose another name, or move what is there"
             )
     folder = target.parent
@@ -177,14 +177,14 @@ def output_files(
     Parameters
     ----------
     paths : mapping of str to path or None
-        By what messages call them, such as ``"--csv"``; None for an output that is not wanted.
+        Outputs by their names in messages, such as ``"--csv"``; None for no output.
     inputs : mapping of str to path, optional
         As for `output_file`.
 
     Returns
     -------
     dict of str to Path
-        The wanted ones, with links followed.
+        The outputs that are not None, with links followed.
 
     Raises
     ------
@@ -221,8 +221,8 @@ def _resolved(path: str | os.PathLike[str], name: str, example: str) -> Path:
     return target
 
 
-def _beside(target: Path) -> tuple[Path, ...]:
-    """Files that may be written beside the target until it is complete."""
+def _temporary_files(target: Path) -> tuple[Path, ...]:
+    """Files that may be written next to the target until it is complete."""
     if not target.name:
         return ()
     partial = unfinished_name(target)
@@ -231,7 +231,7 @@ def _beside(target: Path) -> tuple[Path, ...]:
 
 
 def require_short(target: Path, files: Iterable[Path], name: str = "out") -> None:
-    """Refuse a target beside which files are written of whose names one is too long.
+    """Refuse a target if the name of a temporary file next to it is too long.
 
     Raises
     ------
@@ -243,23 +243,23 @@ def require_short(target: Path, files: Iterable[Path], name: str = "out") -> Non
     if length > _LONGEST:
         raise InputError(
             f"{name} must have a name of at most {_LONGEST - length + name_length} bytes, got "
-            f"{name_length}, which leaves no room for the names of files beside it; choose a "
+            f"{name_length}, which leaves no room for the names of temporary files; choose a "
             "shorter one"
         )
 
 
 def unfinished_name(target: Path) -> Path:
-    """Where the finished blocks of a long computation wait."""
+    """File of the finished blocks of a long computation."""
     return target.with_name(target.name + ".partial")
 
 
 def record_name(target: Path) -> Path:
-    """Where it is recorded what those blocks are."""
+    """File of the record of the finished blocks."""
     return target.with_name(target.name + ".partial.json")
 
 
 def fresh_name(target: Path) -> Path:
-    """Where a file is written that replaces the target when it is complete.
+    """Temporary file that replaces the target when it is complete.
 
     The suffix stays, because libraries choose a format by it.
     """
@@ -267,12 +267,12 @@ def fresh_name(target: Path) -> Path:
 
 
 def require_rereadable(path: Path, label: str) -> None:
-    """Refuse pipes and devices, which would be waited for, or never end.
+    """Refuse pipes and devices, which may block or never end.
 
     Raises
     ------
     InputError
-        If there is something else at the path than a regular file or a folder.
+        If the path is neither a regular file nor a folder.
     """
     other = not_a_file(path)
     if other and not path.is_dir():
@@ -282,7 +282,7 @@ def require_rereadable(path: Path, label: str) -> None:
 
 
 def not_a_file(path: Path) -> str:
-    """What a path is if it is no regular file; empty if it is one, or nothing."""
+    """Type of a path that is no regular file; empty for a file, or if nothing exists."""
     try:
         mode = path.stat().st_mode
     except OSError:

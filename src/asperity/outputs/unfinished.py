@@ -1,8 +1,8 @@
-"""The output of a long computation on its way: finished blocks, and a record of what they are.
+"""Resumable output of a long computation: finished blocks, and a record of them.
 
-``OUT.partial`` holds the finished blocks. ``OUT.partial.json``, the record, holds the inputs that
-they belong to and how far the computation has come. The record is replaced after each block has
-reached the disk: what lies behind the recorded end is a block that was never finished.
+``OUT.partial`` holds the finished blocks. ``OUT.partial.json``, the record, holds the inputs of the
+computation and its progress. The record is replaced after each block is on the disk: bytes behind
+the recorded end belong to an unfinished block.
 """
 
 from __future__ import annotations
@@ -26,20 +26,20 @@ from asperity.outputs.written import to_disk, writable
 
 _Result = TypeVar("_Result")
 
-#: Differences of the inputs that a message lists.
+#: Largest number of differences in a message.
 _LISTED = 3
 
-#: Bytes of finished blocks that are looked at together.
+#: Bytes of finished blocks that are read together.
 _PART = 2**20
 
 
 class Interrupted(KeyboardInterrupt):
-    """The user stopped a computation; the message says what is kept and how to go on.
+    """The user stopped a computation; the message tells what is kept and how to continue.
 
     Parameters
     ----------
     kept : str
-        What is finished, such as ``"8 of 12 rows"``; empty when nothing is kept.
+        The finished part, such as ``"8 of 12 rows"``; empty if nothing is kept.
     """
 
     def __init__(self, kept: str = "") -> None:
@@ -79,12 +79,12 @@ class UnfinishedOutput:
         self.progress: dict[str, Any] = {}
 
     def start(self, resume: bool) -> dict[str, Any]:
-        """Read what an interrupted computation has left.
+        """Read the record of an interrupted computation.
 
         Returns
         -------
         dict
-            The saved progress; empty where there is none.
+            The saved progress; empty without one.
 
         Raises
         ------
@@ -156,20 +156,20 @@ class UnfinishedOutput:
         self.record.unlink(missing_ok=True)
 
     def discard_if_empty(self) -> None:
-        """Leave nothing behind when not one block was finished."""
+        """Remove all files if no block was finished."""
         if not self.progress:
             self.discard()
 
 
 class UnfinishedText(UnfinishedOutput):
-    """Finished blocks that are lines of text, one behind the other.
+    """Finished blocks of lines of text.
 
     The progress holds ``length``, the bytes of the finished blocks, ``crc32``, their checksum,
     ``rows`` and whatever else is counted.
     """
 
     def start(self, resume: bool) -> dict[str, Any]:
-        """As in `UnfinishedOutput`, and make an empty file where nothing is finished."""
+        """As in `UnfinishedOutput`, and make an empty file if no block is finished."""
         progress = super().start(resume)
         if progress:
             if not self._whole():
@@ -181,7 +181,7 @@ class UnfinishedText(UnfinishedOutput):
         return progress
 
     def _whole(self) -> bool:
-        """Whether the finished blocks are those that were written."""
+        """Whether the finished blocks agree with their checksum."""
         left, checksum = self.progress.get("length", 0), 0
         with writable(self.target), self.data.open("rb") as stream:
             while left > 0 and (part := stream.read(min(left, _PART))):
@@ -194,7 +194,7 @@ class UnfinishedText(UnfinishedOutput):
         return int(self.progress.get("rows", 0))
 
     def append(self, text: str, rows: int, **counts: int) -> None:
-        """Add a block of `rows` rows behind the finished ones and record it.
+        """Append a block of `rows` rows and record it.
 
         Parameters
         ----------
@@ -229,9 +229,9 @@ class UnfinishedText(UnfinishedOutput):
 
     @contextmanager
     def interruptible(self, what: str, total: int, counted: str = "rows") -> Iterator[None]:
-        """Turn Ctrl-C into `Interrupted`, with how many of `total` are finished, called `what`.
+        """Raise `Interrupted` on Ctrl-C, with the finished number of `total`, called `what`.
 
-        Nothing is left behind where not one block was finished.
+        All files are removed if no block is finished.
 
         Parameters
         ----------
@@ -259,7 +259,7 @@ def _checksum(progress: Mapping[str, Any]) -> int:
 
 
 def undisturbed(work: Callable[[], _Result]) -> _Result:
-    """Do what an interruption must not tear apart.
+    """Run `work` without interruption by Ctrl-C.
 
     Ctrl-C reaches the main thread only, which waits here while another one works.
     """
@@ -279,13 +279,13 @@ def _flat(inputs: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def differences(saved: Mapping[str, Any], wanted: Mapping[str, Any]) -> str:
-    """Which inputs differ, in words; empty where all are the same.
+    """Differences between inputs, in words; empty if there are none.
 
     Parameters
     ----------
-    saved, asked : mapping of str to object
-        Inputs of what is there and of what is asked for, as JSON values; nested mappings are
-        allowed.
+    saved, wanted : mapping of str to object
+        Inputs of the existing output and of the present command, as JSON values; nested mappings
+        are allowed.
     """
     saved, wanted = _flat(saved), _flat(wanted)
     changed = [n for n in {**saved, **wanted} if saved.get(n, ...) != wanted.get(n, ...)]

@@ -1,4 +1,4 @@
-"""Files and folders that are written completely or not at all."""
+"""Atomic output: files and folders that are written completely or not at all."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _PREFIX = ".asperity-unfinished-"
 
 @contextmanager
 def written_file(target: str | os.PathLike[str], name: str = "out") -> Iterator[Path]:
-    """Hand out a path beside `target` whose file replaces `target` at the end.
+    """A temporary path next to `target`, whose file replaces `target` at the end.
 
     An error or an interruption leaves `target` as it was and removes the new file. What is
     written has reached the disk before it gets its name.
@@ -54,7 +54,7 @@ def written_file(target: str | os.PathLike[str], name: str = "out") -> Iterator[
 
 @contextmanager
 def writable(target: Path, name: str = "out") -> Iterator[None]:
-    """Turn an error of the file system into a sentence about `target`."""
+    """Raise an `InputError` about `target` in place of an error of the file system."""
     try:
         yield
     except OSError as error:
@@ -66,7 +66,7 @@ def writable(target: Path, name: str = "out") -> Iterator[None]:
 
 
 def to_disk(path: Path) -> None:
-    """Wait until the contents of a file have reached the disk."""
+    """Wait until the contents of a file are on the disk."""
     with path.open("rb+") as stream:
         os.fsync(stream.fileno())
 
@@ -87,10 +87,10 @@ def require_folder(folder: Path, name: str = "out") -> None:
 
 @contextmanager
 def written_folder(folder: Path, name: str = "out") -> Iterator[Path]:
-    """Hand out a temporary folder whose files are moved to `folder` at the end.
+    """A temporary folder, whose files are moved to `folder` at the end.
 
     An error, or an interruption, leaves `folder` as it was. Files of other names that lie there
-    stay. The temporary folder lies inside `folder` if that exists, else beside it, so that moving
+    stay. The temporary folder lies inside `folder` if that exists, else next to it, so that moving
     is renaming, which cannot stop half-way through a file. Temporary folders that killed processes
     have left at that place are removed; those of running processes stay.
 
@@ -123,7 +123,7 @@ def _staging(folder: Path, name: str) -> tuple[Path, int | None]:
 
 
 def held_folder(place: Path, prefix: str) -> tuple[Path, int | None]:
-    """A new temporary folder, and the descriptor that holds its lock where there are locks.
+    """A new temporary folder, and the descriptor of its lock (None without locks).
 
     Folders of the same prefix that killed processes have left are removed; those of running
     processes stay.
@@ -131,11 +131,11 @@ def held_folder(place: Path, prefix: str) -> tuple[Path, int | None]:
     Parameters
     ----------
     place : Path
-        Where it is made.
+        Parent folder.
     prefix : str
         With which its name begins.
     """
-    # Nobody else may take a folder for abandoned between its creation and its lock.
+    # Until it is locked, another process might take the new folder for abandoned and remove it.
     guard = _locked(place, wait=True)
     try:
         if guard is not None:

@@ -1,4 +1,4 @@
-"""A protocol: law, numbers and what an experimenter does, as a file and as an object."""
+"""`Protocol`: law, numbers and steps of an experiment."""
 
 from __future__ import annotations
 
@@ -6,33 +6,36 @@ import hashlib
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import PositiveInt, PrivateAttr, ValidationError, WrapValidator, model_validator
 
 from asperity import materials
-from asperity.errors import InputError, MistakesError, closest
+from asperity.errors import InputError, MistakesError
 from asperity.laws import get_law, registered
 from asperity.laws.uneven_track import on_uneven_track
 from asperity.loads import Programme, ProgrammeStep
 from asperity.loads.programme.steps import LoadAndVelocity
-from asperity.operating_point import SourcedNumber, sourced_numbers
-from asperity.parameters import MACHINE, canonical_name, law_parameters
+from asperity.operating_point import (
+    SourcedNumber,
+    known_parameters,
+    numbers_for,
+    refuse_foreign,
+    sourced_numbers,
+)
+from asperity.parameters import MACHINE, known_name, law_parameters
+from asperity.parameters.arguments import FilePath, typed
 from asperity.protocol.recording import RecordingSetup, setup_of
 from asperity.protocol.steps import PlannedStep, check_levels, plan
-from asperity.questions.record import Question, Record, shown
+from asperity.questions.record import Given, Question, Record, quantity, shown, without_unit
 from asperity.slider import Slider
 from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, transient
 from asperity.transients.inputs import MOST_STEPS, require_contact
 from asperity.transients.trajectory import planned_rows, row_bytes
-from asperity.units import to_si
 
-#: A number in SI, or a text with its unit.
-Given = float | str
-
-#: Segments whose values are listed one by one, so that two protocols can be compared.
+#: Segments whose values are part of the comparison of two protocols.
 _COMPARED = 100
 
 
@@ -50,7 +53,7 @@ def numbers_of(
     law_name : str
     stated : mapping of str to float or str
     material : str
-        Name, or file relative to `folder`; empty for none.
+        Name, or file relative to `folder`; may be empty.
     folder : Path
     inertia : bool
         Whether a mass is needed.
@@ -63,32 +66,16 @@ def numbers_of(
     """
     law = get_law(law_name)
     known = {**law_parameters(law), **MACHINE}
-    names = tuple(known)
+    refuse_foreign(law_name, stated)
     for name in stated:
-        if canonical_name(name, known) is None:
-            owners = [n for n, other in registered().items() if name in law_parameters(other)]
-            raise InputError(
-                f"parameters must belong to {law_name} or the machine, got '{name}'"
-                + (f", which belongs to {', '.join(owners)}; leave it out" if owners else "; ")
-                + ("" if owners else closest(name, names))
-            )
-    source = None
-    if material:
-        source = materials.load_from(folder, material)
+        known_name(name, known, "parameters")
+    source = materials.load_from(folder, material) if material else None
     numbers = sourced_numbers(stated, source, "protocol", law_name)
-    needed = [n for n in names if known[n].default is None or (n == "M" and inertia)]
-    missing = [n for n in needed if n not in numbers]
-    if missing:
-        raise InputError(
-            f"parameters must have all numbers of {law_name}, got none for {', '.join(missing)}; "
-            f"name a material that has them or give each one, like {missing[0]} = "
-            f'"{known[missing[0]].example}"'
-        )
-    return {name: numbers[name] for name in names if name in numbers}
+    return numbers_for(law_name, numbers, known, ("M",) if inertia else ())
 
 
 def slider_of(law_name: str, values: Mapping[str, float]) -> Slider:
-    """The slider that SI values by name describe."""
+    """The slider with these SI values, by name."""
     return slider_from(get_law(law_name), values)
 
 
@@ -99,7 +86,7 @@ class ProtocolError(MistakesError):
 
 
 def _each_step_once(steps: Any, fill: Callable[[Any], Any]) -> Any:
-    """The steps; a wrong one is one mistake, which pydantic reports for each kind of step."""
+    """The steps; a wrong step is one mistake, which pydantic would report for each kind of step."""
     try:
         return fill(steps)
     except ValidationError as error:
@@ -124,7 +111,7 @@ def _wrong_step(number: Any, reported: Any) -> InputError:
 
 
 class Repeat(Record):
-    """Steps done several times, one round after the other.
+    """Repeated steps.
 
     Attributes
     ----------
@@ -143,7 +130,7 @@ class ProtocolStart(Record):
     Attributes
     ----------
     velocity : float or str
-        Pulling velocity (m/s): the slider slides steadily at it, unless states are given.
+        Pulling velocity (m/s); without `states` the slider is in steady sliding at this velocity.
     load : float or str, optional
         Normal load (N), W0 by default.
     states : tuple of float, optional
@@ -151,8 +138,8 @@ class ProtocolStart(Record):
         `asperity.transients.transient`.
     """
 
-    velocity: Given
-    load: Given | None = None
+    velocity: quantity("velocity")  # type: ignore[valid-type]
+    load: quantity("force") | None = None  # type: ignore[valid-type]
     states: tuple[float, ...] | None = None
 
 
@@ -171,38 +158,38 @@ class Track(Record):
         Where on the track the slider begins (m).
     """
 
-    amplitude: Given
-    length: Given
+    amplitude: float
+    length: quantity("length")  # type: ignore[valid-type]
     exponent: float = 2.0
-    origin: Given = 0.0
+    origin: quantity("length") = 0.0  # type: ignore[valid-type]
 
 
 class SolverSettings(Record):
-    """How the motion is integrated and written.
+    """Settings of the integration and of the output.
 
     Attributes
     ----------
     inertia : bool
         Whether the mass of the slider counts.
     sampling : float or str, optional
-        Samples per second (Hz); the integrator's own steps by default.
+        Samples per second (Hz); the integrator's steps by default.
     rtol : float
         Tolerated relative error of a step.
     method : str
         "auto", "explicit" or "implicit".
     most_steps : float
-        Number of steps at which the integration stops and says so.
+        Largest number of steps of the integration.
     """
 
     inertia: bool = False
-    sampling: Given | None = None
+    sampling: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
     rtol: float = 1e-9
-    method: str = "auto"
+    method: Literal["auto", "explicit", "implicit"] = "auto"
     most_steps: float = MOST_STEPS
 
 
 class Protocol(Question):
-    """An experiment: what slides, how it begins, and the steps.
+    """An experiment: slider, initial state, and steps.
 
     Attributes
     ----------
@@ -212,14 +199,14 @@ class Protocol(Question):
         Lines such as ``"hold 10 s"``, steps of `asperity.loads`, or blocks of them.
     start : ProtocolStart
     material : str
-        Where numbers come from that `parameters` does not have.
+        Material whose numbers apply where `parameters` has none.
     parameters : mapping of str to float or str
         Numbers of the law, and K, W0, M and eta (radiation damping), by the names of tables.
     solver : SolverSettings
     track : Track, optional
         By default mu0 is the same everywhere.
     tribometer : mapping, optional
-        What a recording of the run is made with: fields of `Recorder`, ``seed``, and ``sensors``.
+        Recording of the run: fields of `Recorder`, ``seed``, and ``sensors``.
     title : str
     folder : Path
         Where files that steps name lie.
@@ -249,10 +236,16 @@ class Protocol(Question):
 
     @model_validator(mode="after")
     def _free_of_mistakes(self) -> Protocol:
-        planned, mistakes = plan(self.steps, self.folder)
+        planned, wrong = plan(self.steps, self.folder)
         self._planned.extend(planned)
+        known = known_parameters(self.law if self.law in registered() else None)
+        stated = self.parameters.items()
+        mistakes = without_unit(
+            (f"parameters.{n}", known[n].kind, v) for n, v in stated if n in known
+        )
+        mistakes += wrong
         try:
-            self._numbers.update(self._found_numbers())
+            self._numbers.update(self._sourced_numbers())
             level = self._level()
             _ = self.slider
         except InputError as error:
@@ -265,25 +258,22 @@ class Protocol(Question):
             mistakes.append(error)
         if mistakes:
             raise ProtocolError(mistakes)
-        # What concerns the programme as a whole, such as steps that take no time.
+        # Mistakes of the programme as a whole, such as steps without duration.
         require_contact(self.programme, self._numbers["W0"].value)
         return self
 
-    def _found_numbers(self) -> dict[str, SourcedNumber]:
+    def _sourced_numbers(self) -> dict[str, SourcedNumber]:
         return numbers_of(
             self.law, self.parameters, self.material, self.folder, self.solver.inertia
         )
 
     def _level(self) -> LoadAndVelocity:
         load = self._numbers["W0"].value if self.start.load is None else self.start.load
-        return LoadAndVelocity(
-            to_si(load, "force", "start.load"),
-            to_si(self.start.velocity, "velocity", "start.velocity"),
-        )
+        return LoadAndVelocity(load, self.start.velocity)
 
     @property
     def numbers(self) -> dict[str, SourcedNumber]:
-        """Parameters in SI by name, with where each comes from."""
+        """Parameters in SI by name, with their origins."""
         return dict(self._numbers)
 
     @cached_property
@@ -295,7 +285,7 @@ class Protocol(Question):
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Each step as it was written, repetitions written out."""
+        """The lines of the steps, with repetitions expanded."""
         return tuple(one.text for one in self._planned)
 
     @cached_property
@@ -309,15 +299,15 @@ class Protocol(Question):
 
     @cached_property
     def setup(self) -> RecordingSetup | None:
-        """What a recording of the run is made with, None without a tribometer."""
+        """Sensors and recorder of the run, None without a tribometer."""
         if self.tribometer is None:
             return None
-        K = self._numbers.get("K")  # none where another mistake has left no numbers
+        K = self._numbers.get("K")  # missing if another mistake prevents the numbers
         return setup_of(self.tribometer, self.solver.sampling, np.nan if K is None else K.value)
 
     @property
     def integration(self) -> dict[str, Any]:
-        """Keyword arguments for `asperity.transients.transient` besides slider and programme."""
+        """Keyword arguments of `asperity.transients.transient` except slider and programme."""
         eta = self._numbers.get("eta")
         states = self.start.states
         return {
@@ -332,7 +322,7 @@ class Protocol(Question):
 
     @property
     def rows(self) -> float | None:
-        """Number of rows that a run writes, None where the integrator's steps decide."""
+        """Number of rows of a run; None for the steps of the integrator."""
         return planned_rows(self.solver.sampling, self.programme.duration)
 
     @property
@@ -341,12 +331,12 @@ class Protocol(Question):
         return row_bytes(len(self.slider.law.state_names))
 
     def trajectory(self) -> Trajectory:
-        """The motion, all of it in memory; `run_protocol` writes it to a file block by block."""
+        """The whole motion in memory; `run_protocol` writes it to a file block by block."""
         return transient(self.slider, self.programme, **self.integration)
 
     @cached_property
     def inputs(self) -> dict[str, Any]:
-        """Everything that the motion depends on besides the version, as JSON values by name."""
+        """Everything that determines the motion except the version, as JSON values by name."""
         import jax
 
         digest = hashlib.sha256()
@@ -356,7 +346,7 @@ class Protocol(Question):
             for path, leaf in jax.tree_util.tree_leaves_with_path(segment):
                 values = np.asarray(leaf, float)
                 digest.update(values.tobytes())
-                # Recordings may have millions of samples: the digest covers them.
+                # A digest represents recordings, which may have millions of samples.
                 if values.ndim == 0 and number <= _COMPARED:
                     segments[f"segment {number}{jax.tree_util.keystr(path)}"] = float(values)
         return {
@@ -368,3 +358,21 @@ class Protocol(Question):
             **segments,
             "programme": digest.hexdigest(),
         }
+
+
+@typed
+def load_protocol(path: FilePath) -> Protocol:
+    """Read a protocol from a TOML file.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not TOML.
+    ProtocolError
+        An `InputError` that lists all mistakes, with file, step and a valid example.
+    """
+    return Protocol.from_file(path, folder=Path(path).parent)

@@ -1,16 +1,16 @@
-"""The recording that a laboratory would have of a run: a protocol's ``[tribometer]``."""
+"""The simulated recording of a run, from the protocol's table ``[tribometer]``."""
 
 from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from asperity.errors import InputError, closest
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import annotations_of, at_least, of_type, shown
 from asperity.recording.roles import candidates
 from asperity.recording.trace import Trace
 from asperity.tribometer.sensors import (
@@ -21,9 +21,8 @@ from asperity.tribometer.sensors import (
     SpringGauge,
 )
 from asperity.tribometer.tribometer import Recorder, Tribometer
-from asperity.units import to_si
 
-#: Sensors by the names that files give them, each with what it can measure, the usual first.
+#: Sensors by their names in files, each with its possible quantities, the usual one first.
 SENSORS: Mapping[str, tuple[type[Sensor], tuple[str, ...]]] = {
     "spring gauge": (SpringGauge, ("shear force",)),
     "load cell": (LoadCell, ("normal load", "shear force")),
@@ -31,7 +30,7 @@ SENSORS: Mapping[str, tuple[type[Sensor], tuple[str, ...]]] = {
     "displacement gauge": (DisplacementGauge, ("slider displacement", "load-point displacement")),
 }
 
-#: Variable of the motion for what a sensor measures; the load point is made of two.
+#: Variable of the motion for each quantity of a sensor; the load point needs two variables.
 _SIGNALS = {
     "shear force": "force",
     "normal load": "load",
@@ -39,13 +38,13 @@ _SIGNALS = {
     "load-point displacement": "load point",
 }
 
-#: Role that a channel's name may claim, with what plays it.
+#: Quantity that a channel must have whose name is that of a role.
 _CLAIMS = {"F": "shear force", "W": "normal load"}
 
 
 @dataclasses.dataclass(frozen=True)
 class RecordingSetup:
-    """What a protocol says of its recording.
+    """The recording of a protocol: tribometer, quantities and seed.
 
     Attributes
     ----------
@@ -66,16 +65,16 @@ class RecordingSetup:
 
 
 def setup_of(
-    table: Mapping[str, Any], sampling: float | str | None, stiffness: float = np.nan
+    table: Mapping[str, Any], sampling: float | None, stiffness: float = np.nan
 ) -> RecordingSetup:
-    """The tribometer that a table of a protocol describes.
+    """The tribometer of a table of a protocol.
 
     Parameters
     ----------
     table : mapping
         Fields of `Recorder`, ``seed``, and ``sensors``: a table for each channel, with ``type``,
         the fields of that sensor and, where it can measure several things, ``measures``.
-    sampling : float, str or None
+    sampling : float or None
         At which the motion is written (Hz).
     stiffness : float
         Of the spring (N/m).
@@ -87,8 +86,7 @@ def setup_of(
     """
     settings = dict(table)
     seed, described = settings.pop("seed", 0), settings.pop("sensors", {})
-    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise InputError("tribometer.seed", "be a whole number from 0", shown(seed), "correct it")
+    of_type(seed, Annotated[int, at_least(0)], "tribometer.seed")
     if not isinstance(described, Mapping) or not described:
         raise InputError(
             "tribometer.sensors",
@@ -105,7 +103,7 @@ def setup_of(
 
 
 def record_run(setup: RecordingSetup, run: str | Path) -> Trace:
-    """Record the motion of a run; all of it is in memory.
+    """Record the motion of a run; the whole motion is in memory.
 
     Parameters
     ----------
@@ -126,7 +124,7 @@ def record_run(setup: RecordingSetup, run: str | Path) -> Trace:
         stretched = (motion["force"] - motion["force"][:1]) / setup.stiffness
         motion["load point"] = motion["displacement"] + stretched
     signals = {channel: motion[name] for channel, name in setup.exposed.items()}
-    # A motion that has ended early ends between two samples of its clock.
+    # A motion that ends early may end between two samples.
     even = time.size - 1 if time.size > 3 and _last_is_odd(time) else time.size
     signals = {channel: values[:even] for channel, values in signals.items()}
     return setup.tribometer.record(time[:even], signals, seed=setup.seed, provenance=provenance)
@@ -160,47 +158,28 @@ def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
             f"{place}.measures",
             f"be given for a {name} in a channel of this name",
             "nothing",
-            f"it measures the {measured} unless it says measures = '{claimed}'",
+            f"it measures the {measured} without measures = '{claimed}'",
         )
     return _made(made, options, place), _SIGNALS[measured]
 
 
 def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
-    known = {f.name: f for f in dataclasses.fields(kind)}
-    for name in fields:
+    known = annotations_of(kind.__init__)
+    for name, value in fields.items():
         if name not in known:
             advice = closest(name, known)
-            raise InputError(f"{place}.{name}", "be a known field", shown(fields[name]), advice)
-        if isinstance(fields[name], list) or (
-            isinstance(fields[name], Mapping) and name != "ranges"
-        ):
-            raise InputError(
-                f"{place}.{name}",
-                "be one value",
-                shown(fields[name]),
-                "give a number or a text with its unit",
-            )
-    for name, field in known.items():
+            raise InputError(f"{place}.{name}", "be a known field", shown(value), advice)
+        of_type(value, known[name], f"{place}.{name}")
+    for field in dataclasses.fields(kind):
         needed = field.default is field.default_factory is dataclasses.MISSING
-        if needed and name not in fields:
-            raise InputError(f"{place}.{name}", "be given", "nothing", "add it")
-    try:
-        return kind(**fields)
-    except TypeError:
-        raise InputError(
-            place,
-            "hold numbers and texts with units",
-            f"{dict(fields)}",
-            "correct the one that is neither",
-        ) from None
+        if needed and field.name not in fields:
+            raise InputError(f"{place}.{field.name}", "be given", "nothing", "add it")
+    return kind(**fields)
 
 
-def _check_sampling(
-    sampling: float | str | None, recorder: Recorder, sensors: Mapping[str, Sensor]
-) -> None:
-    """Before anything is computed: what the tribometer will ask of the motion."""
+def _check_sampling(rate: float | None, recorder: Recorder, sensors: Mapping[str, Sensor]) -> None:
+    """Check, before the computation, the sampling that the tribometer needs of the motion."""
     wanted = max(recorder.rate, *(2 * sensor.bandwidth for sensor in sensors.values()))
-    rate = None if sampling is None else to_si(sampling, "frequency", "solver.sampling")
     if rate is None or rate < wanted:
         shown = "none" if rate is None else f"{rate:g} Hz"
         raise InputError(

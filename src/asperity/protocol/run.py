@@ -1,14 +1,13 @@
-"""A protocol from its first step to its last, into a NetCDF file.
+"""Running a protocol into a NetCDF file, with resumption after an interruption.
 
 The state of an unfinished run is saved with its finished blocks, from which it is resumed.
 
-A run that begins with unstable steady sliding says so.
+A run that begins with unstable steady sliding reports this.
 """
 
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
@@ -21,9 +20,8 @@ import numpy as np
 from asperity import materials
 from asperity.errors import InputError
 from asperity.outputs import Interrupted, UnfinishedOutput, output_file, require_disk, undisturbed
-from asperity.parameters.arguments import file_path, function, switch
-from asperity.protocol.load import load_protocol
-from asperity.protocol.protocol import Protocol
+from asperity.parameters.arguments import FilePath, typed
+from asperity.protocol.protocol import Protocol, load_protocol
 from asperity.protocol.run_file import CHUNKS, append, describe
 from asperity.theory import closed_forms as cf
 from asperity.transients import Checkpoint, Trajectory, integrate_blocks
@@ -31,15 +29,15 @@ from asperity.transients import Checkpoint, Trajectory, integrate_blocks
 if TYPE_CHECKING:
     import xarray
 
-    from asperity.protocol.protocol import Protocol
+    from asperity.protocol.protocol import Protocol, load_protocol
 
 
-#: Growth per slipped metre (1/m) that counts as zero: far below that of any interface.
+#: Growth per slip distance (1/m) that counts as zero, far below that of any interface.
 _ROUND_OFF = 1e-3
 
 
 def stability_statement(protocol: Protocol) -> str:
-    """A sentence where the run begins with steady sliding that is unstable; empty where not.
+    """A sentence if the run begins with unstable steady sliding, else empty.
 
     Without a perturbation such sliding goes on until rounding errors have grown: what the run
     shows before is no stable state.
@@ -110,7 +108,7 @@ def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
     )
 
 
-#: Rows integrated and written at a time: at most so many are lost by an interruption.
+#: Rows of a block, the most that an interruption loses.
 _ROWS = 20_000
 
 
@@ -125,7 +123,7 @@ class RunProgress:
     time : float
         Time of the last row (s); NaN without one.
     checkpoint : Checkpoint or None
-        Where the integration goes on.
+        State from which the integration continues.
     steady_segment : int
         Segment of the last event "steady", -1 without one.
     steps, rejected : int
@@ -135,7 +133,7 @@ class RunProgress:
     methods : list of str
         Methods of integration that have been used.
     stopped : str
-        Why the motion ended before the programme; empty where it did not.
+        Reason why the motion ended before the programme; empty if it did not.
     finished : bool
         Whether nothing follows.
     """
@@ -152,7 +150,7 @@ class RunProgress:
     finished: bool = False
 
     def to_json(self) -> dict[str, Any]:
-        """Return JSON values; doubles are read back as they are."""
+        """Return JSON values, from which doubles are restored exactly."""
         values = {f.name: getattr(self, f.name) for f in fields(self)}
         if self.checkpoint is not None:
             state = {f.name: getattr(self.checkpoint, f.name) for f in fields(self.checkpoint)}
@@ -187,7 +185,7 @@ class RunSummary:
     time : float
         Time of the last row (s).
     stopped : str or None
-        Why the motion ended before the programme, in a sentence; None where it did not.
+        Sentence why the motion ended before the programme; None if it did not.
     out : Path
     unstable_start : str
         A sentence where the run begins with steady sliding that is unstable; empty where not.
@@ -221,7 +219,7 @@ def run_protocol(
         NetCDF file, written when the run is finished. Until then the finished blocks are in
         ``OUT.partial``, which can be read.
     resume : bool
-        Continue an interrupted run; without one, start from the beginning.
+        Whether to continue an interrupted run, if there is one.
     progress : callable, optional
         Called now and then with the time reached and the end of the programme (s).
     rows : int
@@ -254,7 +252,7 @@ def run_protocol(
             attributes["unstable_start"] = unstable
         undisturbed(partial(_close, output, attributes))
     except InputError as error:
-        # A protocol calls the argument `initial` of a transient otherwise.
+        # The argument `initial` of a transient is `start.states` of a protocol.
         if not str(error).startswith("initial "):
             raise
         raise InputError(f"start.states{str(error).removeprefix('initial')}") from None
@@ -313,7 +311,7 @@ def _one_block(
         progress=progress,
         **protocol.integration,
     )
-    # After a last block that was filled exactly only the end remains.
+    # If the last block is exactly full, only the end of the motion remains.
     for block in islice(blocks, 1):
         new = not block.time.size or not block.time[0] <= done.time
         events, steady_segment = _new_events(protocol, block, done.steady_segment)
@@ -384,7 +382,7 @@ def _new_events(
 
 
 def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
-    """Attributes of the file besides those of the solver."""
+    """Attributes of the file in addition to those of the solver."""
     numbers = protocol.numbers
     works = materials.cited_works(protocol.slider.law.source)
     if protocol.material:
@@ -406,9 +404,10 @@ def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
     }
 
 
+@typed
 def run_experiment(
-    protocol: Protocol | str | os.PathLike[str],
-    out: str | os.PathLike[str],
+    protocol: Protocol | FilePath,
+    out: FilePath,
     *,
     resume: bool = False,
     progress: Callable[[float, float], None] | None = None,
@@ -435,9 +434,5 @@ def run_experiment(
     InputError
         If the protocol has a mistake, or `out` cannot be written.
     """
-    chosen = protocol
-    if not isinstance(chosen, Protocol):
-        chosen = load_protocol(file_path(chosen, "protocol"))
-    target = file_path(out, "out")
-    resume, progress = switch(resume, "resume"), function(progress, "progress")
-    return run_protocol(chosen, target, resume=resume, progress=progress)
+    chosen = protocol if isinstance(protocol, Protocol) else load_protocol(protocol)
+    return run_protocol(chosen, Path(out), resume=resume, progress=progress)

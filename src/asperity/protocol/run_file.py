@@ -1,4 +1,4 @@
-"""The NetCDF file of a run: written block by block, and read in blocks as text or as an outline.
+"""The NetCDF file of a run: writing block by block, export as text, and outline for figures.
 
 Memory does not grow with the file.
 """
@@ -38,7 +38,7 @@ _ROWS = 4 * CHUNKS["time"]
 
 
 def append(path: Path, block: xarray.Dataset, done: Mapping[str, int]) -> None:
-    """Add a block after the finished ones; an unfinished block behind them is overwritten.
+    """Append a block to the finished blocks; an unfinished block is overwritten.
 
     The file is closed again, so that it is whole and readable between blocks.
 
@@ -47,7 +47,7 @@ def append(path: Path, block: xarray.Dataset, done: Mapping[str, int]) -> None:
     path : Path
         Created where nothing is done yet.
     block : xarray.Dataset
-        Variables over ``time`` or ``event``, and others, which are written once.
+        Variables over ``time`` or ``event``, and further variables, which are written once.
     done : mapping of str to int
         Length of each growing dimension so far; empty at the beginning.
 
@@ -173,7 +173,7 @@ def outline(run: str | Path, stretches: int = 2000) -> RunOutline:
     run : str or path
         NetCDF file of `run_protocol`.
     stretches : int
-        At most; fewer where there are fewer rows.
+        Largest number of intervals; fewer for fewer rows.
     """
     import h5netcdf
 

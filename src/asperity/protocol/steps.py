@@ -1,7 +1,7 @@
-"""Lines such as ``modulate 24 % at 120 Hz for 20 s`` to the steps of a programme.
+"""Parsing of lines such as ``modulate 24 % at 120 Hz for 20 s`` to steps of a programme.
 
-A line is one of the forms below. Words in braces are quantities with their units; what stands in
-square brackets may be left out.
+A line has one of the forms below. Words in braces are quantities with their units; parts in square
+brackets are optional.
 """
 
 from __future__ import annotations
@@ -34,13 +34,13 @@ from asperity.recording import read
 from asperity.recording.defects.rounded_time import even_times
 from asperity.units import to_si
 
-#: What a recording can prescribe: the role of its channel, and the kind that it must be of.
+#: Quantities that a recording can prescribe: the role and the kind of the channel.
 _CHANNELS = {"load": ("W", "force"), "velocity": ("velocity", "velocity")}
 
 #: Findings that make a recording unusable here: interpolation would hide them.
 _UNUSABLE = frozenset({"gap", "truncated", "malformed row", "repeated time", "backward time"})
 
-#: What each quantity of a form measures.
+#: Kind of each quantity of a form.
 _KINDS = {
     "duration": "time",
     "rise": "time",
@@ -53,7 +53,7 @@ _KINDS = {
     "frequency": "frequency",
 }
 
-#: Steps that a protocol may have with all repetitions: a misprint must not fill the memory.
+#: Largest number of steps with repetitions; a misprint must not fill the memory.
 MOST = 100_000
 
 
@@ -86,7 +86,7 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
             raise InputError(
                 "follow",
                 f"take a recording without '{finding.name}'",
-                f"'{path.name}': {finding.sentence} Cut it to a part that is whole",
+                f"'{path.name}': {finding.sentence} Cut it to a part without this defect",
             )
     values: dict[str, np.ndarray] = {}
     for name in names:
@@ -116,7 +116,7 @@ def follow(channels: str, file: str, folder: Path) -> Follow:
 
 @dataclass(frozen=True)
 class StepForm:
-    """One way to write a step.
+    """A form of a step.
 
     Attributes
     ----------
@@ -158,7 +158,7 @@ def _modulate(parts: Mapping[str, Any], folder: Path) -> ProgrammeStep:
     return Modulate(**parts)
 
 
-#: Every form that a step can take.
+#: All forms of steps.
 FORMS = (
     StepForm("hold[for] {duration}", "hold 10 s", lambda parts, folder: Hold(**parts)),
     StepForm(
@@ -204,20 +204,20 @@ REPEAT_EXAMPLE = "repeat 3 times: hold 10 s; slide for 60 s"
 
 
 def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
-    """One line of a protocol as a step.
+    """A line of a protocol as a step.
 
     Parameters
     ----------
     text : str
     name : str
-        What messages call it, such as ``"steps[3]"``.
+        Name in messages, such as ``"steps[3]"``.
     folder : Path
         Where files that the line names lie.
 
     Raises
     ------
     InputError
-        If the line is no step, or one of its quantities is not what it has to be.
+        If the line has no known form, or an invalid quantity.
     """
     line = " ".join(text.split())
     forms = _meant(line, name)
@@ -227,7 +227,7 @@ def parse_step(text: str, name: str, folder: Path) -> ProgrammeStep:
             parts = {key: value for key, value in match.groupdict().items() if value is not None}
             return form.build(_quantities(parts, name, line, form.example), folder)
     examples = " or ".join(f"'{form.example}'" for form in forms)
-    raise InputError(name, "be a whole step", f"'{line}'", f"write it like {examples}")
+    raise InputError(name, "be a complete step", f"'{line}'", f"write it like {examples}")
 
 
 def _meant(line: str, name: str) -> list[StepForm]:
@@ -238,7 +238,7 @@ def _meant(line: str, name: str) -> list[StepForm]:
         if forms:
             return forms
     verbs = sorted({verb for form in FORMS for verb in (form.verb, form.verb.split()[0])})
-    # `ramp` alone names two forms, neither of which is meant more than the other.
+    # `ramp` begins two forms, and there is no reason to prefer one of them.
     if words and words[0] in verbs:
         return [form for form in FORMS if form.verb.split()[0] == words[0]]
     verbs = [*verbs, "repeat"]
@@ -259,7 +259,7 @@ def _meant(line: str, name: str) -> list[StepForm]:
 def _quantities(
     parts: Mapping[str, str], name: str, line: str, example: str
 ) -> dict[str, float | str]:
-    """Values in SI; what is no quantity stays a text."""
+    """Values in SI; parts that are no quantities stay texts."""
     quantities: dict[str, float | str] = {}
     for key, text in parts.items():
         if key not in _KINDS:
@@ -282,7 +282,7 @@ class PlannedStep:
 
 
 def plan(steps: Sequence[Any], folder: Path) -> tuple[list[PlannedStep], list[InputError]]:
-    """All steps in their order, repetitions written out, and the mistakes in them.
+    """All steps in order, with repetitions expanded, and their mistakes.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Signals as a laboratory has them: a `Trace` of channels over time, read, checked and measured."""
+"""Recordings of a laboratory: a `Trace` of channels over time, its readers, checks and writers."""
 
 from asperity.recording.defects.check import check
 from asperity.recording.derived import derive

@@ -1,4 +1,4 @@
-"""Conversions that need a number from outside the recording: never done unless asked for.
+"""Conversions that need a number from outside the recording; only the user calls them.
 
 Rock mechanics records stresses over an area, coefficients of friction, and stiffness as change of
 friction per length of slip. The models here are in forces: F = mu W, W = sigma_n A, K = k W.
@@ -20,7 +20,7 @@ _PER_LENGTH = re.compile(r"\s*([-+.\deE]+)\s*(?:friction|mu|1)?\s*/\s*(.+?)\s*")
 def stress_to_force(
     trace: Trace, area: float | str, channels: Sequence[str] | None = None
 ) -> Trace:
-    """Stresses times the area that they act on.
+    """Convert stresses to forces by the nominal contact area.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def stress_to_force(
     area : float or str
         Nominal contact area (m^2, or a text such as ``"25 cm^2"``), the same for all channels.
     channels : sequence of str, optional
-        Names or roles; all pressures without it.
+        Names or roles; all pressures by default.
 
     Returns
     -------
@@ -70,7 +70,7 @@ def _pressure(trace: Trace, name: str) -> str:
 
 
 def friction_to_force(trace: Trace, name: str = "F") -> Trace:
-    """Shear force (or stress) that a recorded coefficient of friction stands for, F = mu W.
+    """Shear force (or stress) F = mu W from a recorded coefficient of friction.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def friction_to_force(trace: Trace, name: str = "F") -> Trace:
 
 
 def stiffness_from_friction(stiffness: float | str, load: float | str) -> float:
-    """Stiffness in force per length of one given as friction per length, K = k W.
+    """Convert a stiffness in friction per length to force per length, K = k W.
 
     Parameters
     ----------

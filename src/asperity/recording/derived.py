@@ -1,4 +1,4 @@
-"""Channels that are computed from those of the file: effective stress, area, gain, zero, clock."""
+"""Channels computed from recorded ones: effective stress, area, gain, zero offset, clock."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from asperity.units.scale import base_units, kind_of_dimension, unit_text
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-#: Findings on time, which belong to no channel.
+#: Findings about time, not about a channel.
 _OF_TIME = frozenset({"backward time", "repeated time", "rounded time", "gap", "uneven sampling"})
 
 
@@ -40,13 +40,13 @@ def derive(trace: Trace, channels: Mapping[str, str]) -> Trace:
     Returns
     -------
     Trace
-        With the expressions in its provenance. What was found in the channels that a new one is
-        made of is a finding of the new one too.
+        With the expressions in its provenance. A new channel has the findings of the channels in
+        its expression.
 
     Raises
     ------
     InputError
-        If an expression cannot be understood, or gives what its role cannot be.
+        If an expression is invalid, or its unit does not fit the role.
     """
     for target, text in channels.items():
         field = f"channels['{target}']"
@@ -124,7 +124,7 @@ def _names(trace: Trace, field: str) -> Names:
 
 
 def _key_of(trace: Trace, name: str) -> str | None:
-    """The channel that a name means: as it is, as a heading, by its role, or but for its dots."""
+    """The channel of a name: a name, a heading, a role, or a name that differs by dots only."""
     if name in trace.channels:
         return name
     headings = [key for key, c in trace.channels.items() if c.recorded_name == name]
@@ -156,7 +156,7 @@ def _quantity(channel: Channel, key: str, field: str) -> Quantity:
     if channel.kind is not None:
         return Quantity(channel.values, base_units(channel.unit)[1])
     if not channel.recorded_unit:
-        # A column without any unit is a column of numbers.
+        # A column without a unit is dimensionless.
         return Quantity(channel.values, ())
     try:
         factor, dimension = base_units(channel.recorded_unit)
@@ -171,7 +171,7 @@ def _quantity(channel: Channel, key: str, field: str) -> Quantity:
 def _inherited(
     findings: tuple[Finding, ...], sources: tuple[str, ...], target: str, known: set[str]
 ) -> list[Finding]:
-    """What is known of the sources that a check of the new channel may not see."""
+    """Findings of the source channels, which a check of the new channel may miss."""
     made = []
     for source in sources:
         for f in findings:

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 #: Characters and levels of brackets that a text may have.
 _LONGEST, _DEEPEST = 2000, 40
-#: Powers beyond this are misprints.
+#: Larger powers are treated as misprints.
 _HIGHEST_POWER = 16.0
 
 _UNIT = r"(?:[^\W\d_]|[%°])+(?:\^?-?\d+)?"
@@ -54,7 +54,7 @@ class Quantity(NamedTuple):
 
 
 class Names(NamedTuple):
-    """Where names of an expression lead.
+    """Lookup of the names in an expression.
 
     Attributes
     ----------
@@ -79,7 +79,7 @@ class Evaluated:
     ----------
     quantity : Quantity
     sources : tuple of str
-        Channels that it is made of.
+        Channels in the expression.
     """
 
     quantity: Quantity
@@ -94,22 +94,22 @@ def evaluate(text: str, names: Names, field: str) -> Evaluated:
     text : str
     names : Names
     field : str
-        What messages call the expression, such as ``"channels['load']"``.
+        Name of the expression in messages, such as ``"channels['load']"``.
 
     Raises
     ------
     InputError
-        If it is no expression, a name or unit is unknown, or dimensions do not agree.
+        If the text is no expression, a name or unit is unknown, or dimensions do not agree.
     """
     expression = _Expression(text, names, field)
-    # What overflows becomes infinite, and is reported by the check of the channel.
+    # Overflow gives infinity, which the check of the channel reports.
     with np.errstate(all="ignore"):
         quantity = expression.value()
     return Evaluated(quantity, tuple(dict.fromkeys(expression.sources)))
 
 
 class _Expression:
-    """A text, and what its names, numbers and units stand for."""
+    """A parsed text, and the quantities of its names, numbers and units."""
 
     def __init__(self, text: str, names: Names, field: str) -> None:
         self.text, self.names, self.field = text, names, field
@@ -182,7 +182,7 @@ class _Expression:
         if text is None:
             unit = self._unit(token["behind"] or "")
             return Quantity(np.float64(number * unit.values), unit.dimension), token.end()
-        # "2 N/area" is a number with a unit over a channel: as much is a unit as can be one.
+        # "2 N/area" is 2 N divided by a channel: the longest valid unit belongs to the number.
         length = len(text)
         while length > 0:
             try:
@@ -305,7 +305,7 @@ class _Expression:
 
 @dataclass(frozen=True)
 class Function:
-    """A function of expressions: how many values it takes, and what it makes of them."""
+    """A function of expressions: its number of arguments, and its implementation."""
 
     arguments: tuple[int, ...]
     example: str

@@ -1,4 +1,4 @@
-"""What a check has found in a recording: a number and a sentence, never a silent repair."""
+"""Findings: the defects of a recording, each as a number and a sentence."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from asperity.errors import InputError, printable
 
 Severity = Literal["note", "warning", "error"]
 
-#: Findings on a file whose columns are not all that was recorded, or not under their names.
+#: Findings about files that may lack recorded columns, or have them under wrong names.
 _COLUMNS = frozenset(
     {"truncated", "heading mismatch", "other length", "short column", "text column"}
 )
@@ -18,7 +18,7 @@ _COLUMNS = frozenset(
 
 @dataclass(frozen=True)
 class Finding:
-    """One thing that a reader or a check noticed in a recording.
+    """A defect of a recording, or an assumption of its reader.
 
     Attributes
     ----------
@@ -28,11 +28,11 @@ class Finding:
         A note changes no result, a warning can, an error means that part of the recording is
         missing or unusable.
     number : float
-        How much of it there is; the sentence says in what unit.
+        Size of the defect; the sentence has the unit.
     where : str
         Channel, row (counted from 0) and time of the first or largest occurrence.
     sentence : str
-        What was found, for a person to read.
+        The sentence for the user.
 
     Control characters of a damaged file are escaped, and long texts cut.
     """
@@ -52,14 +52,14 @@ class Finding:
 
 
 def with_cause(error: InputError, findings: Iterable[Finding]) -> InputError:
-    """An error about a column that is not in a file, with what is wrong with the file's columns.
+    """An error about a missing column, with the findings about the columns of the file added.
 
     Parameters
     ----------
     error : InputError
-        It stays as it is where nothing is wrong with them.
+        Unchanged if there is no such finding.
     findings : iterable of Finding
-        What the reader noticed.
+        Findings of the reader.
     """
     causes = [f.sentence.rstrip(".") for f in findings if f.name in _COLUMNS]
     return InputError(f"{error} ({'; '.join(causes)})") if causes else error

@@ -1,4 +1,4 @@
-"""Which channel plays which part: time, load W, shear force F, velocity, displacement, friction.
+"""Roles of channels: time, load W, shear force F, velocity, displacement, friction.
 
 Laboratories name the same quantity in a dozen ways. A role is matched by the words of the name and
 by the kind of its unit; where two channels fit, nothing is chosen and the answer names both.
@@ -16,7 +16,7 @@ from asperity.errors import Argument, InputError, closest
 
 @dataclass(frozen=True)
 class Role:
-    """How the channels of one role are named.
+    """Names and units of the channels of a role.
 
     Attributes
     ----------
@@ -25,13 +25,13 @@ class Role:
     whole : frozenset of str
         Whole names, lower case without separators.
     words : tuple of str
-        Beginnings of words, one of which the name holds.
+        Beginnings of words; a name of the role has a word with such a beginning.
     weak : frozenset of str
         Whole names that count only where nothing else fits.
     without : tuple of str
         Beginnings of words that rule the name out.
     kinds : frozenset of str
-        What the unit may measure; an unknown unit rules nothing out.
+        Allowed kinds of the unit; an unknown unit is allowed, too.
     """
 
     also: frozenset[str]
@@ -128,14 +128,14 @@ def words(name: str) -> list[str]:
     ``"Normal_stress"`` and ``"NormalStress"`` agree.
     """
     if not name.isascii():
-        # The micro sign becomes the Greek letter, and an accent a mark of its own, left out here.
+        # The micro sign becomes the Greek letter; accents become separate marks and are dropped.
         apart = unicodedata.normalize("NFKD", name)
         name = "".join(c for c in apart if not unicodedata.combining(c))
     return [w.lower() for w in _WORD.findall(name)]
 
 
 def role_of(name: str) -> str | None:
-    """The role that a name stands for, such as W for ``"load"``; None if it is none."""
+    """The role of a name, such as W for ``"load"``; None without a role."""
     for role, spec in ROLES.items():
         if name == role or name in spec.also or name.lower() == role.lower():
             return role
@@ -170,7 +170,7 @@ def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str
     kinds : mapping
         Kind of each channel, None where the unit is unknown.
     chosen : mapping
-        Channels that the user has already given a role.
+        Channels whose role the user has chosen.
 
     Raises
     ------

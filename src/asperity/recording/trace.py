@@ -1,4 +1,4 @@
-"""A recording, simulated or measured: time and channels in SI, with what was found in it."""
+"""`Trace`: a measured or simulated recording, with time and channels in SI and its findings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One recorded quantity.
+    """A recorded quantity.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Channel:
     unit : str
         SI unit of `values`; empty for a pure number and for an unknown unit.
     recorded_name, recorded_unit : str
-        As the file has them; empty where it has none.
+        As in the file; empty without one.
     """
 
     values: NDArray[np.float64]
@@ -60,7 +60,7 @@ class Channel:
 
 @dataclass(frozen=True, eq=False)
 class Trace(Displayed):
-    """Channels over one time axis, with all that is known about them.
+    """Channels over a common time axis, with findings and provenance.
 
     Attributes
     ----------
@@ -69,9 +69,9 @@ class Trace(Displayed):
     channels : mapping of str to Channel
         In the order of the file, under their recorded names; time is not among them.
     findings : tuple of Finding
-        What the reader and `asperity.recording.check` found; empty when nothing was.
+        Findings of the reader and of `asperity.recording.check`.
     provenance : dict
-        Where the trace comes from: file, format, decisions of the reader; or the simulation.
+        Origin of the trace: file, format and decisions of the reader; or the simulation.
     roles : mapping of str to str
         Channels chosen for a role, such as ``{"F": "Shear"}``; other roles go by name.
     """
@@ -140,12 +140,12 @@ class Trace(Displayed):
         return even_rate(self.time)
 
     def slice(self, start: float | str | None = None, end: float | str | None = None) -> Trace:
-        """Samples with ``start <= time < end``, checked anew.
+        """Samples with ``start <= time < end``, checked again.
 
         Parameters
         ----------
         start, end : float, str or None
-            Seconds on the trace's own clock, or texts such as ``"10 s"``; None is no limit.
+            Seconds on the clock of the trace, or texts such as ``"10 s"``; None is no limit.
 
         Raises
         ------

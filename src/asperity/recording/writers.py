@@ -18,7 +18,7 @@ from asperity.units import KINDS
 if TYPE_CHECKING:
     from asperity.recording.trace import Trace
 
-#: Unit and values of each channel, as they are to be written.
+#: Unit and values of each channel in the file.
 _Columns = Mapping[str, tuple[str, NDArray[np.float64]]]
 
 #: Rows that are formatted at a time.
@@ -33,7 +33,7 @@ def write(
     *,
     units: Mapping[str, str] | None = None,
 ) -> Path:
-    """Write a recording as a laboratory would; `asperity.recording.read` reads it back.
+    """Write a recording to a file, which `asperity.recording.read` reads back.
 
     Parameters
     ----------

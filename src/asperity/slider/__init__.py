@@ -1,4 +1,4 @@
-"""Law + spring + mass + load = equation of motion."""
+"""The slider, its equations of motion, and their parameters by name."""
 
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.motion import Motion

@@ -4,7 +4,7 @@
 
 F the spring force, S a shear force besides it, F_i = W F_i/W the interface force, eta v the force
 that waves radiated into the half-spaces take (Rice, 1993), the substitute for inertia in models
-of faults. Asperities of stiffness W/lambda make F_i/W a state of its own,
+of faults. With asperities of stiffness W/lambda, F_i/W is a further state,
 
     d(F_i/W)/dt = (v - v_pl) / lambda,
 
@@ -27,7 +27,7 @@ from asperity.slider.motion import Motion
 
 
 class _Damped(Motion):
-    """Adds the radiation damping to what the slider and the drive give.
+    """A motion with radiation damping.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What the solvers ask of an equation of motion."""
+"""The interface between solvers and equations of motion."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Motion(eqx.Module):
     Class attributes
     ----------------
     name : str
-        What results call the equation of motion.
+        Name of the equation of motion in results.
     mechanical : tuple of str
         Names of the mechanical states.
     logarithmic : tuple of bool
@@ -59,7 +59,7 @@ class Motion(eqx.Module):
 
     @property
     def linear(self) -> tuple[int, ...]:
-        """Which of the states are no logarithms."""
+        """Indices of the states that are not logarithms."""
         return tuple(i for i, log in enumerate(self.logarithmic) if not log)
 
     @property
@@ -90,7 +90,7 @@ class Motion(eqx.Module):
         """Spring force over W0, F/W0."""
 
     def force_split(self, centre: Array, y: Array, at: Excitation) -> tuple[Array, Array]:
-        """F/W0 at Y = centre + y as a constant plus a rest that is small when y is.
+        """F/W0 at Y = centre + y as a constant plus a remainder that is small when y is small.
 
         The split keeps the relative accuracy of harmonics that are many orders of magnitude
         smaller than the mean.
@@ -116,14 +116,14 @@ class Motion(eqx.Module):
     def mechanical_states(
         self, friction: Array, velocity: Array, log_slip: Array, at: Excitation
     ) -> tuple[Array, ...]:
-        """The mechanical states that F_i/W, v/V and ln(v_pl/V) amount to, leaving inertia out."""
+        """The mechanical states from F_i/W, v/V and ln(v_pl/V), without inertia."""
 
     @abstractmethod
     def rates(self, Y: Array, at: Excitation) -> Array:
         """dY/dtheta, same shape as Y, (size, ...)."""
 
     def inertness(self, Y: Array, at: Excitation) -> ArrayLike:
-        """Factors, shape as Y, by which rates are multiplied to depend on Y as evenly as they can.
+        """Factors, shape as Y, that make the rates times them as linear in Y as possible.
 
         Newton's method for a stiff step needs it where a rate relaxes faster by orders of
         magnitude at one end of the step than at the other.

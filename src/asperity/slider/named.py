@@ -1,4 +1,4 @@
-"""Parameters of equations of motion by name: which there are, their values, and other values."""
+"""Parameters of equations of motion by name: their list, their values, and replacing a value."""
 
 from __future__ import annotations
 
@@ -60,8 +60,8 @@ def values_as_text(motion: Motion, load: Modulation | None = None) -> str:
 def slider_values(slider: Slider) -> dict[str, Any]:
     """Parameters of the law, K, W0 and M by name, in SI and of any shape."""
     known = point_parameters(type(slider.law)).values()
-    own = (p for p in known if p.place in ("law", "slider"))
-    return {p.name: _leaf(slider, p.path.removeprefix("system.slider.")) for p in own}
+    of_slider = (p for p in known if p.place in ("law", "slider"))
+    return {p.name: _leaf(slider, p.path.removeprefix("system.slider.")) for p in of_slider}
 
 
 def slider_from(law: type[Any], values: Any) -> Slider:

@@ -1,4 +1,4 @@
-"""What is compiled for each law: its equation of motion at single phases, with derivatives.
+"""The compiled programs of a law: its equation of motion at single phases, with derivatives.
 
 Everything that solves orbits on meshes works on these arrays and knows no law. A program works on
 `ROWS` phases of all operating points, so that one serves all meshes.
@@ -43,7 +43,7 @@ class PointValues(NamedTuple):
     slip_gradient : array, shape (size, ...)
         Derivatives of `log_slip` to the states.
     force_mean, force_rest : array, shape (...)
-        F/W0 as a constant and what the motion and the modulation change, as `Motion.force_split`.
+        F/W0 as a constant and a remainder, as from `Motion.force_split`.
     """
 
     rates: Array
@@ -137,7 +137,7 @@ def values_at(system: Motion, at: Excitation, centre: Any, deviations: Float) ->
         Arrays of shape (..., points), as `excitation_at` returns them.
     centre : array, shape (size, points)
     deviations : array, shape (size, ..., points)
-        Apart from the centre, so that small ones keep their digits.
+        States minus the centre, so that small deviations keep their digits.
     """
     numbers, structure = jax.tree.flatten(system)
     program = _values(structure)

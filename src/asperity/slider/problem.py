@@ -16,7 +16,6 @@ from asperity.laws.uneven_track import POSITION
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.parameters import DRIVE, MACHINE, obeying
-from asperity.parameters.arguments import instance, switch
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic
@@ -44,7 +43,7 @@ def equation_of_motion(
     inertia : bool
         Whether the mass of the slider counts.
     eta : array, optional
-        Radiation damping (N s/m); None for none.
+        Radiation damping (N s/m), or None.
 
     Returns
     -------
@@ -53,9 +52,9 @@ def equation_of_motion(
     Raises
     ------
     InputError
-        If inertia is asked for without a mass, damping is not positive where nothing else
+        If inertia is included without a mass, damping is not positive where nothing else
         would be left of it, a batch mixes points with and without elastic asperities, or either is
-        asked of a law that does not depend on the velocity.
+        combined with a law that does not depend on the velocity.
     """
     if not inertia and eta is None:
         return QuasiStatic(slider, V, omega)
@@ -111,14 +110,13 @@ def checked_problem(
     inertia: bool = False,
     radiation_damping: Any = None,
 ) -> Problem:
-    """Equations and load of what is asked, parameters of any shapes.
+    """Equations and load from the arguments of a response, parameters of any shapes.
 
     Raises
     ------
     InputError
         If a value breaks its rule; as `equation_of_motion`.
     """
-    checked_slider(slider)
     if POSITION in slider.law.state_names:
         raise InputError(
             "slider.law",
@@ -126,30 +124,18 @@ def checked_problem(
             "one on an uneven track",
             "integrate it as a transient",
         )
-    inertia = switch(inertia, "inertia")
     V = DRIVE["V"].check(velocity)
     f = DRIVE["frequency"].check(frequency)
     load = chosen_modulation(epsilon, modulation)
     eta = None
     if radiation_damping is not None:
-        # Zero is no damping in a table; as an argument it would be a mistake.
+        # In a table 0 means no damping; as an argument 0 is a mistake.
         eta = obeying(radiation_damping, MACHINE["eta"].label, "damping", "positive")
     return Problem(equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta), load)
 
 
-def checked_slider(slider: Any) -> Slider:
-    """A slider, and nothing in its place.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
-    return instance(slider, Slider, "slider", "build one as asperity.Slider(law, spring=, load=)")
-
-
 def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation:
-    """The modulation asked for, as an amplitude or as a programme.
+    """The modulation of an amplitude `epsilon`, or the checked `modulation`.
 
     Raises
     ------
@@ -175,7 +161,7 @@ def flatten(problem: T, name: str = "parameters") -> tuple[T, tuple[int, ...]]:
     ----------
     problem : pytree of arrays
     name : str
-        What messages call its arrays.
+        Name of the arrays in messages.
 
     Returns
     -------

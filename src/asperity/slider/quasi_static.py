@@ -43,7 +43,7 @@ class QuasiStatic(Motion):
         return (Y[0] * at.w - ratio * at.shear) / (at.w + ratio)
 
     def force_split(self, centre: Array, y: Array, at: Excitation) -> tuple[Array, Array]:
-        """F/W0 under w = 1, and what the motion and the modulation change."""
+        """F/W0 at the centre under w = 1, and the remainder."""
         ratio = self.compliance_ratio
         constant = centre[0] / (1 + ratio)
         rest = (y[0] * at.w + ratio * (constant * (at.w - 1) - at.shear)) / (at.w + ratio)
@@ -70,7 +70,7 @@ class QuasiStatic(Motion):
 
     def _velocity(self, Y: Array, at: Excitation, slip: Array) -> Array:
         ratio = self.compliance_ratio
-        # Of the excitation alone: loops over the states divide once, before they start.
+        # The divisor depends on the excitation only, so that it is computed once per step.
         per_stiffness = 1 / (at.w + ratio)
         scale = ratio / self.kappa * per_stiffness
         load_rate = scale * per_stiffness * at.w_slope

@@ -70,7 +70,7 @@ class Radiating(_Damped):
 def _excess(
     q: Array, law: Law, V: ArrayLike, damping: ArrayLike, force: ArrayLike, state: State, w: Array
 ) -> Array:
-    """What friction and damping at v = V e^q carry beyond `force`, over W0."""
+    """Friction plus damping at v = V e^q, minus `force`, over W0."""
     slip = jnp.exp(q)
     return w * law.friction(V * slip, state, w) + damping * slip - force
 

@@ -80,7 +80,7 @@ class ReversingInertial(_Damped):
         return jnp.stack(jnp.broadcast_arrays(*rates))
 
     def inertness(self, Y: Array, at: Excitation) -> Array:
-        """Of friction, which relaxes the faster the less the velocity changes with it."""
+        """As in `Motion`; friction relaxes fast where the velocity depends on it weakly."""
         one, steepness = jnp.ones_like(Y[0]), self._steepness(Y[1], self.law_state(Y), at.w)
         return jnp.stack([one, steepness, *(one for _ in Y[2:])])
 
@@ -95,9 +95,9 @@ def _steepness(law: Law, friction: Array, state: tuple[Array, ...], w: ArrayLike
 
 
 def reversing(motion: Motion) -> Motion:
-    """The motion in states that pass through rest, where it has others and its law allows it.
+    """The motion in states that are regular at rest, if its law allows rest.
 
-    That is, where the law yields a velocity that rises with the force at rest too.
+    A law allows rest if its velocity rises with the force at rest, too.
     """
     if not (isinstance(motion, StiffInertial) and motion.signed):
         return motion

@@ -9,7 +9,7 @@ from jax.typing import ArrayLike
 from asperity.laws import Law
 from asperity.laws.consistency import checked_law
 from asperity.parameters import MACHINE
-from asperity.parameters.arguments import instance
+from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import Displayed, SummaryLine, parameter_line
 
 
@@ -33,6 +33,7 @@ class Slider(Displayed, eqx.Module):
     W0: ArrayLike
     M: ArrayLike
 
+    @typed
     def __init__(
         self,
         law: Law,
@@ -56,12 +57,10 @@ class Slider(Displayed, eqx.Module):
         Raises
         ------
         InputError
-            If a value breaks its rule or has a unit of another kind, or a law of one's own breaks
-            one of `asperity.laws.consistency.checked_law`.
+            If a value breaks its rule or has a unit of another kind, or a user's law fails
+            `asperity.laws.consistency.checked_law`.
         """
-        # A law whose fields are traced is still an instance of its class.
-        advice = "build one such as material.law('elasto-plastic')"
-        self.law = checked_law(instance(law, Law, "slider.law", advice))
+        self.law = checked_law(law)
         self.K = jnp.asarray(MACHINE["K"].check(spring))
         self.W0 = jnp.asarray(MACHINE["W0"].check(load))
         self.M = jnp.asarray(MACHINE["M"].check(mass))
@@ -69,5 +68,7 @@ class Slider(Displayed, eqx.Module):
     def summary(self) -> tuple[str, list[SummaryLine]]:
         """Law and parameters."""
         law, lines = self.law.summary()
-        own = [parameter_line(MACHINE[name], getattr(self, name)) for name in ("K", "W0", "M")]
-        return f"Slider, {law}", lines + own
+        of_machine = [
+            parameter_line(MACHINE[name], getattr(self, name)) for name in ("K", "W0", "M")
+        ]
+        return f"Slider, {law}", lines + of_machine

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from asperity.study.results import SweepStatus, open_store, store_status, summary_statistics
     from asperity.study.run import SweepSummary, run_sweep
 
-#: Public names and their modules.
+#: Module of each public name.
 _HOMES = {
     "SweepPlan": "plan",
     "SweepStatus": "results",

@@ -28,15 +28,14 @@ Column = NDArray[Any]
 #: Columns of texts.
 TEXTS = ("law", "data")
 
-#: Rows that are drawn at a time with a seed of their own: any of them can be drawn without those
-#: before.
-_DRAWN_TOGETHER = 4096
+#: Rows of a block of random draws. Each block has its own seed, so that it can be drawn without the
+#: blocks before it.
+_BLOCK_ROWS = 4096
 
-#: Bits of a Sobol sequence, which has as many points; SciPy cannot skip points of longer ones.
+#: A Sobol sequence of b bits has 2^b points; SciPy cannot skip points of a sequence with more bits.
 SOBOL_BITS = 30
 
-
-#: Rows that an axis may list: they are kept in memory and in the record.
+#: Largest number of rows of a listed axis, which is kept in memory and in the record.
 MOST_LISTED = 1_000_000
 
 
@@ -48,7 +47,7 @@ class SweepAxis(ABC):
     name : str
     length : int
     names : tuple of str
-        Of the columns: parameters, ratios, or ``law``.
+        Names of the columns: parameters, ratios, or ``law``.
     """
 
     name: str
@@ -67,7 +66,7 @@ class SweepAxis(ABC):
     def rows(self, start: int, stop: int) -> dict[str, Column]:
         """The columns from row `start` to before `stop`: SI, NaN where a row has no value.
 
-        Columns of texts hold names, "" where a row has none.
+        A column of texts holds "" where a row has no value.
         """
 
     @property
@@ -78,7 +77,7 @@ class SweepAxis(ABC):
 
 @dataclass(frozen=True)
 class ListedAxis(SweepAxis):
-    """An axis whose rows are all known.
+    """An axis whose rows the plan lists.
 
     Attributes
     ----------
@@ -106,7 +105,7 @@ class ListedAxis(SweepAxis):
 
 @dataclass(frozen=True)
 class Spread:
-    """How a drawn number is spread.
+    """Distribution of a drawn number.
 
     Attributes
     ----------
@@ -133,7 +132,7 @@ class Spread:
 
 @dataclass(frozen=True)
 class DrawnAxis(SweepAxis):
-    """An axis of random or quasi-random draws; any row can be had without those before it.
+    """An axis of random or quasi-random draws; a row is drawn without the rows before it.
 
     Attributes
     ----------
@@ -142,7 +141,7 @@ class DrawnAxis(SweepAxis):
         Sobol and Halton sequences are scrambled by the seed.
     seed, count : int
     spreads : mapping of str to Spread
-        One dimension of the draws each, in this order.
+        Distribution of each column; a column is one dimension of the draws, in this order.
     """
 
     name: str
@@ -164,7 +163,7 @@ class DrawnAxis(SweepAxis):
     def rows(self, start: int, stop: int) -> dict[str, Column]:
         """As in `SweepAxis`."""
         u = self._uniform(start, stop)
-        # Both ends are left out: the normal distribution has no quantile there.
+        # The normal distribution has no quantile at 0 and at 1.
         u = np.clip(u, 2.0**-53, 1 - 2.0**-53)
         return {n: s.at(u[:, i]) for i, (n, s) in enumerate(self.spreads.items())}
 
@@ -174,30 +173,30 @@ class DrawnAxis(SweepAxis):
 
         dimensions = len(self.spreads)
         if self.method == "random":
-            first = start // _DRAWN_TOGETHER
+            first = start // _BLOCK_ROWS
             blocks = [
-                np.random.default_rng([self.seed, block]).random((_DRAWN_TOGETHER, dimensions))
-                for block in range(first, -(-stop // _DRAWN_TOGETHER))
+                np.random.default_rng([self.seed, block]).random((_BLOCK_ROWS, dimensions))
+                for block in range(first, -(-stop // _BLOCK_ROWS))
             ]
-            skip = start - first * _DRAWN_TOGETHER
+            skip = start - first * _BLOCK_ROWS
             return np.concatenate(blocks)[skip : skip + stop - start]
         scramble = np.random.default_rng(self.seed)
         if self.method == "halton":
             sequence: Any = qmc.Halton(dimensions, rng=scramble)
-            # Its points follow from their numbers; SciPy's fast_forward makes all those before.
+            # A Halton point follows from its number; fast_forward would compute all points before.
             sequence.num_generated = start
         else:
             sequence = qmc.Sobol(dimensions, bits=SOBOL_BITS, rng=scramble)
             if start:
                 sequence.fast_forward(start)
         with warnings.catch_warnings():
-            # Any part of a Sobol sequence is taken, its balanced powers of two or not.
+            # SciPy warns where the number of Sobol points is not a power of two.
             warnings.simplefilter("ignore", UserWarning)
             return np.asarray(sequence.random(stop - start))
 
 
 def columns_of(axis: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the columns of an axis's record."""
+    """Names of the columns of an axis, from the record of the axis."""
     return tuple(axis["columns"] if "columns" in axis else axis["over"])
 
 
@@ -209,7 +208,7 @@ def axis_record(
     Raises
     ------
     InputError
-        If a name or a value of it is none.
+        If the axis has an unknown name or an invalid value.
     """
     if table.draw is not None:
         spreads = {
@@ -254,7 +253,7 @@ def _listed(columns: Mapping[str, list[Any]]) -> dict[str, Any]:
 
 
 def _check_length(length: int) -> None:
-    """Refuse an axis without rows, or of more than are kept in memory."""
+    """Refuse an axis without rows, or with more than `MOST_LISTED`."""
     if not 1 <= length <= MOST_LISTED:
         raise InputError(
             f"axis must have from 1 to {MOST_LISTED:,} rows, got {length:,}; draw them, or split "
@@ -263,7 +262,7 @@ def _check_length(length: int) -> None:
 
 
 def _name(name: str, known: Mapping[str, Parameter]) -> str:
-    """The one name of a column."""
+    """The canonical name of a column."""
     if name in TEXTS:
         return name
     column = canonical_name(name, known)
@@ -278,7 +277,7 @@ def _name(name: str, known: Mapping[str, Parameter]) -> str:
 def _column(
     name: str, values: Sequence[Any], known: Mapping[str, Parameter], folder: Path
 ) -> list[Any]:
-    """Values in SI; None where a row has none."""
+    """Values in SI; None where the plan has an empty text."""
     column = _name(name, known)
     if column == "law":
         return [law_name(value, folder) for value in values]
@@ -288,7 +287,7 @@ def _column(
 
 
 def law_place(law: Any, folder: Path) -> str:
-    """A law as a plan names it, by its whole path where it lies in a file beside the plan."""
+    """A law as a plan names it; a path relative to the plan's folder becomes absolute."""
     file, _, name = str(law).rpartition(":")
     return f"{(folder / file).resolve()}:{name}" if file.endswith(".py") else str(law)
 
@@ -308,7 +307,7 @@ def checked_value(parameter: Parameter, value: Any) -> float:
 
 
 def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> list[float]:
-    """Values at equal distances or ratios, both ends among them."""
+    """Values at equal distances or ratios, with both ends."""
     column = _name(name, known)
     extra = set(table) - {"from", "to", "count", "spacing"}
     if column in TEXTS or extra or not {"from", "to", "count"} <= set(table):
@@ -326,8 +325,8 @@ def _grid(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -
     _check_spacing(name, spacing, low, high, ("linear", "log"))
     u = np.linspace(0.0, 1.0, count)
     values = low * (high / low) ** u if spacing == "log" else low + (high - low) * u
-    # Fifteen digits: what a longer grid of the same step has in common with this one is then
-    # the same to the last bit, and decimal steps are the numbers that one would write.
+    # Rounding to 15 digits: a longer grid of the same step then has bit for bit the same values,
+    # and a decimal step gives decimal values (0.3, not 0.30000000000000004).
     return [float(f"{value:.15g}") for value in values]
 
 
@@ -346,7 +345,7 @@ def _check_spacing(
 
 
 def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter]) -> dict[str, Any]:
-    """How a number is drawn: ends or mean and standard deviation in SI, and the kind."""
+    """Fields of a `Spread`, from a plan's table of a drawn number."""
     column = _name(name, known)
     if column in TEXTS:
         raise InputError(f"over must name numbers, got '{column}'; add an axis of its values")
@@ -368,14 +367,14 @@ def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter])
 
 
 def _width(parameter: Parameter, value: Any) -> float:
-    """A standard deviation, in the unit of its number."""
+    """A standard deviation in SI."""
     return float(obeying(value, f"{parameter.name}.std", parameter.kind, "positive"))
 
 
 def _cases(
     cases: Sequence[Mapping[str, Any]], known: Mapping[str, Parameter], folder: Path
 ) -> dict[str, Any]:
-    """Rows of all cases, each with every combination of its lists."""
+    """Columns of the rows of all cases; a case gives every combination of its lists."""
     names = dict.fromkeys(_name(name, known) for case in cases for name in case)
     columns: dict[str, list[Any]] = {name: [] for name in names}
     length = 0

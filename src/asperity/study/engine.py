@@ -1,8 +1,7 @@
-"""The engine: chunks of points are handed out, solved, written and counted.
+"""The engine of tables, maps and sweeps: workers solve and write chunks, the engine counts them.
 
-Tables, maps and sweeps all run here. A task is some chunks; whoever does it solves them, writes
-each where it belongs and reports counts. The engine holds no results: its memory is that of the
-window of tasks at work, whatever the number of chunks.
+A task is a call with several chunks. The worker solves the chunks, writes the results and returns a
+`Report`. The engine keeps no results, so that its memory does not grow with the number of chunks.
 """
 
 from __future__ import annotations
@@ -16,32 +15,33 @@ from typing import Protocol
 
 from asperity.study.workers import ThisProcess, Workers
 
-#: Seconds that a task is to take, about.
-_TASK = 2.0
-#: Tasks in the hands of a worker at a time: the next one is there when it ends one.
-_WINDOW = 2
-#: Chunks in a task.
+#: Target duration of a task (s).
+_TASK_SECONDS = 2.0
+#: Tasks submitted for each worker: a worker that ends one task starts the next without waiting.
+_TASKS_PER_WORKER = 2
+#: Largest number of chunks in a task.
 _MOST_CHUNKS = 64
-#: Times that the process of a chunk may die before the chunk is given up; the last time it runs
-#: alone, so that it is known which chunk is to blame.
-_LIVES = 3
-#: Weight of the newest duration in the running mean.
+#: A chunk whose worker process died so often is not solved. Before the last attempt the chunk runs
+#: alone, which shows whether this chunk or another of the task kills the process.
+_MOST_DEATHS = 3
+#: Weight of the newest duration in the exponential moving average.
 _NEWEST = 0.3
 
 
 class WorkersGoneError(RuntimeError):
-    """The workers have ended, and nothing starts others."""
+    """The workers have ended and cannot be restarted."""
 
 
 @dataclass(frozen=True)
 class DoneChunk:
-    """A chunk that is in its place.
+    """A chunk that is solved and written.
 
     Attributes
     ----------
     chunk, points, failed : int
+        Number of the chunk, number of its points, and of those without a converged answer.
     seconds : float, optional
-        That it took, without those of the compiler; None where an earlier run had solved it.
+        Time to solve and write without compilation; None if an earlier run solved the chunk.
     """
 
     chunk: int
@@ -52,13 +52,13 @@ class DoneChunk:
 
 @dataclass
 class Report:
-    """What a task has done.
+    """Result of a task.
 
     Attributes
     ----------
     done : list of DoneChunk
     left : tuple of int
-        Chunks that there was no time for.
+        Chunks not solved within the time budget of the task.
     messages : list of str
         Errors of the solver.
     memory : float
@@ -72,42 +72,42 @@ class Report:
 
 
 class Task(Protocol):
-    """Solves and writes chunks."""
+    """A callable that solves and writes chunks."""
 
     def __call__(self, chunks: tuple[int, ...], budget: float, give_up: bool = False, /) -> Report:
-        """Do at least one chunk, and others while less than `budget` seconds have passed.
+        """Solve at least one chunk, and further chunks until `budget` seconds have passed.
 
-        With `give_up` the chunks are not solved: their points fail.
+        With `give_up` all points of the chunks are marked as failed without being solved.
         """
         ...
 
 
 @dataclass
 class SweepProgress:
-    """How far a study is.
+    """Progress of a study.
 
     Attributes
     ----------
     points, total : int
-        Points that have an answer, of earlier runs too, and all.
+        Points processed by this run and earlier runs, and all points.
     failed : int
-        Points without a converged answer among them.
+        Processed points without a converged answer.
     stored : int
         Points of chunks that were done when this run began.
     kept : int
-        Points with an answer that this run did not solve, of those counted so far.
+        Points of `stored` that this run has checked and kept so far.
     chunks, chunk_total : int
-        Chunks that are done, and all.
+        Chunks that are done, and all chunks.
     seconds : float
-        Since the beginning of this run.
+        Time since the beginning of this run (s).
     spent : float
-        Seconds of all workers for the points solved in this run, without those of the compiler.
+        Time that all workers spent on the points of this run, without compilation (s).
     memory : float
         Largest resident memory of a worker so far (bytes).
     lost : int
-        Times that a worker process died.
+        Number of worker processes that died.
     left : float
-        Seconds left, about; NaN where nothing tells.
+        Estimate of the remaining time (s); NaN before a point is solved.
     """
 
     points: int = 0
@@ -129,21 +129,21 @@ class SweepProgress:
         return (self.points - self.kept) / self.seconds if self.seconds > 0 else 0.0
 
     def add(self, report: Report) -> None:
-        """Count what a task has done."""
+        """Add the counts of a task."""
         self.memory = max(self.memory, report.memory)
-        for one in report.done:
+        for done in report.done:
             self.chunks += 1
-            self.points += one.points
-            self.failed += one.failed
-            if one.seconds is None:
-                self.kept += one.points
+            self.points += done.points
+            self.failed += done.failed
+            if done.seconds is None:
+                self.kept += done.points
             else:
-                self.spent += one.seconds
+                self.spent += done.seconds
 
     def estimate(self, seconds: float, workers: int) -> None:
-        """Note the time since the beginning, and from it the time that is left."""
+        """Set the time since the beginning (s), and the estimate of the remaining time."""
         self.seconds = seconds
-        # Chunks that were done when this run began cost it nothing, looked at already or not.
+        # Checking a chunk that an earlier run solved takes next to no time.
         points_left = self.total - self.points - max(0, self.stored - self.kept)
         solved = self.points - self.kept
         if points_left <= 0:
@@ -153,7 +153,7 @@ class SweepProgress:
 
 
 class _Engine:
-    """One run over some chunks; the arguments are those of `solve_chunks`."""
+    """A run over chunks; the arguments are those of `solve_chunks`."""
 
     def __init__(
         self, task: Task, chunks: Iterable[int], workers: Workers, progress: SweepProgress,
@@ -189,13 +189,13 @@ class _Engine:
             tick(self.progress)
 
     def _fill(self) -> None:
-        """Keep the window full."""
+        """Submit tasks until each worker has `_TASKS_PER_WORKER`; a suspect chunk runs alone."""
         if self._suspects:
             if not self._running:
                 chunk = self._suspects.popleft()
-                self._submit((chunk,), give_up=self._deaths[chunk] >= _LIVES)
+                self._submit((chunk,), give_up=self._deaths[chunk] >= _MOST_DEATHS)
             return
-        while len(self._running) < _WINDOW * self.workers.count:
+        while len(self._running) < _TASKS_PER_WORKER * self.workers.count:
             chunks = self._next()
             if not chunks:
                 return
@@ -203,17 +203,17 @@ class _Engine:
 
     def _submit(self, chunks: tuple[int, ...], give_up: bool = False) -> None:
         try:
-            self._running[self.workers.submit(self.task, chunks, _TASK, give_up)] = chunks
+            self._running[self.workers.submit(self.task, chunks, _TASK_SECONDS, give_up)] = chunks
         except self.workers.gone:
             raise WorkersGoneError from None
 
     def _next(self) -> tuple[int, ...]:
-        """Chunks of the next task, those handed back before new ones."""
+        """Chunks of the next task; chunks that a task left come before new ones."""
         left = self.progress.chunk_total - self.progress.chunks
         share = -(-left // (2 * self.workers.count))
-        pace = 1 if self._seconds is None else round(_TASK / max(self._seconds, 1e-3))
+        in_time = 1 if self._seconds is None else round(_TASK_SECONDS / max(self._seconds, 1e-3))
         chunks: list[int] = []
-        while len(chunks) < max(1, min(pace, share, _MOST_CHUNKS)):
+        while len(chunks) < max(1, min(in_time, share, _MOST_CHUNKS)):
             chunk = self._again.popleft() if self._again else next(self._fresh, None)
             if chunk is None:
                 break
@@ -224,22 +224,22 @@ class _Engine:
         self.progress.add(report)
         for message in report.messages:
             self.log(message)
-        for one in report.done:
-            if one.seconds is not None:
-                mean = one.seconds if self._seconds is None else self._seconds
-                self._seconds = mean + _NEWEST * (one.seconds - mean)
+        for done in report.done:
+            if done.seconds is not None:
+                mean = done.seconds if self._seconds is None else self._seconds
+                self._seconds = mean + _NEWEST * (done.seconds - mean)
         self._again.extendleft(reversed(report.left))
 
     def _repeat(self, chunks: list[int]) -> None:
-        """Hand out again what died with its process."""
+        """Queue again the chunks whose worker process died."""
         self.progress.lost += 1
         self.log(f"a worker process died with {len(chunks)} chunks at work; they are done again")
         self.workers.restart()
         for chunk in chunks:
             self._deaths[chunk] += 1
-            alone = self._deaths[chunk] >= _LIVES - 1
+            alone = self._deaths[chunk] >= _MOST_DEATHS - 1
             (self._suspects if alone else self._again).append(chunk)
-            if self._deaths[chunk] == _LIVES:
+            if self._deaths[chunk] == _MOST_DEATHS:
                 self.log(f"chunk {chunk} kills its process each time; its points are given up")
 
 
@@ -251,28 +251,28 @@ def solve_chunks(
     tick: Callable[[SweepProgress], None],
     log: Callable[[str], None],
 ) -> None:
-    """Have every chunk solved and written, and count.
+    """Solve and write every chunk.
 
     Parameters
     ----------
     task : Task
-        Goes to another process where the workers are processes.
+        Pickled and sent to the workers where these are other processes.
     chunks : iterable of int
-        Numbers of the chunks, in the order in which they are handed out.
+        Numbers of the chunks, in the order in which they are submitted.
     workers : Workers
     progress : SweepProgress
-        With the totals; counted up here.
+        With the totals set; the other counts are updated.
     tick : callable
         Called with `progress` at least once a second.
     log : callable
-        Called with a line about what went wrong.
+        Called with a line of text for every error.
 
     Raises
     ------
     OSError
         If a chunk could not be written.
     WorkersGoneError
-        If the workers have ended for good.
+        If the workers have ended and cannot be restarted.
     """
     _Engine(task, chunks, workers, progress, log).run(tick)
 
@@ -284,16 +284,16 @@ def solve_here(
     progress: Callable[[int, int], None],
     done: int = 0,
 ) -> None:
-    """Chunks of at most `size` points, one after the other in this process.
+    """Solve chunks of at most `size` points in this process, in order.
 
     Parameters
     ----------
     total, done : int
-        All points, and those that are done already: the first ones.
+        Number of points; the first `done` of them are solved already.
     size : int
     solve : callable
-        Solves and keeps the points from its first to before its second argument; the third is to
-        be called with the number of points finished since the last call.
+        ``solve(start, stop, advance)`` solves and keeps the points from `start` to before `stop`,
+        and calls ``advance`` with the number of points finished since its last call.
     progress : callable
         Called with the number of points done so far and of all points.
     """
@@ -307,7 +307,7 @@ def solve_here(
 
     def task(chunks: tuple[int, ...], budget: float, give_up: bool = False, /) -> Report:
         report = Report()
-        # All of them, whatever the budget: the order counts where chunks are lines of one file.
+        # The budget is ignored: chunks that are lines of one file must be written in order.
         for chunk in chunks:
             start = first + chunk * size
             stop = min(start + size, total)

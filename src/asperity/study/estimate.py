@@ -1,4 +1,4 @@
-"""What a sweep would take, from its plan and some of its chunks."""
+"""Estimate of the time, memory and failures of a sweep, from a sample of its chunks."""
 
 from __future__ import annotations
 
@@ -12,29 +12,29 @@ from asperity.study.grid import SweepGrid, load_plan
 from asperity.study.plan import SweepPlan
 from asperity.study.solve import SOLVES
 
-#: Chunks that are looked at, and seconds for all of them, about.
+#: Chunks of the sample, and target time for the sample (s).
 _CHUNKS, _SECONDS = 8, 20.0
-#: Points of a chunk that are solved first: a whole chunk of hard points would take minutes.
-_FEW = 32
+#: Points of a chunk that are solved first; the whole chunk follows if its time allows.
+_FIRST_POINTS = 32
 
 
 @dataclass(frozen=True)
 class SweepEstimate:
-    """What a sweep would take.
+    """Size of a sweep, and estimates of its time and of its share of failures.
 
     Attributes
     ----------
     shape, chunk_shape : tuple of int
-        Rows of each axis, and of a chunk.
+        Rows along each axis, of the sweep and of a chunk.
     points, chunks : int
     bytes : float
-        In the store, uncompressed.
+        Size of the answers in the store, uncompressed.
     sample : int
         Points that were solved for the estimate.
     failed : float
-        Share of the points of the sample without an answer.
+        Share of the points of the sample without a converged answer.
     seconds : float
-        Processor time for all points; to be divided by the workers.
+        Processor time for all points (s); divide by the number of workers.
     """
 
     shape: tuple[int, ...]
@@ -48,7 +48,7 @@ class SweepEstimate:
 
 
 def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
-    """Count the points of a plan, and solve some of them for an estimate of the time.
+    """Count the points of a plan, and solve a sample of them to estimate the time.
 
     Raises
     ------
@@ -63,12 +63,13 @@ def dry_run(plan: SweepPlan | str | os.PathLike[str]) -> SweepEstimate:
     count = min(_CHUNKS, grid.chunk_count)
     sample, failed, seconds = 0, 0, 0.0
     begin = time.perf_counter()
-    # Evenly over the plan, whose outer axes have the laws.
+    # Chunks at equal distances, so that the sample has all laws of an outer axis of laws.
     for k in range(count):
         chunk = grid.at((2 * k + 1) * grid.chunk_count // (2 * count))
-        some = np.sort(draw.permutation(len(chunk))[:_FEW])
-        for points in (chunk.take(some), chunk):
-            SOLVES[plan.solve].solve(points, record)  # for the compiler
+        drawn = np.sort(draw.permutation(len(chunk))[:_FIRST_POINTS])
+        for points in (chunk.take(drawn), chunk):
+            # The first call compiles and is not timed.
+            SOLVES[plan.solve].solve(points, record)
             start = time.process_time()
             answers = SOLVES[plan.solve].solve(points, record)
             spent = time.process_time() - start

@@ -19,9 +19,9 @@ _FORMATS = (".nc", ".csv", ".parquet")
 
 
 def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> int:
-    """Write a store to one file, whose format its suffix says.
+    """Write a store to one file; the suffix of the file chooses the format.
 
-    NetCDF keeps the grid, and points that are not computed are missing there. Tables have a row
+    NetCDF keeps the grid; points that are not computed have fill values. CSV and Parquet have a row
     for each point of the chunks that are done: the columns of the axes, the outputs, ``outcome``
     as a word, and ``detail``.
 
@@ -34,7 +34,7 @@ def export_store(store: str | os.PathLike[str], out: str | os.PathLike[str]) -> 
     Returns
     -------
     int
-        Points that were written.
+        Number of points written.
 
     Raises
     ------
@@ -81,7 +81,7 @@ def _netcdf(store: SweepStore, file: Path) -> int:
                 name, dims, dtype=array.dtype, fillvalue=fill, chunks=store.grid.chunks
             )
             _attributes(variables[name], dict(array.attrs))
-            # Where the others are is said for each variable: CF has no place for it in the file.
+            # CF names auxiliary coordinates in each variable, not once for the file.
             variables[name].attrs["coordinates"] = store.attributes.get("coordinates", "")
         for chunk, _ in store.done():
             slices = store.grid.slices(chunk)
@@ -137,7 +137,7 @@ def _csv(store: SweepStore, file: Path) -> int:
 
 
 def _cells(values: np.ndarray) -> list[Any]:
-    """Cells of a column; empty where there is no number."""
+    """Cells of a column; empty for NaN."""
     if values.dtype.kind != "f":
         return list(values.tolist())
     return ["" if np.isnan(v) else v for v in values.tolist()]

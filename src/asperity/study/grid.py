@@ -1,6 +1,6 @@
-"""The grid of a sweep: from the numbers of its chunks to the operating points in them.
+"""The grid of a sweep: which operating points a chunk has, by the number of the chunk.
 
-A plan is read from its file here, in which every quantity carries its unit.
+`load_plan` reads a plan from its file and checks that every quantity has a unit.
 """
 
 from __future__ import annotations
@@ -15,12 +15,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters, canonical_name
 from asperity.parameters.arguments import shown
-from asperity.questions.record import without_unit
+from asperity.questions.record import units_required, without_unit
 from asperity.study.axes import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
 from asperity.study.plan import PlanError, SweepPlan
 from asperity.study.points import RATIOS, Points
@@ -43,13 +42,14 @@ def load_plan(path: str | os.PathLike[str]) -> SweepPlan:
         An `InputError` with all mistakes.
     """
     plan = SweepPlan.from_file(path, folder=Path(path).parent)
-    # Mistakes in the laws are reported with all others of the plan.
+    # `plan_record` reports mistakes in the laws; here they would be reported twice.
     known = known_names(laws_named(plan, []), plan.solve)
-    mistakes = without_unit(
-        (place, known[name].kind, value)
-        for place, written, value in _numbers(plan)
-        if (name := canonical_name(written, known)) is not None
-    )
+    with units_required():
+        mistakes = without_unit(
+            (place, known[name].kind, value)
+            for place, written, value in _numbers(plan)
+            if (name := canonical_name(written, known)) is not None
+        )
     if mistakes:
         raise PlanError(mistakes, str(path))
     return plan
@@ -69,26 +69,25 @@ def _numbers(plan: SweepPlan) -> Iterator[tuple[str, str, Any]]:
         for case in table.cases or ():
             for name, value in case.items():
                 grid = isinstance(value, Mapping)
-                ends = [value.get("from"), value.get("to")] if grid else value
-                for one in ends if isinstance(ends, list | tuple) else [ends]:
-                    yield f"{where}.cases.{name}", name, one
+                values = [value.get("from"), value.get("to")] if grid else value
+                for number in values if isinstance(values, list | tuple) else [values]:
+                    yield f"{where}.cases.{name}", name, number
         for name, spread in (table.over or {}).items():
             for value in spread.values():
                 yield f"{where}.over.{name}", name, value
 
 
-Float = NDArray[np.float64]
 Slices = tuple[slice, ...]
 
-#: Laws of an axis that are more than this share chunks.
+#: Up to this length an axis of laws is not divided: a chunk has points of all laws.
 _LAWS_APART = 64
 
-#: Points that can be counted in 64 bits.
+#: Largest number of points, a 64-bit integer.
 _MOST_POINTS = 2**63 - 1
 
 
 class SweepGrid:
-    """The points of a sweep, none of which is in memory.
+    """The points of a sweep; only the points of the requested chunks are in memory.
 
     Parameters
     ----------
@@ -117,7 +116,7 @@ class SweepGrid:
         Raises
         ------
         PlanError
-            If the plan means nothing that can be solved, or has more points than can be counted.
+            If the plan has mistakes, or more points than a 64-bit integer counts.
         InputError
             If memory cannot hold the points of a chunk.
         """
@@ -139,7 +138,7 @@ class SweepGrid:
 
     @property
     def bytes(self) -> float:
-        """Of all answers in a store, uncompressed."""
+        """Size of all answers in a store, uncompressed."""
         return self.points * (8.0 * (len(self.record["outputs"]) + 1) + 2)
 
     @property

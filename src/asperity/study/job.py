@@ -1,7 +1,7 @@
-"""What a worker does: it solves chunks of a store and writes them itself.
+"""The job of a worker: solve chunks of a sweep and write them to the store.
 
-JAX must not be loaded when this module is imported: the number of its threads is set here, because
-sums over several threads differ in their last bits from sums in one.
+JAX must not be loaded before this module sets its number of threads to one: sums over several
+threads differ in their last bits from sums in one thread.
 """
 
 from __future__ import annotations
@@ -29,40 +29,40 @@ if TYPE_CHECKING:
     from asperity.study.points import Points
     from asperity.study.store.store import SweepStore
 
-#: Packages that the numbers come from.
+#: Packages whose version may change the last digits of a number.
 _PACKAGES = ("jax", "jaxlib", "numpy", "scipy")
-#: Parts of this package that do not compute a number of a sweep.
-_ASIDE = ("app", "cli", "experiment", "figures", "fit_report", "ledger", "recording")
+#: Rooms of this package that compute no number of a sweep.
+_NOT_NUMERICAL = ("app", "cli", "experiment", "figures", "fit_report", "ledger", "recording")
 
 
 class SupersededError(RuntimeError):
-    """Another driver has the store: the chunks of this task are no longer wanted."""
+    """Another driver has taken the store; this task must not write to it."""
 
 
 class WorkerError(InputError):
-    """A worker that would give other numbers than the driver, or none."""
+    """A worker whose numbers would differ from the driver's, or that cannot solve at all."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """What all tasks of one run share; called with chunks, it solves and writes them.
+    """The `Task` of a sweep: called with numbers of chunks, it solves and writes these chunks.
 
     Attributes
     ----------
     store : str
         Path of the store.
     digest : str
-        Of the plan in it.
+        SHA-256 of the plan in the store.
     token : str
-        Of the driver's lock; "" to write whoever has the lock.
+        Token of the driver's lock; "" to write without checking the lock.
     retry : bool
         Whether chunks with failed points are solved again.
     laws : tuple of str
-        Places of laws that are neither of the package nor installed, ``path/to/file.py:Name``.
+        Laws in files or modules that the worker must load, like ``path/to/file.py:Name``.
     folder : str
-        Where files that the plan names lie.
+        Folder of the files that the plan names.
     numerics : dict of str to str, optional
-        `numerics` of the driver.
+        Return value of `numerics` in the driver.
     """
 
     store: str
@@ -74,7 +74,7 @@ class Job:
     numerics: Mapping[str, str] | None = None
 
     def __call__(self, chunks: tuple[int, ...], budget: float, give_up: bool = False) -> Report:
-        """Do chunks one after the other until `budget` seconds are over, at least one.
+        """Solve and write at least one chunk, and further chunks until `budget` seconds are over.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class Job:
             if i and time.perf_counter() - begin > budget:
                 report.left = chunks[i:]
                 break
-            self._do(chunk, give_up, report)
+            self._complete(chunk, give_up, report)
             spare_mappings()
         report.memory = _largest_memory()
         return report
@@ -115,7 +115,7 @@ class Job:
             )
 
     def _require_laws(self) -> None:
-        """Make laws known that the package does not bring."""
+        """Register the laws of the plan that are not part of the package."""
         from asperity.laws import get_law, known_law
 
         for place in self.laws:
@@ -125,12 +125,12 @@ class Job:
                 get_law(name)
             except InputError:
                 raise WorkerError(
-                    f"law must be known to the workers, got '{name}', which only the program has "
-                    "that started them; name it by its place, like law = 'my_law.py:MyLaw'"
+                    f"law must be known to the workers, got '{name}', which only the program that "
+                    "started them has registered; name its file, like law = 'my_law.py:MyLaw'"
                 ) from None
 
-    def _do(self, chunk: int, give_up: bool, report: Report) -> None:
-        """See that a chunk is in the store; one that is, and whose files are whole, is done."""
+    def _complete(self, chunk: int, give_up: bool, report: Report) -> None:
+        """Solve and write a chunk, unless the store has it and its files are undamaged."""
         store = self._store
         size, failed = store.grid.size(chunk), store.failed_in(chunk)
         if failed >= 0 and not (self.retry and failed):
@@ -140,13 +140,13 @@ class Job:
             report.messages.append(f"chunk {chunk} was damaged and is solved again")
         begin = compiler_free_clock()
         points = store.grid.at(chunk)
-        answers = self._lost(points) if give_up else self._solved(points, report)
+        answers = self._worker_lost(points) if give_up else self._solved(points, report)
         self._write(chunk, answers)
         seconds = compiler_free_clock() - begin
         report.done.append(DoneChunk(chunk, size, answers.failed, seconds))
 
-    def _lost(self, points: Points) -> Answers:
-        """Outcomes of points whose process died each time."""
+    def _worker_lost(self, points: Points) -> Answers:
+        """Outcomes of points whose process died at every attempt."""
         from asperity.study.outcome import Answers, SweepOutcome
 
         answers = Answers.empty(self._store.record["outputs"], len(points))
@@ -154,13 +154,13 @@ class Job:
         return answers
 
     def _solved(self, points: Points, report: Report) -> Answers:
-        """Solve; where the solver stops with an error, single out the points that it stops at."""
+        """Solve points; after an error of the solver, find the failing points by bisection."""
         from asperity.study.outcome import Answers, SweepOutcome
         from asperity.study.solve import SOLVES
 
         record = self._store.record
         try:
-            # The record names no folder: a store may move, and its data with it.
+            # The folder is not part of the record, because store and data may be moved.
             return SOLVES[record["solve"]].solve(points, {**record, "folder": self.folder})
         except (MemoryError, OSError):
             raise
@@ -188,7 +188,7 @@ class Job:
 
 @lru_cache(maxsize=1)
 def _opened(path: str, digest: str, token: str) -> SweepStore:
-    """The store as the driver `token` has opened it: the next one may have repaired it."""
+    """The open store; opened again for each `token`, as the next driver may have repaired it."""
     from asperity.study.store.store import SweepStore
 
     store = SweepStore(Path(path))
@@ -208,14 +208,14 @@ def _require_one_thread() -> None:
 
 
 def compiler_free_clock() -> float:
-    """A time without the compiler's, which is spent once and no measure of a chunk (s)."""
+    """A clock that stops during compilation, which is not part of the time of a chunk (s)."""
     from asperity._jax import seconds_compiling
 
     return time.perf_counter() - seconds_compiling()
 
 
 def _largest_memory() -> float:
-    """Largest resident memory of this process so far (bytes); 0 where the system has no answer."""
+    """Largest resident memory of this process so far (bytes); 0 where it is unknown."""
     try:
         lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
         return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("VmHWM:"))
@@ -231,7 +231,7 @@ def _largest_memory() -> float:
 
 
 def package_version(package: str) -> str:
-    """Version of an installed package, "" without it."""
+    """Version of a package; "" if it is not installed."""
     try:
         return version(package)
     except PackageNotFoundError:
@@ -240,9 +240,9 @@ def package_version(package: str) -> str:
 
 @cache
 def numerics() -> dict[str, str]:
-    """What changes the last digits of a sweep: versions, kind of processor, code of the solver.
+    """Versions, type of processor and digest of the solver's code.
 
-    Two runs with the same give the same bits.
+    Two runs with equal `numerics` give bit for bit the same numbers.
     """
     return {
         "asperity": __version__,
@@ -253,11 +253,11 @@ def numerics() -> dict[str, str]:
 
 
 def _digest_of_sources() -> str:
-    """Digest of the package's modules, which may change between versions where it is developed."""
+    """Digest of the numerical modules: under development they change without a new version."""
     root = Path(__file__).parents[1]
     digest = hashlib.sha256()
     for file in sorted(root.rglob("*.py")):
         place = file.relative_to(root)
-        if place.parts[0] not in _ASIDE:
+        if place.parts[0] not in _NOT_NUMERICAL:
             digest.update(place.as_posix().encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()[:16]

@@ -1,4 +1,4 @@
-"""What became of points: their numbers, and an outcome as a code, a word and a sentence."""
+"""Answers of operating points: numbers, and an outcome as a code, a word and a sentence."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Index = NDArray[np.intp]
 
 
 class SweepOutcome(IntEnum):
-    """Outcomes beyond those of a periodic solve, which keep their codes."""
+    """Outcomes of a sweep's points, in addition to those of `asperity.orbit.outcome.Outcome`."""
 
     NOT_COMPUTED = -1
     CONVERGED = 0
@@ -39,18 +39,18 @@ _SENTENCES = {
     SweepOutcome.NOT_COMPUTED: "not computed yet",
     SweepOutcome.CONVERGED: "converged",
     SweepOutcome.SOLVER_ERROR: (
-        "the solver stopped with an error of its own; the log of the run holds its message"
+        "the solver stopped with an unexpected error; the log of the run has its message"
     ),
     SweepOutcome.WORKER_LOST: (
-        "the process that solved this point died each time, perhaps for want of memory; try "
-        "again with --retry-failed and fewer workers"
+        "the process that solved this point died at each attempt, perhaps for lack of memory; "
+        "repeat with --retry-failed and fewer workers"
     ),
     SweepOutcome.STABLE_THROUGHOUT: (
-        "no threshold: stable at every stiffness looked at, from {detail:.4g} K_c; extend "
+        "no threshold: stable at every stiffness of the scan, from {detail:.4g} K_c; extend "
         "threshold.between"
     ),
     SweepOutcome.UNSTABLE_THROUGHOUT: (
-        "no threshold: unstable at the stiffest spring looked at, {detail:.4g} K_c; extend "
+        "no threshold: unstable at the stiffest spring of the scan, {detail:.4g} K_c; extend "
         "threshold.between"
     ),
     SweepOutcome.NO_CROSSING: (
@@ -58,15 +58,15 @@ _SENTENCES = {
         "multiplier crosses the unit circle there"
     ),
     SweepOutcome.NO_RESPONSE: (
-        "no periodic response at some of the stiffnesses looked at, the first of them "
+        "no periodic response at some of the stiffnesses of the scan, the first of them "
         "{detail:.4g} K_c"
     ),
     SweepOutcome.STOPPED: "the transient stopped before its end, at {detail:.6g} s",
     SweepOutcome.REFUSED: (
-        "the numbers or the data of this point cannot be solved with; the log of the run says why"
+        "the numbers or the data of this point are invalid; the log of the run gives the reason"
     ),
     SweepOutcome.FIT_FAILED: (
-        "the fit did not converge; asperity fit with the numbers of this point says more"
+        "the fit did not converge; asperity fit with the numbers of this point gives details"
     ),
     SweepOutcome.NO_READINGS: (
         "no readings to fit: at the true values some row of the table has no periodic response"
@@ -75,7 +75,7 @@ _SENTENCES = {
 
 
 def words() -> dict[int, str]:
-    """A word for each code, as the attribute ``flag_meanings`` has it."""
+    """The word of each outcome code, as in the attribute ``flag_meanings``."""
     codes = {int(o): o.name.lower() for o in Outcome} | {
         int(o): o.name.lower() for o in SweepOutcome
     }
@@ -83,7 +83,7 @@ def words() -> dict[int, str]:
 
 
 def reason(outcome: int, detail: float) -> str:
-    """The sentence for a point."""
+    """The sentence of an outcome with its number."""
     if outcome == SweepOutcome.CONTACT_LOST:
         return no_contact(detail)
     if outcome in _SENTENCES:
@@ -92,18 +92,18 @@ def reason(outcome: int, detail: float) -> str:
 
 
 def flag_attributes() -> dict[str, Any]:
-    """Attributes by which any reader understands the codes."""
+    """CF attributes of the variable ``outcome``: codes and their meanings."""
     known = words()
     return {
         "units": "1",
-        "long_name": "what became of the point",
+        "long_name": "outcome of the point",
         "flag_values": list(known),
         "flag_meanings": " ".join(known.values()),
     }
 
 
 def reasons(outcome: Any, detail: Any) -> NDArray[np.object_]:
-    """What became of points, as sentences.
+    """Outcomes of points as sentences.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def reasons(outcome: Any, detail: Any) -> NDArray[np.object_]:
 
 @dataclass
 class Answers:
-    """Numbers and outcomes of some points.
+    """Numbers and outcomes of points.
 
     Attributes
     ----------
@@ -128,7 +128,7 @@ class Answers:
     outcome : int16 array, shape (points,)
         A `SweepOutcome`, or an `asperity.orbit.outcome.Outcome`.
     detail : array, shape (points,)
-        The number in the sentence of the outcome; 0 where there is none.
+        The number in the sentence of the outcome; 0 where the sentence has no number.
     """
 
     numbers: dict[str, Float]
@@ -137,7 +137,7 @@ class Answers:
 
     @classmethod
     def empty(cls, names: Sequence[str], count: int) -> Answers:
-        """Room for `count` points, none of them computed."""
+        """Answers of `count` points that are not computed yet."""
         return cls(
             {name: np.full(count, np.nan) for name in names},
             np.full(count, SweepOutcome.NOT_COMPUTED, dtype=np.int16),
@@ -151,18 +151,18 @@ class Answers:
         return self.numbers[name]
 
     def take(self, index: Any) -> Answers:
-        """The answers of the points `index`, by number or by a mask."""
+        """The answers of the points `index`, which is an array of numbers, a mask or a slice."""
         numbers = {name: values[index] for name, values in self.numbers.items()}
         return Answers(numbers, self.outcome[index], self.detail[index])
 
     def put(self, index: Any, others: Answers) -> None:
-        """Take over `others` at the places `index`."""
+        """Replace the answers at `index` by `others`."""
         for name, values in others.numbers.items():
             self.numbers[name][index] = values
         self.outcome[index], self.detail[index] = others.outcome, others.detail
 
     def fail(self, index: Any, outcome: int, detail: Any = 0.0) -> None:
-        """Give the points `index` an outcome without numbers."""
+        """Set an outcome at the points `index`, and their numbers to NaN."""
         for values in self.numbers.values():
             values[index] = np.nan
         self.outcome[index], self.detail[index] = outcome, detail
@@ -179,5 +179,5 @@ class Answers:
 
     @property
     def result(self) -> NDArray[np.object_]:
-        """The word "converged", or why not, as sentences."""
+        """The word "converged", or the sentence of the outcome."""
         return reasons(self.outcome, self.detail)

@@ -1,10 +1,10 @@
-"""The plan of a sweep as a file has it, checked field by field."""
+"""The plan of a sweep as it stands in a file; pydantic checks the type of each field."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PositiveInt, model_validator
 
@@ -20,18 +20,18 @@ class PlanError(MistakesError):
 
 
 class AxisTable(Record):
-    """An axis as a plan writes it: exactly one of five forms.
+    """An axis as a plan writes it, in exactly one of five forms.
 
     Attributes
     ----------
     from_, to, count, spacing
         A grid with both ends, written ``from``; ``spacing`` is ``"linear"`` or ``"log"``.
     values : tuple
-        Its values one by one.
+        All values.
     zip : mapping of str to tuple
         Several numbers that vary together, all of one length.
     cases : tuple of mapping
-        Rows one after the other; where a case has lists, all their combinations.
+        Rows; a case with lists gives a row for every combination of their values.
     draw : {"random", "sobol", "halton"}
         ``count`` draws of the numbers in ``over``.
     over : mapping of str to mapping
@@ -69,21 +69,21 @@ class AxisTable(Record):
         missing = [name for name in needed if getattr(self, name) is None]
         if missing:
             raise InputError(
-                f"axis must have {' and '.join(needed)} beside {forms[0]}, got no "
+                f"axis must have {' and '.join(needed)} together with {forms[0]}, got no "
                 f"{' and no '.join(missing)}; add it"
             )
         return self
 
 
 class ThresholdTable(Record):
-    """How thresholds of stiffness are looked for.
+    """Settings of the search for stiffness thresholds.
 
     Attributes
     ----------
     between : pair of float
-        Stiffnesses over K_c = (B - A) W0/D0 of the same point.
+        Limits of the search, in units of K_c = (B - A) W0/D0 of the same point.
     scan : int
-        Stiffnesses looked at before the search, at equal ratios.
+        Number of stiffnesses solved before the search, at equal ratios.
     """
 
     between: tuple[float, float] = (0.3, 4.0)
@@ -91,7 +91,7 @@ class ThresholdTable(Record):
 
 
 class NumberTable(Record):
-    """A number read from a transient.
+    """A number computed from a transient.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class NumberTable(Record):
     take : str
         ``mean``, ``min``, ``max``, ``range``, ``std``, ``first`` or ``last``.
     from_, to : float or str, optional
-        Times between which it is taken (s), written ``from``; the whole transient by default.
+        First and last time (s) of the samples, written ``from`` and ``to``; all by default.
     """
 
     of: str
@@ -111,12 +111,12 @@ class NumberTable(Record):
 
 
 class TransientTable(Record):
-    """A transient, and the numbers that are read from it.
+    """A transient, and the numbers that are computed from it.
 
     Attributes
     ----------
     steps : tuple of str
-        Lines as those of a protocol; ``{epsilon}`` stands for the value at the point.
+        Lines of a protocol; ``{epsilon}`` stands for the value at the point.
     numbers : mapping of str to NumberTable
     sampling : float or str
         Samples per second (Hz).
@@ -132,12 +132,12 @@ class TransientTable(Record):
 
 
 class FitTable(Estimation):
-    """A fit at every point.
+    """Settings of a fit at every point.
 
     Attributes
     ----------
     data : tuple of str
-        Tables of readings, all in one likelihood, where no axis has a column ``data``.
+        Tables of readings, all in one likelihood; left out where an axis has a column ``data``.
     """
 
     data: Names | None = None
@@ -149,25 +149,25 @@ class SweepPlan(Question):
     Attributes
     ----------
     axes : mapping of str to AxisTable
-        In the order of the dimensions. The grid is the product of all of them.
+        In the order of the dimensions. The grid is the product of the axes.
     law : str
-        Friction law, where no axis has a column ``law``.
+        Friction law; left out where an axis has a column ``law``.
     material : str
-        Where numbers come from that neither an axis nor `parameters` has.
+        Material whose numbers apply where neither an axis nor `parameters` has one.
     parameters : mapping of str to float, str or bool
-        Numbers that are the same at every point, by the names of tables, and ratios.
+        Numbers and ratios that are the same at every point, by name.
     solve : {"periodic", "threshold", "transient", "fit"}
     outputs : tuple of str
-        What is kept of each point; all that the solve has by default.
+        Outputs to keep of each point; the default outputs of `solve` if left out.
     seed : int
-        Of drawn axes.
+        Seed of drawn axes.
     chunk : int, optional
-        Points solved and written together, about.
+        Approximate number of points that are solved and written together.
     threshold, transient, fit
-        How these are solved.
+        Settings of these kinds of solve.
     title : str
     folder : Path
-        Where files that the plan names lie.
+        Folder of the files that the plan names.
 
     Raises
     ------
@@ -183,7 +183,7 @@ class SweepPlan(Question):
     material: str = ""
     parameters: Mapping[str, Given] = {}
     solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
-    outputs: tuple[str, ...] | None = None
+    outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     seed: int = Field(default=0, ge=0)
     chunk: PositiveInt | None = None
     threshold: ThresholdTable = ThresholdTable()
@@ -194,7 +194,7 @@ class SweepPlan(Question):
 
     @property
     def columns(self) -> dict[str, tuple[Any, ...]]:
-        """What the axes vary, as the plan writes it: listed values by name, none of draws."""
+        """Columns of the axes as the plan writes them; drawn columns have no values."""
         columns: dict[str, tuple[Any, ...]] = {}
         for name, table in self.axes.items():
             if table.values is not None or table.from_ is not None:

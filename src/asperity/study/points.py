@@ -1,4 +1,4 @@
-"""Operating points of a chunk, and the dimensionless numbers by which a plan may give them."""
+"""Operating points of a chunk, and the dimensionless ratios from which parameters may follow."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ from asperity.parameters import Parameter, point_parameters
 Float = NDArray[np.float64]
 Index = NDArray[np.intp]
 
-#: Bytes that a point takes while it is solved: 1.6 kB on periodic responses and 1.2 kB on the
-#: stiffnesses of thresholds, from the largest resident memory at 1e5 to 4e5 points of rice-ruina.
+#: Memory of a point while it is solved (bytes): measured 1.6 kB for periodic responses and 1.2 kB
+#: for stiffness thresholds (largest resident memory, 1e5 to 4e5 points of rice-ruina).
 POINT_BYTES = 2000.0
 
 
 @dataclass(frozen=True)
 class Points:
-    """Operating points of a chunk, along one axis.
+    """Operating points of a chunk, as one-dimensional columns.
 
     Attributes
     ----------
     laws : str array, shape (points,)
     values : dict of str to array, shape (points,)
-        SI numbers by name, NaN where a point has none.
+        SI numbers by name, NaN where a point has no value.
     data : str array, shape (points,), or None
-        Files of data, where they vary.
+        Data file of each point; None where no axis varies it.
     """
 
     laws: NDArray[np.object_]
@@ -48,7 +48,7 @@ class Points:
         return Points(self.laws[index], {n: v[index] for n, v in self.values.items()}, data)
 
     def of_law(self, law: str) -> dict[str, Float]:
-        """Values of all parameters of one law, with defaults where a point has none."""
+        """Values of all parameters of one law, with defaults where a point has no value."""
         of_law = {}
         for name, parameter in point_parameters(get_law(law)).items():
             default = math.nan if parameter.default is None else parameter.default
@@ -64,21 +64,18 @@ class Points:
 
 @dataclass(frozen=True)
 class Ratio:
-    """A dimensionless number and the parameter that it determines.
-
-    It determines the parameter from the others of the same point, after all of them have their
-    values.
+    """A dimensionless ratio, and the parameter that it determines with others of the same point.
 
     Attributes
     ----------
     parameter : Parameter
-        Name, meaning and rule of the number itself.
+        Name, meaning and rule of the ratio.
     target : str
-        The parameter that it determines.
+        The parameter that the ratio determines.
     needs : tuple of str
-        Parameters that enter.
+        The other parameters in the definition of the ratio.
     solve : callable
-        From the values of the point, the number among them, to the target in SI.
+        Maps the values of the point, with the ratio, to the target in SI.
     """
 
     parameter: Parameter
@@ -93,7 +90,7 @@ def _dimensionless(name: str, aliases: tuple[str, ...], meaning: str, symbol: st
     )
 
 
-#: By name. A plan may also write the formula.
+#: Ratios by name; their formulas are aliases that a plan may write too.
 RATIOS: Mapping[str, Ratio] = MappingProxyType(
     {
         "stiffness_ratio": Ratio(

@@ -1,7 +1,7 @@
-"""A plan in SI, with everything looked up: what two runs are compared by.
+"""The record of a plan: all numbers in SI, those of the material included.
 
-A record is a tree of JSON values. It names no file, so that a worker on another machine needs
-nothing but the record.
+Two runs have the same plan if their records are equal. A record is a tree of JSON values, and has
+no absolute path of a file, so that it is the same on another machine.
 """
 
 from __future__ import annotations
@@ -22,12 +22,12 @@ from asperity.study.plan import PlanError, SweepPlan
 from asperity.study.points import RATIOS
 from asperity.study.solve import SOLVES
 
-#: Variables of every store with a number for each point, and with one for each chunk.
+#: Variables of every store with a number for each point, and with a number for each chunk.
 OF_POINTS, OF_CHUNKS = ("outcome", "detail"), ("checksum", "status")
-#: Group of every store that has its attributes once more.
+#: Group of every store with a second copy of its attributes.
 ATTRIBUTES = "attributes"
-#: Names that no axis may have.
-_TAKEN = (*OF_POINTS, *OF_CHUNKS, ATTRIBUTES, *TEXTS)
+#: Names that an axis of several columns may not have.
+_RESERVED = (*OF_POINTS, *OF_CHUNKS, ATTRIBUTES, *TEXTS)
 
 
 def plan_record(plan: SweepPlan) -> dict[str, Any]:
@@ -36,7 +36,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     Raises
     ------
     PlanError
-        With all mistakes that concern the meaning of its fields.
+        With all mistakes in the names and values of the plan.
     """
     mistakes: list[str] = []
     axes: dict[str, Any] = {}
@@ -73,8 +73,8 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
         mistakes.append(str(error))
     if not mistakes:
         mistakes += _missing(laws, axes, numbers, supplied)
-        mistakes += _twice(axes)
-        mistakes += _misnamed(axes, {*known, *outputs, *_TAKEN})
+        mistakes += _repeated_columns(axes)
+        mistakes += _misnamed(axes, {*known, *outputs, *_RESERVED})
     if mistakes:
         raise PlanError(mistakes)
     return {
@@ -91,19 +91,19 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
 
 
 def known_names(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
-    """Every name that an axis or a fixed number may have."""
+    """All names that an axis or a fixed number may have."""
     parameters = {**known_parameters(laws[0] if laws else None), **SOLVES[solve].parameters()}
     return {**parameters, **{name: ratio.parameter for name, ratio in RATIOS.items()}}
 
 
 def law_places(plan: SweepPlan) -> tuple[str, ...]:
-    """Places of the laws that the plan names by one; files by their whole path."""
+    """Laws that the plan names by module or file; a file by its absolute path."""
     named = dict.fromkeys(law_place(law, plan.folder) for law in plan.laws)
     return tuple(text for text in named if ":" in text)
 
 
 def _law_files(plan: SweepPlan) -> dict[str, str]:
-    """SHA-256 of the file of each law that is named by its place, by its name."""
+    """SHA-256 of the file of each law that the plan names by module or file, by law name."""
     digests = {}
     for place in law_places(plan):
         module = sys.modules[get_law(known_law(place)).__module__]
@@ -133,7 +133,7 @@ def _numbers(
     laws: Sequence[str],
     known: Mapping[str, Parameter],
 ) -> tuple[dict[str, float], dict[str, str]]:
-    """Numbers that are the same everywhere, in SI, and where each comes from."""
+    """Numbers that are the same at every point, in SI, and the origin of each."""
     material = materials.load_from(plan.folder, plan.material) if plan.material else None
     ratios = {
         ratio: checked_value(RATIOS[ratio].parameter, value)
@@ -178,7 +178,7 @@ def _missing(
     numbers: Mapping[str, float],
     supplied: Sequence[str],
 ) -> Iterator[str]:
-    """What a law of the plan needs and no point of it has."""
+    """Mistakes of parameters that a law of the plan needs and that have no value."""
     for law in laws:
         present = {*numbers, *supplied}
         for axis in axes.values():
@@ -187,7 +187,7 @@ def _missing(
             lacking = [n for n in RATIOS[name].needs if n not in present]
             if lacking:
                 yield (
-                    f"{name} must have the numbers that it is made of, got none for "
+                    f"{name} must have the numbers of its definition, got none for "
                     f"{', '.join(lacking)}; add them to parameters or name a material"
                 )
             present.add(RATIOS[name].target)
@@ -202,7 +202,7 @@ def _missing(
 
 
 def _present(axis: Mapping[str, Any], law: str) -> set[str]:
-    """Columns of an axis that have a value in every row for a law."""
+    """Columns of an axis that have a value in every row of a law."""
     if "over" in axis:
         return set(axis["over"])
     columns = axis["columns"]
@@ -217,7 +217,7 @@ def _present(axis: Mapping[str, Any], law: str) -> set[str]:
 
 
 def _misnamed(axes: Mapping[str, Any], taken: Set[str]) -> Iterator[str]:
-    """Axes of several columns whose name is no name of a dimension, or is that of a variable."""
+    """Mistakes of axes of several columns whose name is invalid or belongs to a variable."""
     for name, axis in axes.items():
         if columns_of(axis) == (name,):
             continue
@@ -228,26 +228,26 @@ def _misnamed(axes: Mapping[str, Any], taken: Set[str]) -> Iterator[str]:
             )
         elif name in taken:
             yield (
-                f"axes.{name} must have a name of its own, got '{name}', which a number of the "
-                "store has; rename it, like 'sample'"
+                f"axes.{name} must have a name of its own, got '{name}', the name of a variable of "
+                "the store; rename it, like 'sample'"
             )
 
 
-def _twice(axes: Mapping[str, Any]) -> Iterator[str]:
-    """Columns that two axes have."""
+def _repeated_columns(axes: Mapping[str, Any]) -> Iterator[str]:
+    """Mistakes of columns that two axes have."""
     owners: dict[str, str] = {}
     for name, axis in axes.items():
         for column in columns_of(axis):
             if column in owners:
                 yield (
-                    f"axes.{name} must have numbers of its own, got '{column}', which "
+                    f"axes.{name} must have columns of its own, got '{column}', which "
                     f"axes.{owners[column]} has too; leave one out"
                 )
             owners[column] = name
 
 
 def is_extension(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """Whether `new` has all points of `old`, and others only behind them along axes."""
+    """Whether `new` only appends rows to axes of `old`."""
     others = [key for key in {*old, *new} if key not in ("axes", "laws")]
     if any(old.get(key) != new.get(key) for key in others):
         return False

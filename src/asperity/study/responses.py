@@ -1,4 +1,4 @@
-"""Periodic responses at any operating points: what tables, maps, thresholds and sweeps solve."""
+"""Periodic responses at operating points, for tables, maps, thresholds and sweeps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from asperity.study.points import Float, Index, Points
 def periodic_answers(
     points: Points, outputs: Sequence[str], progress: Callable[[int], None] | None = None
 ) -> Answers:
-    """Periodic responses of points of any registered laws.
+    """Periodic responses at points with any registered laws.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def answers_of_law(
     outputs: Sequence[str],
     progress: Callable[[int], None] | None = None,
 ) -> Answers:
-    """Periodic responses, each group of points with one equation of motion on its own.
+    """Periodic responses of one law; points with the same equation of motion are solved together.
 
     Parameters
     ----------
@@ -50,9 +50,9 @@ def answers_of_law(
     values : mapping of str to array, shape (points,)
         SI numbers by the names of `point_parameters`.
     outputs : sequence of str
-        Attributes of a `PeriodicResponse` with one number a point, or one of ``log_multiplier``
-        and ``multiplier_argument``: ln|m| of the leading multiplier, -inf for a law without
-        dynamics, and its arg m (rad).
+        Attributes of a `PeriodicResponse` with one number a point, and ``log_multiplier``, ln|m| of
+        the leading multiplier (-inf for a law without dynamics), and ``multiplier_argument``, its
+        arg m (rad).
     progress : callable, optional
         Called with the number of points finished since the last call.
     """
@@ -63,14 +63,14 @@ def answers_of_law(
         progress(len(rows) - len(sound))
     for group in motions({n: v[sound] for n, v in values.items()}) if len(sound) else []:
         index = sound[group]
-        some = {n: v[index] for n, v in values.items()}
-        response = respond(law, some, increments(progress), workers=1)
+        of_group = {n: v[index] for n, v in values.items()}
+        response = respond(law, of_group, increments(progress), workers=1)
         answers.put(index, _answers_of(response, outputs))
     return answers
 
 
 def solvable(law: type[Law], values: Mapping[str, Float], rows: Index, answers: Answers) -> Index:
-    """Which of the points can be solved; the others get their outcome in `answers` at `rows`."""
+    """Indices of the points that can be solved; `answers` gets the outcome of the others."""
     wrong = without_mass(values)
     for name, parameter in point_parameters(law).items():
         if name in values:
@@ -93,13 +93,13 @@ def is_stable(answers: Answers) -> NDArray[np.bool_]:
 
 
 def bifurcation_kinds(answers: Answers) -> NDArray[np.object_]:
-    """Bifurcation of the leading multiplier at the unit circle; "" where not known."""
+    """Bifurcation at which the leading multiplier crosses the unit circle; "" where unknown."""
     return kind_of_crossing(answers["log_multiplier"] + 1j * answers["multiplier_argument"])
 
 
 def _answers_of(response: PeriodicResponse, outputs: Sequence[str]) -> Answers:
     converged = response.converged
-    # A phase of a point that failed may be 0 where its modulus is NaN.
+    # A point that failed may have a phase of 0 with an amplitude of NaN.
     numbers = {n: np.where(converged, _output(response, n), np.nan) for n in outputs}
     detail = np.where(converged, 0.0, response.detail)
     return Answers(numbers, response.outcome.astype(np.int16), detail)

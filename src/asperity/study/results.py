@@ -1,4 +1,4 @@
-"""What a store holds: how far it is, the dataset, and statistics of its points, chunk by chunk."""
+"""Status, dataset and summary statistics of a store, read chunk by chunk."""
 
 from __future__ import annotations
 
@@ -25,25 +25,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class SweepStatus:
-    """How far a sweep is.
+    """Status of a sweep.
 
     Attributes
     ----------
     store : Path
     title : str
     points, done, failed : int
-        All points, those in chunks that are done, and those of these without a converged answer.
+        All points, points in chunks that are done, and points among these without a converged
+        answer.
     chunks, chunks_done, chunks_damaged : int
-        All, those that are done, and those that were and whose files are no longer what was
-        written: the next run solves them again.
+        All chunks, chunks that are done, and chunks whose files have changed since they were
+        written. The next run solves the damaged chunks again.
     outcomes : dict of str to int
-        Points of each outcome, of chunks that are done.
+        Number of points of each outcome in the chunks that are done.
     running : str
-        Who is at work on it; "" for nobody.
+        Process that works on the store; "" if none does.
     runs : list of dict
-        Every run so far: when, where, with which versions, how many points.
+        Every run so far: time, machine, versions, number of points.
     bytes : int
-        On the disk.
+        Size on the disk.
     """
 
     store: Path
@@ -61,9 +62,9 @@ class SweepStatus:
 
 
 def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
-    """The dataset of a sweep, finished or not: labelled, with units, and lazy.
+    """The dataset of a finished or unfinished sweep, with labels and units; loaded on access.
 
-    `xarray.open_zarr` opens the same.
+    `xarray.open_zarr` gives the same dataset.
 
     Parameters
     ----------
@@ -81,7 +82,7 @@ def open_store(store: str | os.PathLike[str]) -> xarray.Dataset:
 
 
 def store_status(store: str | os.PathLike[str]) -> SweepStatus:
-    """How far a sweep is, while it runs too.
+    """Status of a sweep, which may be running.
 
     Raises
     ------
@@ -124,7 +125,7 @@ def store_status(store: str | os.PathLike[str]) -> SweepStatus:
 
 
 def _bytes_in(path: Path) -> int:
-    """Bytes of all files; one that a worker removes meanwhile has none."""
+    """Size of all files; a file that a worker removes at this moment counts as 0."""
     total = 0
     for folder, _, names in os.walk(path):
         for name in names:
@@ -135,7 +136,7 @@ def _bytes_in(path: Path) -> int:
 
 @dataclass
 class _Moments:
-    """Sums that two parts of a population can be joined from (Chan, Golub and LeVeque, 1979)."""
+    """Running count, mean and sum of squared deviations (Chan, Golub and LeVeque, 1979)."""
 
     count: int = 0
     mean: float = 0.0
@@ -144,35 +145,34 @@ class _Moments:
     high: float = -math.inf
 
     def add(self, values: np.ndarray) -> None:
-        """Join the finite ones of some values."""
+        """Add the finite values of an array."""
         values = values[np.isfinite(values)]
         if not values.size:
             return
         count, mean = values.size, float(values.mean())
         square = float(((values - mean) ** 2).sum())
-        total, apart = self.count + count, mean - self.mean
-        self.square += square + apart**2 * self.count * count / total
-        self.mean += apart * count / total
+        total, shift = self.count + count, mean - self.mean
+        self.square += square + shift**2 * self.count * count / total
+        self.mean += shift * count / total
         self.count = total
         self.low = min(self.low, float(values.min()))
         self.high = max(self.high, float(values.max()))
 
     def record(self) -> dict[str, float]:
-        """The statistics by name; NaN where there is no value."""
-        none = not self.count
+        """The statistics by name; NaN without a value."""
+        if not self.count:
+            return {"count": 0, **dict.fromkeys(("mean", "std", "min", "max"), math.nan)}
+        std = math.sqrt(self.square / self.count)
         return {
-            "count": self.count,
-            "mean": math.nan if none else self.mean,
-            "std": math.nan if none else math.sqrt(self.square / self.count),
-            "min": math.nan if none else self.low,
-            "max": math.nan if none else self.high,
-        }
+            "count": self.count, "mean": self.mean, "std": std, "min": self.low, "max": self.high,
+        }  # fmt: skip
 
 
 def summary_statistics(store: str | os.PathLike[str]) -> dict[str, dict[str, float]]:
     """Count, mean, standard deviation, smallest and largest value of every output.
 
-    Over the points that have one, a chunk at a time: memory does not grow with the store.
+    Points without a converged answer are left out. The store is read a chunk at a time, so that
+    memory does not grow with the store.
 
     Raises
     ------

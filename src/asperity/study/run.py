@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from asperity._version import __version__
 from asperity.errors import InputError, listed
@@ -21,7 +21,7 @@ from asperity.laws import get_law
 from asperity.materials import cited_works, load_from
 from asperity.orbit.search import available_cores
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
-from asperity.parameters.arguments import file_path, whole_number
+from asperity.parameters.arguments import FilePath, at_least, typed
 from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
 from asperity.study.grid import SweepGrid, load_plan
@@ -34,7 +34,7 @@ from asperity.study.store.root import read_root
 from asperity.study.store.store import SweepStore
 from asperity.study.workers import Workers, local_cluster, local_processes, scheduler
 
-#: Seconds between signs of life in the lock file.
+#: Seconds between updates of the lock file, which show that the driver runs.
 _REFRESH = 5.0
 #: Packages whose versions the store records.
 _PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "zarr", "loky", "distributed")
@@ -42,20 +42,20 @@ _PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "zarr", "loky", "distributed")
 
 @dataclass(frozen=True)
 class SweepSummary:
-    """How a run went.
+    """Counts of a finished run.
 
     Attributes
     ----------
     out : Path
     points, failed : int
-        All points of the store, and those without a converged answer.
+        All points of the store, and the points without a converged answer.
     solved : int
         Points that this run solved.
     seconds : float
     memory : float
         Largest resident memory of a worker (bytes).
     lost : int
-        Times that a worker process died.
+        Number of worker processes that died.
     """
 
     out: Path
@@ -67,12 +67,13 @@ class SweepSummary:
     lost: int
 
 
+@typed
 def run_sweep(
     plan: SweepPlan | str | os.PathLike[str],
-    out: str | os.PathLike[str],
+    out: FilePath,
     *,
-    workers: int | Workers | None = None,
-    cluster: int | None = None,
+    workers: Annotated[int, at_least(1)] | Workers | None = None,
+    cluster: Annotated[int, at_least(1)] | None = None,
     address: str | None = None,
     extend_store: bool = False,
     retry_failed: bool = False,
@@ -81,8 +82,8 @@ def run_sweep(
 ) -> SweepSummary:
     """Solve every point of a plan and write it to a Zarr store.
 
-    The same call goes on after an interruption of any kind: chunks that are done and sound are
-    read and kept, whatever the number of workers.
+    The same call continues after an interruption of any kind: chunks that are done and undamaged
+    are kept. The numbers do not depend on the number of workers.
 
     Parameters
     ----------
@@ -90,33 +91,33 @@ def run_sweep(
     out : path
         Folder of the store.
     workers : int or Workers, optional
-        Processes of this machine; one for each core by default. Or any other
+        Number of processes on this machine, the number of cores by default; or any other
         `asperity.study.workers.Workers`.
     cluster : int, optional
-        Workers of a Dask cluster on this machine, instead.
+        Number of workers of a Dask cluster on this machine, in place of `workers`.
     address : str, optional
-        Of a Dask scheduler, instead.
+        Address of a Dask scheduler, in place of `workers`.
     extend_store : bool
-        The plan may have more rows than the store's, behind those that it has.
+        Whether the plan may append rows to the axes of the store.
     retry_failed : bool
-        Solve chunks with failed points again, with this version of the package.
+        Whether to solve chunks with failed points again, with this version of the package.
     progress : callable, optional
         Called with a `SweepProgress` at least once a second.
     log : callable, optional
-        Called with lines about what went wrong on the way.
+        Called with a line of text for every error and repair.
 
     Raises
     ------
     InputError
         If the plan has mistakes, the store has another plan or is in use, or the disk is full.
     """
-    path = file_path(out, "out").resolve()
+    path = Path(out).resolve()
     require_short(path, (fresh_folder(path), lock_file(path)))
     log = log or _silent
     text = ""
     if not isinstance(plan, SweepPlan):
         file, plan = plan, load_plan(plan)
-        # A pipe has been read.
+        # The text of a pipe cannot be read a second time.
         text = file_content(Path(file)).decode("utf-8-sig") if Path(file).is_file() else ""
     grid = SweepGrid.of(plan)
     pool = _workers(workers, cluster, address)
@@ -127,13 +128,13 @@ def run_sweep(
             store = _opened(path, plan, text, grid, extend_store, retry_failed, log)
             swept = store.sweep_orphans()
         if swept:
-            log(f"{swept} files that killed writers had left half-written were removed")
+            log(f"{swept} half-written files of killed processes were removed")
         try:
             require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
                          "choose another disk or fewer outputs")  # fmt: skip
             pool_workers = stack.enter_context(pool)
         except InputError:
-            # A refused start leaves nothing behind.
+            # A run that is refused leaves no new store.
             if fresh:
                 shutil.rmtree(path)
             raise
@@ -155,17 +156,17 @@ def _workers(
             "leave all but one out"
         )
     if cluster is not None:
-        return local_cluster(whole_number(cluster, "cluster", least=1))
+        return local_cluster(cluster)
     if address is not None:
         return scheduler(address)
     if isinstance(workers, Workers):
         return nullcontext(workers)
-    count = available_cores() if workers is None else whole_number(workers, "workers", least=1)
+    count = available_cores() if workers is None else workers
     return local_processes(count)
 
 
 def _silent(line: str) -> None:
-    """No lines about what went wrong."""
+    """No log."""
 
 
 def _opened(
@@ -177,7 +178,7 @@ def _opened(
     retry: bool,
     log: Callable[[str], None],
 ) -> SweepStore:
-    """The store of the plan: a new one, or one of the same plan, repaired."""
+    """The store of the plan: created, or that of an earlier run, repaired and extended."""
     if not path.exists() or (path.is_dir() and not any(path.iterdir())):
         if path.exists():
             path.rmdir()
@@ -192,7 +193,7 @@ def _opened(
     made = root.attributes["numerics"]
     if made != numerics() and not retry:
         raise InputError(
-            f"out must be continued by what began it, got '{path.name}' with "
+            f"out must be continued with the versions that began it, got '{path.name}' with "
             f"{differences(made, numerics())}, so that last digits may differ; finish it with "
             "those versions, or choose another store"
         )
@@ -216,10 +217,10 @@ def _opened(
         extend(path, root, grid, _attributes(plan, text, grid))
         return SweepStore(path)
     changed = differences(old, grid.record)
-    way = "its axes may only become longer" if extending else (
+    advice = "its axes may only become longer" if extending else (
         "change the plan back, choose another store, or add points to the end of axes with --extend"
     )  # fmt: skip
-    raise InputError(f"{path.name} must have the same plan, got {changed}; {way}")
+    raise InputError(f"{path.name} must have the same plan, got {changed}; {advice}")
 
 
 def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
@@ -241,7 +242,7 @@ def _attributes(plan: SweepPlan, text: str, grid: SweepGrid) -> dict[str, Any]:
 
 
 def _require_coordinates(grid: SweepGrid, folder: Path) -> None:
-    """Refuse coordinates that the disk has no room for: they are written before all else."""
+    """Refuse axes whose coordinates do not fit on the disk; coordinates are written first."""
     numbers = sum(axis.length * len(axis.names) for axis in grid.axes)
     require_disk(
         8.0 * numbers, folder, "axes", f"{numbers:.3g} numbers along them", "shorten them",
@@ -266,7 +267,7 @@ def _run(
     if not job.retry:
         counts.stored = round(store.share_done() * grid.points)
     runs = [*store.root.runs, _started(workers)]
-    # With --retry-failed these may be others than before; the runs have them all.
+    # With --retry-failed the versions may differ from the first run's; each run records its own.
     store.update_attributes(runs=runs, numerics=numerics())
     refreshed = time.monotonic()
 
@@ -304,7 +305,7 @@ def _run(
 
 @contextmanager
 def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
-    """Turn an error of the file system into a sentence about the store."""
+    """Raise an `InputError` about the store in place of an error of the file system."""
     try:
         yield
     except OSError as error:

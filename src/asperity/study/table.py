@@ -1,10 +1,10 @@
-"""Tables of operating points: one point a row in, the same rows with their responses out.
+"""Tables of operating points: each row of the input is a point; the output adds its response.
 
 Input columns are SI numbers without units, named ``law, A, B, D0, mu0, V0, K, M, W0, alpha,
-lambda, V, epsilon, frequency`` and whatever else a registered law declares. They are written back
-as they were read, in their order, followed by `asperity.parameters.RESULT_COLUMNS`. For a row
-that cannot be solved ``result`` says why; the other rows are solved. Rows are read, solved and
-written in chunks, so that memory does not grow with the table.
+lambda, V, epsilon, frequency``, and the further parameters of registered laws. The output has the
+input columns unchanged, followed by `asperity.parameters.RESULT_COLUMNS`. For a row that cannot be
+solved ``result`` gives the reason; the other rows are solved. Rows are read, solved and written in
+chunks, so that memory does not grow with the table.
 """
 
 from __future__ import annotations
@@ -36,12 +36,12 @@ from asperity.study.responses import answers_of_law
 
 Row = list[str]
 
-#: Rows of a chunk: at most so many are lost by an interruption.
+#: Rows of a chunk, the most that an interruption loses.
 _CHUNK = 20_000
 #: The result columns that hold numbers, and ``stable``.
 _OUTPUTS = RESULT_COLUMNS[: RESULT_COLUMNS.index("converged")]
 _DELIMITERS = (",", ";", "\t")
-#: Similarity above which a name is a misspelling and not a column of the user's own.
+#: An unknown column whose name is more similar to a known one than this counts as misspelt.
 _SIMILAR = 0.75
 
 
@@ -78,21 +78,21 @@ def run_table(
     source, out : Path
         `out` is written when all rows are done; until then finished chunks are in ``OUT.partial``.
     law : str, optional
-        Law of the rows that name none.
+        Law of the rows without a law.
     filled : mapping of str to float, optional
         SI numbers for missing columns and empty cells, by column name.
     resume : bool
-        Continue an interrupted table; without one, start from the first row.
+        Whether to continue an interrupted table, if there is one.
     progress : callable, optional
         Called with the number of rows done so far and of all rows.
     block : int
-        Rows of a chunk: solved and written at a time.
+        Number of rows of a chunk.
 
     Raises
     ------
     InputError
-        If the table as a whole cannot be used or `out` cannot be written. A bad row is no error:
-        its reason stands in ``result``.
+        If the table as a whole cannot be used or `out` cannot be written. A bad row raises no
+        error; its column ``result`` has the reason.
     Interrupted
         On Ctrl-C.
     """
@@ -126,7 +126,7 @@ def _solved(
     filled: Mapping[str, float],
     advance: Callable[[int], None],
 ) -> tuple[Answers, list[str]]:
-    """Answers of some rows, and the column ``result``; rows with a reason are not solved."""
+    """Answers of rows, and the column ``result``; rows that have a reason are not solved."""
     answers = Answers.empty(_OUTPUTS, len(rows))
     advance(sum(bool(reason) for reason in reasons))
     for name, members in _by_law(rows, table.columns.get("law"), law, reasons).items():
@@ -140,8 +140,8 @@ def _solved(
         advance(sum(bool(reason) for reason in refused))
         sound = np.array([k for k, reason in enumerate(refused) if not reason], dtype=np.intp)
         if len(sound):
-            some = {n: v[sound] for n, v in values.items()}
-            answers.put(members[sound], answers_of_law(kind, some, _OUTPUTS, advance))
+            valid = {n: v[sound] for n, v in values.items()}
+            answers.put(members[sound], answers_of_law(kind, valid, _OUTPUTS, advance))
     results = [reason or str(text) for reason, text in zip(reasons, answers.result, strict=True)]
     return answers, results
 
@@ -149,7 +149,7 @@ def _solved(
 def _by_law(
     rows: Sequence[Row], place: int | None, law: str | None, reasons: Sequence[str]
 ) -> dict[str, np.ndarray]:
-    """Rows without a reason yet, by their law."""
+    """Indices of the rows without a reason, by law."""
     members: dict[str, list[int]] = {}
     for i, row in enumerate(rows):
         if not reasons[i]:
@@ -173,7 +173,7 @@ def _cells(answers: Answers, results: Sequence[str]) -> Iterator[tuple[object, .
 
 @dataclass(frozen=True)
 class TableSource:
-    """A table that can be solved.
+    """A checked table.
 
     Attributes
     ----------
@@ -184,7 +184,7 @@ class TableSource:
     columns : mapping of str to int
         Position of every known column.
     rows : int
-        Rows of data; blank lines are none.
+        Number of rows of data, without blank lines.
     digest : str
         SHA-256 of the file.
     """
@@ -206,7 +206,7 @@ class TableSource:
 
 @dataclass
 class _ColumnContents:
-    """Contents of the columns, from a first reading of all rows."""
+    """Contents of the columns, from a first pass over all rows."""
 
     rows: int = 0
     laws: set[str] = field(default_factory=set)
@@ -221,9 +221,9 @@ def _open_table(path: Path, law: str | None, filled: Mapping[str, object]) -> Ta
     ----------
     path : Path
     law : str or None
-        Law of the rows that name none.
+        Law of the rows without a law.
     filled : mapping
-        Names of the numbers that need no column.
+        Numbers that need no column, by name.
 
     Raises
     ------
@@ -255,7 +255,7 @@ def _open_table(path: Path, law: str | None, filled: Mapping[str, object]) -> Ta
 
 @contextmanager
 def _opened(path: Path) -> Iterator[TextIO]:
-    """The table as text; any failure to read it becomes an `InputError`."""
+    """The table as text; errors of reading are raised as `InputError`."""
     require_rereadable(path, "table")
     try:
         # utf-8-sig: spreadsheets put a byte-order mark in front.
@@ -329,13 +329,13 @@ def _checked_header(header: Sequence[str], shown: str) -> dict[str, int]:
         if meant:
             raise InputError(
                 f"{shown} must have columns of known names, got '{name}'; "
-                f"did you mean '{meant}'? Rename a column of your own that is not meant so"
+                f"did you mean '{meant}'? If not, rename the column"
             )
     return {name: place for place, name in enumerate(names) if name in known}
 
 
 def _nearest(name: str, known: set[str]) -> str | None:
-    """The known column that resembles an unknown one, None if there is none."""
+    """The known column whose name is similar to an unknown name; None without one."""
     # 'V (m/s)' and 'D0 [m]' carry the name before the unit.
     bare = re.split(r"[\s(\[]", name.lower(), maxsplit=1)[0].rstrip("_")
     if not bare:
@@ -361,7 +361,7 @@ def _column_contents(
         contents.rows += 1
         written = row[law_place].strip() if 0 <= law_place < len(row) else ""
         contents.laws.add(written or law or "")
-        # Only columns without a number so far are examined: a long table is read at full speed.
+        # Columns that have shown a number are not examined further, for speed.
         for name in [n for n, place in without_number.items() if place < len(row)]:
             text = row[without_number[name]].strip()
             if _is_number(text):
@@ -385,7 +385,7 @@ def _check_columns(
     """Refuse a table in which no row can be solved because a required column is missing."""
     if contents.laws == {""}:
         raise InputError(
-            f"{path} must say the law of its rows, got no column 'law'; add it or give --law"
+            f"{path} must name the law of its rows, got no column 'law'; add it or give --law"
         )
     needs = [set(required(get_law(name))) for name in contents.laws if _known_law(name)]
     if not needs:
@@ -450,9 +450,9 @@ def _read_numbers(
     Returns
     -------
     values : dict of str to array, shape (rows,)
-        SI; meaningless where there is a reason.
+        SI; undefined for a row with a reason.
     reasons : list of str
-        Why a row cannot be solved; empty where it can.
+        Why a row cannot be solved; empty for the other rows.
     """
     reasons = [""] * len(rows)
     values = {}
@@ -527,7 +527,7 @@ def _check(
     parameter: Parameter,
     reasons: list[str],
 ) -> None:
-    """Check the rule of the numbers; a row that breaks it gets the reason."""
+    """Check the rule of a parameter; a row that breaks the rule gets the reason."""
     try:
         parameter.check(numbers[present])
         return

@@ -1,14 +1,14 @@
-"""The stiffness above which modulated sliding is stable.
+"""Stiffness thresholds: the stiffness above which modulated sliding is stable.
 
-It is where ln|m| of the leading multiplier passes zero on a straight line; many lines are searched
-at once.
+A threshold is a zero of ln|m| of the leading multiplier along a line of operating points. Many
+lines are searched together.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +18,9 @@ from asperity.errors import InputError
 from asperity.laws import Law
 from asperity.outputs import require_memory
 from asperity.parameters import DRIVE, law_parameters
-from asperity.parameters.arguments import number, pair, switch, whole_number
+from asperity.parameters.arguments import at_least, number, typed
 from asperity.slider import Slider
 from asperity.slider.named import slider_values
-from asperity.slider.problem import checked_slider
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.points import POINT_BYTES, Float
 from asperity.study.responses import answers_of_law, bifurcation_kinds
@@ -30,10 +29,9 @@ from asperity.units import format_si
 #: Accuracy of the position of a crossing, in fractions of an axis.
 TOLERANCE = 1e-6
 _MOST_STEPS = 60
-#: Where |ln|m|| at the crossing exceeds this fraction of its difference between the ends of the
-#: line, ln|m| does not pass through zero but jumps over it.
+#: ln|m| jumps over zero, and does not cross it, where |ln|m|| at the end of the search exceeds this
+#: fraction of the difference of ln|m| between the ends of the line.
 _JUMP = 1e-2
-
 
 #: Outputs that a search for crossings needs.
 STABILITY = ("log_multiplier", "multiplier_argument")
@@ -44,11 +42,11 @@ class ResponseSource(Protocol):
 
     @property
     def outputs(self) -> tuple[str, ...]:
-        """What each answer holds, `STABILITY` among it."""
+        """Names of the numbers of each answer; `STABILITY` is a part of them."""
         ...
 
     def solve(self, where: Float) -> Answers:
-        """The responses."""
+        """Responses at the positions `where`."""
         ...
 
 
@@ -59,9 +57,9 @@ class Crossings:
     Attributes
     ----------
     where : array, shape (points, 2)
-        Fractions of the axes; of a crossing that was not located, where the search ended.
+        Fractions of the axes; the last position of the search where no crossing is located.
     points : Answers
-        The responses there.
+        Responses at `where`.
     located : bool array, shape (points,)
     reason : object array, shape (points,)
         "converged", or why there is no crossing.
@@ -79,7 +77,7 @@ def find_crossings(
     """Locate the change of stability on each line from `start` to `end`.
 
     Chandrupatla's method (1997): inverse quadratic interpolation, and bisection where that is not
-    safe. ln|m| is continuous also where another multiplier takes the lead, and has kinks there.
+    safe. ln|m| is continuous, with a kink where another multiplier becomes the leading one.
 
     Parameters
     ----------
@@ -106,19 +104,19 @@ def find_crossings(
     lost = np.flatnonzero(~root.success)
     reason = points.result
     reason[jumps] = "the response jumps here: its branch folds away, or two branches meet"
-    reason[lost] = [f"the search for the crossing met a point without response: {lines.failure[i]}"
+    reason[lost] = [f"a point on the way to the crossing has no response: {lines.failure[i]}"
                     for i in lost]  # fmt: skip
     return Crossings(lines.where, points, points.converged & root.success & ~jumps, reason)
 
 
 class _SearchLines:
-    """Straight lines, and on each the solved point with the smallest |ln|m||."""
+    """Straight lines, and the solved point of each with the smallest |ln|m||."""
 
     def __init__(
         self, plane: ResponseSource, start: Float, end: Float, g0: Float, g1: Float
     ) -> None:
-        self.plane, self.start, self.way = plane, start, end - start
-        self.length = np.hypot(self.way[:, 0], self.way[:, 1])
+        self.plane, self.start, self.vector = plane, start, end - start
+        self.length = np.hypot(self.vector[:, 0], self.vector[:, 1])
         self.g0, self.g1 = g0, g1
         self.points = Answers.empty(plane.outputs, len(start))
         self.nearest = np.where(np.abs(g0) < np.abs(g1), 0.0, self.length)
@@ -127,7 +125,7 @@ class _SearchLines:
     @property
     def where(self) -> Float:
         """Fractions of the axes of the nearest points."""
-        return self.start + (self.nearest / self.length)[:, None] * self.way
+        return self.start + (self.nearest / self.length)[:, None] * self.vector
 
     def log_multiplier(self, s: Float, index: Float) -> Float:
         """ln|m| at the distances `s` along the lines `index`."""
@@ -135,7 +133,7 @@ class _SearchLines:
         g = np.where(s == 0, self.g0[i], self.g1[i])
         inside = (s != 0) & (s != self.length[i])
         i, s = i[inside], s[inside]
-        answers = self.plane.solve(self.start[i] + (s / self.length[i])[:, None] * self.way[i])
+        answers = self.plane.solve(self.start[i] + (s / self.length[i])[:, None] * self.vector[i])
         g[inside] = answers["log_multiplier"]
         failed = ~answers.converged
         self.failure[i[failed]] = answers.take(failed).result
@@ -146,7 +144,7 @@ class _SearchLines:
         return g
 
     def solve_at(self, s: Float) -> None:
-        """Solve at the distances `s`, where that is not done yet."""
+        """Solve at the distances `s`, except where that point is solved already."""
         index = np.flatnonzero(~self.points.converged | (self.nearest != s))
         self.nearest = np.asarray(s, dtype=float)
         self.points.put(index, self.plane.solve(self.where[index]))
@@ -163,10 +161,10 @@ class StiffnessThreshold:
     Attributes
     ----------
     K : array, shape (...)
-        The stiffness (N/m); NaN where none was found.
+        The stiffness (N/m); NaN without a threshold.
     ratio : array, shape (...)
-        K/K_c, with K_c = (B - A) W0/D0 of unmodulated sliding on rigid asperities; NaN for a law
-        without A, B and D0 too.
+        K/K_c, with K_c = (B - A) W0/D0 of unmodulated sliding on rigid asperities; NaN also for a
+        law without A, B and D0.
     kind : str array, shape (...)
         "fold", "period doubling" or "Neimark-Sacker".
     mode_frequency : array, shape (...)
@@ -182,6 +180,7 @@ class StiffnessThreshold:
     result: NDArray[np.object_]
 
 
+@typed
 def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, float]:
     """K_c (N/m) and the stick-slip frequency f_c (Hz) at K_c, of rigid asperities.
 
@@ -200,7 +199,6 @@ def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, fl
     InputError
         If the law has no A, B or D0.
     """
-    checked_slider(slider)
     if not {"A", "B", "D0"} <= set(law_parameters(type(slider.law))):
         raise InputError(
             f"law must have A, B and D0 for a critical stiffness in closed form, got "
@@ -213,6 +211,7 @@ def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, fl
     return excess * p["W0"] / p["D0"], float(frequency)
 
 
+@typed
 def stiffness_threshold(
     slider: Slider,
     *,
@@ -222,18 +221,18 @@ def stiffness_threshold(
     inertia: bool = False,
     radiation_damping: ArrayLike | str | None = None,
     between: tuple[Any, Any] | None = None,
-    scan: int = 24,
+    scan: Annotated[int, at_least(2)] = 24,
 ) -> StiffnessThreshold:
     """The highest stiffness at which the leading multiplier passes the unit circle.
 
     Parameters
     ----------
     slider : Slider
-        Numbers, no arrays; its own stiffness has no effect.
+        With numbers, no arrays; the stiffness of the slider has no effect.
     velocity : float or str
         Pulling velocity V (m/s).
     epsilon, frequency : array
-        Amplitude on the contacts and frequency (Hz); they broadcast.
+        Relative amplitude of the load on the contacts and frequency (Hz); they broadcast.
     inertia : bool
         Whether the mass is included.
     radiation_damping : float or str, optional
@@ -241,15 +240,14 @@ def stiffness_threshold(
     between : pair of float or str, optional
         Softest and stiffest spring of the search (N/m); 0.3 and 4 times K_c by default.
     scan : int
-        Stiffnesses solved before the search, at equal ratios: narrower features are not detected.
+        Number of stiffnesses solved before the search, at equal ratios. A change of stability and
+        back between two of them is not detected.
 
     Raises
     ------
     InputError
         If a number breaks its rule, or the law has no K_c and `between` is not given.
     """
-    checked_slider(slider)
-    inertia, scan = switch(inertia, "inertia"), whole_number(scan, "scan", least=2)
     eps, f = DRIVE["epsilon"].check(epsilon), DRIVE["frequency"].check(frequency)
     try:
         eps, f = np.broadcast_arrays(eps, f)
@@ -287,12 +285,12 @@ def stiffness_threshold(
 
 
 def require_scan(points: int, scan: int, name: str) -> None:
-    """Refuse more stiffnesses at each of some points than memory can hold.
+    """Refuse a scan that does not fit in memory.
 
     Raises
     ------
     InputError
-        Which calls the number of stiffnesses `name`.
+        About the field `name`.
     """
     require_memory(
         points * scan * POINT_BYTES, name, f"{scan:,} stiffnesses at each of {points:,} points",
@@ -301,23 +299,23 @@ def require_scan(points: int, scan: int, name: str) -> None:
 
 
 class SearchedThresholds(NamedTuple):
-    """Thresholds of many operating points, each along its own line of stiffnesses.
+    """Thresholds of many operating points.
 
     Attributes
     ----------
     K : array, shape (points,)
-        Threshold (N/m); NaN where none was found.
+        Threshold (N/m); NaN without one.
     turn : array, shape (points,)
-        |arg m| / (2 pi) of the leading multiplier there.
+        |arg m| / (2 pi) of the leading multiplier at the threshold.
     kind : object array, shape (points,)
-        Bifurcation; "" where none was found.
+        Bifurcation; "" without a threshold.
     result : object array, shape (points,)
         "converged", or why there is no threshold.
     outcome : int16 array, shape (points,)
         A `SweepOutcome`.
     where : array, shape (points,)
-        Stiffness (N/m) of the threshold, of what stands in its way, or the end that `outcome` is
-        about.
+        Stiffness (N/m) of the threshold, or of the point that `outcome` describes: a failed point,
+        or an end of the scan.
     """
 
     K: Float
@@ -339,20 +337,20 @@ def search_thresholds(
     values : mapping of str to array, shape (points,)
         All numbers but K in SI, by name.
     low, high : array, shape (points,)
-        Stiffnesses to look between (N/m).
+        Softest and stiffest spring of the search (N/m).
     scan : int
-        Stiffnesses looked at before the search, at equal ratios.
+        Number of stiffnesses solved before the search, at equal ratios.
     """
     lines = _StiffnessLines(law, values, low, high)
     count = len(low)
     steps = np.linspace(0.0, 1.0, scan)
     grid = np.stack([a.ravel() for a in np.meshgrid(steps, np.arange(count, dtype=float))], -1)
-    seen = lines.solve(grid)
-    g = seen["log_multiplier"].reshape(count, scan)
-    reasons = np.where(seen.converged, "", seen.result).reshape(count, scan)
+    scanned = lines.solve(grid)
+    g = scanned["log_multiplier"].reshape(count, scan)
+    reasons = np.where(scanned.converged, "", scanned.result).reshape(count, scan)
     with np.errstate(invalid="ignore"):
         crossed = (g[:, :-1] > 0) & (g[:, 1:] < 0)
-    # The stable side must reach up to the stiffest spring, with a response everywhere.
+    # All stiffer springs of the scan must have a stable response.
     last = scan - 2 - np.argmax(crossed[:, ::-1], axis=1)
     stiffer = np.array([(g[i, k + 1 :] < 0).all() for i, k in enumerate(last)], dtype=bool)
     usable = crossed.any(axis=1) & stiffer
@@ -389,7 +387,7 @@ def search_thresholds(
 
 
 def _numbers(slider: Slider) -> dict[str, float]:
-    """Parameters of a slider by name, numbers only."""
+    """Parameters of a slider by name, as numbers."""
     values = slider_values(slider)
     arrays = [name for name, value in values.items() if np.size(value) != 1]
     if arrays:
@@ -401,7 +399,7 @@ def _numbers(slider: Slider) -> dict[str, float]:
 
 
 def _critical(slider: Slider, velocity: Any) -> float:
-    """K_c, NaN for a law that has none."""
+    """K_c (N/m); NaN for a law without A, B and D0."""
     try:
         return natural_scales(slider, velocity)[0]
     except InputError:
@@ -418,9 +416,7 @@ def _ends(slider: Slider, velocity: Any, between: tuple[Any, Any] | None) -> tup
                 f"K_c = {critical:g} N/m; give two stiffnesses"
             )
         return _BETWEEN[0] * critical, _BETWEEN[1] * critical
-    low, high = (
-        number(end, "between", "stiffness", "positive") for end in pair(between, "between")
-    )
+    low, high = (number(end, "between", "stiffness", "positive") for end in between)
     if not low < high:
         raise InputError(
             f"between must go from a softer to a stiffer spring, got {low:g} to {high:g} N/m; "
@@ -430,7 +426,7 @@ def _ends(slider: Slider, velocity: Any, between: tuple[Any, Any] | None) -> tup
 
 
 class _StiffnessLines:
-    """Lines of increasing stiffness, each with the other numbers of its operating point."""
+    """A `ResponseSource`: a line of increasing stiffness for each operating point."""
 
     outputs = STABILITY
 
@@ -441,12 +437,12 @@ class _StiffnessLines:
         self.low, self.high = low, high
 
     def stiffness(self, where: Float) -> Float:
-        """K (N/m) at (fraction, number of the line)."""
+        """K (N/m) at the rows of `where`: fraction of the line, number of the line."""
         line = np.round(where[:, 1]).astype(int)
         return np.asarray(self.low[line] * (self.high[line] / self.low[line]) ** where[:, 0])
 
     def solve(self, where: Float) -> Answers:
-        """Responses at (fraction, number of the line)."""
+        """Responses at the rows of `where`: fraction of the line, number of the line."""
         line = np.round(where[:, 1]).astype(int)
         values = {name: numbers[line] for name, numbers in self.values.items()}
         values["K"] = self.stiffness(where)

@@ -15,31 +15,31 @@ from typing import Any
 
 from asperity.errors import InputError, printable
 
-#: Environment of a worker: one thread of XLA and of the linear algebra of NumPy, as Dask has it.
-#: Sums over several threads differ in their last bits from sums in one.
+#: Environment of a worker: one thread for XLA and for the linear algebra of NumPy, as in Dask.
+#: Sums over several threads differ in their last bits from sums in one thread.
 ENVIRONMENT = {
     "NPROC": "1",
     **dict.fromkeys(("OMP_NUM_THREADS", "MKL_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"),
 }
 
-#: Seconds after which the workers of a scheduler are counted again.
+#: Seconds between counts of the workers of a scheduler.
 _RECOUNT = 5.0
-#: Seconds between looks of a worker process at whether its driver still runs.
-_LOOK = 1.0
+#: Seconds between checks of a worker process whether its driver still runs.
+_DRIVER_CHECK = 1.0
 
 
 class Workers(ABC):
-    """Processes that do tasks.
+    """Processes that run tasks.
 
     Attributes
     ----------
     count : int
     about : str
-        What the store says of them.
+        Description of the workers in the store.
     lost : tuple of type
-        Exceptions of a task whose process died.
+        Exceptions that mean: the process of the task died.
     gone : tuple of type
-        Exceptions where there are no workers any more, and will be none.
+        Exceptions that mean: there are no workers any more, and none will start.
     """
 
     count: int
@@ -49,18 +49,18 @@ class Workers(ABC):
 
     @abstractmethod
     def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
-        """Hand out a task."""
+        """Submit a task."""
 
     def restart(self) -> None:  # noqa: B027
-        """Start new processes in place of dead ones, where that does not happen by itself."""
+        """Replace dead processes, if the executor does not do so itself."""
 
     @abstractmethod
     def close(self, *, kill: bool) -> None:
-        """Let the processes go; with `kill`, whatever they are doing."""
+        """Release the processes; with `kill` their running tasks are killed."""
 
 
 class ThisProcess(Workers):
-    """The process of the driver: a task is done when it is handed out."""
+    """The process of the driver: `submit` runs the task before it returns."""
 
     count = 1
     about = "this process"
@@ -68,11 +68,11 @@ class ThisProcess(Workers):
     gone = ()
 
     def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
-        """As in `Workers`; an interruption is raised at once."""
+        """As in `Workers`; Ctrl-C is raised at once."""
         future: Future[Any] = Future()
         try:
             future.set_result(task(*args))
-        except Exception as error:  # as an executor does
+        except Exception as error:  # an executor stores exceptions in the future, too
             future.set_exception(error)
         return future
 
@@ -96,7 +96,7 @@ class LocalProcesses(Workers):
     def _start(self) -> Any:
         from loky import get_reusable_executor
 
-        # Never forked: a fork of a process in which JAX runs hangs.
+        # loky does not fork: the fork of a process that runs JAX hangs.
         return get_reusable_executor(
             max_workers=self.count,
             env=dict(ENVIRONMENT),
@@ -118,7 +118,7 @@ class LocalProcesses(Workers):
         self._executor = self._start()
 
     def close(self, *, kill: bool) -> None:
-        """As in `Workers`; without `kill` the processes stay for the next sweep a while."""
+        """As in `Workers`; without `kill` idle processes stay ten minutes for the next sweep."""
         if kill:
             self._executor.shutdown(wait=False, kill_workers=True)
 
@@ -127,16 +127,16 @@ def _begin(driver: int) -> None:
     """Set up a worker of the process `driver`."""
     from loky import process_executor
 
-    # A worker whose memory has grown by 300 MB has compiled programs, and no leak.
+    # loky restarts workers whose memory grows by 300 MB; here compiled programs take this memory.
     process_executor._USE_PSUTIL = False
     if os.name == "posix":
         threading.Thread(target=_end_with, args=(driver,), daemon=True).start()
 
 
 def _end_with(driver: int) -> None:
-    """End this process when its driver is gone: one that was killed can tell it nothing."""
+    """End this process when its driver has ended; a killed driver cannot end its workers."""
     while os.getppid() == driver:
-        time.sleep(_LOOK)
+        time.sleep(_DRIVER_CHECK)
     os._exit(1)
 
 
@@ -162,7 +162,7 @@ class DaskWorkers(Workers):
         self._executor: Executor = client.get_executor(pure=False)
 
     def _recount(self) -> None:
-        """Count the workers: jobs of a batch system begin and end while a sweep runs."""
+        """Count the workers, which a batch system may start and end while a sweep runs."""
         self.count = max(1, sum(self.client.nthreads().values()))
         self._counted = time.monotonic()
 
@@ -179,7 +179,7 @@ class DaskWorkers(Workers):
 
 @contextmanager
 def local_processes(count: int) -> Iterator[Workers]:
-    """Processes of this machine; they are killed if the block ends with an exception."""
+    """Processes of this machine, which are killed if the block ends with an exception."""
     workers = LocalProcesses(count)
     try:
         yield workers
@@ -191,7 +191,7 @@ def local_processes(count: int) -> Iterator[Workers]:
 
 @contextmanager
 def local_cluster(count: int) -> Iterator[Workers]:
-    """A Dask cluster on this machine, for the time of the block.
+    """A Dask cluster on this machine, which ends with the block.
 
     Raises
     ------
@@ -206,8 +206,8 @@ def local_cluster(count: int) -> Iterator[Workers]:
             dask.config.set({"distributed.nanny.pre-spawn-environ": dict(ENVIRONMENT)})
         )
         try:
-            # Without a limit: near one Dask pauses a worker, whose compiled programs no pause
-            # frees.
+            # No memory limit: near a limit Dask pauses a worker, and a pause does not free the
+            # memory of compiled programs.
             cluster = stack.enter_context(
                 distributed.LocalCluster(
                     n_workers=count,
@@ -219,7 +219,7 @@ def local_cluster(count: int) -> Iterator[Workers]:
             )
             client = stack.enter_context(distributed.Client(cluster))
             workers = DaskWorkers(client, f"Dask cluster on one machine with {count} workers")
-        # Dask raises one of these when a process ends, or does not answer, while it starts.
+        # Dask raises one of these when a starting process ends or does not answer.
         except (RuntimeError, OSError, TimeoutError, CancelledError) as error:
             raise InputError(
                 f"--cluster must be workers that this machine can start, got {count}, of which "
@@ -231,7 +231,7 @@ def local_cluster(count: int) -> Iterator[Workers]:
 
 @contextmanager
 def scheduler(address: str) -> Iterator[Workers]:
-    """The workers of a Dask scheduler that runs already.
+    """The workers of a running Dask scheduler.
 
     Raises
     ------
@@ -275,6 +275,6 @@ def _distributed(option: str) -> Any:
             f"{option} must have Dask, got none installed; install it with pip install "
             "'asperity[dask]', or leave the option out for processes of this machine"
         ) from None
-    # What it logs of a lost scheduler, with tracebacks, reaches the driver as an exception.
+    # A lost scheduler reaches the driver as an exception; its logged tracebacks are not needed.
     logging.getLogger("distributed.client").setLevel(logging.CRITICAL)
     return distributed

@@ -1,4 +1,4 @@
-"""The limit of slow modulation: at every phase the steady state under the load of that phase."""
+"""The limit of slow modulation: at every phase the steady state under the present load."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ from asperity.algebra.small_systems import Matrix, inverse_points
 from asperity.loads import Excitation
 from asperity.slider import QuasiStatic
 
-#: Largest change of a logarithmic state in one step; the mean of e^(-state) is what is solved for.
+#: Largest change of a logarithmic state in a step; the unknown is the mean of e^(-state).
 _STATE_STEP = 2.0
 
 
@@ -69,7 +69,7 @@ def laplace_estimate(system: QuasiStatic, at: Excitation) -> Array:
     """
     start = jnp.broadcast_to(system.steady(), (system.size, at.w.shape[1]))
     pulse = slip_pulse(system, at)
-    # Second derivative of the strength at its minimum, as if its whole swing were one cosine.
+    # Second derivative of the strength at its minimum, for a cosine with the same range.
     gain = 0.5 * jnp.log(jnp.maximum(2 * jnp.pi * pulse.sharpness, 1.0))
     return start.at[0].set(jnp.minimum(start[0], pulse.weakest + pulse.width * gain))
 
@@ -107,7 +107,7 @@ def averaged_limit(
     Returns
     -------
     AveragedLimit
-        Not finite where it failed.
+        Not finite where Newton's method failed.
     """
     points = at.w.shape[1]
     n = system.size
@@ -130,7 +130,7 @@ def _newton_step(
     system: QuasiStatic, centre: tuple[Array, ...], at: Excitation, weights: Array
 ) -> tuple:
     """The new means, the matrix used, and the largest logarithmic change."""
-    # Of constant states, terms in the slopes of load and shear force have zero mean.
+    # For constant states, terms with the slopes of load and shear force have zero mean.
     flat = jnp.zeros_like(at.w)
     constant = Excitation(at.w, flat, at.shear)
 

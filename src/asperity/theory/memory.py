@@ -1,4 +1,4 @@
-"""Closed forms of an interface's memory: velocity steps, holds, healing, critical stiffness.
+"""Closed forms for velocity steps, holds, healing and critical stiffness.
 
 Lengths in m, stiffness over the normal load, k = K/W0, in 1/m. Phi is the age, D0 the memory
 length, V the velocity, u the slip at constant V. With x = V Phi/D0 three laws have closed forms:
@@ -32,17 +32,18 @@ from asperity.errors import InputError
 from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
 from asperity.loads import Excitation
 from asperity.parameters import obeying
-from asperity.parameters.arguments import instance, number
+from asperity.parameters.arguments import number, typed
 from asperity.slider import QuasiStatic, Slider
 
 Float = NDArray[np.float64]
 
-#: Stiffnesses at which stability is looked at, over the scale of the law: decades and points.
+#: Stiffnesses of the stability scan, over the scale of the law: decades and number of points.
 _DECADES, _POINTS = 8, 400
-_BISECTIONS = 60
+_REFINEMENTS = 8
 _DECADE = math.log(10)
 
 
+@typed
 def decay_rates(law: Law, velocity: float | str) -> NDArray[np.complex128]:
     """Rates per slip (1/m) at which states relax to steady sliding at imposed velocity.
 
@@ -59,7 +60,6 @@ def decay_rates(law: Law, velocity: float | str) -> NDArray[np.complex128]:
         Eigenvalues of -d(state rate)/d(state) over the velocity, by rising real part: 1/D0 of the
         three laws above.
     """
-    law = instance(law, Law, "law", "build one such as material.law('rice-ruina')")
     V = jnp.asarray(number(velocity, "decay_rates.velocity", "velocity", "positive"))
     one = jnp.ones(())
 
@@ -70,6 +70,7 @@ def decay_rates(law: Law, velocity: float | str) -> NDArray[np.complex128]:
     return np.sort_complex(-np.linalg.eigvals(np.asarray(jax.jacfwd(rates)(steady)))) / float(V)
 
 
+@typed
 def critical_stiffness(law: Law, velocity: float | str) -> float:
     """Largest stiffness K/W0 (1/m) at which steady sliding is unstable, without inertia.
 
@@ -98,23 +99,35 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
             "its sliding has no critical stiffness"
         )
     k = scale * np.logspace(-_DECADES, _DECADES, _POINTS)
-    unstable = np.flatnonzero(_growth(law, V, k) > 0)
-    if not unstable.size:
-        return 0.0
-    low, high = k[unstable[-1]], k[min(unstable[-1] + 1, _POINTS - 1)]
-    for _ in range(_BISECTIONS):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if _growth(law, V, np.array([middle]))[0] > 0 else (low, middle)
-    return float(low)
+    low = 0.0
+    for _ in range(_REFINEMENTS):
+        unstable = np.flatnonzero(_growth(law, V, k) > 0)
+        if not unstable.size:
+            break
+        low, high = (float(k[i]) for i in (unstable[-1], min(unstable[-1] + 1, _POINTS - 1)))
+        k = np.geomspace(low, high, _POINTS)
+    return low
 
 
 def _growth(law: Law, V: float, k: Float) -> Float:
     """Growth rate of a small disturbance of steady sliding, at stiffnesses `k`."""
-    wide = jax.tree.map(lambda a: jnp.broadcast_to(jnp.asarray(a, float), k.shape), law)
-    motion = QuasiStatic(Slider(wide, spring=k, load=np.ones_like(k)), jnp.full(k.shape, V), 1.0)
-    at = Excitation(jnp.ones(k.shape))
+    wide = jax.tree.map(lambda a: np.broadcast_to(np.asarray(a, float), k.shape), law)
+    slider = Slider(wide, spring=k, load=np.ones_like(k))
+    return np.asarray(steady_growth(slider, np.full(k.shape, V)))
+
+
+@jax.jit
+def steady_growth(slider: Slider, V: Array) -> Array:
+    """Growth rate of a small disturbance of steady sliding without inertia, over its phase.
+
+    Parameters
+    ----------
+    slider : Slider
+        Parameters of shape (points,), as `V` (m/s).
+    """
+    motion, at = QuasiStatic(slider, V, 1.0), Excitation(jnp.ones_like(V))
     _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), motion.steady())
-    return np.asarray(spectral_abscissa(jnp.stack(columns, axis=1)))
+    return spectral_abscissa(jnp.stack(columns, axis=1))
 
 
 def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) -> Array:
@@ -123,7 +136,7 @@ def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) ->
     Parameters
     ----------
     law : RiceRuina, RuinaSlip or PerrinRiceZheng
-        Others have no closed form here.
+        RiceRuina (ageing), RuinaSlip or PerrinRiceZheng.
     ratio : array
         New velocity over the old one, positive.
     slip : array or str
@@ -141,14 +154,14 @@ def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) ->
 
 
 class LongHold(NamedTuple):
-    """Healing after a long hold of the ageing law, and what it leaves out.
+    """Healing of the ageing law after a long hold: leading and next order.
 
     Attributes
     ----------
     leading : array
         Of contacts that only age in the hold.
     renewal : array
-        Next order: what the slip in the hold takes off, negative. It falls with the hold time as
+        Next order: reduction by the slip in the hold, negative. It falls with the hold time as
         t^(-(B - A)/A) if B > A, slowly where A and B are close.
     """
 
@@ -157,7 +170,7 @@ class LongHold(NamedTuple):
 
     @property
     def healing(self) -> Array:
-        """Both."""
+        """Sum of both orders."""
         return self.leading + self.renewal
 
 

@@ -1,4 +1,4 @@
-"""Stick-slip in closed form: a slider that overshoots, and drops that grow with the time of rest.
+"""Stick-slip in closed form: overshooting slider, and stress drops that grow with the stick time.
 
 A slider of mass M under the load W0 rests until the spring force K (V t - x) reaches mu_s W0, and
 slips at the constant friction mu_d W0 until it rests again. With omega = sqrt(K/M) and

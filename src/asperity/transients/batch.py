@@ -30,7 +30,7 @@ _SAFETY, _SHRINK, _GROW = 0.9, 0.2, 6.0
 #: ln(v_pl / V) of a slider that slips: 30 times as fast as its drive.
 _SLIPPING = 3.4
 
-#: Steps that a motion may take, rejected ones among them.
+#: Largest number of steps of a motion, with rejected ones.
 MOST_STEPS = 60_000
 _ROOT_STEPS = 60
 
@@ -61,7 +61,7 @@ class ConstantDrive(SegmentEquations):
 
 
 class Drive(NamedTuple):
-    """What drives a motion, and where it ends; arrays of one shape.
+    """The drive of a motion, and the conditions that end it; arrays of one shape.
 
     Attributes
     ----------
@@ -90,7 +90,7 @@ class Drive(NamedTuple):
 
 
 class Reached(NamedTuple):
-    """Where a motion ended; arrays of one shape.
+    """The end of a motion; arrays of one shape.
 
     Attributes
     ----------
@@ -125,7 +125,7 @@ def drive_many(slider: Slider, V: Array, drive: Drive, Y: Array) -> Reached:
     Y : array, shape (points, size + 1)
     """
 
-    # Of one type whatever they come from: one program serves all drives.
+    # All arrays get the same type and shape, so that one program serves all drives.
     def wide(a: ArrayLike) -> Array:
         return jnp.broadcast_to(jnp.asarray(a, jnp.float64), jnp.shape(V))
 
@@ -184,7 +184,7 @@ def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
         log_slip = stop_gradient(system.log_slip(trial.end))
         off = jnp.abs(log_slip) + jnp.abs(trial.end[:-1] - target)[1:].sum()
         lost = ~good & ~(t + h_next > t)
-        # A fast slider for which no step is short enough comes to infinity there.
+        # A fast slider without an accurate step ends at infinity.
         away = lost & (stop_gradient(system.log_slip(Y)) > _SLIPPING)
         end = jnp.select(
             [
@@ -216,7 +216,7 @@ def _drive(motion: QuasiStatic, drive: Drive, Y: Array) -> Reached:
     none = first._replace(h=zero)
     start = _Run(first, distances(Y), (none, none), jnp.asarray(-1), jnp.asarray(0))
     run = jax.lax.while_loop(lambda run: run.end < 0, body, start)
-    # Both crossings by one loop.
+    # One loop locates both crossings.
     steps = jax.tree.map(lambda a, b: jnp.stack([a, b]), *run.crossed)
     s, there = jax.vmap(lambda step, n: _located(system, step, lambda Y: distances(Y)[n]))(
         steps, jnp.arange(2)

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from jax import Array
 
-#: Steps that a compiled program takes before it returns.
+#: Steps of a call of a compiled program.
 STEPS = 2048
 
-#: Events are looked for at the ends of this many equal parts of every step.
+#: Events are detected at the ends of this many equal parts of every step.
 PARTS = 4
 
 #: Status of a compiled program: more steps to take, or no accurate step.
@@ -18,7 +18,7 @@ GOING_ON, UNDERFLOW = 0, 1
 
 
 class StepChunk(NamedTuple):
-    """Some steps, as a compiled program returns them.
+    """Steps as a compiled program returns them.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class StepChunk(NamedTuple):
 
 
 class DenseOutput(NamedTuple):
-    """Accepted steps one after the other, as in `StepChunk` without its unused rows.
+    """Accepted steps in order, as in `StepChunk` without its unused rows.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ class DenseOutput(NamedTuple):
 
     @property
     def end(self) -> float:
-        """Where the last step ends (s)."""
+        """End of the last step (s)."""
         return float(self.begin[-1] + self.length[-1])
 
     def evaluate(self, t: np.ndarray) -> np.ndarray:

@@ -27,10 +27,10 @@ from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.slider import Motion, QuasiStatic, ReversingInertial
 from asperity.transients.dense_output import PARTS, StepChunk
 
-#: Relative error of the displacement that rounding leaves room for.
+#: Lower bound of the relative error of the displacement, above rounding.
 _DIGITS = 1e-13
 
-#: Numbers of instants that one call of a compiled program evaluates; the smallest that is enough.
+#: Numbers of instants in a call of a compiled program; a call uses the smallest sufficient one.
 BATCH_SIZES = (64, 1024, 4096)
 
 
@@ -152,7 +152,7 @@ def motion_samples(system: SegmentEquations, t: np.ndarray, Y: np.ndarray) -> Mo
     parts = []
     most = next((room for room in BATCH_SIZES if len(t) <= room), BATCH_SIZES[-1])
     for i in range(0, max(len(t), 1), most):
-        # Filled up with the last instant, so that one program serves any number.
+        # Padded with the last instant, so that one program serves any number of instants.
         part = np.minimum(np.arange(i, i + most), len(t) - 1)
         parts.append(np.asarray(_read_points(system, t[part], Y[:, part]))[:, : len(t) - i])
     return MotionSamples(*np.concatenate(parts, axis=1))

@@ -1,6 +1,6 @@
 """Events: detected between points of a step, located on the dense output.
 
-`Termination` says why an integration ends before its programme does.
+`Termination` is the reason why an integration ends before its programme.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Termination:
     time : float
         Seconds.
     detail : str
-        What the sentence adds.
+        Further text of the sentence.
     """
 
     kind: str
@@ -129,7 +129,7 @@ class EventDetector:
         V = float(motion.V)
 
         def log_speed(velocity: np.ndarray, threshold: float) -> np.ndarray:
-            # Of a slider that runs away the velocity may leave the range of doubles.
+            # The velocity of a slider that runs away may overflow.
             with np.errstate(over="ignore"):
                 return np.log(np.maximum(velocity * V, 1e-300)) - np.log(threshold)
 
@@ -279,7 +279,7 @@ class _PeriodicSteadiness:
         self._next += len(times)
         if times.size == 0:
             return None
-        # Without the displacement, which grows from period to period.
+        # The displacement is left out, because it grows from period to period.
         states = dense_output.evaluate(times)[:-1]
         before = states[:, :1] if self._last is None else self._last
         changes = np.abs(np.diff(np.concatenate([before, states], axis=1))).max(0)

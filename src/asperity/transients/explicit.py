@@ -5,7 +5,7 @@ follows from the force; then an explicit method of high order is the fastest.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
 (Springer, 1993), section II.5 (error estimate, coefficients) and II.6 (dense output); the
-coefficients are those that SciPy gives with its integrator of the same name.
+coefficients are those of SciPy's integrator of the same name.
 """
 
 from __future__ import annotations
@@ -27,8 +27,8 @@ _LIMITS = LengthLimits(shrink=0.2, grow=6.0)
 #: smaller value on a step counts as limited by stability.
 _STIFF = 5.0
 
-#: Product far beyond the limit of stability. There the end of the step is a huge number, compared
-#: with which the estimated error is small: the step is refused whatever the estimate.
+#: Product far beyond the limit of stability. The end of such a step is a huge number, and the
+#: estimated error relative to it is small; the step is rejected independent of the estimate.
 _UNSTABLE = 100.0
 
 

@@ -1,4 +1,4 @@
-"""The two tests of an interface's memory, from steady sliding: a hold, and a step of the velocity.
+"""Slide-hold-slide and velocity-step tests of an interface, from steady sliding.
 
 In both the spring force has an extremum where the plastic velocity equals that of the drive, since
 dF/dt = K (V - v_pl) up to a positive factor. That instant is located, not sampled.
@@ -8,29 +8,30 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
 from asperity.slider import QuasiStatic, Slider
 from asperity.transients.batch import ConstantDrive, Drive, End, Reached, drive_many
 
-#: Share of the way from the extremum to steady sliding within which sliding counts as steady.
+#: Sliding counts as steady within this share of the change of force from the extremum.
 SETTLED = 0.05
 #: Logarithms within which a motion that never reached the velocity of the drive counts as over.
 _OVER = 1e-9
 
 
-class Settling(NamedTuple):
-    """The way from an extremum to steady sliding; arrays of shape (points,).
+class SettlingDistance(NamedTuple):
+    """Displacements from an extremum to steady sliding; arrays of shape (points,).
 
     Attributes
     ----------
     end : array
         `End` of the motion.
     distance, slip : array
-        Way of the drive and of the slider (m) from the beginning of reloading, or from the step, to
-        where the force stays within `SETTLED` of the change from its extremum. NaN where the
-        motion does not come there.
+        Displacement of the drive and of the slider (m) from the beginning of reloading, or from the
+        step, to the point from which the force stays within `SETTLED` of the change from its
+        extremum. NaN if the motion does not reach this point.
     """
 
     end: Array
@@ -46,13 +47,13 @@ class HoldResponse(NamedTuple):
     level, minimum, maximum : array
         F/W0 in steady sliding, at the end of the hold, and at the maximum after it.
     hold_slip : array
-        Way of the slider in the hold (m).
+        Displacement of the slider in the hold (m).
     velocity, velocity_at_maximum : array
         Plastic velocity at the end of the hold and at the maximum, over that of the drive.
     states, states_at_maximum : array, shape (points, size)
         States of the quasi-static motion at the end of the hold and at the maximum.
     distance, slip : array
-        Way of the drive and of the slider (m) from the end of the hold to the maximum.
+        Displacement of the drive and of the slider (m) from the end of the hold to the maximum.
     end : array
         `End`: CROSSING where there is a maximum; STEADY where the force rises to its steady value
         without one, which is then the supremum.
@@ -82,38 +83,50 @@ def hold(slider: Slider, V: Array, hold_time: Array) -> tuple[HoldResponse, Reac
     Returns
     -------
     (HoldResponse, Reached)
-        And where the motion is at the maximum, for `settle`.
+        Observables of the hold, and the motion at the maximum, for `settle`.
     """
+    steady, still, again = _before_hold(slider, V, hold_time)
+    holding = drive_many(slider, V, still, steady)
+    return _after_hold(slider, V, steady, holding, drive_many(slider, V, again, holding.Y))
+
+
+@jax.jit
+def _before_hold(slider: Slider, V: Array, hold_time: Array) -> tuple[Array, Drive, Drive]:
+    """States of steady sliding, and the drives of hold and reloading."""
+    still = _filled(Drive(pull=0.0, until=hold_time), jnp.ones_like(V))
+    again = _filled(Drive(up=1.0, steady=_OVER), jnp.ones_like(V))
+    return _from_here(QuasiStatic(slider, V, 1.0).steady()), still, again
+
+
+@jax.jit
+def _after_hold(
+    slider: Slider, V: Array, steady: Array, holding: Reached, reloaded: Reached
+) -> tuple[HoldResponse, Reached]:
     motion = QuasiStatic(slider, V, 1.0)
-    one, steady = jnp.ones_like(V), _from_here(motion.steady())
     level = _force(motion, steady)
-    still = _filled(Drive(pull=0.0, until=hold_time), one)
-    held = drive_many(slider, V, still, steady)
-    again = _filled(Drive(up=1.0, steady=_OVER), one)
-    reloaded = drive_many(slider, V, again, held.Y)
-    lost = (held.end != End.TIME) | (reloaded.end == End.TOO_MANY_STEPS)
+    lost = (holding.end != End.TIME) | (reloaded.end == End.TOO_MANY_STEPS)
     end = jnp.where(lost, End.TOO_MANY_STEPS, reloaded.end)
     maximum = _force(motion, reloaded.Y)
     maximum = jnp.where(end == End.STEADY, jnp.maximum(maximum, level), maximum)
     way = slider.W0 / slider.K
     at_end, at_maximum = (
-        jnp.exp(ConstantDrive(motion, None).log_slip(there.Y.T)) for there in (held, reloaded)
+        jnp.exp(ConstantDrive(motion, None).log_slip(end_of.Y.T)) for end_of in (holding, reloaded)
     )
     response = HoldResponse(
         level,
-        _force(motion, held.Y),
+        _force(motion, holding.Y),
         jnp.where(lost, jnp.nan, maximum),
-        held.Y[:, -1] * way,
+        holding.Y[:, -1] * way,
         at_end,
         at_maximum,
-        held.Y[:, :-1],
+        holding.Y[:, :-1],
         reloaded.Y[:, :-1],
         jnp.where(lost, jnp.nan, reloaded.t * V),
-        jnp.where(lost, jnp.nan, (reloaded.Y[:, -1] - held.Y[:, -1]) * way),
+        jnp.where(lost, jnp.nan, (reloaded.Y[:, -1] - holding.Y[:, -1]) * way),
         end,
     )
     # The displacement counts from the beginning of reloading.
-    from_there = reloaded.Y.at[:, -1].add(-held.Y[:, -1])
+    from_there = reloaded.Y.at[:, -1].add(-holding.Y[:, -1])
     return response, reloaded._replace(Y=from_there, end=end)
 
 
@@ -126,7 +139,7 @@ class StepResponse(NamedTuple):
         F/W0 in steady sliding before the step, at its first extremum after it, and in steady
         sliding at the new velocity.
     distance, slip : array
-        Way of the drive and of the slider (m) from the step to the extremum.
+        Displacement of the drive and of the slider (m) from the step to the extremum.
     states_at_extremum : array, shape (points, size)
     end : array
         `End`: CROSSING where there is an extremum.
@@ -146,13 +159,25 @@ def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reach
 
     Shapes and the second result as of `hold`.
     """
-    before, motion = (QuasiStatic(slider, speed, 1.0) for speed in (V_before, V))
-    one, start = jnp.ones_like(V), _from_here(before.steady())
+    start, drive = _before_step(slider, V_before, V)
+    reached = drive_many(slider, V, drive, start)
+    return _after_step(slider, V, start, reached), reached
+
+
+@jax.jit
+def _before_step(slider: Slider, V_before: Array, V: Array) -> tuple[Array, Drive]:
+    """States of steady sliding, and the drive after the step."""
     up = jnp.where(V_before < V, 1.0, -1.0)
-    reached = drive_many(slider, V, _filled(Drive(up=up, steady=_OVER), one), start)
+    drive = _filled(Drive(up=up, steady=_OVER), jnp.ones_like(V))
+    return _from_here(QuasiStatic(slider, V_before, 1.0).steady()), drive
+
+
+@jax.jit
+def _after_step(slider: Slider, V: Array, start: Array, reached: Reached) -> StepResponse:
+    motion = QuasiStatic(slider, V, 1.0)
     lost = reached.end == End.TOO_MANY_STEPS
     way = slider.W0 / slider.K
-    response = StepResponse(
+    return StepResponse(
         _force(motion, start),
         jnp.where(lost, jnp.nan, _force(motion, reached.Y)),
         _force(motion, _from_here(motion.steady())),
@@ -161,10 +186,9 @@ def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reach
         reached.Y[:, :-1],
         reached.end,
     )
-    return response, reached
 
 
-def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Settling:
+def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> SettlingDistance:
     """Integrate from an extremum to steady sliding, or until the slider runs away.
 
     Parameters
@@ -176,17 +200,28 @@ def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Settl
     runaway : array, shape (points,)
         ln(v_pl / V) at which a motion counts as a runaway.
     """
+    on = drive_many(slider, V, _to_steady(slider, V, extremum, runaway), extremum.Y)
+    return _settling(slider, V, extremum, on)
+
+
+@jax.jit
+def _to_steady(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Drive:
+    """The drive from an extremum on."""
     motion = QuasiStatic(slider, V, 1.0)
     level = _force(motion, _from_here(motion.steady()))
     width = SETTLED * jnp.abs(_force(motion, extremum.Y) - level)
     # Where all logarithms are this close to steady sliding the force stays within the width.
     close = jnp.minimum(1e-3, 0.05 * width)
     drive = Drive(level=level, width=width, runaway=runaway, steady=close)
-    on = drive_many(slider, V, _filled(drive, jnp.ones_like(V)), extremum.Y)
+    return _filled(drive, jnp.ones_like(V))
+
+
+@jax.jit
+def _settling(slider: Slider, V: Array, extremum: Reached, on: Reached) -> SettlingDistance:
     crossing = extremum.end == End.CROSSING
     over = crossing & (on.end == End.STEADY)
     way = slider.W0 / slider.K
-    return Settling(
+    return SettlingDistance(
         jnp.where(crossing, on.end, extremum.end),
         jnp.where(over, (extremum.t + on.last) * V, jnp.nan),
         jnp.where(over, on.last_Y[:, -1] * way, jnp.nan),

@@ -33,10 +33,10 @@ _SAFETY = 0.9
 _LIMITS = LengthLimits(shrink=0.1, grow=8.0)
 
 _NEWTON_STEPS = 10
-#: Newton's method ends where the estimated remainder is this share of the tolerated error.
+#: Newton's method ends when the estimated error is this share of the tolerance.
 _NEWTON_SHARE = 0.01
 
-#: Product of step and largest eigenvalue up to which explicit steps would cost less.
+#: Product of step and largest eigenvalue below which explicit steps would cost less.
 _MILD = 8.0
 
 #: Squarings of the Jacobian in the estimate of its largest eigenvalue.
@@ -121,7 +121,7 @@ def _run(
 
 def _extrapolated(last: _LastStep, Y: Array, h: Array) -> Array:
     """The last polynomial extrapolated to the stages, less the state, shape (size, stages)."""
-    # Far beyond its step a polynomial is no guide; before the first step there is none.
+    # Far beyond its step the polynomial is inaccurate; before the first step there is none.
     near = h < 3 * last.length
     share = 1 + h / jnp.where(near, last.length, h) * jnp.asarray(_tableau().c)
     ahead = last.polynomial[STAGES][:, None]

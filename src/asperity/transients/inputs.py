@@ -1,8 +1,8 @@
-"""Arguments of a transient, checked and converted to SI, and the states it starts from."""
+"""Checked arguments of a transient in SI, and its initial states."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -14,14 +14,13 @@ from asperity.errors import InputError
 from asperity.laws import Law, State
 from asperity.laws.uneven_track import POSITION
 from asperity.loads import Excitation, Programme
-from asperity.parameters.arguments import instance, number, one_of, switch
+from asperity.parameters.arguments import number, typed
 from asperity.slider import Motion, Slider, equation_of_motion, reversing
-from asperity.slider.problem import checked_slider
 from asperity.transients.equations import SegmentEquations, states_after_jump
 from asperity.transients.events import EventThresholds
-from asperity.transients.integration import METHODS, NO_LOAD, Checkpoint, Integration, Tolerances
+from asperity.transients.integration import NO_LOAD, Checkpoint, Integration, Tolerances
 
-#: Newton steps for the states of the law under another load, and the longest of them.
+#: Number and largest length of the Newton steps for the states of the law under another load.
 _STEPS, _LEAP = 30, 2.0
 
 
@@ -44,7 +43,7 @@ def first_checkpoint(motion: Motion, programme: Programme, initial: Any) -> Chec
     Raises
     ------
     InputError
-        If steady sliding is asked for at rest, states have the wrong number, they or their rates
+        If the start is steady sliding at rest, states have the wrong number, they or their rates
         are not finite, the interface force is negative and the law is not defined there, or there
         is no contact at the beginning.
     """
@@ -79,7 +78,7 @@ def _require_motion(motion: Motion, programme: Programme, states: np.ndarray) ->
             f"initial must be states whose rates are numbers, got {_listed(states)}, of which that "
             f"of {lost[0]} is not finite; begin nearer to steady sliding, at {steady}"
         )
-    # Where ln v is a state the slider goes forwards whatever the law says of so small a velocity.
+    # With ln v as a state the slider always moves forwards, even at the smallest velocity.
     if friction < 0 and not (motion.signed or "log_velocity" in motion.mechanical):
         raise InputError(
             f"initial must leave an interface force that is not negative, got {_listed(states)} "
@@ -123,7 +122,7 @@ def require_contact(programme: Programme, W0: float) -> None:
 
 
 def steady_start(motion: Motion, programme: Programme) -> np.ndarray:
-    """States after steady sliding under the load and at the velocity before the programme.
+    """States of steady sliding under the load and at the velocity before the programme.
 
     With x K / W0 as the last; a step of the load at the very beginning is included.
     """
@@ -171,7 +170,7 @@ def _steady_state(law: Law, v: Array, w: Array) -> State:
     return tuple(jnp.where(w == 1, start, result))
 
 
-#: A slider slips when it is so many times faster than the fastest drive.
+#: A slider slips if its velocity exceeds this multiple of the fastest drive.
 _SLIPS = 30.0
 
 #: Without inertia: a velocity, and a multiple of the fastest drive, that only a runaway reaches.
@@ -181,6 +180,7 @@ _RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
 MOST_STEPS = 200_000_000
 
 
+@typed
 def checked_integration(
     slider: Slider,
     programme: Programme,
@@ -192,20 +192,16 @@ def checked_integration(
     slip_velocity: float | str | None = None,
     runaway_velocity: float | str | None = None,
     steady_tolerance: float = 1e-4,
-    method: str = "auto",
+    method: Literal["auto", "explicit", "implicit"] = "auto",
     most_steps: float = MOST_STEPS,
 ) -> Integration:
-    """An integration at its beginning; parameters as in `transient`.
+    """An integration before its first step; parameters as in `transient`.
 
     Raises
     ------
     InputError
         If a value breaks its rule.
     """
-    checked_slider(slider)
-    advice = "build one as asperity.loads.Programme(steps..., load=, velocity=)"
-    programme = instance(programme, Programme, "programme", advice)
-    inertia = switch(inertia, "inertia")
     eta = None
     if radiation_damping is not None:
         eta = _positive(radiation_damping, "damping", "radiation_damping")
@@ -215,7 +211,6 @@ def checked_integration(
             f"rtol must lie between 1e-13 and 0.01, got {rtol:g}; give one such as 1e-8"
         )
     atol = rtol / 100 if atol is None else _positive(atol, "dimensionless", "atol")
-    method = one_of(method, METHODS, "method")
     if not slider.law.rate_dependent:
         raise InputError(
             f"law must depend on velocity for a transient, got '{slider.law.name}', whose force "

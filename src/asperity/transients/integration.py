@@ -41,13 +41,13 @@ from asperity.transients.equations import (
 )
 from asperity.transients.events import Event, EventDetector, EventThresholds, Termination
 
-#: Steps still to come above which it is tried to leave the ringing out: some ten seconds of work.
+#: Number of remaining steps above which ringing may be left out: some ten seconds of work.
 _MANY_STEPS = 1_000_000
 
-#: How much longer steps have to become for that.
+#: Factor by which the steps must then become longer.
 _GAIN = 50.0
 
-#: StepChunks of steps in a row that must foretell too many steps before the integration gives up.
+#: Number of consecutive chunks that must predict too many steps before the integration stops.
 _HOPELESS_CHUNKS = 20
 
 
@@ -65,7 +65,7 @@ class Pace:
     Parameters
     ----------
     rings : bool
-        Whether the equations have a ringing that can be left out.
+        Whether the equations have ringing that can be left out.
     most_steps : float
         Steps that an integration may take.
     """
@@ -80,10 +80,10 @@ class Pace:
         self._tried, self._hopeless = False, 0
 
     def many(self, chunk: StepChunk, t: float, end: float) -> bool:
-        """Whether steps such as those of a chunk that begins at `t` are too many to wait for."""
+        """Whether too many steps of the length of the chunk's remain to `end`."""
         return _steps_left(chunk, t, end) >= _MANY_STEPS
 
-    def worth_trying(self, chunk: StepChunk, t: float, end: float) -> bool:
+    def should_try(self, chunk: StepChunk, t: float, end: float) -> bool:
         """Whether to try steps without ringing instead of a chunk, once in a segment.
 
         Parameters
@@ -99,7 +99,7 @@ class Pace:
         return True
 
     def gained(self, chunk: StepChunk, trial: StepChunk, t: float) -> bool:
-        """Whether the steps of a trial that begins at `t`, as the chunk does, are longer enough."""
+        """Whether the steps of a trial from `t` are sufficiently longer than the chunk's."""
         return _length(trial, t) > _GAIN * _length(chunk, t)
 
     def out_of_reach(
@@ -130,7 +130,7 @@ def _length(chunk: StepChunk, t: float) -> float:
 
 
 def _steps_left(chunk: StepChunk, t: float, end: float) -> float:
-    """Steps of that length from the end of the chunk to `end`."""
+    """Number of steps of the chunk's mean length from the end of the chunk to `end`."""
     left = end - float(chunk.t)
     if left <= 0 or not chunk.taken:
         return 0.0
@@ -139,15 +139,13 @@ def _steps_left(chunk: StepChunk, t: float, end: float) -> float:
     return left / length if length > 0 else math.inf
 
 
-METHODS = ("auto", "explicit", "implicit")
-
 #: Names of the methods in results.
 NAMES = {explicit: "explicit", implicit: "implicit"}
 
-#: Share of the steps of a chunk that must be doubtful before the other method is tried.
+#: Share of the steps of a chunk that must suggest the other method before it is tried.
 _MOST = 0.6
 
-#: Cost of an implicit step in explicit ones.
+#: Cost of an implicit step in explicit steps.
 _COST = 2.5
 
 
@@ -163,7 +161,7 @@ class MethodChoice:
     ----------
     motion : Motion
     method : str
-        One of `METHODS`.
+        "auto", "explicit" or "implicit".
     """
 
     def __init__(self, motion: Motion, method: str) -> None:
@@ -185,8 +183,8 @@ class MethodChoice:
         ----------
         chunk : StepChunk
         many : bool
-            Whether the end is so many of these steps away that the explicit method is doubted in
-            any case: near a steady state its limit of stability cannot be seen in the steps.
+            Whether so many of these steps remain that the implicit method is tried in any case:
+            near a steady state the steps do not show the limit of stability.
         """
         # A chunk that ends early, at a break point, has too few steps to judge.
         if not self._free or int(chunk.taken) < STEPS:
@@ -211,7 +209,7 @@ NO_LOAD = 1e-6
 
 
 class Tolerances(NamedTuple):
-    """Tolerated error of one step.
+    """Tolerances of a step.
 
     Attributes
     ----------
@@ -242,7 +240,7 @@ class Checkpoint:
     sampled : float
         Time of the programme up to which, inclusive, samples have been yielded (s).
     ringless : bool
-        Whether the ringing of the slider on its asperities is left out from here to the end of
+        Whether ringing of the slider on its asperities is left out from here to the end of
         the segment.
     """
 
@@ -256,7 +254,7 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class SegmentPart:
-    """Some steps of one segment, with their events.
+    """Consecutive steps of a segment, with their events.
 
     Attributes
     ----------
@@ -268,7 +266,7 @@ class SegmentPart:
         Time of the segment up to which the steps are valid (s).
     events : list of Event
     termination : Termination or None
-        Why the integration ends here; None where it goes on.
+        Reason why the integration ends here; None if it continues.
     closes : bool
         Whether the end of the segment is reached.
     checkpoint : Checkpoint
@@ -363,7 +361,7 @@ class Integration:
         while t < end:
             method = implicit if ringless else self._choice.method
             chunk, samples = self._advance(method, system, t, Y, length, end)
-            if not ringless and self._pace.worth_trying(chunk, t, end):
+            if not ringless and self._pace.should_try(chunk, t, end):
                 without = self._system(segment, True)
                 trial, trial_samples = self._advance(implicit, without, t, Y, length, end)
                 if self._pace.gained(chunk, trial, t):
@@ -437,12 +435,12 @@ class Integration:
 
 
 def _contact(segment: ProgrammeSegment, W0: float) -> tuple[float, float | None]:
-    """Where integration of a segment has to end, and where the load vanishes, if it does."""
+    """End of the integration of a segment, and the time at which the load vanishes, if any."""
     duration = float(segment.duration)
     floor = NO_LOAD * W0
     if segment.lowest_load > floor:
         return duration, None
-    # Imported here because it takes a while to load, and contact is rarely lost.
+    # Imported here because the module loads slowly, and contact is rarely lost.
     from scipy.optimize import brentq
 
     def load(t: np.ndarray | float) -> np.ndarray:

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from asperity._jax import spare_mappings
 from asperity.loads import Programme
 from asperity.outputs import require_memory
-from asperity.parameters.arguments import instance
+from asperity.parameters.arguments import typed
 from asperity.slider import Slider
-from asperity.slider.problem import checked_slider
 from asperity.transients.equations import motion_samples
 from asperity.transients.events import Event
 from asperity.transients.inputs import MOST_STEPS, checked_integration, first_checkpoint
@@ -47,7 +46,7 @@ def integrate_blocks(
     """Motion of a slider under a programme, block by block.
 
     After an interruption, by Ctrl-C or otherwise, the blocks already yielded stay valid, and
-    `resume` continues from the `checkpoint` of the last one.
+    `resume` continues from the `checkpoint` of the last block.
 
     Parameters
     ----------
@@ -121,21 +120,21 @@ class _BlockWriter:
 
     @property
     def room(self) -> int:
-        """Samples that the block can still take."""
+        """Free samples of the block."""
         return self._rows - self._count
 
     def write(self, part: SegmentPart, times: np.ndarray) -> None:
         """Evaluate a segment part at `times` (s of the programme)."""
         none, over = len(part.dense_output.begin) == 0, part.termination
-        # At a break point that takes the contact away there is no motion to evaluate.
+        # There is no motion at a break point with a loss of contact.
         if len(times) == 0 or (none and over is not None and over.kind == "loss of contact"):
             return
         checkpoint, (W0, K, V) = part.checkpoint, self._scales
         t = np.clip(times - part.start, 0.0, part.end)
-        # Where no step was accurate there is the state before it.
+        # Without an accurate step the state before the step is evaluated.
         Y = checkpoint.states[:, None] if none else part.dense_output.evaluate(t)
         now = motion_samples(part.system, t, Y)
-        # Of a slider that runs away the velocity may leave the range of doubles.
+        # The velocity of a slider that runs away may overflow.
         with np.errstate(over="ignore"):
             columns = [
                 times,
@@ -174,6 +173,7 @@ class _BlockWriter:
         return trajectory
 
 
+@typed
 def transient(
     slider: Slider,
     programme: Programme,
@@ -187,7 +187,7 @@ def transient(
     slip_velocity: float | str | None = None,
     runaway_velocity: float | str | None = None,
     steady_tolerance: float = 1e-4,
-    method: str = "auto",
+    method: Literal["auto", "explicit", "implicit"] = "auto",
     most_steps: float = MOST_STEPS,
     progress: Callable[[float, float], None] | None = None,
 ) -> Trajectory:
@@ -203,7 +203,7 @@ def transient(
         Steady sliding under the load and velocity before the first step, or states of the
         equation of motion, such as the last row of another trajectory's `states`.
     sampling : float, str or array, optional
-        Rate (Hz) or times (s) at which to write; by default the integrator's own steps, which
+        Rate (Hz) or times (s) at which to write; by default the steps of the integrator, which
         are short where much happens. The solution is a polynomial on every step, so that the
         rate costs next to nothing and does not change it.
     inertia : bool
@@ -253,12 +253,9 @@ def transient(
     segment, ringing below the velocity sqrt(lambda W0 / M) times the tolerated error of F_i/W is
     left out; `provenance` gives it as ``unresolved_ringing`` (m/s), 0 where all is resolved.
     """
-    slider = checked_slider(slider)
-    advice = "build one as asperity.loads.Programme(steps..., load=, velocity=)"
-    programme = instance(programme, Programme, "programme", advice)
     rows = planned_rows(sampling, programme.duration)
     if rows is not None:
-        # Twice: the blocks, and the trajectory that they are joined to.
+        # The factor 2: the blocks, and the joined trajectory.
         size = 2 * rows * row_bytes(len(slider.law.state_names))
         require_memory(
             size, "sampling", f"{rows:.6g} rows",

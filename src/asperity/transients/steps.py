@@ -1,7 +1,7 @@
 """Steps of controlled length, one after the other, whatever the method that makes them.
 
 Loops over small arrays are compiled as one kernel of the processor. XLA runs every operation of the
-body of a loop as a kernel of its own. Where the arrays hold a few numbers, calling the kernels
+body of a loop as a separate kernel. For arrays of a few numbers, calling the kernels
 takes several times as long as what they compute. A call that carries the attributes below is
 compiled to a single kernel, control flow included; compilers that do not know them run it as they
 run any call.
@@ -92,7 +92,7 @@ def _elementwise(structure: Any) -> bool:
 
 
 def _primitives(jaxpr: Any) -> Iterator[str]:
-    """Names of the primitives, those of the functions called among them."""
+    """Names of the primitives of a program and of the functions that it calls."""
     for equation in jaxpr.eqns:
         inner = [getattr(p, "jaxpr", p) for p in equation.params.values()]
         called = [p for p in inner if hasattr(p, "eqns")]
@@ -106,7 +106,7 @@ def _primitives(jaxpr: Any) -> Iterator[str]:
 #: Factor by which a rejected step is shortened at least.
 _SAFETY = 0.9
 
-#: Steps that a compiled program tries before it returns, so that Ctrl-C is heard.
+#: Trial steps in a call of a compiled program; between calls Python can handle Ctrl-C.
 _TRIALS = 4 * STEPS
 
 
@@ -124,7 +124,7 @@ class TrialStep(NamedTuple):
     memory : pytree of arrays
         Passed to the next step if this one is accepted.
     doubtful : array
-        Whether the other method might have taken it more cheaply.
+        Whether the other method might take this step at lower cost.
     record : tuple of arrays
         Data of the dense output.
     """
@@ -216,7 +216,7 @@ def run_steps(
         factor = jnp.clip(trial.factor, limits.shrink, limits.grow)
         factor = jnp.where(jnp.isfinite(trial.error), factor, limits.shrink)
         h_next = h * jnp.where(good, factor, jnp.minimum(factor, _SAFETY))
-        # Neither does a length that is no number go on.
+        # A length of NaN ends the loop, too.
         lost = ~good & ~(t + h_next > t)
 
         def accepted(new: Array, old: Array) -> Array:

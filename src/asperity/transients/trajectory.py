@@ -29,11 +29,11 @@ _MOST_ROWS = 2.0**53
 
 
 class SampleTimes(ABC):
-    """Sampling times in rising order, taken part by part."""
+    """Sampling times in rising order, consumed part by part."""
 
     @abstractmethod
     def take(self, end: float, most: int, steps: np.ndarray, closing: bool) -> np.ndarray:
-        """Times (s) not taken yet that lie before `end`, at most `most` of them.
+        """The next times (s) before `end`, at most `most` of them.
 
         Parameters
         ----------
@@ -41,7 +41,7 @@ class SampleTimes(ABC):
             Seconds of the programme.
         most : int
         steps : ndarray
-            Beginnings of the integrator's steps up to there.
+            Beginnings of the integrator's steps up to `end`.
         closing : bool
             Whether the trajectory ends there; then `end` itself is included.
         """
@@ -52,7 +52,7 @@ class SampleTimes(ABC):
 
 
 class StepTimes(SampleTimes):
-    """The integrator's own steps, which are short where much happens."""
+    """The steps of the integrator, which are short where the motion is fast."""
 
     def __init__(self) -> None:
         self._after = -np.inf
@@ -91,7 +91,7 @@ class EvenTimes(SampleTimes):
 
 
 class GivenTimes(SampleTimes):
-    """Given times."""
+    """Times that the user chose."""
 
     def __init__(self, times: np.ndarray) -> None:
         self._times, self._next = times, 0
@@ -115,7 +115,7 @@ def _limit(end: float, closing: bool) -> float:
 
 
 def planned_rows(sampling: Any, duration: float) -> float | None:
-    """Number of rows that `sampling` asks for, None where the integrator's steps decide.
+    """Number of rows with this `sampling`; None for the steps of the integrator.
 
     Parameters
     ----------
@@ -228,7 +228,7 @@ class Trajectory(Drawn):
     events : tuple of Event
         In the order of time.
     termination : Termination or None
-        Why the trajectory ends before the programme; None where it does not.
+        Reason why the trajectory ends before the programme; None if it does not.
     checkpoint : Checkpoint
         Its end, from which an integration can be resumed.
     motion : Motion
@@ -272,7 +272,7 @@ class Trajectory(Drawn):
 
     @property
     def stopped(self) -> str | None:
-        """Why the trajectory ends before the programme, in a sentence; None where it does not."""
+        """Reason why the trajectory ends before the programme; None if it does not."""
         return None if self.termination is None else str(self.termination)
 
     @property

@@ -1,4 +1,4 @@
-"""Geometries of rigs: forces of the machine to stresses on the sliding surface, and back."""
+"""Geometries of rigs: conversion between machine forces and stresses on the sliding surface."""
 
 from __future__ import annotations
 
@@ -59,12 +59,12 @@ class DirectShear:
 
 @dataclass(frozen=True, kw_only=True)
 class DoubleDirectShear(DirectShear):
-    """A block between two others: both surfaces bear the normal force, and half the shear force.
+    """A block between two blocks: each surface has the normal force, and half the shear force.
 
     Parameters
     ----------
     area : float or str
-        Of one surface (m^2).
+        Area of one surface (m^2).
     """
 
     surfaces = 2
@@ -95,7 +95,7 @@ class Triaxial:
 
     @property
     def area(self) -> float:
-        """Of the cut, an ellipse (m^2)."""
+        """Area of the cut, an ellipse (m^2)."""
         return float(np.pi * self.diameter**2 / 4 / np.sin(self.angle))
 
     def stresses(

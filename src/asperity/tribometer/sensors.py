@@ -20,11 +20,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.units import KINDS, to_si
+from asperity.parameters.arguments import number
+from asperity.units import KINDS
 
 Array = NDArray[np.float64]
 
-#: Nodes of the quadrature over an interval: enough for e^{ps} over the fastest poles in use.
+#: Nodes of the quadrature over an interval, sufficient for e^{ps} of the fastest poles.
 _NODES = 64
 
 
@@ -85,7 +86,7 @@ def filtered(values: Array, rate: float, poles: NDArray, residues: NDArray) -> A
     total = np.zeros(n)
     for pole, residue in zip(poles, residues, strict=True):
         if pole.imag < -1e-9 * abs(pole):
-            continue  # its conjugate has been counted twice
+            continue  # the conjugate pole counts twice
         weights = _weights(pole, 1 / rate)
         drive = sum(c * u for c, u in zip(weights, stencils, strict=True))
         start = -values[0] / pole
@@ -98,7 +99,7 @@ def filtered(values: Array, rate: float, poles: NDArray, residues: NDArray) -> A
 
 def _weights(pole: complex, h: float) -> NDArray:
     """Integral over [0, h] of e^{p (h - s)} l_j(s), l_j the cubics of nodes -h, 0, h, 2h."""
-    # The kernel fades within 1/|p| of the end: nodes where it lives.
+    # The kernel decays within 1/|p| of the end; the nodes lie there.
     length = min(h, 40 / abs(pole.real)) if pole.real else h
     x, w = np.polynomial.legendre.leggauss(_NODES)
     s = h - length * (x + 1) / 2
@@ -132,7 +133,7 @@ def between(values: Array, rate: float, times: Array) -> Array:
     )
 
 
-#: Given as a number in SI or a text with its unit, and a float in SI from the construction on.
+#: A number in SI or a text with its unit; converted to a float in SI at construction.
 Given: TypeAlias = Any
 
 #: Kinds of the fields of a sensor that are not in the unit of its quantity.
@@ -167,7 +168,7 @@ class Sensor:
     noise : float or str
         Standard deviation, in the unit of the quantity.
     resolution : float or str
-        Step q of the reading; 0 for none.
+        Step q of the reading; 0 for no steps.
     offset : float or str
         Reading at zero.
     drift : float
@@ -175,8 +176,8 @@ class Sensor:
     delay : float or str
         Dead time (s): a phase of -2 pi f delay on top of that of the bandwidth.
     resonance, damping : float or str
-        Of the gauge that carries the sensor (Hz, ratio): it rings after a slip. 0 Hz for a rigid
-        one.
+        Natural frequency and damping ratio of the gauge that carries the sensor (Hz, ratio); it
+        rings after a slip. 0 Hz for a rigid gauge.
     impulses : float
         Share of the samples of the motion at which the reading jumps out and back.
     impulse_size : float or str
@@ -203,7 +204,7 @@ class Sensor:
             kind = _KINDS.get(field.name, self.kind)
             name = f"{type(self).__name__}.{field.name}"
             stated = getattr(self, field.name)
-            value = to_si(stated, "dimensionless" if field.name == "drift" else kind, name)
+            value = number(stated, name, "dimensionless" if field.name == "drift" else kind)
             low = field.name not in ("offset", "drift")
             if low and (value < 0 or (value == 0 and field.name in _POSITIVE)):
                 rule = "positive" if field.name in _POSITIVE else "not negative"
@@ -219,7 +220,7 @@ class Sensor:
                 )
 
     def read(self, values: Array, rate: float, random: np.random.Generator) -> Array:
-        """The sensor's output at the samples of a quantity; its delay is the clock's work.
+        """The sensor's output at the samples of a quantity; the recorder's clock adds the delay.
 
         Parameters
         ----------
@@ -286,7 +287,7 @@ class SpringGauge(Sensor):
     stiffness: Given
 
     def read(self, values: Array, rate: float, random: np.random.Generator) -> Array:
-        """Shear force (N) as the gauge has it."""
+        """Shear force (N) from the elongation."""
         return self.stiffness * super().read(values / self.stiffness, rate, random)
 
 
@@ -308,7 +309,7 @@ class LoadCell(Sensor):
 class Accelerometer(Sensor):
     """The modulated part of the load from an accelerometer on the exciter, on a known mean.
 
-    Its reading is the force that accelerates the moving mass: an accelerometer sees none of what
+    Its reading is the force that accelerates the moving mass: an accelerometer does not see what
     is constant, and its first-order high-pass leads by arctan(high_pass/f).
 
     Parameters

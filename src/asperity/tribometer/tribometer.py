@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.errors import InputError
+from asperity.parameters.arguments import number
 from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
@@ -40,16 +41,16 @@ class Recorder:
     rate : float or str
         Samples per second (Hz).
     jitter : float or str
-        Standard deviation of the instants of sampling (s); the time stamps are those without it.
+        Standard deviation of the sampling instants (s); the time stamps do not include it.
     clock_error : float
         Relative error of the clock: a positive one samples late, so that recorded frequencies
         come out higher by this much.
     cut_off : float or str, optional
-        Of the Butterworth low-pass before the converter (Hz): there its gain is 1/sqrt 2.
+        Cut-off frequency (gain 1/sqrt 2) of the Butterworth low-pass before the converter (Hz).
     order : int
         Of that filter.
     bits : int
-        Of the converter; 0 for one without steps.
+        Bits of the converter; 0 for a converter without steps.
     ranges : mapping of str to (float or str, float or str)
         Lowest and highest value of the converter for a channel, by name; what lies
         outside is cut off. A channel without a range is not converted.
@@ -68,7 +69,7 @@ class Recorder:
             stated = getattr(self, name)
             if stated is None:
                 continue
-            value = to_si(stated, kind, f"Recorder.{name}")
+            value = number(stated, f"Recorder.{name}", kind)
             if value < 0 or (value == 0 and name != "jitter"):
                 raise InputError(
                     f"Recorder.{name} must be positive, got {value:g} {KINDS[kind].si}; "
@@ -120,7 +121,7 @@ class Tribometer:
         seed: int | np.random.Generator = 0,
         provenance: Mapping[str, Any] | None = None,
     ) -> Trace:
-        """Record signals as the sensors and the recorder have them.
+        """Record signals with the sensors and the recorder.
 
         Parameters
         ----------
@@ -128,7 +129,7 @@ class Tribometer:
             Evenly spaced (s), closer than the recorder's samples: four times as close is enough
             for the numbers that tests ask for.
         signals : mapping of str to array, shape (n,)
-            What each sensor is exposed to, in SI: the spring's force for a gauge of the spring.
+            Input of each sensor in SI, such as the spring force for a gauge of the spring.
         seed : int or Generator
             Of all noise: the same seed makes the same recording.
         provenance : mapping, optional
@@ -177,10 +178,10 @@ class Tribometer:
         return Trace(stamps, channels, check(trace), origin)
 
     def _clock(self, grid: Array, random: np.random.Generator) -> tuple[Array, Array]:
-        """Time stamps, and the instants since the first sample at which really is sampled."""
+        """Time stamps, and the true sampling instants since the first sample."""
         recorder = self.recorder
         length = grid[-1] - grid[0]
-        # Half a step of a double more, so that the last sample is not lost to rounding.
+        # Plus half a unit in the last place, so that rounding does not lose the last sample.
         count = int(np.floor(length * recorder.rate / (1 + recorder.clock_error) + 1e-9)) + 1
         nominal = np.arange(count) / recorder.rate
         instants = nominal * (1 + recorder.clock_error)
@@ -215,7 +216,7 @@ def channel_gain(
 ) -> NDArray[np.complex128]:
     """Recorded over true amplitude of a harmonic signal, e^{+i w t}.
 
-    A laboratory knows it from calibration: amplitudes are divided by its modulus.
+    A laboratory knows the gain from calibration, and divides amplitudes by its modulus.
 
     Parameters
     ----------
@@ -228,7 +229,7 @@ def channel_gain(
     Returns
     -------
     complex array, of the shape of `frequency`
-        Sensor and anti-alias filter; a clock's error is not in it.
+        Gain of sensor and anti-alias filter, without the error of the clock.
     """
     sensor, recorder = tribometer.sensors[channel], tribometer.recorder
     s = 2j * np.pi * np.asarray(frequency, float)

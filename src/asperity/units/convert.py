@@ -1,4 +1,4 @@
-"""What a user gives to SI, and SI back to text."""
+"""Conversion of user input to SI, and of SI to text."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any, overload
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.units.kinds import Kind, kind_of
+from asperity.units.kinds import KINDS, Kind, kind_of
 from asperity.units.scale import EXACT, normalised, unit_factor
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d+))?(?![\d.])\s*(.*?)\s*", re.S)
-#: Powers of ten beyond which no unit brings a number back into the range of doubles.
+#: Larger powers of ten overflow a double in any unit.
 _LARGEST_POWER = 5000
-#: Characters of a user's text that a message repeats.
+#: Largest length of a user's text in a message.
 _SHOWN = 60
 
 #: Radians in each unit; a text without one is in radians.
@@ -31,7 +31,7 @@ def to_si(value: float, kind: str, name: str, *, require_unit: bool = ...) -> fl
 @overload
 def to_si(value: Any, kind: str, name: str, *, require_unit: bool = ...) -> Any: ...
 def to_si(value: Any, kind: str, name: str, *, require_unit: bool = False) -> Any:
-    """Convert what a user gave to SI.
+    """Convert user input to SI.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def to_si(value: Any, kind: str, name: str, *, require_unit: bool = False) -> An
     kind : str
         A key of `KINDS`.
     name : str
-        What messages call the value, as ``<object>.<field>``.
+        Name of the value in messages, as ``<object>.<field>``.
     require_unit : bool
         Refuse numbers without a unit too, as the command line and files do. A pure number
         needs none.
@@ -80,7 +80,7 @@ def from_si(value: Any, unit: str, kind: str) -> Any:
     value : float or array
         In SI.
     unit : str
-        The unit wanted, such as ``"um/s"``.
+        Target unit, such as ``"um/s"``.
     kind : str
         A key of `KINDS`.
 
@@ -105,7 +105,7 @@ def from_si(value: Any, unit: str, kind: str) -> Any:
 
 
 def format_si(value: float, kind: str, digits: int = 4) -> str:
-    """Text of an SI value in the unit that reads best, such as ``"0.4 um"`` -> ``"400 nm"``.
+    """Text of an SI value in a unit that gives short numbers, such as 4e-7 m -> ``"400 nm"``.
 
     Parameters
     ----------
@@ -116,27 +116,48 @@ def format_si(value: float, kind: str, digits: int = 4) -> str:
     digits : int
         Significant digits.
     """
-    spec = kind_of(kind)
+    return quantity_text(value, kind_of(kind).si, digits)
+
+
+def quantity_text(value: float, unit: str, digits: int = 4) -> str:
+    """Text of a value, in an SI unit, in the unit that reads best."""
     value = float(value)
-    unit, power = spec.si, 0
+    shown, power = display_unit(value, unit, digits)
     if value and math.isfinite(value):
-        # The last unit not larger than the value as rounded, so that 0.99999 um reads 1 um.
-        size = abs(float(f"{value:.{digits}g}"))
-        fitting = [rung for rung in spec.ladder if size >= float(f"1e{rung[1]}")]
-        unit, power = fitting[-1] if fitting else spec.ladder[0]
         value = float(Decimal(repr(value)).scaleb(-power))
-    return f"{value:.{digits}g} {unit}".rstrip()
+    return f"{value:.{digits}g} {shown}".rstrip()
+
+
+def display_unit(value: float, unit: str, digits: int = 4) -> tuple[str, int]:
+    """The unit in which a value reads best, and its power of ten over the SI unit.
+
+    Parameters
+    ----------
+    value : float
+        In the SI unit.
+    unit : str
+        An SI unit of a kind of `KINDS`; any other is kept.
+    digits : int
+        Significant digits that are shown.
+    """
+    spec = next((kind for kind in KINDS.values() if kind.si == unit), None)
+    if spec is None or not value or not math.isfinite(value):
+        return unit, 0
+    # The last unit not larger than the value as rounded, so that 0.99999 um reads 1 um.
+    size = abs(float(f"{value:.{digits}g}"))
+    fitting = [rung for rung in spec.ladder if size >= float(f"1e{rung[1]}")]
+    return fitting[-1] if fitting else spec.ladder[0]
 
 
 def is_traced(value: Any) -> bool:
-    """Whether JAX is transforming the function of which `value` is an argument: no number yet."""
+    """Whether `value` is a tracer of a JAX transformation, which has no number yet."""
     # Looked up, not imported: a program that has not loaded JAX has no tracers.
     jax = sys.modules.get("jax")
     return jax is not None and isinstance(value, jax.core.Tracer)
 
 
 def _shown(value: Any) -> str:
-    """The value in one line: arrays by their type, everything else as Python writes it."""
+    """The value as a line of text; arrays by their type."""
     if np.ndim(value):
         return f"an array of {np.asarray(value).dtype}"
     return f"{value!r}" if isinstance(value, int | float | None) else f"a {type(value).__name__}"
@@ -193,7 +214,7 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
         )
     factor = unit_factor(unit, kind, name, shortened(text))
     power = _power_of_ten(match[2] or "0")
-    # Decimals have a largest power themselves; of what lies beyond, zero alone is a number.
+    # `Decimal` has a largest exponent; beyond it only zero is a number.
     if digits and abs(power + digits.adjusted()) > _LARGEST_POWER:
         raise _beyond_doubles(name, text, spec)
     value = float(EXACT.multiply(digits.scaleb(power if digits else 0, EXACT), factor))
@@ -203,7 +224,7 @@ def _text_to_si(text: str, kind: str, name: str) -> float:
 
 
 def _power_of_ten(text: str) -> int:
-    """The integer, or one that is too large if the text is too long to be read as one."""
+    """The integer of a text, or a too large integer if the text is too long to parse."""
     sign, figures = (-1 if text.startswith("-") else 1), text.lstrip("+-").lstrip("0")
     return sign * (int(figures or "0") if len(figures) < 10 else 10**10)
 
@@ -218,7 +239,7 @@ def _beyond_doubles(name: str, text: str, spec: Kind) -> InputError:
 
 
 def shortened(text: str) -> str:
-    """What a message repeats of a user's text."""
+    """A user's text, shortened for a message."""
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 
@@ -231,7 +252,7 @@ def to_radians(value: Any, name: str) -> Any:
         A text has its unit, ``"5 deg"`` or ``"0.09 rad"``; numbers are in radians and returned as
         they are.
     name : str
-        What messages call the value.
+        Name of the value in messages.
 
     Raises
     ------

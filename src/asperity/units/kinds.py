@@ -1,4 +1,4 @@
-"""The kinds of quantity that cross the door, with the unit each is kept in and displayed in."""
+"""Kinds of quantities of inputs and outputs, with their SI unit and display units."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from asperity.errors import InputError, closest
 
 @dataclass(frozen=True)
 class Kind:
-    """A physical dimension as the interface knows it.
+    """A kind of quantity: dimension, units and examples.
 
     Attributes
     ----------
     noun : str
-        What a message calls it, with its article.
+        Noun in messages, with its article.
     si : str
         SI unit in pint's spelling; empty for a pure number.
     example : str
@@ -32,7 +32,7 @@ class Kind:
     ladder: tuple[tuple[str, int], ...]
 
 
-#: Every kind of quantity that crosses the door.
+#: All kinds of quantities.
 KINDS: Mapping[str, Kind] = MappingProxyType(
     {
         "velocity": Kind(
@@ -59,11 +59,9 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
             "a stiffness",
             "Pa/m",
             "0.06 MPa/um",
-            (("Pa/m", 0), ("kPa/m", 3), ("MPa/m", 6), ("GPa/m", 9), ("MPa/um", 12)),
+            (("Pa/m", 0), ("kPa/m", 3), ("MPa/m", 6), ("MPa/mm", 9)),
         ),
-        "per_length": Kind(
-            "a stiffness over a load", "1/m", "0.003 1/um", (("1/m", 0), ("1/mm", 3), ("1/um", 6))
-        ),
+        "per_length": Kind("a stiffness over a load", "1/m", "0.003 1/um", (("1/um", 6),)),
         "damping": Kind(
             "a damping",
             "N*s/m",

@@ -18,22 +18,24 @@ from asperity.units.kinds import KINDS
 #: More digits than any double needs, so that only the final rounding to a double is inexact.
 EXACT = Context(prec=60)
 
-#: Spellings that need no pint, by kind, besides those of the ladders.
+#: Spellings that are known without pint, by kind, in addition to the display units.
 _ALSO_KNOWN = {
     "dimensionless": {"%": -2, "percent": -2},
     "angular_frequency": {"1/s": 0, "s^-1": 0},
     "length": {"cm": -2},
     "pressure": {"mbar": 2, "bar": 5},
+    "stress_per_length": {"GPa/m": 9, "MPa/um": 12},
+    "per_length": {"1/m": 0, "1/mm": 3},
 }
 
-#: What a unit may be written with; anything else never reaches pint's expression parser.
+#: Characters of a unit; texts with other characters are not given to pint's expression parser.
 _UNIT = re.compile(r"[A-Za-zΩµμ%°][A-Za-z0-9Ωµμ%°²³⁻¹·_ */^.()+-]*|1 ?/[A-Za-z0-9_ */^.()+-]+")
 _LONGEST_UNIT = 60
 
 #: Exponents of the base units of the SI, in alphabetic order; those that are zero are left out.
 Dimension = tuple[tuple[str, float], ...]
 
-#: Of kinds with one dimension, the first is meant.
+#: Several kinds may have the same dimension; the first one is used.
 _KINDS = (
     "dimensionless", "force", "pressure", "length", "time", "velocity", "frequency", "stiffness",
     "damping", "mass", "area", "viscosity", "temperature",
@@ -67,7 +69,7 @@ def unit_factor(unit: str, kind: str, name: str, text: str) -> Decimal:
 
 
 class _UnitError(Exception):
-    """A unit that does not fit: why, and what to do when an example is not advice enough."""
+    """A unit that does not fit: the reason, and optional advice."""
 
     def __init__(self, why: str = "", advice: str = "") -> None:
         super().__init__(why)
@@ -93,12 +95,12 @@ def _factor_by_pint(unit: str, kind: str) -> Decimal:
     if root != si_root:
         raise _UnitError
     if registry.Quantity(Decimal(0), parsed).to(spec.si or "").magnitude != 0:
-        raise _UnitError(", which has a zero of its own")
+        raise _UnitError(", which has an offset")
     return EXACT.divide(Decimal(factor), Decimal(si_factor))
 
 
 def _require_hertz(parsed: Any, root: Any) -> None:
-    """Refuse what pint holds to be the same as Hz: rad/s, rpm and a bare 1/s."""
+    """Refuse units that pint treats as Hz: rad/s, rpm and 1/s."""
     if str(parsed).endswith("hertz"):
         return
     if "second" in str(root) and root.dimensionality == {"[time]": -1}:
@@ -142,7 +144,7 @@ def base_units(unit: str) -> tuple[float, Dimension]:
     Raises
     ------
     InputError
-        If it is no unit, or one with a zero of its own such as the degree Celsius.
+        If the text is no unit, or a unit with an offset such as the degree Celsius.
     """
     text = normalised(unit.strip())
     if not text:
@@ -152,13 +154,11 @@ def base_units(unit: str) -> tuple[float, Dimension]:
         registry = _registry()
         factor, base = registry.get_base_units(parsed)
         shifted = registry.Quantity(Decimal(0), parsed).to(base).magnitude != 0
-    # pint's parser takes some texts that are no units of anything.
+    # pint's parser accepts some texts that are no units.
     except (_UnitError, ArithmeticError, AttributeError, TypeError, ValueError):
         raise InputError("unit", "be a unit", f"'{unit}'", "write it like 'N/V'") from None
     if shifted:
-        raise InputError(
-            "unit", "have its zero where nothing is", f"'{unit}'", "convert it to kelvin first"
-        )
+        raise InputError("unit", "have no offset", f"'{unit}'", "convert it to kelvin first")
     return float(factor), dimension_of({str(k): float(v) for k, v in base._units.items()})
 
 

@@ -24,6 +24,7 @@ from asperity.study import (
     summary_statistics,
 )
 from asperity.study.store import durable
+from asperity.study.store.layout import reset
 from asperity.study.store.lock import StoreLock
 from asperity.study.store.store import SweepStore
 from references.closed_form_sweep import ClosedForm, ThisProcess, files_of, plan_of
@@ -285,7 +286,7 @@ def test_a_worker_of_an_older_driver_writes_nothing(
     out = tmp_path / "s.zarr"
     run(out)
     digest = json.loads((out / "zarr.json").read_text())["attributes"]["plan_sha256"]
-    SweepStore(out).reset(0)
+    reset(out, SweepStore(out).grid, 0)
     with StoreLock(out), pytest.raises(SupersededError):
         Job(str(out), digest, "the token of another driver")((0,), 1.0)
     assert not SweepStore(out).is_done(0)
@@ -386,7 +387,7 @@ def test_an_interrupted_extension_is_not_read(tmp_path: Path, closed_form: Close
         with pytest.raises(Killed):
             run(out, plan=longer, extend_store=True)
     for answer in (store_status, summary_statistics, open_store):
-        with pytest.raises(InputError, match="must be extended to its end"):
+        with pytest.raises(InputError, match="must be completely extended"):
             answer(out)
     run(out, plan=longer, extend_store=True)
     run(tmp_path / "whole.zarr", plan=longer)

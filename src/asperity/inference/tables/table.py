@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtr
 
 from asperity.errors import InputError
 from asperity.laws import registered
@@ -543,7 +543,7 @@ def _without_copies(table: LockInTable) -> LockInTable:
     columns = np.vander(x - x.mean(), degree + 1) / doubt[:, None]
     y = steady[both] / doubt
     left = y - columns @ np.linalg.lstsq(columns, y)[0]
-    if chi2.cdf(float(left @ left), dof) > _SAME_NOISE:
+    if chdtr(dof, float(left @ left)) > _SAME_NOISE:
         return table
     kept = np.where(both, np.nan, table.values["delta_mu"])
     values = {**table.values, "delta_mu": kept}

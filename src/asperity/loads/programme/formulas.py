@@ -56,13 +56,13 @@ class HarmonicSegment(ProgrammeSegment):
         angle = 2 * jnp.pi * self.frequency * jnp.asarray(t)
         cos, sin = jnp.cos(self.phase), jnp.sin(self.phase)
         rotation = jnp.stack([cos, -sin, sin, cos]).reshape(2, 2, *[1] * angle.ndim)
-        # XLA computes a sum over an axis once, but a cosine anew for every number that is made of
-        # it, which would take as long as all the rest of a step.
+        # XLA computes a sum over an axis once, but a cosine again for every number that depends on
+        # it; this would double the time of a step.
         turned = (rotation * jnp.stack([jnp.cos(angle), jnp.sin(angle)])).sum(axis=1)
         return turned[0], turned[1]
 
     def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:
-        """Everything from one cosine and one sine."""
+        """As in `ProgrammeSegment`; one cosine and one sine serve all values."""
         cos, sin = self._turn(t)
         slow = self.rise > 0
         x = jnp.where(slow, jnp.clip(t / jnp.where(slow, self.rise, 1.0), 0.0, 1.0), 1.0)
@@ -109,13 +109,13 @@ class HarmonicSegment(ProgrammeSegment):
 
     @property
     def lowest_load(self) -> float:
-        """Of either end of the level, at the larger amplitude."""
+        """The lower end of the level, at the larger amplitude."""
         begin, rate = float(self.load1), float(self.load_rate)
         epsilon = max(abs(float(self.epsilon1)), abs(float(self.epsilon2)))
         return min(begin, begin + rate * float(self.duration)) * (1 - epsilon)
 
     def surely_above(self, load: float) -> float:
-        """Until a growing amplitude reaches down to it, where the level is constant."""
+        """Time until a growing amplitude may reach `load`, for a constant level."""
         begin, end, rise = float(self.epsilon1), float(self.epsilon2), float(self.rise)
         level, duration = float(self.load1), float(self.duration)
         if float(self.load_rate) != 0 or rise <= 0 or abs(end) <= abs(begin) or begin * end < 0:
@@ -130,7 +130,7 @@ class HarmonicSegment(ProgrammeSegment):
 
     @property
     def fastest_pull(self) -> float:
-        """Of either end."""
+        """The faster end."""
         begin, rate = float(self.pull1), float(self.pull_rate)
         fastest = max(abs(begin), abs(begin + rate * float(self.duration)))
         return fastest * (1 + abs(float(self.epsilon_v)))

@@ -1,4 +1,4 @@
-"""Programmes of load and drive: what an experimenter does, one step after the other."""
+"""Programmes of load and drive: the steps of an experiment in order."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from jax.typing import ArrayLike
 from asperity.errors import InputError
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.loads.programme.steps import LoadAndVelocity, ProgrammeStep
-from asperity.parameters.arguments import number
+from asperity.parameters.arguments import number, typed
 
 #: Relative distance to a break point within which a time counts as the break point itself: sums of
 #: durations and multiples of a sampling interval are not the same doubles.
@@ -34,7 +34,7 @@ class Programme:
     level : LoadAndVelocity
         Load (N) and pulling velocity (m/s) before the first step.
     segments : tuple of ProgrammeSegment
-        What the steps amount to.
+        The steps as segments in time.
     starts : ndarray, shape (segments + 1,)
         Break points (s): beginning of every segment, and the end.
     last : LoadAndVelocity
@@ -47,6 +47,7 @@ class Programme:
     starts: np.ndarray
     last: LoadAndVelocity
 
+    @typed
     def __init__(
         self,
         *steps: ProgrammeStep,
@@ -54,7 +55,7 @@ class Programme:
         velocity: float | str,
         name: str = "programme",
     ) -> None:
-        """Lay the steps out one after the other.
+        """Convert steps to segments.
 
         Parameters
         ----------
@@ -66,7 +67,7 @@ class Programme:
             Pulling velocity (m/s) before the first step; 0 for a slider at rest, which needs
             its initial states given.
         name : str
-            What messages call the programme.
+            Name of the programme in messages.
 
         Raises
         ------
@@ -80,11 +81,6 @@ class Programme:
         segments: list[ProgrammeSegment] = []
         reached = level
         for i, step in enumerate(steps):
-            if not isinstance(step, ProgrammeStep):
-                raise InputError(
-                    f"{name}.steps[{i}] must be a step, got a {type(step).__name__}; "
-                    "take one of asperity.loads, such as Slide('10 s')"
-                )
             new, reached = step.lay_out(reached, f"{name}.steps[{i}]")
             segments.extend(new)
         if not segments:
@@ -123,7 +119,7 @@ class Programme:
         return self._evaluate(t, _pull)
 
     def position(self, t: ArrayLike) -> np.ndarray:
-        """Way of the far end of the spring since t = 0 (m) at times `t` (s)."""
+        """Displacement of the far end of the spring since t = 0 (m) at times `t` (s)."""
         ways = [float(_position(s, s.duration)) for s in self.segments]
         return self._evaluate(t, _position, np.concatenate([[0.0], np.cumsum(ways)]))
 

@@ -55,7 +55,7 @@ class PiecewiseCubic(eqx.Module):
         return t - self.knots[i], self.coefficients[:, i], self.integral[i]
 
     def following(self, t: ArrayLike) -> Array:
-        """The next knot, inf where there is none."""
+        """The next knot; inf behind the last."""
         i = jnp.searchsorted(self.knots, t, side="right")
         return jnp.where(i < self.knots.size, self.knots[i], jnp.inf)
 
@@ -96,11 +96,11 @@ class RecordedSegment(ProgrammeSegment):
     fastest: Scalar = eqx.field(converter=jnp.asarray)
 
     def load(self, t: ArrayLike) -> tuple[Array, Array]:
-        """W and dW/dt of one interpolant."""
+        """W and dW/dt, from the same interpolant."""
         return self.load_curve.value(t)
 
     def shear(self, t: ArrayLike) -> tuple[float, float]:
-        """No shear force besides the spring's."""
+        """No shear force in addition to the spring's."""
         return 0.0, 0.0
 
     def pull(self, t: ArrayLike) -> Array:
@@ -148,7 +148,7 @@ def interpolated(
     kind : {"force", "velocity"}
     interpolant : {"pchip", "spline"}
     name : str
-        What messages call the step.
+        Name of the step in messages.
 
     Raises
     ------
@@ -167,7 +167,7 @@ def interpolated(
             "give one sample for each time"
         )
     pieces = _pieces(interpolant, name)(time - time[0], values)
-    # Splines overshoot: bounds from between the samples too.
+    # Splines overshoot, so the bounds include extrema between samples.
     between = pieces(np.concatenate([pieces.x, 0.5 * (pieces.x[1:] + pieces.x[:-1])]))
     return PiecewiseCubic.of(pieces.x, pieces.c), np.append(between, values[-1])
 

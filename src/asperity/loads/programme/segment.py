@@ -1,4 +1,4 @@
-"""Pieces of a load and drive programme between two break points, as compiled programs read them.
+"""Segments of a load and drive programme between break points, as input of compiled programs.
 
 Every number of a segment is an array, never part of the program's structure: two protocols made of
 the same kinds of segment run the same compiled program. Times are counted from the beginning of the
@@ -20,13 +20,13 @@ from asperity.loads.modulation import Excitation
 
 configure()  # double precision, before any segment makes an array
 
-#: What a number of a segment is: an array of shape ().
+#: Type of a number of a segment: an array of shape ().
 Scalar: TypeAlias = Any
 
 
 def number(default: float) -> Any:
-    """Declare a field of a segment that need not be given."""
-    # Arrays, and never Python numbers: those would have programs of their own.
+    """Declare an optional number of a segment."""
+    # Arrays, not Python numbers: each Python number would need another compiled program.
     return eqx.field(converter=jnp.asarray, default=default)
 
 
@@ -47,7 +47,7 @@ class ProgrammeSegment(eqx.Module):
 
     @abstractmethod
     def shear(self, t: ArrayLike) -> tuple[ArrayLike, ArrayLike]:
-        """Force along the pulling direction besides the spring's (N), and its rate (N/s)."""
+        """Force along the pulling direction in addition to the spring's (N), and its rate (N/s)."""
 
     @abstractmethod
     def pull(self, t: ArrayLike) -> Array:
@@ -55,7 +55,7 @@ class ProgrammeSegment(eqx.Module):
 
     @abstractmethod
     def position(self, t: ArrayLike) -> Array:
-        """Way of the far end of the spring since the beginning of the segment (m)."""
+        """Displacement of the far end of the spring since the beginning of the segment (m)."""
 
     @property
     @abstractmethod
@@ -74,20 +74,20 @@ class ProgrammeSegment(eqx.Module):
     @property
     @abstractmethod
     def longest_step(self) -> float:
-        """Time over which nothing that the programme does can be missed (s)."""
+        """Longest step (s) that misses no change of the programme."""
 
     def next_kink(self, t: ArrayLike) -> ArrayLike:
-        """The next time after `t` at which no step should lie astride (s)."""
+        """The next time (s) after `t` at which a step should end."""
         return jnp.inf
 
     @property
     def period(self) -> float | None:
-        """Period of what is driven (s), None where it does not repeat itself."""
+        """Period of the modulation (s); None without one."""
         return None
 
     @property
     def constant(self) -> bool:
-        """Whether load and pulling velocity stay as they are."""
+        """Whether load and pulling velocity are constant."""
         return False
 
     def at(self, t: ArrayLike, W0: ArrayLike, V: ArrayLike) -> Excitation:

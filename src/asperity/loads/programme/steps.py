@@ -1,4 +1,4 @@
-"""The steps of a programme, as an experimenter names them."""
+"""The steps of a programme: hold, slide, steps and ramps, modulation, recorded signals."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from asperity.loads.modulation import Modulation
 from asperity.loads.programme.formulas import HarmonicSegment, PeriodicSegment
 from asperity.loads.programme.recorded import RecordedSegment, interpolated
 from asperity.loads.programme.segment import ProgrammeSegment
-from asperity.parameters.arguments import number
+from asperity.parameters.arguments import number, typed
 from asperity.units import to_radians, to_si
 
 #: A number in SI, or a text with its unit.
@@ -23,22 +23,22 @@ Given: TypeAlias = float | str
 
 
 class LoadAndVelocity(NamedTuple):
-    """Load (N) and pulling velocity (m/s) that a step finds and leaves."""
+    """Load (N) and pulling velocity (m/s) before or after a step."""
 
     load: float
     velocity: float
 
 
-#: Segments of a step, and the load and velocity that it leaves.
+#: Segments of a step, and the load and velocity after the step.
 LaidOut: TypeAlias = tuple[list[ProgrammeSegment], LoadAndVelocity]
 
 
 class ProgrammeStep(ABC):
-    """One thing that an experimenter does."""
+    """A step of a programme."""
 
     @abstractmethod
     def lay_out(self, level: LoadAndVelocity, name: str) -> LaidOut:
-        """Segments of the step, and the level it leaves.
+        """Segments of the step, and the load and velocity after the step.
 
         Raises
         ------
@@ -49,7 +49,7 @@ class ProgrammeStep(ABC):
 
 @dataclass(frozen=True)
 class Hold(ProgrammeStep):
-    """Stop the drive for `duration`; afterwards it goes on as before."""
+    """Stop the drive for `duration`; afterwards it continues at the velocity before."""
 
     duration: Given
 
@@ -60,7 +60,7 @@ class Hold(ProgrammeStep):
 
 @dataclass(frozen=True)
 class Slide(ProgrammeStep):
-    """Pull for `duration`, at `velocity` from now on, or as before."""
+    """Pull for `duration` at `velocity`, by default at the velocity before."""
 
     duration: Given
     velocity: Given | None = None
@@ -125,7 +125,7 @@ class Modulate(ProgrammeStep):
     frequency : float or str
         Hz.
     rise, fall : float or str
-        Time (s) over which the amplitude comes and goes smoothly; 0 is sudden.
+        Time (s) over which the amplitude rises and falls smoothly; 0 for a sudden change.
     phase : float or str
         Phase at the beginning (rad); at 0 a sudden beginning is a step of the load by eps.
     velocity : float or str, optional
@@ -191,9 +191,10 @@ class Modulate(ProgrammeStep):
         return segments, level
 
 
+@typed
 @dataclass(frozen=True)
 class CyclicLoading(ProgrammeStep):
-    """A periodic modulation of any form, over the load and velocity of the moment.
+    """A periodic modulation of any form, relative to the present load and velocity.
 
     Parameters
     ----------

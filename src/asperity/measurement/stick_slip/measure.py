@@ -21,7 +21,7 @@ from asperity.measurement.stick_slip.noise import estimate, without_impulses
 from asperity.measurement.stick_slip.regimes import Regime, regimes
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, percent, worst
-from asperity.parameters.parameter import Displayed, SummaryLine
+from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel
 
@@ -72,7 +72,7 @@ class Machine:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StickSlipMeasurement(Displayed):
+class StickSlipMeasurement(Drawn):
     """Events of a recording and what they say.
 
     Attributes
@@ -104,6 +104,8 @@ class StickSlipMeasurement(Displayed):
         Channels that were read.
     checks : tuple of Check
     """
+
+    _drawn_by = "asperity.figures.stick_slip:draw_stick_slip"
 
     time: Array
     friction: Array

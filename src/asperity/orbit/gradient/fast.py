@@ -117,7 +117,7 @@ _BALANCED_TOLERANCE = 1e-11
 
 
 class FastOrbits(NamedTuple):
-    """Orbits of the fast method; of no meaning where `converged` is False.
+    """Orbits of the fast method; undefined where `converged` is False.
 
     Attributes
     ----------
@@ -126,7 +126,7 @@ class FastOrbits(NamedTuple):
     floquet : pytree or None
         Of those of the Floquet factor, where multipliers are wanted.
     prepared : tuple
-        What the linear systems of their derivatives need.
+        Data of the linear systems of the derivatives.
     valid, converged : bool array, shape (points,)
         Whether the parameters obey their rules, and whether the orbit converged and is resolved.
     """
@@ -139,7 +139,7 @@ class FastOrbits(NamedTuple):
 
 
 def has_fast_method(program: Program) -> bool:
-    """Whether there is one; not of the multipliers with inertia or damping."""
+    """Whether a fast method can solve it; not for multipliers with inertia or damping."""
     return _quasi_static(program) or not program.multipliers
 
 
@@ -158,7 +158,7 @@ def fast_orbits(parameters: Parameters, *, program: Program) -> FastOrbits:
     problem = program.equations.problem(parameters)
     valid = program.equations.valid(parameters)
     rate, sharpness, unloading = steady_sliding_of(problem)
-    # Points out of range are left to the search, which says so.
+    # Points out of range are left to the search, which reports the reason.
     good = valid & (rate >= SMALLEST_RATE) & (rate < LARGEST_CONTRACTING_RATE)
     good &= (unloading <= LARGEST_UNLOADING) & (sharpness <= _SHARPEST)
     solve = _fourier_orbits if _quasi_static(program) else _balanced_orbits
@@ -193,7 +193,7 @@ def _fourier_orbits(problem: Problem, program: Program, valid: Array, good: Arra
         floquet, converged, more_steps = floquet_factor(_NODES, J, _MOST_STEPS)
         good &= converged
         floquet = jax.tree.map(lambda a: jnp.where(good, a, 0.0), floquet)
-    # Elsewhere states at which the equations are finite, so that they harm no other point.
+    # Other points get states with finite equations, so that no NaN reaches a good point.
     steady = system.steady()
     mean = tuple(jnp.where(good, a, s) for a, s in zip(orbit.mean, steady, strict=True))
     rest = tuple(jnp.where(good, a, 0.0) for a in orbit.rest)

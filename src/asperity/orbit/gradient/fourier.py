@@ -29,7 +29,7 @@ from asperity.orbit.methods.fourier.orbit import (
 )
 from asperity.slider.problem import Problem
 
-#: Steps that a linear system is given beyond those that the orbit took.
+#: Iterations of a linear system in addition to those that the orbit took.
 _MORE_STEPS = 1
 #: Last change of the Floquet factor.
 _FLOQUET_TOLERANCE = 1e-11
@@ -84,7 +84,7 @@ class FourierEquations:
     def residual(
         self, parameters: tuple[Problem, Array], unknowns: FourierUnknowns, at: _InvertedJacobian
     ) -> FourierUnknowns:
-        """The unknowns less what a step of the iteration makes of them."""
+        """The unknowns minus the result of one iteration step from them."""
         problem, _ = parameters
         cycle = self.cycle(problem)
         rates = rates_on(problem.system, cycle)(*together(*unknowns))
@@ -98,7 +98,7 @@ class FourierEquations:
     def solve(
         self, product: Callable[[Any], Any], right: FourierUnknowns, at: _InvertedJacobian
     ) -> FourierUnknowns:
-        """By the contraction that solves for the orbit."""
+        """As in `Equations`, by the contraction that solves for the orbit."""
         J, share, integral = self._transposed(at)
 
         def contract(y: FourierUnknowns) -> FourierUnknowns:
@@ -116,7 +116,7 @@ class FourierEquations:
     def solve_transposed(
         self, product: Callable[[Any], Any], right: FourierUnknowns, at: _InvertedJacobian
     ) -> FourierUnknowns:
-        """By the transpose of that contraction."""
+        """As in `Equations`, by the transpose of the contraction of `solve`."""
         J, share, integral = self._transposed(at)
         n = range(len(J))
 
@@ -172,7 +172,7 @@ class FloquetEquations:
         return parameters[1]
 
     def residual(self, parameters: tuple[Matrix, Array], unknowns: Matrix, at: Array) -> Matrix:
-        """Q less what a step of the iteration makes of it."""
+        """Q minus the result of one iteration step from it."""
         integral = grid(self.nodes)[1]
         slope = self.slope(parameters[0], unknowns)
         return [
@@ -181,11 +181,11 @@ class FloquetEquations:
         ]
 
     def solve(self, product: Callable[[Any], Any], right: Any, at: Array) -> Any:
-        """By the contraction that solves for it."""
+        """As in `Equations`, by the contraction that solves for Q."""
         return contracted(lambda y: _less(y, product(y)), right, at + _MORE_STEPS, points_last=True)
 
     def solve_transposed(self, product: Callable[[Any], Any], right: Any, at: Array) -> Any:
-        """The same: the transpose contracts as fast."""
+        """As in `Equations`; the transposed system contracts as fast."""
         return self.solve(product, right, at)
 
 

@@ -1,4 +1,4 @@
-"""Orbits on collocation meshes, and how they serve as guesses at nearby parameters.
+"""Known orbits on collocation meshes, initial guesses at nearby parameters.
 
 A fit calls again and again with the same points and parameters that change little. From the orbits
 of the call before, Newton's method needs a few steps, where a search from nothing takes ten times
@@ -58,9 +58,9 @@ class SearchedOrbits(NamedTuple):
     Attributes
     ----------
     outcome : int array, shape (points,)
-        Of all points; those that were not wanted have `Outcome.NO_ORBIT`.
+        Outcome of every point; `Outcome.NO_ORBIT` where no orbit was requested.
     parts : list of (array of int, MeshOrbits)
-        Converged points with their orbits, each point once, each part on a mesh of its own.
+        Indices and orbits of converged points; each part has its number of intervals.
     """
 
     outcome: NDArray[np.int64]
@@ -72,13 +72,13 @@ class SearchedOrbits(NamedTuple):
         return cls(np.full(points, int(Outcome.NO_ORBIT)), [])
 
     def add(self, index: Indices, orbits: MeshOrbits) -> None:
-        """Note converged orbits of the points `index`."""
+        """Add converged orbits of the points `index`."""
         if len(index):
             self.outcome[index] = Outcome.CONVERGED
             self.parts.append((index, orbits))
 
     def by_mesh(self) -> list[tuple[Indices, MeshOrbits]]:
-        """The parts, those on meshes of as many intervals together."""
+        """The parts; parts with the same number of intervals are joined."""
         sizes: dict[int, list[tuple[Indices, MeshOrbits]]] = {}
         for part in self.parts:
             sizes.setdefault(len(part[1].orbit.mesh), []).append(part)
@@ -86,7 +86,7 @@ class SearchedOrbits(NamedTuple):
 
 
 def joined(parts: list[tuple[Indices, MeshOrbits]]) -> tuple[Indices, MeshOrbits]:
-    """Parts on meshes of as many intervals as one."""
+    """Parts with the same number of intervals, joined to one."""
     index = np.concatenate([index for index, _ in parts])
     several = [orbits for _, orbits in parts]
     return index, jax.tree.map(lambda *a: np.concatenate(a, axis=-1), *several)
@@ -94,7 +94,7 @@ def joined(parts: list[tuple[Indices, MeshOrbits]]) -> tuple[Indices, MeshOrbits
 
 Float = NDArray[np.float64]
 
-#: Intervals of the meshes that known orbits are kept on.
+#: Number of intervals of the meshes of stored orbits.
 KEPT = 216
 #: Intervals of the mesh that is compared with the first one on which orbits are differentiated.
 COARSER = FIRST_MESH
@@ -106,7 +106,7 @@ _AGREEMENT, _LAST_AGREEMENT = 1e-8, AGREEMENT
 
 @dataclass
 class KnownOrbits:
-    """The last orbits known of some points, with which the next call begins.
+    """The latest orbit of each point, the initial guess of the next call.
 
     Attributes
     ----------
@@ -140,7 +140,7 @@ class KnownOrbits:
             put(self.orbit, index[part], kept)
 
     def picked(self, index: Indices) -> KnownOrbits:
-        """The points `index`, which may name one several times."""
+        """The known orbits of the points `index`, which may repeat a point."""
         orbit = None if self.orbit is None else take(self.orbit, index)
         others = KnownOrbits(len(index), orbit)
         others.there[:] = self.there[index]

@@ -37,7 +37,7 @@ from asperity.slider.problem import Problem
 Float = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-#: Right-hand sides that are solved together, whatever their number.
+#: Number of right-hand sides that are solved together; shorter sets are padded.
 _SIDES = 8
 #: Largest relative difference of multipliers on the mesh from the known ones.
 _MULTIPLIER_GAP = 1e-5
@@ -145,7 +145,7 @@ def _orbit_changes(orbit: Orbit, values: Any, sides: Float) -> Float:
 
 
 def _filled(sides: Float) -> Float:
-    """Right-hand sides filled up with zeros to as many as are solved together."""
+    """Right-hand sides padded with zeros to the number that is solved together."""
     missing = _SIDES - sides.shape[2]
     return np.pad(sides, [(0, 0), (0, 0), (0, missing), *[(0, 0)] * (sides.ndim - 3)])
 
@@ -183,7 +183,7 @@ def _multiplier_columns(
 ) -> list[Float]:
     """Changes of the logarithms of the multipliers, real and imaginary parts."""
     size, points = logs.shape
-    # Liouville: the smaller of two, which drowns in the round-off of the larger, from their sum.
+    # Two multipliers: the smaller is lost in the round-off of the larger; Liouville's sum gives it.
     pair = size == 2
     theta, states = orbit.stage_phases, orbit.stage_states
     none = np.zeros((*orbit.slopes.shape[:2], 1, *orbit.widths.shape))
@@ -220,7 +220,7 @@ def _multiplier_columns(
             for i in range(size)
         )
         whole = (quadrature(orbit) * trace).sum((1, 2))
-        # Of a complex pair both have half of it.
+        # A complex pair shares the sum equally.
         turning = (logs[0].imag != 0) & (np.abs(logs[0].imag) != np.pi)
         result[:, 0].real[:] = np.where(turning, whole / 2, result[:, 0].real)
         result[:, 1] = whole - result[:, 0]
@@ -255,9 +255,9 @@ def _eigenvectors(maps: Float, logs: Complex) -> tuple[list[Complex], list[Compl
     multipliers, vectors = np.linalg.eig(matrix.astype(complex))
     duals = np.linalg.inv(vectors)
     mesh_logs = np.where(finite[:, None], np.log(multipliers) + log_scale[:, None], np.nan)
-    apart = np.abs(np.expm1(mesh_logs[:, None] - logs.T[:, :, None]))  # (points, known, mesh)
-    nearest = np.argmin(np.nan_to_num(apart, nan=np.inf), axis=2)
-    gap = np.take_along_axis(apart, nearest[..., None], 2)[..., 0].T
+    distance = np.abs(np.expm1(mesh_logs[:, None] - logs.T[:, :, None]))  # (points, known, mesh)
+    nearest = np.argmin(np.nan_to_num(distance, nan=np.inf), axis=2)
+    gap = np.take_along_axis(distance, nearest[..., None], 2)[..., 0].T
     at = np.arange(points)
     right, left = [], []
     for j in range(size):

@@ -29,7 +29,7 @@ _SERIES = ("load", "shear", "pull")
 
 @dataclasses.dataclass(frozen=True)
 class ParametrisedProblem:
-    """What the parameters of an operating point are, and the equations that they give.
+    """The named parameters of an operating point, and the equations of motion as their function.
 
     Hashable and without arrays: programs are compiled once for each.
 
@@ -51,14 +51,14 @@ class ParametrisedProblem:
 
     @classmethod
     def of(cls, problem: Problem) -> ParametrisedProblem:
-        """The one that a problem is an instance of."""
+        """The parametrisation of a given problem."""
         system, load = problem
         damped = bool(jnp.any(jnp.asarray(system.damping) > 0))
         return cls(type(system.slider.law), type(system), damped, coefficients_of(load))
 
     @property
     def massive(self) -> bool:
-        """Whether the mass counts."""
+        """Whether the equations have inertia."""
         return self.motion in (Inertial, StiffInertial)
 
     @property
@@ -70,8 +70,8 @@ class ParametrisedProblem:
     def names(self) -> tuple[str, ...]:
         """Names of all parameters: of the law, K, W0, M, V, frequency, eta, and of the load."""
         eta = ("eta",) if self.damped else ()
-        own = law_parameters(self.law)
-        return (*own, "K", "W0", "M", "V", "frequency", *eta, *self.load_names)
+        of_law = law_parameters(self.law)
+        return (*of_law, "K", "W0", "M", "V", "frequency", *eta, *self.load_names)
 
     @property
     def load_names(self) -> tuple[str, ...]:
@@ -87,7 +87,7 @@ class ParametrisedProblem:
 
     @property
     def optional(self) -> tuple[str, ...]:
-        """Names of parameters that have no influence, and need not be given."""
+        """Names of parameters without influence, which a caller may leave out."""
         return () if self.massive else ("M",)
 
     def table(self) -> dict[str, Parameter]:
@@ -95,7 +95,7 @@ class ParametrisedProblem:
         known = point_parameters(self.law)
         positive = (("M",) if self.massive else ()) + (("lambda",) if self.elastic else ())
         table = {n: known.get(n, Parameter(n, "dimensionless", "finite")) for n in self.names}
-        # Where the mass or the asperities are part of the equations they must not vanish.
+        # Mass and asperity compliance must be positive if the equations contain them.
         return table | {n: dataclasses.replace(table[n], rule="positive") for n in positive}
 
     def problem(self, parameters: Mapping[str, Any]) -> Problem:
@@ -153,7 +153,7 @@ class ParametrisedProblem:
         return directions
 
     def valid(self, parameters: Mapping[str, Array]) -> Array:
-        """Whether all parameters of a point obey their rules, shape (points,)."""
+        """Mask of the points whose parameters all obey their rules, shape (points,)."""
         good = [jnp.isfinite(parameters[name]) for name in self.names]
         for name, parameter in self.table().items():
             if parameter.rule != "finite":
@@ -167,7 +167,7 @@ def coefficients_of(load: Modulation) -> tuple[int, int, int] | None:
         return None
     if not isinstance(load, Periodic):
         raise InputError(
-            "modulation must be given by its Fourier coefficients where derivatives are asked for, "
+            "modulation must be given by its Fourier coefficients for derivatives, "
             f"got {type(load).__name__}; give its samples to asperity.loads.sampled"
         )
     return len(load.load), len(load.shear), len(load.pull)
@@ -194,7 +194,7 @@ class ResponseValues(NamedTuple):
     harmonics : complex array, shape (points, count)
         c_1, c_2, ...
     log_multipliers : complex array, shape (points, states)
-        ln|m| + i arg m, by falling modulus; of shape (points, 0) where not asked for.
+        ln|m| + i arg m, by falling modulus; of shape (points, 0) if not requested.
     outcome : int array, shape (points,)
         `asperity.orbit.Outcome` of each point. Where it is not `Outcome.CONVERGED`, all numbers
         and their derivatives are NaN.
@@ -207,7 +207,7 @@ class ResponseValues(NamedTuple):
 
 
 class Program(NamedTuple):
-    """What a program is compiled for: equations, outputs, and whether orbits are searched for."""
+    """Static data of a compiled program: equations, outputs, and whether it may use the search."""
 
     equations: ParametrisedProblem
     harmonics: int
@@ -229,7 +229,7 @@ def by_point(values: Array, like: Array) -> Array:
 
 
 def chosen(condition: Array, yes: Any, no: Any) -> Any:
-    """Point by point one of two pytrees, the points along the first axis."""
+    """`yes` where the condition holds, else `no`; pytrees with points along the first axis."""
     return jax.tree.map(lambda a, b: jnp.where(by_point(condition, a), a, b), yes, no)
 
 

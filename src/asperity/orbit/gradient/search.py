@@ -1,4 +1,4 @@
-"""The search for orbits that can be differentiated: each on the first mesh that serves.
+"""The search for orbits to differentiate: each orbit on the coarsest mesh that is accurate enough.
 
 The whole search takes the orbits of `asperity.orbit.search`. A direct search solves each point by
 itself, from an orbit known of it or from one that is soon computed: it takes some milliseconds a
@@ -39,7 +39,7 @@ from asperity.slider.problem import Problem
 #: it serves. A steep slip pulse that moves along the mesh multiplies the error of the derivatives
 #: by the pulse's shift over its width, some thousand times.
 _AGREEMENT = 1e-10
-#: The same on the last mesh: as good as the values of the search themselves.
+#: Limit on the last mesh, equal to the accuracy of the search.
 _LAST_AGREEMENT = 1e-8
 
 
@@ -131,7 +131,7 @@ class DirectSearch:
     every: bool
 
     def run(self, wanted: Indices) -> None:
-        """Search for the points `wanted`."""
+        """Search for the orbits of the points `wanted`."""
         known = self.known
         if known is not None and known.orbit is not None:
             self._follow(known.orbit, wanted[known.there[wanted]])
@@ -153,7 +153,7 @@ class DirectSearch:
         return wanted[~done]
 
     def _follow(self, guess: Orbit, index: Indices) -> None:
-        """Solve the points `index` from guesses, which are of all points."""
+        """Solve the points `index`; `guess` has an orbit for every point."""
         for part, orbit, observables in followed_orbits(
             self.problem, guess, index, self._counted, self.meshes
         ):
@@ -162,7 +162,7 @@ class DirectSearch:
                 self.known.keep(self.problem, part, orbit)
 
     def _from_averaged_limit(self, index: Indices) -> None:
-        """But for points out of range."""
+        """Solve the points `index` in range from the averaged limit."""
         none = find_orbits(
             take(self.problem, index),
             len(index),
@@ -177,16 +177,16 @@ class DirectSearch:
         self._follow(guess.orbit, index[guess.solved[index]])
 
     def _from_motions(self, index: Indices) -> None:
-        """Until the first motion that does not settle, where every point must have an orbit."""
-        guess, settled = settled_orbits(
+        """Solve the points `index` from motions, up to the first motion without convergence."""
+        guess, periodic = settled_orbits(
             self.equations, self.parameters, self.problem, index, COARSER, every=self.every
         )
         wanted = len(index) if self.every else 1
-        if len(settled) >= wanted:
-            self._follow(guess, settled)
+        if len(periodic) >= wanted:
+            self._follow(guess, periodic)
 
 
-#: Intervals of the meshes on which orbits are differentiated: each on the first that serves it.
+#: Numbers of intervals of the meshes for derivatives; an orbit uses the first that is accurate.
 MESHES = (216, 648, 1944)
 
 

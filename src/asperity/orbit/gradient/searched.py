@@ -1,4 +1,4 @@
-"""Response of the orbits of the search with its derivatives, for traced and other programs."""
+"""Response and derivatives at orbits of the search, inside and outside of compiled programs."""
 
 from __future__ import annotations
 
@@ -115,8 +115,8 @@ def _called(
 def _in_another_process(function: Any, *arguments: Any) -> Any:
     """The result of a function that a compiled program waits for.
 
-    XLA's programs for the CPU may wait for each other for ever where one calls another, so that
-    the search has a process of its own, which is started at its first use.
+    A program of XLA for the CPU that calls another program may deadlock. The search therefore runs
+    in a separate process, which starts at its first use.
     """
     from loky import get_reusable_executor
 
@@ -129,7 +129,7 @@ def _response(
 ) -> tuple[Float, NDArray[np.int64], Float]:
     """Real columns (points, count) of the response, the outcome, and derivatives of the columns.
 
-    The derivatives are of shape (parameters, points, count), without parameters if not asked for.
+    The derivatives are of shape (parameters, points, count), without parameters if not requested.
     """
     equations, points, count = program.equations, len(wanted), _count(program)
     orbits = search_orbits(equations, program.harmonics, parameters, wanted)
@@ -156,7 +156,7 @@ def _columns_rule(program: Program, primals: tuple, tangents: tuple) -> tuple[An
     parameters, wanted = primals
     fixed = jax.lax.stop_gradient(parameters)
     columns, outcome, table = _called(program, fixed, wanted, derivatives=True)
-    # Of both, derivatives of the next order are not known.
+    # Second derivatives are unknown for both.
     point = sum(parameters.values())
     columns, table = _unknown(columns, point), _unknown(table, point)
     names = program.equations.names
@@ -166,7 +166,7 @@ def _columns_rule(program: Program, primals: tuple, tangents: tuple) -> tuple[An
 
 @jax.custom_jvp
 def _unknown(values: Array, point: Array) -> Array:
-    """Values whose derivatives are NaN where those of `point`, (points,), are not zero."""
+    """`values` with NaN derivatives where the derivatives of `point`, (points,), are not zero."""
     return values
 
 

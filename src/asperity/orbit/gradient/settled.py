@@ -1,4 +1,4 @@
-"""Orbits from motions that settle: a slider in steady sliding whose load begins to be modulated.
+"""Initial guesses from transients: the periodic state after a modulation of the load begins.
 
 Where a modulation slower than the memory of the joint sets off slip events, orbits are pulses that
 move along the period with every parameter: Newton's method from a smooth guess does not find them,
@@ -25,13 +25,13 @@ from asperity.transients.inputs import checked_integration, first_checkpoint
 
 Float = NDArray[np.float64]
 
-#: Periods after which a motion should have settled, and most steps of them.
+#: Number of periods of a transient, and the largest number of its steps.
 _PERIODS, _MOST_STEPS = 6, 2000
-#: Periods before over which the modulation rises: a sudden one may make the slider run away.
+#: Number of periods over which the modulation rises; after a sudden start the slider may run away.
 _RISE = 2
-#: Tolerated error of a step: Newton's method does the rest.
+#: Tolerance of a step; Newton's method corrects the remaining error.
 _TOLERANCE = 1e-6
-#: Largest change of a state over the last period of a motion that is taken to settle.
+#: Largest change of a state over the last period of a transient that counts as periodic.
 _SETTLED = 0.1
 
 
@@ -44,7 +44,7 @@ def settled_orbits(
     *,
     every: bool = False,
 ) -> tuple[Orbit, Indices]:
-    """Orbits on which the motion from steady sliding settles, to begin Newton's method with.
+    """Initial guesses for Newton's method: the last period of transients from steady sliding.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def settled_orbits(
     orbit : Orbit
         Of all points.
     index : array of int
-        Points whose motion settles.
+        Points whose transient becomes periodic.
     """
     points, size = len(parameters["V"]), problem.system.size
     orbit = Orbit.empty(scheme_for(problem.system), size, intervals, points)
@@ -81,7 +81,7 @@ def settled_orbits(
 
 
 def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> DenseOutput | None:
-    """The last period of a motion that settles, in radians from its beginning; None of others."""
+    """The last period of a transient, over the phase from its beginning; None if not periodic."""
     slider = jax.tree.map(float, equations.problem(values).system.slider)
     period = 1 / values["frequency"]
     programme = Programme(
@@ -104,7 +104,7 @@ def _last_period(equations: ParametrisedProblem, values: dict[str, float]) -> De
         most_steps=_MOST_STEPS,
     )
     if type(integration.motion) is not equations.motion:
-        # In other states, for slip that may reverse.
+        # The transient has other states, which allow slip to reverse.
         return None
     integration.checkpoint = first_checkpoint(integration.motion, programme, "steady")
     parts = []

@@ -1,1 +1,1 @@
-"""Orbits on meshes: collocation, Newton's method on a whole orbit, and what is read from it."""
+"""Orbits on meshes: collocation, Newton's method on the whole orbit, observables."""

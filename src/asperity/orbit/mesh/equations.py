@@ -27,7 +27,7 @@ from asperity.orbit.mesh.mesh import STAGES, Orbit
 from asperity.slider.pointwise import PointValues, excitation_at, slopes_along, values_at
 from asperity.slider.problem import Problem
 
-#: Entries of small matrices that are eliminated at a time: they fit into a core's cache.
+#: Matrix entries that are eliminated together; they fit into the cache of a core.
 _CACHED = 20_000
 
 
@@ -73,7 +73,7 @@ def _fits(intervals: int, blocks: int, entries: int) -> bool:
 
 
 def _condense_block(part: tuple[Array, Array, Array], *, a: Array) -> Array:
-    """The same of some intervals; (n, STAGES, n + right-hand sides, intervals)."""
+    """`condense` of a block of intervals; (n, STAGES, n + right-hand sides, intervals)."""
     jacobian, right, widths = part
     n = jacobian.shape[0]
     per_stage = jnp.transpose(jacobian, (2, 0, 1, 3))  # (stage, row, column, intervals)
@@ -97,10 +97,10 @@ def _eliminate_stages(rows: Array) -> Array:
     for _ in range(stages):
         pivot, rest = rows[0, :, :n], rows[0, :, n:]
         inverse = inverse_points([list(row) for row in pivot])
-        own = product(jnp.stack([jnp.stack(row) for row in inverse]), rest)
+        pivot = product(jnp.stack([jnp.stack(row) for row in inverse]), rest)
         below, rows = rows[1:, :, :n], rows[1:, :, n:]
-        rows = rows - (below[:, :, :, None] * own[None, None]).sum(2)
-        solved.append(own)
+        rows = rows - (below[:, :, :, None] * pivot[None, None]).sum(2)
+        solved.append(pivot)
     for j in reversed(range(stages - 1)):
         for later in range(stages - 1, j, -1):
             at = (later - j - 1) * n
@@ -127,7 +127,7 @@ def transfer_maps(response: Array, widths: Array, b: Array) -> Array:
 
 Float = NDArray[np.float64]
 
-#: Intervals that are condensed in a call, of few and of many.
+#: Numbers of intervals that are condensed in a call, for small and large numbers of them.
 _FEW, _MANY = 576, 1728
 
 _condense = jit_large(condense)
@@ -217,7 +217,7 @@ def condensed_jacobian(jacobian: Float, right: Float, orbit: Orbit) -> tuple[Flo
 
 
 def _flat(array: Float, block: int) -> Float:
-    """Intervals and points along one axis, filled up to whole blocks with the last interval."""
+    """Intervals and points along one axis, padded to whole blocks with the last interval."""
     flat = np.reshape(array, (*array.shape[:-2], -1))
     missing = -flat.shape[-1] % block
     if not missing:

@@ -30,7 +30,7 @@ def scheme_for(system: Motion) -> CollocationScheme:
 
 Float = NDArray[np.float64]
 
-#: Share of a mesh that is spread evenly whatever the error estimate says.
+#: Share of the intervals that is spread evenly, independent of the error estimate.
 _EVEN_SHARE = 0.3
 
 
@@ -57,7 +57,7 @@ class Orbit(NamedTuple):
 
     @classmethod
     def empty(cls, scheme: CollocationScheme, size: int, intervals: int, points: int) -> Orbit:
-        """NumPy arrays to be filled in."""
+        """An orbit of NumPy arrays without values."""
         return cls(
             np.zeros((intervals + 1, points)),
             np.zeros((size, points)),
@@ -77,7 +77,7 @@ class Orbit(NamedTuple):
         return self.centre[:, None] + apart
 
     def piece(self, start: int, stop: int) -> Orbit:
-        """Its intervals from `start` to before `stop`."""
+        """The intervals from `start` to before `stop`."""
         return self._replace(
             mesh=self.mesh[start : stop + 1],
             nodes=self.nodes[:, start:stop],
@@ -85,7 +85,7 @@ class Orbit(NamedTuple):
         )
 
     def moved(self, **parts: Array) -> Orbit:
-        """The same with other arrays."""
+        """A copy with the arrays `parts` replaced."""
         return self._replace(**parts)
 
     @property
@@ -111,6 +111,18 @@ class Orbit(NamedTuple):
     def stage_states(self) -> Array:
         """States at the collocation points, shape as `slopes`."""
         return self.centre[:, None, None] + self.stage_deviations
+
+
+#: Newton steps for Kepler's equation; quadratic convergence needs fewer for a grading below 0.9.
+_KEPLER_STEPS = 60
+
+
+def eccentric_phase(theta: Float, grading: float) -> Float:
+    """Tau with tau + g sin(tau) = theta (Kepler's equation), 0 <= g < 1, by Newton's method."""
+    tau = np.array(theta, float)
+    for _ in range(_KEPLER_STEPS):
+        tau = tau - (tau + grading * np.sin(tau) - theta) / (1 + grading * np.cos(tau))
+    return tau
 
 
 def graded_mesh(intervals: int, points: int, grading: float) -> Float:

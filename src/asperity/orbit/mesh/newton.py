@@ -7,7 +7,7 @@ interval by interval to a transfer map and the maps are tied into a cycle by
     <row, dX> + corner dt = value:
 
 of a plane across a branch of orbits for continuation, or dt = 0 where the parameters are fixed.
-Stable or not makes no difference to it, and neither do fast and slow directions.
+The method does not depend on the stability of the orbit, nor on fast and slow directions.
 
 The exponent of the slip rate changes by tens of units within a period, so the step is shortened
 until no exponent and no logarithmic state changes by more than a few units.
@@ -35,7 +35,7 @@ from asperity.slider.problem import Problem
 
 Float = NDArray[np.float64]
 
-#: Change at which Newton's method ends: the error is about its square.
+#: Newton's method ends at this change; the error is then about the square of the change.
 TOLERANCE = 1e-8
 #: A last change below this counts as converged.
 ACCEPTED = 1e-6
@@ -88,7 +88,7 @@ class NewtonStep(NamedTuple):
 
 
 class NewtonResult(NamedTuple):
-    """Where Newton's method ended.
+    """Result of Newton's method.
 
     Attributes
     ----------
@@ -151,7 +151,7 @@ def newton_step(
     *,
     closed: bool = True,
 ) -> NewtonStep:
-    """One step, not yet taken.
+    """A Newton step, which the caller applies.
 
     Parameters
     ----------
@@ -183,13 +183,13 @@ def newton_step(
 
 @cache
 def _linear(motion: type[Motion], size: int) -> tuple[bool, ...]:
-    """Which of the states are no logarithms."""
+    """For each state, whether it is not a logarithm."""
     mechanical = [not logarithm for logarithm in motion.logarithmic]
     return (*mechanical, *[False] * (size - len(mechanical)))
 
 
 def least_swing(system: Motion, points: int) -> Float:
-    """What a swing of a force or velocity is taken to be at least, shape (points,)."""
+    """Lower bound for the range of a force or velocity in relative errors, shape (points,)."""
     return np.broadcast_to(1e-4 * np.minimum(np.asarray(system.kappa), 1.0), (points,))
 
 
@@ -239,7 +239,7 @@ def solve_in_plane(
         step = newton_step(problem.system, equations, orbit, plane)
         with np.errstate(invalid="ignore", divide="ignore"):
             shortened = np.minimum(1.0, _LARGEST_CHANGE / step.largest)
-        # Points that have converged stay as they are, whatever the others of the chunk need.
+        # Converged points are not changed while other points of the chunk iterate.
         change = Change(*(np.where(going, part, 0.0) for part in step.change))
         orbit, t = moved(orbit, t, change, shortened)
         size = np.where(np.isfinite(step.error), step.error, np.inf)

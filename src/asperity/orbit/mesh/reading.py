@@ -1,4 +1,4 @@
-"""What is read from orbits on meshes: mean, harmonics, multipliers and waveforms."""
+"""Observables of orbits on meshes: mean, harmonics, multipliers and waveforms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Orbits on meshes that spread the error, and solved anew on them.
+"""Equidistribution of the collocation error: new meshes, and orbits solved on them.
 
 The meshes of all methods are one ladder, each with three times the intervals of the one before.
 """
@@ -23,7 +23,7 @@ Float = NDArray[np.float64]
 MESHES = (72, 216, 648, 1944)
 FIRST_MESH = MESHES[0]
 
-#: Times that a mesh is laid and Newton's method tried on it.
+#: Largest number of attempts: a new mesh, and Newton's method on it.
 _ROUNDS = 4
 _NEWTON_STEPS = 15
 
@@ -42,10 +42,10 @@ def _error_scales(problem: Problem, orbit: Orbit, values: PointValues) -> Float:
     swing = np.abs(orbit.nodes).max(1) + least_swing(system, orbit.nodes.shape[-1])
     for i in range(len(scales)):
         if i in system.linear:
-            # Slip does not feel every force and velocity: those count relative to their swing.
+            # A force or velocity without influence on slip: errors relative to its range.
             scales[i] = np.where(scales[i] > 0, scales[i], 1 / swing[i])
         else:
-            # Logarithmic states matter on their own, not only through the slip they allow.
+            # Errors of logarithmic states count directly, not only by their effect on slip.
             scales[i] = np.maximum(scales[i], 1.0)
     return scales
 
@@ -64,7 +64,7 @@ def refined_orbit(
     for _ in range(_ROUNDS - 1):
         if (error < ACCEPTED).all():
             break
-        # Even a failed attempt puts the mesh where the orbit is steep.
+        # A failed attempt still improves the mesh where the orbit is steep.
         mesh = remeshed(problem, _where(np.isfinite(error), best, mesh), intervals)
         result = solve(problem, mesh, _NEWTON_STEPS)
         done = error < ACCEPTED

@@ -1,4 +1,4 @@
-"""What every method that finds periodic orbits has in common."""
+"""The interface of a method that finds periodic orbits."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ from asperity.slider.problem import Problem
 class Method(ABC):
     """A method that finds periodic orbits.
 
-    A search goes through a list of methods; each is given the points that the ones before it left
-    and that it may help. To add one, implement it and put it into
+    A search goes through a list of methods; each method gets the points that earlier methods left
+    unsolved and that it may solve. To add a method, implement this class and put an instance into
     `asperity.orbit.search`.
 
     Class attributes
     ----------------
     name : str
-        What results call it.
+        Name in results.
     choice : str
-        What a user calls it in the `methods` of `periodic_response`; several may share one.
+        Name in the argument `methods` of `periodic_response`; methods may share a name.
     block : int
-        Points that it is given at a time, which bounds its memory.
+        Largest number of points in a call of `solve`, which bounds the memory.
     on_mesh : bool
         Whether its orbits lie on meshes, so that they can be kept.
     """
@@ -38,10 +38,10 @@ class Method(ABC):
 
     @abstractmethod
     def suits(self, problem: Problem) -> bool:
-        """Whether the method knows these equations under this load."""
+        """Whether the method can solve these equations under this load."""
 
     def candidates(self, solution: Solution) -> Indices:
-        """Points that it may help, by their outcome so far: all that are not solved."""
+        """Points that the method may solve, by their outcome so far; by default all unsolved."""
         return np.flatnonzero(~solution.converged)
 
     @abstractmethod
@@ -57,6 +57,6 @@ class Method(ABC):
         Returns
         -------
         Solution
-            Converged points have passed the method's own checks; of the others `outcome` and
+            Converged points have passed the checks of the method; for the others `outcome` and
             `detail` say what was learnt.
         """

@@ -55,12 +55,12 @@ _FIRST_STEPS, _NEXT_STEPS = 14, 4
 _LARGEST_CHANGE = 1.5
 #: Newton change after which the method ends: the next change is about its square.
 _CONVERGED = 1e-9
-#: Steps after which a point is given up whose last change was larger.
+#: Number of steps after which a point with a large last change is abandoned.
 _PATIENCE, _FAR = 7, 0.5
 #: Largest change of a state from one series to the next at which the latter is exact: errors fall
 #: exponentially with the nodes.
 _AGREED = 1e-10
-#: The same, as extrapolated to the longest series, below which it is tried.
+#: Limit of the extrapolated error of the longest series, below which that series is tried.
 _HOPEFUL = 1e-8
 
 
@@ -99,7 +99,7 @@ class FourierSeries(Method):
 def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool_]]:
     """Orbits of all points of `problem` (NumPy arrays) on `INTERVALS` even intervals.
 
-    Returned with them is which of them a series resolves, shape (points,).
+    Also returned is a mask of the points that a series resolves, shape (points,).
     """
     scheme, size = scheme_for(problem.system), problem.system.size
     orbit = Orbit.empty(scheme, size, INTERVALS, points)
@@ -107,7 +107,7 @@ def series_orbits(problem: Problem, points: int) -> tuple[Orbit, NDArray[np.bool
     chunk, *_ = mesh_chunk(size)
     for start in range(0, points, chunk):
         rows = np.arange(start, min(start + chunk, points))
-        # The last chunk is filled up so that one program serves all; the filling is not solved.
+        # The last chunk is padded to the common shape; padding points are not solved.
         filled = np.concatenate([rows, np.full(chunk - len(rows), rows[-1])])
         harmonics, resolved[rows] = _solve(take(problem, filled), len(rows))
         put(orbit, rows, _on_even_mesh(harmonics, scheme))
@@ -196,7 +196,7 @@ def _derivative(nodes: int) -> Float:
 
 
 def _last_harmonics(Y: Float) -> Float:
-    """Size of the last harmonics, about the error of the series."""
+    """Size of the last harmonics, an estimate of the error of the series."""
     with np.errstate(invalid="ignore"):
         harmonics = np.abs(np.fft.rfft(Y, axis=1)) / Y.shape[1]
         return np.nan_to_num(harmonics[:, -3:].max((0, 1)), nan=1.0, posinf=1.0)

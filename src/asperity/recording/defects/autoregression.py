@@ -21,7 +21,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 
 Float = NDArray[np.float64]
 
-#: Highest order that is tried, as a number and as a share of the samples.
+#: Highest order, as a number and as a share of the samples.
 _HIGHEST, _SHARE = 60, 0.05
 #: The order is at least this times the decimal logarithm of the number of samples (Berk, Ann. Stat.
 #: 2, 489, 1974): what matters is the spectrum at low frequency, and criteria choose for all of it.
@@ -36,7 +36,7 @@ class Whitening(NamedTuple):
     Attributes
     ----------
     taps : array, shape (p + 1,)
-        Weights of a sample and those before it.
+        Weights of a sample and of the samples before it.
     first : array, shape (p, p)
         Weights of the first samples, before which lower orders predict.
     """
@@ -83,7 +83,7 @@ class Autoregression:
 
     @property
     def innovation(self) -> float:
-        """Standard deviation of a sample if all before it are known."""
+        """Standard deviation of a sample if all samples before it are known."""
         return math.sqrt(self.variance * float(np.prod(1 - self.reflection**2)))
 
     @functools.cached_property
@@ -96,7 +96,7 @@ class Autoregression:
         return orders
 
     def autocovariances(self, n: int) -> Float:
-        """Of the first n lags, from 0 on; n is at most the order (Levinson's recursion)."""
+        """Autocovariances of the lags 0 to n - 1; n is at most the order (Levinson's recursion)."""
         result = np.zeros(n)
         result[:1] = self.variance
         rest = self.variance
@@ -119,7 +119,7 @@ class Autoregression:
 
     @functools.cached_property
     def _first_taps(self) -> Float:
-        """Weights of the first samples, by which lower orders predict, shape (p, p)."""
+        """Weights of the predictors of lower order for the first samples, shape (p, p)."""
         result = np.zeros((self.order, self.order))
         scale = self.variance
         for t, (b, partial) in enumerate(zip(self.coefficients, self.reflection, strict=False)):
@@ -128,7 +128,7 @@ class Autoregression:
         return result
 
     def departures_of_single_samples(self, white: Float) -> Float:
-        """How far each sample alone is off what the others predict, in standard deviations.
+        """Difference of each sample from its prediction by all others, in standard deviations.
 
         Parameters
         ----------
@@ -162,7 +162,7 @@ class Autoregression:
         return np.asarray(self.innovation**2 / np.abs(transfer) ** 2)
 
     def effective_samples(self, n: int) -> float:
-        """Independent samples whose mean is as uncertain as that of n samples of the process."""
+        """Number of independent samples whose mean has the variance of the mean of n samples."""
         return min(float(n), n * self.variance / float(self.spectrum(np.zeros(1))[0]))
 
 
@@ -184,7 +184,7 @@ def fitted(
     parameters : int
         That were fitted to the same samples: the variance is larger than that of the residual.
     uncertain : sequence of array, shape (columns, samples of the stretch), optional
-        What the fit may have taken off the noise: a root of the covariance of the fitted curve.
+        A root of the covariance of the fitted curve, which a fit has removed from the noise.
 
     Notes
     -----
@@ -218,7 +218,7 @@ def fitted(
 
 
 def _lowest_order(n: int) -> int:
-    """Order of n samples below which the spectrum of slow noise is too smooth."""
+    """Lowest order for n samples; a lower order smooths the spectrum of slow noise too much."""
     return round(_ORDERS_PER_DECADE * math.log10(n))
 
 
@@ -246,13 +246,13 @@ def _reflections(stretches: Sequence[Float], highest: int) -> list[float]:
 class LaggedProducts:
     """Sums over time of the products of samples at two lags, of one order after the other.
 
-    All that Burg's method asks of the samples, from one Fourier transform of each row: a fit asks
-    it hundreds of times of dozens of rows.
+    Burg's method needs these sums only; one Fourier transform of each row gives all of them. A fit
+    needs them hundreds of times for dozens of rows.
 
     Attributes
     ----------
     sums : array, shape (highest + 1,)
-        Of the products of all samples with those so many before.
+        Sums of the products of all samples with the samples at a lag.
     power : float
         Sum of all squares.
     table : array, shape (m + 1, m + 1)
@@ -274,17 +274,17 @@ class LaggedProducts:
         """Go on to the next order."""
         m = len(self.table)
         first, last = self._first[:, :m][:, ::-1], self._last[:, :m]
-        beside = self.table[-1] - last[:, -1] @ last
+        first_row = self.table[-1] - last[:, -1] @ last
         inner = self.table - first.T @ first
         self.table = np.empty((m + 1, m + 1))
         self.table[:m, :m] = inner
         self.table[m, 0] = self.sums[m]
-        self.table[m, 1:] = beside
+        self.table[m, 1:] = first_row
         self.table[:m, m] = self.table[m, :m]
 
 
 def _reflections_of_smooth(stretches: Sequence[Float], highest: int) -> list[float]:
-    """The same from the prediction errors of every sample, which rounding hardly touches."""
+    """`_reflections` from the prediction errors of each sample: less rounding error."""
     forward, backward = list(stretches), list(stretches)
     result: list[float] = []
     for _ in range(highest):
@@ -305,5 +305,5 @@ def _inside(partial: float) -> float:
 
 
 def _dot(a: Float, b: Float) -> float:
-    # Threads of BLAS would wait for each other longer than these short sums take.
+    # For such short sums the synchronisation of BLAS threads takes longer than the sum.
     return float(np.einsum("ij,ij->", a, b))

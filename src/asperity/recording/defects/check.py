@@ -1,4 +1,4 @@
-"""Is a recording whole? Sampling, missing values, saturation: looked at, and never repaired."""
+"""Checks of a recording: sampling, missing values, saturation. A check never changes a value."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = ["CHECKED", "check", "even_rate"]
 
-#: Names of the findings that `check` can make; a reader makes others.
+#: Names of the findings of `check`; a reader has further ones.
 CHECKED = frozenset(
     {
         "backward time",
@@ -38,30 +38,30 @@ CHECKED = frozenset(
 
 
 def check(trace: Trace) -> tuple[Finding, ...]:
-    """Look for everything that can make a reading of `trace` wrong.
+    """Check a recording for defects that can make a measurement wrong.
 
     Parameters
     ----------
     trace : Trace
-        Any recording; it stays as it is.
+        Any recording; it is not changed.
 
     Returns
     -------
     tuple of Finding
         ``"backward time"``, ``"repeated time"``, ``"rounded time"``, ``"gap"``,
         ``"uneven sampling"``, ``"nan"``, ``"infinite"``, ``"constant"``, ``"spike"`` and
-        ``"saturation"``; at most one of a name for time and for each channel. Empty when nothing
-        was found.
+        ``"saturation"``; at most one of each name for time and for each channel. Empty without a
+        defect.
 
     Notes
     -----
     A gap is a step of time longer than 1.5 times the median of the 24 steps before it, and of
     those after it, and outside their scatter: a change of the sampling rate is uneven, and no gap.
-    Saturation is a crowd of samples at exactly the largest or smallest value, or a few in a row
-    there where no two samples are equal by chance. A spike stands out of
+    Saturation is an excess of samples at exactly the largest or smallest value, or several such
+    samples in a row where no two samples are equal by chance. A spike stands out of
     the samples on both sides of it by ten usual differences, for three samples at most.
     """
-    # Sums and differences of a damaged file may overflow, which is no news here.
+    # Sums and differences of a damaged file may overflow; another check reports such values.
     with np.errstate(over="ignore", invalid="ignore"):
         findings = [*_missing(trace.time, trace.time, "time"), *check_sampling(trace.time)]
         for name, channel in trace.channels.items():
@@ -72,7 +72,7 @@ def check(trace: Trace) -> tuple[Finding, ...]:
 
 
 def _missing(values: Array, time: Array, name: str) -> list[Finding]:
-    # A sum is finite when all terms are, and costs one pass without a copy; when it is not, look.
+    # A finite sum means that all values are finite; this takes one pass without a copy.
     if np.isfinite(values.sum()):
         return []
     findings = []
@@ -118,16 +118,16 @@ def _saturation(values: Array, time: Array, name: str) -> list[Finding]:
             f"{name}, row {level.rows[0]}, t = {time[level.rows[0]]:.10g} s",
             f"{level.rows.size} of {values.size} samples of '{name}' stand at exactly its "
             f"{level.side} value, {level.value:.6g}, and at most {level.usual} at any value next "
-            "to it: saturated, or held there by a command.",
+            "to it: saturated, or kept there by a command.",
         )
         for level in saturated(values)
     ]
 
 
 def _spikes(values: Array, time: Array, name: str) -> list[Finding]:
-    """Finding ``"spike"``, for samples that stand out of both sides of themselves.
+    """Finding ``"spike"``, for samples that stand out of the samples before and behind them.
 
-    A step, a slip event or a change of the amplitude has a new level on one side, and is none.
+    A step, a slip event or a change of the amplitude has a new level on one side; it is no spike.
     """
     at = np.array(spikes(values), dtype=np.intp)
     if not at.size:

@@ -1,4 +1,4 @@
-"""Jumps of a signal's level that nothing explains: a gauge that slips, is moved, or changes range.
+"""Unexplained jumps of a signal's level: a gauge that slips, is moved, or changes its range.
 
 A jump is one large step among the steps from sample to sample, and its neighbours are as usual. The
 steps are an autoregression, which follows what is slow, be it drift, motion or noise of any length:
@@ -15,23 +15,23 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
 Float = NDArray[np.float64]
 
-#: Probability of a jump that is noise, anywhere in a recording.
+#: Probability that noise is taken for a jump, anywhere in a recording.
 CHANCE = 1e-3
-#: Jumps that are looked for, at most.
+#: Largest number of jumps.
 _MOST = 5
-#: Samples at the ends of a stretch that show no level on one side of them.
+#: Number of samples at the ends of a stretch; a jump there has too few samples on one side.
 _EDGE = 6
 #: Samples over which a change is gradual, and the share of its departure that a jump exceeds. Of
 #: 180 recordings with hum and no jump, 9 have one without this rule, and none with it: motion
 #: after changes of the drive. With a share of 1 one jump in six under white noise is lost.
 _GRADUAL, _SUDDEN = (4, 8, 16, 32), 0.95
-#: Samples of a stretch, at least.
+#: Smallest number of samples of a stretch.
 _SHORTEST = 64
 
 
@@ -41,7 +41,7 @@ class Jump(NamedTuple):
     Attributes
     ----------
     sample : int
-        The first one behind it.
+        First sample behind the jump.
     size : float
     departure : float
         Size over its standard error.
@@ -62,8 +62,8 @@ def find_jumps(
     values : array, shape (n,)
         Evenly sampled and finite within each stretch.
     stretches : sequence of (int, int)
-        First sample and the one after the last of each stretch in which nothing is known that would
-        move the level. Short ones are passed over.
+        Start and stop (exclusive) of each stretch without a known change of the level. Short
+        stretches are skipped.
     chance : float
         Probability that any of the jumps is noise.
 
@@ -79,7 +79,7 @@ def find_jumps(
     used = [k for k, d in enumerate(steps) if d.size >= _SHORTEST]
     if not used:
         return []
-    limit = float(norm.isf(chance / (2 * sum(steps[k].size for k in used))))
+    limit = -float(ndtri(chance / (2 * sum(steps[k].size for k in used))))
     result: list[Jump] = []
     while len(result) < _MOST:
         model = fitted([steps[k] - np.mean(steps[k]) for k in used])
@@ -100,9 +100,9 @@ def find_jumps(
 
 
 def _impulses(model: Autoregression, steps: Float) -> tuple[Float, Float]:
-    """Size of an impulse at each sample, and the same over its standard error.
+    """Size of an impulse at each sample, and this size over its standard error.
 
-    The latter is 0 where a change over several samples departs as far: motion is gradual.
+    The ratio is 0 where a gradual change over several samples explains the departure as well.
     """
     white = model.whiten(steps[:, None])[:, 0]
     departure = model.departures_of_single_samples(white)
@@ -113,7 +113,7 @@ def _impulses(model: Autoregression, steps: Float) -> tuple[Float, Float]:
     for wide in _GRADUAL:
         spread = np.convolve(weights, np.ones(wide))
         apart = np.abs(sums[wide:] - sums[:-wide]) * length / np.sqrt(float(spread @ spread))
-        # The farthest of the changes that a sample is within.
+        # The largest of the gradual changes that contain the sample.
         around = np.concatenate([np.zeros(wide - 1), apart, np.zeros(wide - 1)])
         sudden &= np.abs(departure) > _SUDDEN * sliding_window_view(around, wide).max(axis=1)
     return model.innovation / length * departure, np.where(sudden, departure, 0.0)

@@ -1,4 +1,4 @@
-"""Values that repeat: a channel at the end of its range, rounded, held, or lost to zero."""
+"""Repeated values: a channel that is saturated, coarsely rounded, held, or lost to zero."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Values next to the extreme that say how crowded a level is without saturation.
+#: Number of levels next to the extreme that show the usual number of samples at a level.
 _LEVELS = 3
 #: The extreme of a smooth signal that is quantised holds at most 2.4 times the samples of the next
 #: level where it is a parabola, and 5.3 times where it is as flat as a fourth power.
 _CROWDED = 8
 _FEWEST = 5
-#: Equal samples in a row that chance does not make where the values next to them occur once.
+#: So many equal samples in a row are no chance where the values next to them occur once.
 _IN_A_ROW = 3
 #: Rounding is coarse where this share of neighbours is equal and the other differences are whole
 #: multiples of one step, to this share of it.
@@ -31,16 +31,16 @@ _AWAY = 5.0
 
 
 class Saturated(NamedTuple):
-    """An extreme at which a channel is cut off, or held by a command.
+    """An extreme at which a channel is cut off, or kept by a command.
 
     Attributes
     ----------
     side : {"largest", "smallest"}
     value : float
     rows : array of int
-        Samples at it, in rising order.
+        Samples at the extreme, in rising order.
     usual : int
-        Samples at the fullest of the values next to it.
+        Number of samples at the most frequent of the levels next to the extreme.
     """
 
     side: str
@@ -50,7 +50,7 @@ class Saturated(NamedTuple):
 
 
 def saturated(values: Array) -> list[Saturated]:
-    """Extremes that hold more samples than a signal leaves there.
+    """Extremes at which the channel has more samples than an unsaturated signal.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def saturated(values: Array) -> list[Saturated]:
     for side, extreme in (("largest", float(finite.max())), ("smallest", float(finite.min()))):
         at_extreme = values == extreme
         count = int(np.count_nonzero(at_extreme))
-        # The usual case, and the cheap one.
+        # The usual case, without further work.
         if count < _IN_A_ROW or not (at_extreme[1:] & at_extreme[:-1]).any():
             continue
         usual = _most_at_a_level(finite, extreme, side)
@@ -80,7 +80,7 @@ def saturated(values: Array) -> list[Saturated]:
 
 
 def _most_at_a_level(values: Array, extreme: float, side: str) -> int | None:
-    """Samples at the fullest of the values next to the extreme; None if there are too few."""
+    """Samples at the most frequent level next to the extreme; None with too few levels."""
     left, most = values, 0
     level = extreme
     for _ in range(_LEVELS):
@@ -93,7 +93,7 @@ def _most_at_a_level(values: Array, extreme: float, side: str) -> int | None:
 
 
 def coarsely_rounded(values: Array) -> tuple[float, float] | None:
-    """Share of values that repeat the one before, and the usual step of the others.
+    """Share of values equal to the value before, and the usual step of the other values.
 
     None where values were not rounded, or no more coarsely than their noise.
 
@@ -103,8 +103,8 @@ def coarsely_rounded(values: Array) -> tuple[float, float] | None:
 
     Notes
     -----
-    Rounding is noise like other noise as long as there is some before it (Widrow, 1956): if most
-    neighbours are equal there is not, and the rounding follows the signal.
+    Rounding acts like white noise if the signal has noise of that size (Widrow, 1956). If most
+    neighbours are equal there is no such noise, and the rounding error follows the signal.
     """
     steps = np.abs(np.diff(values))
     moved = steps[steps > 1e-9 * max(float(np.median(np.abs(values))), 1e-300)]
@@ -117,9 +117,9 @@ def coarsely_rounded(values: Array) -> tuple[float, float] | None:
 
 
 def held_length(values: Array) -> float | None:
-    """Mean number of equal samples in a row, as of a converter that is slower than the recorder.
+    """Mean number of equal samples in a row, where a converter is slower than the recorder.
 
-    None where the resolution explains them.
+    None where the resolution of the channel explains the equal samples.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Lines of the mains and the like: found high above the spectrum about them, and taken off.
+"""Spectral lines such as hum of the mains: detection above the local background, and removal.
 
 Amplitude and phase of a line are linear over pieces of 100 periods, since mains wander.
 """
@@ -10,7 +10,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.signal import welch
 
 Float = NDArray[np.float64]
 
@@ -20,7 +19,7 @@ _RESOLUTION, _HEIGHT, _ABOUT, _LINES, _PERIODS = 0.1, 8.0, 101, 12, 100
 
 
 def find_lines(x: Float, step: float, lowest: float) -> list[float]:
-    """Frequencies (Hz) at which the spectrum stands high above what is about them.
+    """Frequencies (Hz) of lines high above the spectrum around them.
 
     Parameters
     ----------
@@ -34,6 +33,9 @@ def find_lines(x: Float, step: float, lowest: float) -> list[float]:
     size = min(2 ** round(math.log2(1 / (_RESOLUTION * step))), x.size // 4)
     if size < 4 * _ABOUT:
         return []
+    # scipy.signal loads the whole of scipy.stats, and short recordings need neither.
+    from scipy.signal import welch
+
     frequency, power = welch(x, 1 / step, nperseg=size, detrend="linear")
     height = power / np.maximum(median_filter(power, _ABOUT), 1e-300)
     height[frequency < lowest] = 0.0
@@ -41,14 +43,14 @@ def find_lines(x: Float, step: float, lowest: float) -> list[float]:
     for k in np.argsort(-height):
         if height[k] < _HEIGHT or len(result) >= _LINES:
             break
-        beside = power[k - 1 : k + 2]
+        around = power[k - 1 : k + 2]
         if (
-            beside.size < 3
-            or beside.argmax() != 1
+            around.size < 3
+            or around.argmax() != 1
             or any(abs(frequency[k] - f) < 1 for f in result)
         ):
             continue
-        low, top, high = np.log(beside)
+        low, top, high = np.log(around)
         result.append(
             float(frequency[k] + frequency[1] * (low - high) / 2 / (low - 2 * top + high))
         )
@@ -56,10 +58,10 @@ def find_lines(x: Float, step: float, lowest: float) -> list[float]:
 
 
 def take_off(x: Float, turns: float) -> None:
-    """Take a line of so many turns a sample off, in place and in pieces of 100 periods.
+    """Subtract a line of `turns` cycles a sample, in place, in pieces of 100 periods.
 
-    Amplitude and phase are those of what means over a period leave: a step of friction has every
-    frequency, a kink of it little of them.
+    Amplitude and phase are fitted to the signal minus its running mean over a period, because a
+    step of friction has components of every frequency.
     """
     m = min(math.ceil(_PERIODS / turns), x.size)
     k = np.arange(m)

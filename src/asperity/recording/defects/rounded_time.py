@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: Samples between gaps, on average.
+#: Smallest mean number of samples between gaps.
 _FEWEST = 16
-#: Samples in which the quantum is looked for: in single precision it doubles with time.
+#: Samples from which the quantum is estimated; in single precision the quantum grows with time.
 _WINDOW = 64
 #: The quantum in the last part of a recording over that in most of it, at most.
 _DOUBLED = 2.1
@@ -36,7 +36,7 @@ _GAP = 0.4
 
 @dataclass(frozen=True, eq=False)
 class RoundedGrid:
-    """The grid that rounded stamps stand for.
+    """The even grid of rounded time stamps.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class RoundedGrid:
     step : float
         Seconds between samples.
     quantum : float
-        What the stamps were rounded to, s; the largest, in single precision.
+        Quantum of the rounding, s; the largest quantum in single precision.
     gaps : int
     """
 
@@ -56,7 +56,7 @@ class RoundedGrid:
 
 
 def even_times(time: Array) -> Array:
-    """Times of the samples: the grid where the stamps are one that was rounded, else the stamps.
+    """Times of the samples: the grid if the stamps are a rounded grid, else the stamps.
 
     Parameters
     ----------
@@ -73,7 +73,7 @@ def even_times(time: Array) -> Array:
 
 
 def rounded_grid(time: Array) -> RoundedGrid | None:
-    """The grid of stamps that are explained by rounding; None if they are not, or are not rounded.
+    """The even grid that explains the stamps by rounding; None if there is no such grid.
 
     Between gaps all steps of the grid are equal; where the sampling begins anew after a gap, the
     samples there say.
@@ -87,7 +87,7 @@ def rounded_grid(time: Array) -> RoundedGrid | None:
         return None
     steps = np.diff(time)
     low, high = float(steps.min()), float(steps.max())
-    # NaN is no clock either.
+    # NaN fails this test, too.
     if not (low >= 0 and np.isfinite(high)):
         return None
     exact = 8 * float(np.spacing(np.abs(time[[0, -1]]).max()))

@@ -59,7 +59,7 @@ def check_sampling(time: Array) -> list[Finding]:
     steps = np.diff(clean)
     low, high = float(steps.min()), float(steps.max())
     if low > 0 and high - low <= _EVEN * low + _slack(clean, low):
-        # The usual case: as even as the sharpest measure asks, so that no median is needed.
+        # The usual case: even within the strictest limit, so that no median is needed.
         return []
     rows = np.flatnonzero(np.isfinite(time))
     grid = rounded_grid(time)
@@ -136,7 +136,7 @@ def gap_rows(time: Array) -> NDArray[np.intp]:
 
 
 def rate_stretches(time: Array) -> tuple[tuple[int, int], ...]:
-    """First sample and the one after the last of each stretch of one sampling rate.
+    """Start and stop (exclusive) of each stretch with a constant sampling rate.
 
     Parameters
     ----------
@@ -149,7 +149,7 @@ def rate_stretches(time: Array) -> tuple[tuple[int, int], ...]:
     bounds = [0]
     level, begin, reach = steps[0], 0, 64
     while begin < steps.size:
-        # The next other interval, looked for in growing parts.
+        # Search the next different interval in growing parts.
         other = np.abs(steps[begin : begin + reach] - level) > np.log(_OTHER_RATE)
         if not other.any():
             begin, reach = begin + reach, 4 * reach
@@ -167,7 +167,7 @@ def _gaps(steps: Array, time: Array) -> tuple[NDArray[np.intp], Array]:
     """Indices of the steps that are gaps, and the time missing in each."""
     median = float(np.median(steps))
     suspects = np.flatnonzero(steps > _GAP * median + _slack(time, median))
-    # Where the rate changes, every step of the slow part is a suspect: hence the chunks.
+    # After a change to a lower rate every step is a candidate; chunks bound the memory.
     gaps, missing = [], []
     for part in np.array_split(suspects, suspects.size // _CHUNK + 1):
         before = part[:, None] + np.arange(-_SIDE, 0)
@@ -181,7 +181,7 @@ def _gaps(steps: Array, time: Array) -> tuple[NDArray[np.intp], Array]:
 
 
 def _usual(steps: Array, window: NDArray[np.intp]) -> tuple[Array, Array]:
-    """Median step of each window, and the longest that is usual there; NaN where there is none."""
+    """Median step of each window and the longest usual step; NaN for an empty window."""
     if not window.size:
         return np.empty(0), np.empty(0)
     inside = (window >= 0) & (window < steps.size)
@@ -228,14 +228,14 @@ def _are_even(steps: Array, time: Array) -> bool:
 
 
 def _slack(time: Array, step: float) -> float:
-    """By how much a step may differ as the stamps have few digits, which then jump by one."""
+    """Tolerance for a step, from the last digit of the time stamps."""
     digit = _digit(time)
-    # Coarser than half a step, the digits say nothing: stamps of 1 ms at 1 kHz are exact.
+    # Digits coarser than half a step give no tolerance: stamps of 1 ms at 1 kHz are exact.
     return 1.01 * digit if digit <= step / 2 else 0.0
 
 
 def _digit(time: Array) -> float:
-    """The last decimal that the stamps are written with, s; rounding error where there is none."""
+    """The last decimal of the time stamps, s; the rounding error if they are not decimal."""
     rounding = 4 * np.spacing(np.abs(time[[0, -1]]).max())
     sample = time[:: max(1, time.size // 1000)]
     for decimals in range(10):

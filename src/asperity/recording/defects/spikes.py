@@ -1,9 +1,9 @@
-"""Single samples that are wrong by themselves: spikes of electronics, misreadings.
+"""Spikes: single wrong samples, from electronics or transmission.
 
 A spike stands out of the samples on both sides of it, for three samples at most; a step, a slip
-event or a change of an amplitude has a new level on one side, and is none. Where the drive of a
-recording changes, friction itself may have a peak that one sample holds: there a spike is farther
-off than any two neighbours of the recording are apart elsewhere.
+event or a change of an amplitude has a new level on one side, and is no spike. Friction itself may
+have a peak of one sample where the drive changes: there a spike must be larger than any difference
+of neighbouring samples elsewhere in the recording.
 """
 
 from __future__ import annotations
@@ -18,17 +18,17 @@ if TYPE_CHECKING:
 
     Array = NDArray[np.float64]
 
-#: A spike stands out of both samples so far before and behind it. Next neighbours see it beside a
+#: A spike stands out of both samples at these distances. Next neighbours detect it next to a
 #: fast modulation; those farther off see spikes that last longer than a sample.
 _APART = (1, 3)
 #: How far it stands out, in usual differences of samples so far apart. White noise of 1e8 samples
 #: reaches seven, a sine 1.6.
 _OUT = 10.0
-#: Samples that share one usual difference: small enough for the second cache.
+#: Samples of a chunk with a common usual difference; they fit into the second-level cache.
 _CHUNK = 1 << 14
-#: Differences on each side of a spike that must be small too.
+#: Number of differences on each side of a spike that must be small, too.
 _SIDE = 16
-#: A chunk's usual difference is taken from every so many of them.
+#: Stride of the differences from which the usual difference of a chunk is computed.
 _EVERY = 8
 #: Samples on either side of a change of the drive at which a peak is no spike by itself; samples
 #: beside it whose differences are its own; and how many times as far off as all others a spike is.
@@ -39,7 +39,7 @@ def spikes(values: Array) -> NDArray[np.intp]:
     """Samples that are spikes, in rising order."""
     parts = [np.empty(0, dtype=np.intp)]
     most = max(_APART)
-    # What overflows or is missing is news of another check.
+    # Another check reports missing and overflowing values.
     with np.errstate(over="ignore", invalid="ignore"):
         for start in range(0, max(values.size - 2 * most, 0), _CHUNK):
             piece = values[start : start + _CHUNK + 2 * most]
@@ -55,13 +55,13 @@ def _standing_out(piece: Array, apart: int) -> NDArray[np.intp]:
     up, down = steps > limit, steps < -limit
     if not (up.any() and down.any()):
         return np.empty(0, dtype=np.intp)
-    # Out on one side and back on the other: a step has a new level there.
+    # A spike goes out and back; a step stays at a new level.
     at = np.flatnonzero((up[:-apart] & down[apart:]) | (down[:-apart] & up[apart:])) + apart
     return at[np.isfinite(piece[at]) & _locally(np.abs(steps), at, apart)]
 
 
 def _locally(sizes: Array, at: NDArray[np.intp], apart: int) -> NDArray[np.bool_]:
-    """Whether spikes stand out of what is usual on each side, as where a modulation begins."""
+    """Whether spikes stand out of the usual differences on each side, as a modulation may begin."""
     jump = np.minimum(sizes[at - apart], sizes[at])
     out = np.ones(at.size, dtype=bool)
     # The steps of the spike itself end where it is one step away.
@@ -83,7 +83,7 @@ def _usual(steps: Array) -> float:
     usual = float(np.median(size))
     if usual:
         return usual
-    # A coarse recorder stands still most of the time: its single steps are usual too.
+    # A coarse recorder repeats most values; its single steps then count as usual.
     every = np.abs(steps[np.isfinite(steps)])
     moving = every[every > 0]
     return float(np.median(moving)) if moving.size > 0.02 * every.size else _smallest(moving)
@@ -125,7 +125,7 @@ def away_from_changes(
 
 
 def without(values: Array, rows: NDArray[np.intp]) -> Array:
-    """Values with lines between the neighbours in place of some samples.
+    """Values with linear interpolation in place of the samples `rows`.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Readers of recordings: one function for all formats, and the parts of a reader of one's own."""
+"""Readers of recordings: one function for all formats, and the parts of a new reader."""
 
 from asperity.recording.readers.from_file import read
 from asperity.recording.readers.raw import RawColumn, RawRecording

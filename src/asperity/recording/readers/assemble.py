@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from asperity.recording.readers.raw import RawColumn, RawRecording
 
 
-#: Characters of a column's name.
+#: Largest length of a column's name.
 _LONGEST_NAME = 120
-#: More findings of one name than this become one.
+#: More findings with the same name than this are merged.
 _FOLDED = 60
 
 
@@ -42,7 +42,7 @@ def assemble(
     units: Mapping[str, str] | None,
     rate: float | str | None,
 ) -> Trace:
-    """Trace of what a file holds; the arguments are those of `read`."""
+    """The trace of a file's columns; the arguments are those of `read`."""
     findings = list(recorded.findings)
     split = split_labels([c.label for c in recorded.columns])
     # Names of a damaged file may hold anything.
@@ -89,14 +89,14 @@ def assemble(
 
 
 def _unit_text(column: RawColumn, split: tuple[str, str]) -> str:
-    """The unit beside the name where the format has one, else the one in the heading."""
+    """The unit that the format states for the column, else the unit in the heading."""
     if column.unit is not None and not is_empty(column.unit):
         return column.unit.strip().strip("[](){}").strip()
     return split[1]
 
 
 def _unique(names: list[str], findings: list[Finding]) -> list[str]:
-    """Names that differ: of several columns of one name, the later ones are numbered."""
+    """Unique names: repeated names get numbers."""
     unique: dict[str, None] = {}
     times: dict[str, int] = {}
     for i, name in enumerate(names):
@@ -134,7 +134,7 @@ def _chosen_roles(
 
 
 def _check_kinds(roles: Mapping[str, str], known: Mapping[str, Unit]) -> None:
-    """Refuse a column that measures what its role cannot be; a ratio may stand for a force."""
+    """Refuse a column whose unit does not fit its role; a ratio may stand for a force."""
     for role, name in roles.items():
         kind = known[name].kind if name in known else None
         fitting = ROLES[role].kinds | ({"dimensionless"} if role in ("W", "F") else set())
@@ -173,7 +173,7 @@ def _by_name(
     labels: Mapping[str, str],
     roles: Mapping[str, str],
 ) -> dict[str, str]:
-    """Units by the name of the column, whatever the user has called it."""
+    """Units by the name of the column; the user may have used its heading or role."""
     by_name = {}
     for key, text in units.items():
         role = role_of(key) if key not in names else None
@@ -193,7 +193,7 @@ def _by_name(
 def _known_units(
     texts: dict[str, str], stated: Mapping[str, str], findings: list[Finding]
 ) -> dict[str, Unit]:
-    """Units that are understood; what the user gives goes before what the file says."""
+    """Known units; a unit of the user has priority over the file's."""
     known = {}
     for name, text in texts.items():
         unit = understood(text)
@@ -212,7 +212,7 @@ def _known_units(
                 )
             unit = wanted
         elif unit is None and is_empty(text) and candidates("friction", {name: "dimensionless"}):
-            # A coefficient of friction has no unit to state.
+            # A coefficient of friction is dimensionless.
             unit = Unit("dimensionless", Decimal(1))
         if unit is not None:
             known[name] = unit
@@ -231,7 +231,7 @@ def _left_out(names: list[str]) -> Finding:
 
 
 def _folded(findings: list[Finding]) -> list[Finding]:
-    """One finding in place of many of one name, as a wide table without units has."""
+    """Findings, of which many with the same name become one (a wide table without units)."""
     many = {name for name, n in Counter(f.name for f in findings).items() if n > _FOLDED}
     folded = [f for f in findings if f.name not in many]
     for name in many:

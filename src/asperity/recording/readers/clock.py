@@ -39,9 +39,9 @@ class Clock:
     source : str
         For the provenance.
     column : str or None
-        The column that was used up for it.
+        The column that became time.
     findings : list of Finding
-        Assumptions that had to be made.
+        Assumptions about the clock.
     """
 
     time: NDArray[np.float64]
@@ -57,7 +57,7 @@ def settle_time(
     rate: float | str | None,
     recorded: RawRecording,
 ) -> Clock:
-    """Time by the user's word, else by a column of that name, else by the file's own interval.
+    """Time from the user's choice, else from a column named like time, else from the interval.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def settle_time(
 def _from_first_column(
     values: Mapping[str, NDArray[Any]], units: Mapping[str, Unit], recorded: RawRecording
 ) -> Clock:
-    """Without any heading, a first column that only rises is time; the finding says so."""
+    """Without headings a rising first column is time; a finding reports this assumption."""
     first = next(iter(values))
     bare = not any(c.label for c in recorded.columns)
     numbers = values[first]
@@ -152,7 +152,7 @@ def _from_dates(name: str, raw: NDArray[Any]) -> Clock:
 
 
 def _elapsed(raw: NDArray[Any]) -> tuple[NDArray[np.float64], str] | None:
-    """Seconds since the first stamp, and that stamp; None if these are no stamps.
+    """Seconds since the first time stamp, and this stamp; None if the texts are no time stamps.
 
     ISO 8601, days before or behind months, hours:minutes:seconds, which go on beyond midnight, and
     minutes:seconds. Where day and month can be exchanged, the shorter recording is meant.
@@ -164,7 +164,7 @@ def _elapsed(raw: NDArray[Any]) -> tuple[NDArray[np.float64], str] | None:
     import pandas as pd
 
     texts = pd.Series(raw).astype("string").str.strip().str.replace(",", ".", regex=False)
-    # Stamps with and without a time zone agree in nothing but universal time.
+    # Stamps with and without a time zone are compared in universal time.
     stamps = pd.to_datetime(texts, errors="coerce", format="ISO8601", utc=True)
     stamps = stamps.dt.tz_localize(None)
     if stamps.isna().all():
@@ -174,7 +174,7 @@ def _elapsed(raw: NDArray[Any]) -> tuple[NDArray[np.float64], str] | None:
         return _seconds(stamps - origin), str(origin)
     short = texts.str.fullmatch(_MINUTES).fillna(False).astype(bool)
     clock = texts.where(~short, "0:" + texts)
-    # Words such as "5 S" would be durations of pandas' own.
+    # pandas would read words such as "5 S" as durations.
     clock = clock.where(clock.str.fullmatch(_HOURS).fillna(False).astype(bool))
     times = pd.to_timedelta(clock, errors="coerce")
     if times.isna().all():

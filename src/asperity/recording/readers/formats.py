@@ -1,4 +1,4 @@
-"""Which reader reads a file: those of this package, and those that other packages bring.
+"""The choice of the reader of a file: readers of this package, and plugins of other packages.
 
 A reader is a module, or any object, with
 
@@ -6,7 +6,7 @@ A reader is a module, or any object, with
 - ``read(path) -> RawRecording``: its columns as recorded. A reader that has them as keywords
   takes the user's ``group``, ``delimiter`` or ``decimal`` too, None where the user names none.
 
-Readers of other packages are entry points in the group ``asperity.readers``, and are asked first.
+Readers of other packages are entry points in the group ``asperity.readers``, and are tried first.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from asperity.recording.readers.raw import RawRecording
 
 GROUP = "asperity.readers"
 #: The formats of this package, each a module next to this one, in the order in which they are
-#: asked: those with a signature first.
+#: tried: formats with a signature first.
 FORMATS = ("hdf5", "tdms", "look", "matlab", "text")
 
 
 @lru_cache(maxsize=1)
 def reader_points() -> dict[str, EntryPoint]:
-    """Entry points by the name of the format; none of them is loaded yet.
+    """Entry points by the name of the format; they are not loaded.
 
     Raises
     ------
@@ -64,7 +64,7 @@ def reader_named(name: str) -> Any:
         raise InputError("read.format", "be a format", f"'{name}'", known)
     try:
         reader = points[name].load()
-    # Another package's code: whatever it raises, the user hears of it in a sentence.
+    # Code of another package: any exception becomes a sentence for the user.
     except Exception as error:
         raise InputError(
             "read.format",
@@ -84,7 +84,7 @@ def reader_named(name: str) -> Any:
 
 
 def format_of(path: Path) -> str:
-    """Name of the first format whose reader takes a file for one of its own.
+    """Name of the first format whose reader recognises a file.
 
     Raises
     ------
@@ -122,7 +122,7 @@ def raw_recording(
     ----------
     path : Path
     format : str or None
-        None where the file is to show it.
+        None to recognise the format from the file.
     options : mapping of str to str or None
         Layout of this file, which its reader must be able to take.
     defaults : mapping of str to str or None
@@ -153,7 +153,7 @@ def raw_recording(
         raise InputError(
             "recording.path", "fit into memory", f"'{path.name}', which holds more", "cut it"
         ) from None
-    # Libraries raise whatever the damage makes of the data: type, value, memory, zlib errors.
+    # For damaged files libraries raise many types: TypeError, ValueError, MemoryError, zlib errors.
     except Exception as error:
         raise InputError(
             "recording.path",

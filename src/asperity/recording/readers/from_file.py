@@ -1,4 +1,4 @@
-"""A file to a checked `Trace`: one door for all formats."""
+"""`read`: a file of any format to a checked `Trace`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.errors import InputError, printable
-from asperity.parameters.arguments import file_path
+from asperity.parameters.arguments import FilePath, typed
+from asperity.questions.recording import ReadingRecipe, Source
 from asperity.recording.derived import derive
 from asperity.recording.finding import Finding
 from asperity.recording.readers.assemble import assemble
@@ -21,22 +22,21 @@ from asperity.recording.readers.formats import raw_recording
 from asperity.recording.roles import role_of
 
 if TYPE_CHECKING:
-    from asperity.questions.recording import Source
-    from asperity.recording.recipe import ReadingRecipe
     from asperity.recording.trace import Trace
 
 
-#: Characters of a message.
+#: Largest length of a message.
 _LONGEST = 1200
 
 
+@typed
 def read(
-    path: str | os.PathLike[str],
+    path: FilePath,
     columns: Mapping[str, str | int] | None = None,
     units: Mapping[str, str] | None = None,
     *,
     channels: Mapping[str, str] | None = None,
-    recipe: ReadingRecipe | str | os.PathLike[str] | None = None,
+    recipe: ReadingRecipe | FilePath | None = None,
     rate: float | str | None = None,
     group: str | None = None,
     delimiter: str | None = None,
@@ -66,7 +66,7 @@ def read(
         A reduction file with any of these arguments; what is given here goes before it, and
         mappings are joined.
     rate : float or str, optional
-        Samples per second (Hz, or a text such as ``"10 kHz"``), in place of the file's own times.
+        Samples per second (Hz, or a text such as ``"10 kHz"``), in place of the times in the file.
     group : str, optional
         The group of an HDF5, MATLAB (a struct) or TDMS file to read, where groups differ in length.
     delimiter, decimal : str, optional
@@ -86,19 +86,17 @@ def read(
     InputError
         If the file cannot be read, or can be read in more than one way.
     """
-    from asperity.recording.recipe import ReadingRecipe, load_recipe
-
     if recipe is not None and not isinstance(recipe, ReadingRecipe):
-        recipe = load_recipe(recipe)
+        recipe = ReadingRecipe.from_file(recipe)
     rules = ReadingRecipe() if recipe is None else recipe
     layout = {"group": group, "delimiter": delimiter, "decimal": decimal}
     rate = rules.rate if rate is None else rate
     expressions = {**rules.channels, **(channels or {})}
-    file = file_path(path, "recording.path")
+    file = Path(path)
     with _quiet() as warned:
         clock = [name for name in expressions if role_of(name) == "time"]
         if clock and rate is None:
-            # The file's own clock is a column as any other until the new one is made of it.
+            # The recorded clock is an ordinary column until the expression for time is evaluated.
             rate = "1 Hz"
         recorded = raw_recording(
             _with_content(file),
@@ -122,7 +120,7 @@ def read(
 
 
 def read_source(path: str | os.PathLike[str], source: Source) -> Trace:
-    """Read a recording as a question says.
+    """Read a recording with the settings of a question.
 
     Parameters
     ----------
@@ -155,7 +153,7 @@ def _with_content(file: Path) -> Path:
 
 @contextmanager
 def _quiet() -> Iterator[list[warnings.WarningMessage]]:
-    """Collect the warnings of libraries, and make an error that quotes a file fit for a line."""
+    """Collect the warnings of libraries, and shorten errors that quote a file to one line."""
     with warnings.catch_warnings(record=True) as caught, np.errstate(all="ignore"):
         warnings.simplefilter("always")
         try:
@@ -165,7 +163,7 @@ def _quiet() -> Iterator[list[warnings.WarningMessage]]:
 
 
 def _library_warnings(caught: list[warnings.WarningMessage]) -> list[Finding]:
-    """What a library has warned of while a file was read, once for each text."""
+    """Findings of the warnings of a library, one for each text."""
     texts = dict.fromkeys(str(w.message) for w in caught)
     return [
         Finding("library warning", "warning", 1.0, "the file", f"While it was read: {text}")

@@ -20,14 +20,14 @@ from asperity.recording.readers.raw import (
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
-#: Where a group lies: the place of the group that it lies in, and its name; None for the root.
+#: Place of a group: the place of its parent, and its name; None for the root.
 _Place = tuple[Any, str] | None
 
 
 def is_format(path: Path) -> bool:
-    """By the signature, which may stand behind a block of the user's."""
+    """Recognise the signature, which may follow a user block."""
     head = beginning(path)
-    # Of 512 bytes or a power of two times that; MATLAB writes one of 512.
+    # A user block has 512 bytes times a power of two; MATLAB writes 512 bytes.
     return any(head[at : at + 8] == _SIGNATURE for at in (0, 512, 1024, 2048)) or head.startswith(
         b"MATLAB 7.3 MAT-file"
     )
@@ -60,9 +60,9 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
 
 
 def _refuse_links_out(file: Any, path: Path) -> None:
-    """Refuse links that lead to other files, before one of them is followed.
+    """Refuse links to other files before a link is followed.
 
-    Soft links are left alone: what they lead to in this file has a hard link too.
+    Soft links are ignored, because their targets in this file also have a hard link.
     """
     import h5py
 
@@ -85,10 +85,10 @@ def _elsewhere(path: Path, name: str) -> InputError:
 
 
 def _groups(file: Any, followed: Callable[[Any, str], bool]) -> list[tuple[_Place, Any]]:
-    """Every group once, with the first place that leads to it; inner groups before outer ones.
+    """Every group once, with the first place that leads to it; inner groups first.
 
-    A group may lie in itself, and as deep as the file is long: there is no recursion, and each
-    group is opened from the one that it lies in.
+    A group may contain itself and be very deep. Therefore there is no recursion, and each group is
+    opened from its parent.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def _path(place: _Place) -> str:
 
 
 def _address(item: Any) -> int:
-    """Where an object lies in the file: one number for all of its names."""
+    """Address of an object in the file, the same for all of its names."""
     import h5py
 
     address: int = h5py.h5o.get_info(item.id).addr
@@ -130,7 +130,7 @@ def _address(item: Any) -> int:
 
 
 class _Contents(NamedTuple):
-    """Columns of every group that has some, an interval if one is stated, and names of groups.
+    """Columns of the groups, the stated sampling interval if any, and names of the groups.
 
     A group has the name under which it is in `columns` by each of its names.
     """
@@ -177,7 +177,7 @@ def _holds_values(item: Any) -> bool:
 
 
 def _is_bare_dimension(item: Any) -> bool:
-    """Whether NetCDF has made the dataset for the length of a dimension only."""
+    """Whether the dataset is a NetCDF dimension without coordinate values."""
     name = item.attrs.get("NAME", b"")
     name = name.decode(errors="replace") if isinstance(name, bytes) else str(name)
     return name.startswith("This is a netCDF dimension but not a netCDF variable")
@@ -234,7 +234,7 @@ class _Reader:
         return item[()]
 
     def _cells(self, references: Any) -> list[Any]:
-        """Contents of MATLAB's cells, each read once; None for cells in cells, without end."""
+        """Contents of MATLAB's cells, each read once; None for cells that contain themselves."""
         import h5py
 
         contents: dict[int, Any] = {}

@@ -1,4 +1,4 @@
-"""How a text lays out its table: delimiter, decimal mark, headings, and where the numbers begin."""
+"""Layout of a table of text: delimiter, decimal mark, headings, and the first row of numbers."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from asperity.errors import InputError
 from asperity.recording.readers.units import is_empty, usual
 from asperity.recording.roles import ROLES, candidates
 
-#: Ways to divide a line and to mark the decimals, the first of equally good ones being taken.
+#: Pairs of delimiter and decimal mark, in order of preference.
 _WAYS: tuple[tuple[str | None, str], ...] = (
     ("\t", "."),
     (";", "."),
@@ -30,7 +30,7 @@ _WAYS: tuple[tuple[str | None, str], ...] = (
 #: Delimiters by their names, for command lines.
 _NAMED = {"tab": "\t", "comma": ",", "semicolon": ";", "\\t": "\t"}
 _SAMPLE = 40
-#: What a comment begins with.
+#: Signs that begin a comment.
 COMMENTS = ("#", "%", "!", "//")
 #: Cells without a value, as recording programs write them.
 MISSING = (
@@ -54,7 +54,7 @@ _NUMBER = {
     )
     for mark in (".", ",")
 }
-#: Thousands set apart count only before decimals: without them nothing tells the marks apart.
+#: A thousands separator is recognised only in numbers with decimals; else the mark is ambiguous.
 _GROUPED = {
     mark: re.compile(rf"[+-]?\d{{1,3}}(?:{re.escape(other)}\d{{3}})+{re.escape(mark)}\d*")
     for mark, other in ((".", ","), (",", "."))
@@ -67,10 +67,10 @@ _WORD = re.compile(
 _LINE = re.compile(rb"([^\r\n]*)(\r\n|\n|\r|\Z)")
 _DELIMITERS = ("\t", ";", ",", "|", None)
 _WIDE = re.compile(r"\s{2,}|\t")
-#: Cells that name nothing: numbers, and the counts of records that xlook writes.
+#: Cells that are no names: numbers, and the counts of records that xlook writes.
 _COUNT = re.compile(r"[-+\d.,eE]*\d[-+\d.,eE]*(\s*recs?)?")
 _LONGEST_UNIT = 14
-#: Lines above the table in which names of another number than the columns are looked for.
+#: Number of lines above the table searched for names whose number differs from the columns'.
 _LAST = 2
 _WITH_UNIT = re.compile(r".*[\[({<]([^\[\](){}<>]*)[\])}>]\s*", re.S)
 _TYPES = frozenset({"float", "float32", "float64", "double", "single", "real", "number", "int"})
@@ -96,12 +96,12 @@ class TextLine:
 
     @property
     def blank(self) -> bool:
-        """Whether nothing stands on it."""
+        """Whether the line is empty."""
         return not self.text.strip()
 
     @property
     def comment(self) -> str:
-        """The sign that makes it a comment; empty if it is none."""
+        """The sign that begins a comment; empty for another line."""
         bare = self.text.lstrip(' "')
         return next((sign for sign in COMMENTS if bare.startswith(sign)), "")
 
@@ -117,7 +117,7 @@ def lines_of(head: bytes, start: int) -> list[TextLine]:
 
 
 def _decoded(text: str) -> str:
-    """Text of one character a byte as it was meant: UTF-8, else Windows' Western code page."""
+    """Decode text of one character a byte: UTF-8, else the Windows code page 1252."""
     raw = text.encode("latin-1")
     try:
         return raw.decode("utf-8")
@@ -142,7 +142,7 @@ def is_number(cell: str, decimal: str) -> bool:
 
 
 def _is_grouped(cell: str, decimal: str) -> bool:
-    """Whether a number has its thousands set apart by the other mark."""
+    """Whether a number has a thousands separator, the other mark."""
     return bool(_GROUPED[decimal].fullmatch(cell))
 
 
@@ -157,7 +157,7 @@ def _has_words(text: str) -> bool:
 
 
 def digits(cell: str, decimal: str) -> tuple[int, int]:
-    """Digits behind the decimal mark and in the exponent; (0, 0) for what is no number."""
+    """Digits behind the decimal mark and in the exponent; (0, 0) if the cell is no number."""
     if not is_number(cell, decimal):
         return 0, 0
     mantissa, _, exponent = cell.lower().partition("e")
@@ -225,10 +225,10 @@ def _headings(
 def _names_of_another_width(
     above: Sequence[TextLine], delimiter: str | None, width: int
 ) -> Headings:
-    """Names that are fewer or more than the columns, if a line of names is beyond doubt.
+    """Names whose number differs from the number of columns, if a line is certainly names.
 
-    It is the last line of words, or stands over the row of units, and two of its names at least
-    are those of a role or carry a unit.
+    This line is the last line of words, or the line above the row of units, and at least two of
+    its names belong to a role or have a unit.
     """
     plain = [line.text for line in above if not line.comment and not line.blank]
     rows = []
@@ -299,7 +299,7 @@ def _fitting(
 def _row(text: str, delimiter: str | None, width: int, counted: bool) -> list[str] | None:
     ways = [cells_of(text, delimiter)]
     if delimiter is None:
-        # Names with blanks in them over a table that blanks divide.
+        # Names that contain blanks, above a table with blanks as delimiter.
         ways += [
             [cell.strip('" ') for cell in _WIDE.split(text.strip())],
             _quoted(text),
@@ -322,7 +322,7 @@ def _quoted(text: str) -> list[str]:
 
 
 def _with_units(tokens: list[str]) -> list[str]:
-    """Words with a unit in brackets that follows joined to the name before it."""
+    """Words; a unit in brackets is joined to the name before it."""
     joined: list[str] = []
     for token in tokens:
         if joined and token[0] in "([{" and token[-1] in ")]}":
@@ -338,7 +338,7 @@ def _bracketed(cell: str) -> str | None:
 
 
 def _are_units(row: Sequence[str], above: Sequence[str]) -> bool:
-    """Whether a row holds units: a third of it at least does, under names that are none."""
+    """Whether a row holds units: at least a third of its cells do, and the names above do not."""
     known = sum(_is_unit(cell) for cell in row)
     short = all(len(cell) <= _LONGEST_UNIT for cell in row)
     return short and 3 * known >= len(row) and sum(map(_is_unit, above)) < known
@@ -359,7 +359,7 @@ class Layout:
     decimal : str
         ``"."`` or ``","``.
     width : int
-        Columns; an empty one behind a delimiter at the line's end does not count.
+        Number of columns, without an empty one behind a delimiter at the end of the lines.
     closed : bool
         Whether every row ends with a delimiter.
     headings : Headings
@@ -400,15 +400,15 @@ def layout_of(
     path : Path
         For messages.
     delimiter, decimal : str or None
-        What the user knows.
+        Settings of the user.
 
     Raises
     ------
     InputError
-        If no table of numbers is found.
+        If the text has no table of numbers.
     """
     written = [line for line in lines if not line.blank and not line.comment]
-    # Headings of a short file would outnumber its rows, and its last line may be cut.
+    # The sample excludes headings and the last line, which may be cut.
     numeric = (line for line in reversed(written) if not _has_words(line.text))
     last = list(islice(numeric, _SAMPLE)) or written[-_SAMPLE:]
     sample = [line.text for line in last if line.ended] or [line.text for line in last]
@@ -474,7 +474,7 @@ def _ways(delimiter: str | None, decimal: str | None) -> list[tuple[str | None, 
             "read.delimiter",
             "be one character or 'blank'",
             f"{delimiter!r}",
-            "leave it out to have it found",
+            "leave it out to have it recognised",
         )
     return ways
 

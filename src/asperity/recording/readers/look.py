@@ -33,17 +33,17 @@ from asperity.recording.roles import candidates
 
 _START = struct.Struct(">20siiif")
 _CHANNEL = struct.Struct(">13s13sf50si")
-#: Headers that a file may have room for, the newer first.
+#: Possible numbers of channel headers, the newer format first.
 _SLOTS = (32, 16)
 _PRINTABLE = frozenset(string.printable.encode()) - frozenset(b"\t\n\r\x0b\x0c")
 _UNUSED = "no_val"
 
-#: Number formats, the likelier first.
+#: Number formats, the more common first.
 _TYPES = (">f4", "<f8", ">f8", "<f4")
 _SAMPLE = 20_000
-#: What it counts for the number format that the size of the file fits.
+#: Bonus for the number format that agrees with the size of the file.
 _FITS = 0.4
-#: What a laboratory records lies between these, in any unit.
+#: Recorded values lie between these limits, in any unit.
 _SMALLEST, _LARGEST = 1e-12, 1e12
 
 
@@ -124,7 +124,7 @@ def _header(head: bytes, slots: int) -> _Header | None:
         return None
     behind = head[_header_size(slots) :][: len(_UNUSED)]
     if behind and _UNUSED.encode().startswith(behind):
-        # The header goes on: a file of 32 slots that is cut within them.
+        # The header is cut: a file of 32 slots that ends within them.
         return None
     used = []
     for i in range(slots):
@@ -135,7 +135,7 @@ def _header(head: bytes, slots: int) -> _Header | None:
             return None
         # An empty slot of a program that does not write `no_val` holds nothing.
         if name and not name.startswith(_UNUSED):
-            # xlook itself takes a channel without a count for a full one.
+            # Like xlook: a channel without a count has all rows.
             used.append(_Channel(name, units, comment or "", elements or records))
     if not used:
         return None
@@ -143,13 +143,13 @@ def _header(head: bytes, slots: int) -> _Header | None:
 
 
 def _text(raw: bytes) -> str | None:
-    """Text up to its NUL; None if it holds what no text does."""
+    """Text up to its NUL; None if it holds control characters."""
     text = raw.partition(b"\0")[0]
     return text.decode("ascii").strip() if _PRINTABLE.issuperset(text) else None
 
 
 def _as_doubles(data: np.ndarray[Any, Any]) -> np.ndarray[Any, Any]:
-    # NaN of a damaged file may be of the signalling sort.
+    # A damaged file may hold signalling NaN.
     with np.errstate(all="ignore"):
         return data.astype(np.float64)
 
@@ -158,7 +158,7 @@ def _layout(raw: np.ndarray[Any, Any], readings: list[_Header]) -> tuple[_Header
     """Header and number format that fit, and whether nothing else fits as well."""
     pairs = [(h, t) for h in readings for t in _TYPES]
     whole = [p for p in pairs if _needed(*p) == raw.size]
-    # Bytes behind the data are rarer than a cut. A cut can make the size fit by chance.
+    # Files are cut more often than they have extra bytes. A cut size may agree by chance.
     fitting = [p for p in pairs if _needed(*p) >= raw.size] or pairs
     scores = [_sense(raw, *pair) + (_FITS if pair in whole else 0.0) for pair in fitting]
     best = int(np.argmax(scores))
@@ -172,7 +172,7 @@ def _needed(header: _Header, dtype: str) -> int:
 
 
 def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
-    """Share of numbers of a size that occurs, less the roughness of the first columns.
+    """Share of plausible numbers, minus the roughness of the first columns.
 
     Half of a float64 is no sensible float32 and makes a rough column; two float32 in one float64
     make a column run on into the next.
@@ -196,7 +196,7 @@ def _sense(raw: np.ndarray[Any, Any], header: _Header, dtype: str) -> float:
 def _columns(
     path: Path, header: _Header, data: np.ndarray[Any, Any]
 ) -> tuple[list[RawColumn], list[Finding]]:
-    """Channels one behind the other; of a file that is cut, those that can be used."""
+    """The channels in order; of a cut file the usable channels."""
     ends = np.cumsum([c.elements for c in header.channels])
     lost = max(0, int(ends[-1]) - data.size)
     arrays = []

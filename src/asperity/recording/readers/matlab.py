@@ -2,7 +2,7 @@
 
 SciPy trusts the tags of a version 5 file that is not compressed, and a damaged one ends the
 interpreter: 3 of 3 runs over at most 500 such files with one to five changed bytes did so. The
-elements of a file are walked before SciPy reads them; what is compressed has a checksum of its own.
+elements of a file are checked before SciPy reads them; compressed elements have a checksum.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def _visit(
 
 
 class _DamagedError(Exception):
-    """Whatever is wrong with an element."""
+    """An invalid element."""
 
 
 class _Element(NamedTuple):
@@ -93,7 +93,7 @@ class _Element(NamedTuple):
 
 
 def _refuse_unsound(path: Path, raw: bytes) -> None:
-    """Refuse a version 5 file whose elements do not lie within those that hold them."""
+    """Refuse a version 5 file with an element that exceeds the element around it."""
     order = {b"IM": "<", b"MI": ">"}.get(raw[126:128])
     if order is None:
         why = "which is cut within its header" if len(raw) < _HEADER else "whose header is damaged"

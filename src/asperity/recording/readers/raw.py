@@ -1,4 +1,4 @@
-"""What a file holds, before units and roles are looked at: the common ground of all formats.
+"""Raw columns of a file, before units and roles are determined: common to all formats.
 
 HDF5, MATLAB and TDMS files hold named arrays in groups; which of them are the columns of one
 recording is decided here.
@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
+from asperity.parameters.arguments import typed
 from asperity.recording.finding import Finding, with_cause
 
 #: Names as `plain` has them: of a sampling rate (Hz), of an interval (s), of the lists that name
@@ -25,12 +26,13 @@ _INTERVALS = frozenset({"dt", "sampleinterval", "samplinginterval", "timestep", 
 _NAMES = frozenset({"columns", "columnnames", "names", "channels", "channelnames", "labels"})
 _NAMES |= {"headers", "header", "varnames", "variablenames"}
 _UNITS = frozenset({"units", "unit", "columnunits", "channelunits", "unitnames"})
-#: Columns of a matrix.
+#: Largest number of columns of a matrix.
 _MOST_COLUMNS = 256
 #: Bytes that show the format of a file.
 _HEAD = 4096
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class RawColumn:
     """A column as recorded.
@@ -57,15 +59,10 @@ class RawColumn:
     unit: str | None = None
 
     def __post_init__(self) -> None:
-        label: Any = self.label
-        unit: Any = self.unit
-        values: Any = self.values
-        if not isinstance(label, str) or not (unit is None or isinstance(unit, str)):
-            raise TypeError(f"label and unit of a RawColumn are texts, got {label!r} and {unit!r}")
-        if not isinstance(values, np.ndarray) or values.ndim != 1:
+        if self.values.ndim != 1:
             raise InputError(
-                f"RawColumn.values must be an array of one dimension, got another thing in "
-                f"'{label}'; write numpy.asarray around it"
+                f"RawColumn.values must be an array of one dimension, got {self.values.ndim} in "
+                f"'{self.label}'; correct the reader"
             )
 
 
@@ -128,7 +125,7 @@ def beginning(path: Path) -> bytes:
 
 
 def truncated(path: Path, number: float, where: str, sentence: str, sure: bool = True) -> Finding:
-    """The finding of a file that ends, or may end, too early, what is whole being read."""
+    """The finding of a file that is or may be cut; the complete rows are read."""
     whole = f"{path.name} {'is' if sure else 'may be'} cut short: {sentence}"
     return Finding("truncated", "error" if sure else "warning", number, where, whole)
 
@@ -260,7 +257,7 @@ def one_table(
     chosen: str | None,
     noticed: Sequence[Finding] = (),
 ) -> tuple[list[RawColumn], list[Finding]]:
-    """The columns of one length that make the recording, and what was left out of it.
+    """The columns of one length that make the recording, and findings about other columns.
 
     Parameters
     ----------

@@ -29,7 +29,7 @@ _UNITS = ("units", "unit", "Units", "Unit", "UNITS", "UNIT", "unit_string", "NI_
 
 
 def is_format(path: Path) -> bool:
-    """By the mark of a segment, or of its index."""
+    """Recognise the mark of a segment, or of its index."""
     return beginning(path).startswith((b"TDSm", b"TDSh"))
 
 
@@ -74,7 +74,7 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
 
 @contextmanager
 def _quiet(nptdms: Any) -> Iterator[None]:
-    """Keep the library from talking of files that are cut: a finding says it here."""
+    """Suppress the log of the library about cut files; a finding reports them."""
     manager = nptdms.log.log_manager
     level = manager.log_level
     manager.set_level(logging.ERROR)

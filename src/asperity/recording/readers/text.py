@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 
     import pandas as pd
 
-#: Where the table is looked for; farther only if it is not found: headers of some megabytes exist.
+#: Bytes searched for the table, first and at most: headers of some megabytes exist.
 _HEADS = (1 << 16, 1 << 22)
 _BUFFER = 1 << 20
-#: Whole lines that a head must hold to show the layout.
+#: Smallest number of complete lines from which the layout is determined.
 _FEWEST_LINES = 8
 _SKIPPED = re.compile(r"line (\d+)")
 _GZIP = b"\x1f\x8b"
@@ -46,9 +46,9 @@ _ARCHIVES = {
 #: of any size.
 LARGEST = 1 << 30
 _TAIL = 1 << 16
-#: Rows that must agree before a last line without its end is trusted.
+#: Number of rows that must agree before a last line without line end is accepted.
 _ENOUGH = 5
-#: Characters of a row of words that its finding shows.
+#: Characters of a row of words shown in its finding.
 _SHOWN = 60
 
 
@@ -97,7 +97,7 @@ def read(path: Path, *, delimiter: str | None = None, decimal: str | None = None
 
 
 def _document(head: bytes) -> str:
-    """What sort of document the beginning of a text is of; empty if it is none."""
+    """Type of the document that a text begins; empty for a table."""
     text = head.decode("utf-8-sig", errors="replace").lstrip()
     if text.startswith(("<?xml", "<!DOCTYPE", "<!doctype", "<html", "<HTML", "<svg")):
         return "XML or HTML"
@@ -111,7 +111,7 @@ def _is_json(text: str) -> bool:
     except json.JSONDecodeError as error:
         # Where only the cut is wrong, the rest is JSON; headings in brackets fail at once.
         return error.pos > 0.9 * len(text) or "Unterminated" in error.msg
-    except RecursionError:  # brackets in brackets without end
+    except RecursionError:  # deeply nested brackets
         return True
     # Values one after the other, a line each; "[1], [2]" is a heading.
     return text.startswith("{") or text.rstrip().endswith("]")
@@ -291,7 +291,7 @@ def _parsed_with_texts(parsed: Callable[..., pd.DataFrame], path: Path) -> pd.Da
 def _parse(
     file: BinaryIO, layout: Layout, stop: int, path: Path
 ) -> tuple[pd.DataFrame, list[Finding]]:
-    """The table, as numbers if all of it is numbers; and the rows that are none."""
+    """The table, as numbers if all cells are numbers, and the malformed rows."""
     import pandas as pd
 
     options: dict[str, Any] = {
@@ -313,7 +313,7 @@ def _parse(
         frame = pd.read_csv(part, **options, **more)
         if isinstance(frame.index, pd.RangeIndex):
             return frame
-        # Surplus cells in the first row were taken for row labels, which moves all columns.
+        # pandas took surplus cells of the first row for row labels, which shifts all columns.
         part = io.BufferedReader(_Part(file, layout.start, stop), _BUFFER)
         return pd.read_csv(part, index_col=False, **options, **more)
 
@@ -331,16 +331,16 @@ def _parse(
 
 @dataclass(frozen=True)
 class _Ending:
-    """Where the whole rows of a text end.
+    """End of the complete rows of a text.
 
     Attributes
     ----------
     stop : int
         Offset in bytes behind the last row that counts.
     rows : int
-        Rows left out behind it.
+        Number of rows left out at the end.
     sentence : str
-        Why; empty where the text ends as it should.
+        The reason; empty for a complete text.
     sure : bool
         Whether the file must have been cut, or only may have been.
     """
@@ -391,7 +391,7 @@ def _ending_of(file: BinaryIO, size: int, layout: Layout) -> _Ending:
 
 
 def _is_whole(cells: list[str], layout: Layout) -> bool | None:
-    """Whether the last number has all its digits; None where nothing tells."""
+    """Whether the last number is complete; None if unknown."""
     if layout.closed:
         # The delimiter behind the last number is there.
         return True
@@ -417,7 +417,7 @@ def _malformed(lines: list[int]) -> Finding:
 
 
 def _without_text_rows(frame: pd.DataFrame, width: int) -> tuple[pd.DataFrame, list[Finding]]:
-    """A table of numbers without its rows of words: headings between parts, remarks below.
+    """A table of numbers without rows of words, such as headings between parts and remarks.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ _WORDED = re.compile(r"(?P<name>.+?)(?:,\s*|\s+in\s+|;\s*)(?P<unit>[^\s,].*?)\s*
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit that is understood.
+    """A known unit.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Unit:
 
 
 def is_empty(text: str) -> bool:
-    """Whether a unit field says nothing."""
+    """Whether a unit field is empty or a placeholder."""
     return text.strip().lower() in _EMPTY
 
 
@@ -104,13 +104,13 @@ def understood(text: str) -> Unit | None:
     degrees and the like, which `asperity` has no kind for, are not understood.
     """
     text = _bare(text)
-    # A bare letter that is no usual unit is more likely a name than a unit of pint's.
+    # A single letter that is no usual unit is more likely a name than a unit.
     return usual(text) or (_by_pint(_worded(text)) if len(text) > 1 else None)
 
 
 @lru_cache(maxsize=1024)
 def usual(text: str) -> Unit | None:
-    """Unit of a text if it is one that laboratories use every day, None otherwise."""
+    """Unit of a text if it is a usual unit of laboratories, else None."""
     text = _bare(text)
     if text.lower() in _PURE:
         return Unit("dimensionless", Decimal(1))
@@ -146,7 +146,7 @@ def _by_pint(text: str) -> Unit | None:
 
 
 def required(text: str, name: str) -> Unit:
-    """Unit that the user has given for a column, which must be understood.
+    """Unit of a column from the user, which must be a known unit.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def in_si(values: NDArray[Any], unit: Unit | None) -> NDArray[np.float64]:
     values = np.asarray(values, dtype=np.float64)
     if unit is None or unit.factor == 1:
         return values
-    # What overflows in a damaged file becomes infinite, which the checks report.
+    # Overflow in a damaged file gives infinity, which the checks report.
     with np.errstate(over="ignore"):
         # 10^-n is inexact in binary, 10^n is not.
         if abs(unit.factor) < 1:
@@ -201,7 +201,7 @@ def in_si(values: NDArray[Any], unit: Unit | None) -> NDArray[np.float64]:
 
 
 def split_labels(labels: Sequence[str]) -> list[tuple[str, str]]:
-    """Name and unit text of each heading of a file; the unit is empty where there is none.
+    """Name and unit text of each heading of a file; the unit may be empty.
 
     Brackets at the end hold the unit whatever it says. A slash, a comma, ``in`` and an underscore
     count only before a usual unit, so that ``dW/dt``, ``mu_s`` and ``D_c`` stay whole; and ``F_N``

@@ -1,7 +1,8 @@
 """Maps: response and stability over any two numbers of an operating point.
 
-The grid is solved in blocks, every edge of it whose ends differ in stability is searched for the
-crossing, and the crossings are joined to lines, with the kind of bifurcation at each point.
+The points of a grid are solved in chunks. On each edge of the grid whose ends differ in stability
+the crossing of the stability boundary is searched. The crossings are joined to lines, with the kind
+of bifurcation at each point.
 """
 
 from asperity.study.map.dataset import SHOWN

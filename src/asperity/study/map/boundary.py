@@ -1,11 +1,10 @@
-"""The stability boundary on a grid: every edge that it crosses, and lines through the crossings.
+"""The stability boundary on a grid: the crossings with the edges, joined to lines.
 
-All crossings are searched at once, and the grid finds every piece of the boundary that changes the
-stability of one of its points, closed ones too. Continuation (`asperity.branches`) gives what no
-grid shows, the curves that bound no stability; it follows one orbit in steps that wait for each
-other, needs a start on each piece and ends where the bifurcation becomes one of another kind. For
-rice-ruina over 0.5 to 100 Hz and K it took 154 s for three curves, the crossings of a grid of
-40 x 40 points 43 s for the one line that the map has.
+All crossings are searched together. The grid detects every piece of the boundary, open or closed,
+that separates two of its points. Continuation (`asperity.branches`) also gives bifurcation curves
+that bound no stable region, but it is sequential, needs a start on each curve, and ends where the
+kind of bifurcation changes. Measured for rice-ruina over K and 0.5 to 100 Hz: 154 s for three
+curves by continuation, 43 s for the one line of the map with a grid of 40 x 40 points.
 """
 
 from __future__ import annotations
@@ -22,12 +21,12 @@ from asperity.study.points import Float, Index
 from asperity.study.responses import is_stable
 from asperity.study.threshold import Crossings, find_crossings
 
-#: Largest distance of the boundary from the chord between two of its points, in fractions of the
-#: axes.
+#: Largest distance of the boundary from the chord between two neighbouring points, in fractions of
+#: the axes.
 CHORD = 5e-5
 _MOST_ROUNDS = 7
-#: Half width of the search perpendicular to a chord, over its length: a boundary that bends more
-#: within a cell is not refined further.
+#: Half width of the search perpendicular to a chord, in units of its length. A boundary that leaves
+#: this strip is not refined further.
 _REACH = 0.5
 
 
@@ -38,13 +37,14 @@ class MapBoundary:
     Attributes
     ----------
     where : array, shape (points, 2)
-        Fractions of the axes, line after line.
+        Fractions of the axes, in the order of the lines.
     line : int array, shape (points,)
         Number of the line that each point belongs to, from 0; -1 where stability changes between
-        two neighbours of the grid but no crossing was located, for the `reason` given.
+        two neighbours of the grid but no crossing was located.
     points : Answers
-        The responses there.
+        Responses at `where`.
     reason : object array, shape (points,)
+        "converged", or why no crossing was located.
     unresolved : int
         Chords between neighbours whose distance from the boundary is unknown.
     """
@@ -57,9 +57,9 @@ class MapBoundary:
 
     @classmethod
     def empty(cls) -> MapBoundary:
-        """No points: nothing was searched for."""
-        no = Answers.empty(OUTPUTS, 0)
-        return cls(np.empty((0, 2)), np.empty(0, dtype=int), no, np.empty(0, dtype=object), 0)
+        """A boundary without points, for maps without a search."""
+        none = Answers.empty(OUTPUTS, 0)
+        return cls(np.empty((0, 2)), np.empty(0, dtype=int), none, np.empty(0, dtype=object), 0)
 
 
 def trace_boundary(plane: MapPlane, grid: Answers) -> MapBoundary:
@@ -69,7 +69,7 @@ def trace_boundary(plane: MapPlane, grid: Answers) -> MapBoundary:
     ----------
     plane : MapPlane
     grid : Answers
-        At `plane.nodes`.
+        Responses at `plane.nodes`.
 
     Notes
     -----
@@ -89,7 +89,7 @@ def trace_boundary(plane: MapPlane, grid: Answers) -> MapBoundary:
 
 
 def _crossed_edges(shape: tuple[int, int], grid: Answers) -> Index:
-    """Ends of the edges whose ends converged and differ in stability, shape (edges, 2)."""
+    """Nodes of the edges whose two nodes converged and differ in stability, shape (edges, 2)."""
     index = np.arange(shape[0] * shape[1]).reshape(shape)
     along = np.stack([index[:, :-1].ravel(), index[:, 1:].ravel()], axis=-1)
     across = np.stack([index[:-1].ravel(), index[1:].ravel()], axis=-1)
@@ -121,7 +121,7 @@ def _links(plane: MapPlane, grid: Answers, ends: Index, located: NDArray[np.bool
         b, d = a + 1, a + columns
         bottom, top = number[(a, b)], number[(d, d + 1)]
         left, right = number[(a, d)], number[(b, d + 1)]
-        # The boundary separates the middle from the two corners of the other stability.
+        # The boundary separates the middle from the two corners that differ from it in stability.
         cut = ((bottom, right), (left, top)) if stable == stable_nodes[a] else (
             (bottom, left), (right, top)
         )  # fmt: skip
@@ -132,7 +132,7 @@ def _links(plane: MapPlane, grid: Answers, ends: Index, located: NDArray[np.bool
 def refined_lines(
     plane: MapPlane, edges: Crossings, links: Sequence[Index]
 ) -> tuple[Float, Answers, list[Index], int]:
-    """Halve chords until none is further from the boundary than `CHORD`, and join them to lines.
+    """Halve chords until the boundary is within `CHORD` of each, and join them to lines.
 
     Parameters
     ----------
@@ -144,10 +144,10 @@ def refined_lines(
     Returns
     -------
     where : array, shape (points, 2)
-        The crossings, and the points added.
+        The crossings, and the added points.
     points : Answers
     lines : list of int arrays
-        Indices of the points of each line, in order; of a closed one the first is repeated.
+        Indices of the points of each line, in order; a closed line ends with its first point.
     unresolved : int
         Chords whose distance from the boundary is unknown.
     """
@@ -156,8 +156,8 @@ def refined_lines(
     done: list[Index] = []
     unresolved = 0
     for rounds_left in range(_MOST_ROUNDS, -1, -1):
-        bent, unmet, between = _bent(plane, where, chords)
-        unresolved += int(unmet.sum())
+        bent, unknown, between = _bent(plane, where, chords)
+        unresolved += int(unknown.sum())
         if not rounds_left:
             unresolved += int(bent.sum())
             bent[:] = False
@@ -173,7 +173,7 @@ def refined_lines(
 
 
 def join(links: Index) -> list[Index]:
-    """Lines from pairs of neighbours: open ones from end to end, then closed ones.
+    """Lines from pairs of neighbours: first open lines from end to end, then closed lines.
 
     Parameters
     ----------
@@ -206,8 +206,8 @@ def _bent(
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_], Crossings]:
     """Chords further than `CHORD` from the boundary, chords of unknown distance, and crossings.
 
-    The distance is that of the crossing on the perpendicular through the middle of the chord,
-    which is returned for the former; a chord shorter than `CHORD` needs none.
+    The distance is measured from the middle of the chord along its perpendicular. The crossings
+    are those of the chords further than `CHORD`. A chord shorter than `CHORD` needs no distance.
     """
     a, b = where[chords[:, 0]], where[chords[:, 1]]
     middle, chord = (a + b) / 2, b - a
@@ -220,13 +220,14 @@ def _bent(
         gap = np.abs(g / (g1 - g0)) * np.linalg.norm(end - start, axis=1)
     index = np.flatnonzero(crossed & (gap > CHORD))
     between = find_crossings(plane, start[index], end[index], g0[index], g1[index])
-    met = between.located
-    bent, unmet = np.zeros(len(chords), dtype=bool), ~crossed
-    bent[index[met]] = True
-    unmet[index[~met]] = True
-    unmet &= np.linalg.norm(chord, axis=1) > CHORD
-    kept = Crossings(between.where[met], between.points.take(met), met[met], between.reason[met])
-    return bent, unmet, kept
+    located = between.located
+    bent, unknown = np.zeros(len(chords), dtype=bool), ~crossed
+    bent[index[located]] = True
+    unknown[index[~located]] = True
+    unknown &= np.linalg.norm(chord, axis=1) > CHORD
+    points = between.points.take(located)
+    kept = Crossings(between.where[located], points, located[located], between.reason[located])
+    return bent, unknown, kept
 
 
 def _joined(points: Answers, others: Answers) -> Answers:
@@ -240,7 +241,7 @@ def _joined(points: Answers, others: Answers) -> Answers:
 def _in_order(
     where: Float, points: Answers, lines: list[Index], edges: Crossings, unresolved: int
 ) -> MapBoundary:
-    """Line after line, the crossings that were not located behind them."""
+    """The points of all lines in order, followed by the crossings that were not located."""
     lost = np.flatnonzero(~edges.located)
     order = np.concatenate([*lines, lost]).astype(int) if lines else lost
     sizes = [len(line) for line in lines]

@@ -16,7 +16,7 @@ from asperity.study.outcome import Answers
 from asperity.study.responses import bifurcation_kinds, is_stable
 from asperity.theory import closed_forms as cf
 
-#: Names of the numbers on the grid, which a picture can show.
+#: Names of the numbers on the grid that a figure can show.
 SHOWN = (
     "mean_friction",
     "delta_mu",
@@ -87,10 +87,10 @@ def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
         "boundary_line": (
             _POINT,
             boundary.line,
-            _described("1", "line of the point; -1: not found"),
+            _described("1", "line of the point; -1: not located"),
         ),
         "boundary_kind": _texts((_POINT,), kinds, "bifurcation on the stability boundary"),
-        "boundary_result": _texts((_POINT,), boundary.reason, "converged, or why not found"),
+        "boundary_result": _texts((_POINT,), boundary.reason, "converged, or why not located"),
     }
     for axis in (plane.x, plane.y):
         attributes = _described(axis.unit or "1", f"{axis.name} on the stability boundary")
@@ -102,7 +102,7 @@ def _boundary(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]:
 
 
 def _derived(points: Answers, frequency: np.ndarray) -> dict[str, np.ndarray]:
-    """All that `SHOWN` names, from what is kept of the points."""
+    """The numbers of `SHOWN`, some of them computed from the answers."""
     log = points["log_multiplier"]
     with np.errstate(over="ignore"):
         largest = np.exp(log)
@@ -113,7 +113,7 @@ def _derived(points: Answers, frequency: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _critical_stiffness_along(plane: MapPlane) -> dict[str, np.ndarray]:
-    """K_c (N/m) of unmodulated sliding along the other axis, where K is on one of the two.
+    """K_c (N/m) of unmodulated sliding along the other axis of a map with K on an axis.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def _global_attributes(plane: MapPlane, boundary: MapBoundary) -> dict[str, Any]
         "y_scale": "log" if plane.y.log else "linear",
         "relative_tolerance": 1e-8,
         "convention": _CONVENTION,
-        # Chords of the boundary that may deviate from it by more than 1e-4 of the axes.
+        # Chords whose distance from the boundary may exceed 1e-4 of the axes.
         "boundary_unresolved_chords": boundary.unresolved,
     }
 

@@ -1,11 +1,11 @@
-"""The plane of a map: two axes, the fixed numbers, and the responses at positions on it."""
+"""The plane of a map: two axes, the fixed numbers, and responses at positions on the plane."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,18 +13,19 @@ from asperity.errors import InputError
 from asperity.laws import Law
 from asperity.operating_point import known_parameters, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
-from asperity.parameters.arguments import number, shown, switch, whole_number
+from asperity.parameters.arguments import at_least, number, shown, typed
 from asperity.study.outcome import Answers
 from asperity.study.points import Float
 from asperity.study.responses import answers_of_law
 from asperity.study.threshold import STABILITY
 
-#: Outputs that are kept of each point.
+#: Outputs of each point that a map keeps.
 OUTPUTS = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", *STABILITY)
 
 _AXIS = re.compile(r"\s*([\w]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)(?:\s+|(?=%))(.*)")
 
 
+@typed
 @dataclass(frozen=True)
 class Axis:
     """A number that varies along a side of a map.
@@ -36,21 +37,21 @@ class Axis:
     low, high : float
         Ends in SI; texts with units are converted. ``low < high``.
     count : int
-        Points of the grid, at least 2, both ends among them.
+        Number of points with both ends, at least 2.
     log : bool
-        Whether they lie at equal ratios instead of equal distances.
+        Whether the points lie at equal ratios instead of equal distances.
 
     Raises
     ------
     InputError
-        If the name is unknown, an end breaks the rule of its parameter, or the ends and the count
-        make no grid.
+        If the name is unknown, an end breaks the rule of its parameter, or the ends or the count
+        are invalid.
     """
 
     name: str
     low: float | str
     high: float | str
-    count: int
+    count: Annotated[int, at_least(0)]
     log: bool = False
 
     def __post_init__(self) -> None:
@@ -60,8 +61,6 @@ class Axis:
             value = getattr(self, end)
             si = number(value, parameter.label, parameter.kind, parameter.rule)
             object.__setattr__(self, end, si)
-        object.__setattr__(self, "count", whole_number(self.count, f"axis of {self.name}", 0))
-        object.__setattr__(self, "log", switch(self.log, "axis.log"))
         if not self._ends[0] < self._ends[1]:
             raise InputError(
                 f"axis of {self.name} must go from a smaller to a larger value, got "
@@ -70,7 +69,7 @@ class Axis:
         if self.count < 2:
             raise InputError(
                 f"axis of {self.name} must have at least 2 points, got {self.count}; "
-                "ask for 2 or more"
+                "choose 2 or more"
             )
         if self.log and not self._ends[0] > 0:
             raise InputError(
@@ -85,7 +84,7 @@ class Axis:
         Raises
         ------
         InputError
-            If the text has another form, or as `Axis`.
+            If the text has another form, or as for `Axis`.
         """
         match = _AXIS.fullmatch(text + " ")
         if match is None:
@@ -131,7 +130,7 @@ class Axis:
 
 
 def _parameter(name: str) -> Parameter:
-    # A map cannot pass through a switch.
+    # A switch such as inertia cannot vary along an axis.
     known = {n: p for n, p in known_parameters().items() if p.rule != "switch"}
     name_in_table = canonical_name(str(name), known)
     if name_in_table is None:
@@ -148,7 +147,7 @@ def _unit(parameter: Parameter) -> str:
 
 @dataclass(frozen=True)
 class MapPlane:
-    """Two axes, and the fixed numbers.
+    """Two axes and the fixed numbers of a map.
 
     Attributes
     ----------
@@ -177,7 +176,7 @@ class MapPlane:
         return np.stack([a.ravel() for a in np.meshgrid(u, v)], axis=-1)
 
     def values(self, where: Float) -> dict[str, Float]:
-        """Numbers of the operating points at some positions, in SI.
+        """Numbers of the operating points at positions on the plane, in SI.
 
         Parameters
         ----------
@@ -190,13 +189,13 @@ class MapPlane:
         values[self.y.name] = self.y.at(where[:, 1])
         if without_mass(values).any():
             raise InputError(
-                "M must be positive where inertia is asked for, got 0 kg; give the mass, as "
+                "M must be positive where inertia is included, got 0 kg; give the mass, as "
                 "M='1.6 kg'"
             )
         return values
 
     def solve(self, where: Float, progress: Callable[[int], None] | None = None) -> Answers:
-        """Responses at some positions.
+        """Responses at positions on the plane.
 
         Parameters
         ----------

@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.errors import InputError
@@ -18,7 +17,7 @@ from asperity.operating_point import (
 )
 from asperity.outputs import UnfinishedText, output_file, require_memory, written_file
 from asperity.parameters import MODULATION, point_parameters
-from asperity.parameters.arguments import function, instance, switch
+from asperity.parameters.arguments import FilePath, typed
 from asperity.study.engine import solve_here
 from asperity.study.map.boundary import MapBoundary, trace_boundary
 from asperity.study.map.dataset import as_dataset
@@ -31,11 +30,12 @@ if TYPE_CHECKING:
 
 #: Points of a chunk.
 _CHUNK = 4800
-#: Bytes that a point of a map takes, with its boundary and its file: 250 to 300 without these, from
-#: the largest resident memory at 250,000 to 2,250,000 points.
+#: Memory of a point with its share of the boundary and of the file (bytes); without these measured
+#: 250 to 300 (largest resident memory, 250,000 to 2,250,000 points).
 _POINT_BYTES = 500.0
 
 
+@typed
 def response_map(
     law: str,
     numbers: Mapping[str, Any],
@@ -45,7 +45,7 @@ def response_map(
     boundary: bool = True,
     progress: Callable[[int, int], None] | None = None,
 ) -> xarray.Dataset:
-    """Response and stability on a grid over two numbers, and the stability boundary between.
+    """Response and stability on a grid over two numbers, and the stability boundary.
 
     Parameters
     ----------
@@ -54,13 +54,13 @@ def response_map(
     numbers : mapping of str to float, str or SourcedNumber
         The other numbers of the operating point by name (`asperity.parameters`), SI or
         texts with units: parameters of the law, ``K, W0, M, eta, V, epsilon, frequency``,
-        ``inertia=1`` to include the mass, and `asperity.parameters.MODULATION`. Parameters that
-        belong to other laws only are left out.
+        ``inertia=1`` to include the mass, and `asperity.parameters.MODULATION`. Parameters of other
+        laws only are ignored.
     x, y : Axis
-        The numbers that vary; any two.
+        The two numbers that vary.
     boundary : bool
-        Whether to search for the stability boundary, which takes longer than a coarse grid itself.
-        Without it there are no points on ``boundary_point``.
+        Whether to search for the stability boundary, which takes longer than a coarse grid.
+        Without it the dimension ``boundary_point`` has length 0.
     progress : callable, optional
         Called with the number of points done so far and of all points.
 
@@ -70,10 +70,11 @@ def response_map(
         On the dimensions (y, x): `asperity.study.map.SHOWN`, ``mode``, ``stable``, ``converged``
         and ``result``; a point that failed has NaN and its reason in ``result``. On
         ``boundary_point``: position (``boundary_`` and the axis' name), ``boundary_line``,
-        ``boundary_kind``, ``boundary_mode_frequency`` and ``boundary_result``; line -1 holds
-        places where stability changes between neighbours but no crossing was found, and why.
-        ``critical_stiffness`` is there if K is on an axis and K_c has a closed form. Every
-        variable has `units` and `long_name`; fixed numbers are scalar coordinates.
+        ``boundary_kind``, ``boundary_mode_frequency`` and ``boundary_result``. Points of line -1
+        are places where stability changes between neighbours of the grid but no crossing was
+        located; their ``boundary_result`` is the reason. ``critical_stiffness`` is present if K is
+        on an axis and K_c has a closed form. Every variable has `units` and `long_name`; fixed
+        numbers are scalar coordinates.
 
     Raises
     ------
@@ -82,19 +83,21 @@ def response_map(
 
     Notes
     -----
-    The boundary consists of points at which ln|m| = 0 within 1e-6 of the axes; between neighbours
-    it deviates from a straight line by less than 1e-4 of them. The attribute
-    ``boundary_unresolved_chords`` counts the exceptions: chords where it bends too much for the
-    grid. A feature within one cell that changes no stability at its corners is not detected.
+    The position of a boundary point, ln|m| = 0, is accurate to 1e-6 of the axes. Between
+    neighbouring points the boundary deviates from a straight line by less than 1e-4 of the axes;
+    the attribute ``boundary_unresolved_chords`` counts the exceptions, where the boundary bends too
+    much for the grid. A feature inside a cell whose corners have the same stability is not
+    detected.
     """
     plane, origins = _plane(law, numbers, x, y)
-    grid = _solved(plane, None, function(progress, "progress") or _silent, _CHUNK)
-    traced = trace_boundary(plane, grid) if switch(boundary, "boundary") else MapBoundary.empty()
+    grid = _solved(plane, None, progress or _silent, _CHUNK)
+    traced = trace_boundary(plane, grid) if boundary else MapBoundary.empty()
     return as_dataset(plane, grid, traced, origins)
 
 
+@typed
 def write_map(
-    out: Path,
+    out: FilePath,
     law: str,
     numbers: Mapping[str, Any],
     *,
@@ -109,18 +112,18 @@ def write_map(
     Parameters
     ----------
     out : Path
-        Written when everything is done; until then finished chunks are in ``OUT.partial``.
+        Written when all points are solved; until then finished chunks are in ``OUT.partial``.
     law, numbers, x, y, progress
         As for `response_map`.
     resume : bool
-        Continue an interrupted map; without one, start from the first point.
+        Whether to continue an interrupted map, if there is one.
     block : int
-        Points of a chunk: solved and kept at a time.
+        Number of points of a chunk.
 
     Raises
     ------
     InputError
-        As `response_map`, and if `out` cannot be written.
+        As for `response_map`, and if `out` cannot be written.
     Interrupted
         On Ctrl-C.
     """
@@ -144,7 +147,7 @@ def _solved(
     progress: Callable[[int, int], None],
     chunk: int,
 ) -> Answers:
-    """Responses at the points of the grid; those of finished chunks are lines of `kept`."""
+    """Responses at the points of the grid; `kept` has a line for each point of finished chunks."""
     nodes = plane.nodes()
     grid = Answers.empty(OUTPUTS, len(nodes))
     if kept is not None:
@@ -169,10 +172,6 @@ def _plane(
     law: str, numbers: Mapping[str, Any], x: Axis, y: Axis
 ) -> tuple[MapPlane, dict[str, str]]:
     """The checked plane, and the origin of each fixed number."""
-    advice = "build one as asperity.study.map.Axis('epsilon', 0.0, 0.5, 20)"
-    x, y = instance(x, Axis, "x", advice), instance(y, Axis, "y", advice)
-    advice = "give a dictionary such as {'V': '1 um/s'}"
-    numbers = instance(numbers, Mapping, "numbers", advice)
     if x.name == y.name:
         raise InputError(
             f"axes must be two numbers, got '{x.name}' on both; choose another one for y"
@@ -195,7 +194,7 @@ def _plane(
     defaults = {
         name: SourcedNumber(parameter.default, "default")
         for name, parameter in known.items()
-        # What is not modulated needs no coordinate.
+        # The default of a modulation is none, which needs no coordinate.
         if parameter.default is not None and name not in MODULATION
     }
     require_memory(
@@ -209,4 +208,4 @@ def _plane(
 
 
 def _silent(done: int, total: int) -> None:
-    """No report of progress."""
+    """No progress."""

@@ -1,4 +1,4 @@
-"""What a sweep solves at each of its points: one module a kind."""
+"""Kinds of solve: what a sweep solves at each of its points."""
 
 from asperity.study.solve.fit import FitSolve
 from asperity.study.solve.kind import SolveKind
@@ -6,7 +6,7 @@ from asperity.study.solve.periodic import PeriodicSolve
 from asperity.study.solve.threshold import ThresholdSolve
 from asperity.study.solve.transient import TransientSolve
 
-#: Every kind, by the name that plans use.
+#: Every kind of solve, by its name in plans.
 SOLVES: dict[str, SolveKind] = {
     kind.name: kind for kind in (PeriodicSolve(), ThresholdSolve(), TransientSolve(), FitSolve())
 }

@@ -1,4 +1,4 @@
-"""Fits: a law fitted at every point to a table of readings, or to readings drawn anew."""
+"""Fits: a law fitted at every point to a table of readings, or to simulated readings."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from asperity.parameters import (
     canonical_name,
     point_parameters,
 )
-from asperity.parameters.arguments import some_of
+from asperity.parameters.arguments import one_of
 from asperity.parameters.toml_file import file_content
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.plan import FitTable, SweepPlan
@@ -45,20 +45,21 @@ _QUALITY = (
     Output("other_minima", "1", "further minima of chi-squared that the data do not exclude"),
     Output("warnings", "1", "warnings of the fit"),
 )
-#: Outputs of each free parameter: what is put behind its name.
+#: Outputs of each free parameter, by the suffix of their name.
 _ESTIMATE = {
     "fit": "estimate",
     "se": "standard error",
     "low": "lower end of the 95 % interval",
     "high": "upper end of the 95 % interval",
 }
-#: What a table may hold in a column or leave to the plan.
+#: Quantities that are a column of a table or a number of the plan, with a number that stands for
+#: the plan's while only the columns are read.
 _OPERATING = {"V": 1e-6, "epsilon": 0.1, "frequency": 1.0}
 NOISE_SEED = Parameter(
     "noise_seed",
     "dimensionless",
     "not negative",
-    "seed of the noise of readings that are drawn",
+    "seed of the noise of simulated readings",
     place="drive",
     label="noise_seed",
 )
@@ -67,9 +68,9 @@ NOISE_SEED = Parameter(
 class FitSolve(SolveKind):
     """`asperity.inference.fit` at every point.
 
-    The numbers of a point are fixed in its fit, but for the free parameters: there they are the
-    start values. Where a point has a ``noise_seed``, they are the true values, and the readings of
-    the table give way to readings of the law at these, with noise of the table's uncertainties.
+    A number of a point is the start value of a free parameter, and the fixed value of any other
+    parameter. If a point has a ``noise_seed``, its numbers are true values: the fit is to readings
+    simulated at these values, with noise according to the uncertainties of the table.
     """
 
     name = "fit"
@@ -80,7 +81,7 @@ class FitSolve(SolveKind):
         """As in `SolveKind`."""
         from asperity.inference.unknowns import EPS_RATIO
 
-        return {one.name: one for one in (EPS_RATIO, NOISE_SEED)}
+        return {parameter.name: parameter for parameter in (EPS_RATIO, NOISE_SEED)}
 
     def settings(self, plan: SweepPlan) -> dict[str, Any]:
         """As in `SolveKind`."""
@@ -89,7 +90,7 @@ class FitSolve(SolveKind):
         free = _free(table)
         if "M" in free and not _all_inertial(plan):
             raise InputError(
-                "fit.free must be parameters that count, got 'M', which has no influence without "
+                "fit.free must be parameters of the model, got 'M', which has no influence without "
                 "inertia; add inertia = true to parameters or fix M"
             )
         return {
@@ -103,20 +104,20 @@ class FitSolve(SolveKind):
         }
 
     def supplied(self, plan: SweepPlan) -> tuple[str, ...]:
-        """Free parameters, and what all tables have columns of."""
+        """Columns that all tables have, and the free parameters if no readings are simulated."""
         table = _table(plan)
         columns = [set(_read(str(plan.folder / n), "", ()).points) for n in data_files(plan)]
         common = set.intersection(*columns) if columns else set()
-        drawn = "noise_seed" in {*plan.parameters, *plan.columns}
-        # What is free has a start of its own; readings are drawn from true values.
-        return tuple(sorted(common | (set() if drawn else set(_free(table)))))
+        simulated = "noise_seed" in {*plan.parameters, *plan.columns}
+        # A fit chooses missing start values; a simulation needs the true value of every parameter.
+        return tuple(sorted(common | (set() if simulated else set(_free(table)))))
 
     def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
         """As in `SolveKind`."""
         known = list(_outputs(_free(_table(plan)), {}))
         if plan.outputs is None:
             return tuple(known)
-        return tuple(dict.fromkeys(some_of(plan.outputs, known, "outputs")))
+        return tuple(dict.fromkeys(one_of(o, known, "outputs") for o in plan.outputs))
 
     def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
         """As in `SolveKind`."""
@@ -132,9 +133,9 @@ class FitSolve(SolveKind):
         answers = Answers.empty(record["outputs"], len(points))
         for law, rows in points.by_law():
             for row in rows:
-                one = {n: float(v[row]) for n, v in points.values.items() if np.isfinite(v[row])}
+                point = {n: float(v[row]) for n, v in points.values.items() if np.isfinite(v[row])}
                 files = [] if points.data is None else [str(points.data[row])]
-                _fit_point(law, one, files, int(row), record, answers)
+                _fit_point(law, point, files, int(row), record, answers)
         return answers
 
 
@@ -144,7 +145,7 @@ def data_files(plan: SweepPlan) -> list[str]:
     Raises
     ------
     InputError
-        If there is none, or an axis names some besides those of the table ``fit``.
+        If there is none, or both an axis and the table ``fit`` name files.
     """
     axis = [str(name) for name in plan.columns.get("data", ())]
     table = _table(plan)
@@ -171,13 +172,13 @@ def _table(plan: SweepPlan) -> FitTable:
 
 
 def _all_inertial(plan: SweepPlan) -> bool:
-    """Whether every point of a plan has inertia."""
+    """Whether every point of a plan includes inertia."""
     values = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
     return all(value in (True, "true", "yes", 1) for value in values)
 
 
 def _free(table: FitTable) -> list[str]:
-    """Free parameters by their one names."""
+    """Canonical names of the free parameters."""
     from asperity.inference.unknowns import EPS_RATIO
 
     known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
@@ -198,18 +199,18 @@ def _priors(plan: SweepPlan, table: FitTable, free: Sequence[str]) -> dict[str, 
     from asperity.inference.unknowns import EPS_RATIO
 
     known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
-    given: dict[str, Any] = {}
+    written: dict[str, Any] = {}
     for name, prior in table.prior.items():
         canonical = canonical_name(name, known)
         if prior is None:
-            given[str(plan.folder / name) if name.endswith(".toml") else name] = prior
+            written[str(plan.folder / name) if name.endswith(".toml") else name] = prior
         elif canonical is None or canonical not in free:
             raise InputError(
                 f"fit.prior must be of free parameters, got '{name}'; free it or leave it out"
             )
         else:
-            given[canonical] = prior
-    priors = priors_of(given, free)
+            written[canonical] = prior
+    priors = priors_of(written, free)
     return {name: [p.mean, p.sd, p.source] for name, p in priors.items()}
 
 
@@ -234,15 +235,15 @@ def _digest(path: Path) -> str:
 
 @lru_cache(maxsize=256)
 def _read(path: str, digest: str, for_all: tuple[tuple[str, float], ...]) -> LockInTable:
-    """A table, whose file must be the one that the plan was checked with."""
+    """A table; its file must not have changed since the plan was checked."""
     from asperity.inference import read_table
 
     if digest and _digest(Path(path)) != digest:
         raise InputError(
-            f"data must not change while a sweep runs, got another '{path}' than at its begin; "
-            "restore the file, or choose another store"
+            f"data must not change while a sweep runs, got '{path}', which has changed since the "
+            "sweep began; restore the file, or choose another store"
         )
-    # Without a digest the columns are of interest, whatever the plan has for all rows.
+    # Without a digest only the columns are read, and any operating numbers serve.
     return read_table(path, dict(for_all) if digest else _OPERATING)
 
 
@@ -258,7 +259,7 @@ def _fit_point(
 
     settings = record["settings"]
     known = {**point_parameters(get_law(law)), **FitSolve().parameters()}
-    # Of several laws each has its own of the free parameters.
+    # A free parameter of another law of the sweep does not concern this law.
     elsewhere = set(all_parameters(map(get_law, record["laws"])))
     free = [n for n in settings["free"] if n in known or n not in elsewhere]
     for_all = tuple((n, values[n]) for n in _OPERATING if n in values)
@@ -271,9 +272,9 @@ def _fit_point(
     inertia = values.get("inertia", 0.0) > 0
     if "noise_seed" in values:
         noise = np.random.default_rng(round(values["noise_seed"]))
-        drawn = [_drawn(t, law, {**fixed, **truth}, inertia, noise) for t in tables]
-        tables = [table for table in drawn if table is not None]
-        if len(tables) < len(drawn):
+        simulated = [_simulated(t, law, {**fixed, **truth}, inertia, noise) for t in tables]
+        tables = [table for table in simulated if table is not None]
+        if len(tables) < len(simulated):
             answers.fail(np.array([row]), SweepOutcome.NO_READINGS)
             return
     priors = {n: Prior(*p) for n, p in settings["prior"].items() if n in free}
@@ -281,7 +282,7 @@ def _fit_point(
         tables, law, free, fixed=fixed, start=truth, prior=priors or None,
         inertia=inertia, radiation_damping=values.get("eta", 0.0) > 0 or "eta" in free,
         profile=settings["profile"], starts=settings["starts"], seed=settings["seed"],
-        # Only the number of warnings is kept, and this one takes another fit.
+        # This check costs a second fit; a sweep keeps the number of warnings only.
         check_stiffness=False,
     )  # fmt: skip
     if not fitted.converged:
@@ -299,9 +300,10 @@ def _fixed(
     origins: Mapping[str, str],
     tables: Sequence[LockInTable],
 ) -> dict[str, float]:
-    """Numbers of a point that its fit does not change.
+    """Fixed numbers of a fit.
 
-    Those of the plan come before columns of the data, which come before those of a material.
+    A number of the plan has priority over a column of the data, and a column over a number of the
+    material.
     """
     columns = set().union(*(table.points for table in tables))
     return {
@@ -331,17 +333,18 @@ def _numbers(fitted: Fit) -> dict[str, float]:
     }
 
 
-def _drawn(
+def _simulated(
     table: LockInTable,
     law: str,
     truth: Mapping[str, float],
     inertia: bool,
     noise: np.random.Generator,
 ) -> LockInTable | None:
-    """The table with readings of the law at `truth`, with noise of its uncertainties.
+    """The table with simulated readings: responses of the law at `truth`, plus noise.
 
-    Errors of the observables of a row are normal, with the correlations that the table gives, and
-    harmonics with a phase are disturbed in the complex plane. None where a row has no response.
+    Errors of the observables of a row are normal, with the uncertainties and correlations of the
+    table. The error of a harmonic with a phase is added in the complex plane. None is returned if
+    a row has no periodic response.
     """
     known = point_parameters(get_law(law))
     at = {}
@@ -361,7 +364,7 @@ def _drawn(
 def _disturbed(
     table: LockInTable, exact: Mapping[str, np.ndarray], normal: np.ndarray
 ) -> LockInTable:
-    """Exact observables with errors `normal` times the uncertainties, where the table has some."""
+    """Exact observables plus `normal` (standard normal errors) times the table's uncertainties."""
     from asperity.inference.tables.table import OBSERVABLES
 
     values = {n: np.where(np.isfinite(table.values[n]), exact[n], np.nan) for n in table.values}
@@ -373,15 +376,16 @@ def _disturbed(
     for amplitude, phase in (("mu1", "phase1"), ("mu2", "phase2")):
         if amplitude not in values:
             continue
-        turned = values[amplitude] + errors[amplitude] * units[amplitude] + 0j
+        # The phasor relative to the exact phase.
+        phasor = values[amplitude] + errors[amplitude] * units[amplitude] + 0j
         if phase in values:
-            # The uncertainty across is that of the reading, whatever amplitude is drawn.
-            across = table.values[amplitude] * errors[phase]
+            # The quadrature error of the table's reading applies to any simulated amplitude.
+            quadrature = table.values[amplitude] * errors[phase]
             both = np.isfinite(values[phase])
-            turned = turned + 1j * np.where(both, across * units[phase], 0.0)
-            values[phase] = values[phase] + np.angle(turned)
-            errors[phase] = np.where(both, across / np.maximum(np.abs(turned), 1e-300), np.nan)
-        values[amplitude] = np.abs(turned)
+            phasor = phasor + 1j * np.where(both, quadrature * units[phase], 0.0)
+            values[phase] = values[phase] + np.angle(phasor)
+            errors[phase] = np.where(both, quadrature / np.maximum(np.abs(phasor), 1e-300), np.nan)
+        values[amplitude] = np.abs(phasor)
     scale = {n: errors[n] / table.errors[n] for n in errors}
     covariances = {
         (a, b): table.covariances[a, b] * scale[a] * scale[b] for a, b in table.covariances

@@ -1,4 +1,4 @@
-"""What every kind of solve has in common."""
+"""The interface of a kind of solve."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from asperity.errors import InputError
 from asperity.outputs import require_memory
 from asperity.parameters import Output, Parameter
-from asperity.parameters.arguments import some_of
+from asperity.parameters.arguments import one_of
 from asperity.study.outcome import Answers
 from asperity.study.plan import SweepPlan
 from asperity.study.points import POINT_BYTES, Points
@@ -21,13 +21,13 @@ class SolveKind(ABC):
     Class attributes
     ----------------
     name : str
-        What plans call it.
+        Name in plans.
     outputs : tuple of Output
-        What it can keep of a point.
+        Numbers that a store can keep of a point.
     defaults : tuple of str
-        Names of the outputs that are kept where the plan names none.
+        Names of the outputs that are kept if the plan names none.
     supplies : tuple of str
-        Parameters that a point need not have.
+        Parameters of the law that a point need not have.
     """
 
     name: ClassVar[str]
@@ -36,32 +36,32 @@ class SolveKind(ABC):
     supplies: ClassVar[tuple[str, ...]] = ()
 
     def parameters(self) -> dict[str, Parameter]:
-        """Numbers that a point of this kind may have besides those of its law, by name."""
+        """Numbers that a point may have in addition to the parameters of its law, by name."""
         return {}
 
     def supplied(self, plan: SweepPlan) -> tuple[str, ...]:
-        """Parameters that a point of this plan need not have."""
+        """Parameters of the law that a point of this plan need not have."""
         return self.supplies
 
     def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
-        """Outputs by name, of a plan with this record."""
+        """Outputs of a plan with this record, by name."""
         return {output.name: output for output in self.outputs}
 
     def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
-        """Names of what the plan keeps.
+        """Names of the outputs that the plan keeps.
 
         Raises
         ------
         InputError
-            If it names something else.
+            If the plan names an unknown output.
         """
         if plan.outputs is None:
             return self.defaults
         known = [output.name for output in self.outputs]
-        return tuple(dict.fromkeys(some_of(plan.outputs, known, "outputs")))
+        return tuple(dict.fromkeys(one_of(o, known, "outputs") for o in plan.outputs))
 
     def settings(self, plan: SweepPlan) -> dict[str, Any]:
-        """What a plan says of this kind of solve, as JSON values."""
+        """Settings of this kind of solve in a plan, as JSON values."""
         for other in ("transient", "fit"):
             if other != self.name and getattr(plan, other) is not None:
                 raise InputError(
@@ -71,7 +71,7 @@ class SolveKind(ABC):
         return {}
 
     def require_memory(self, points: int, record: Mapping[str, Any]) -> None:
-        """Refuse chunks of so many points where memory cannot hold them while they are solved."""
+        """Refuse chunks whose points do not fit in memory while they are solved."""
         require_memory(
             points * POINT_BYTES,
             "chunk",
@@ -81,12 +81,12 @@ class SolveKind(ABC):
 
     @abstractmethod
     def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
-        """About how many of all points a chunk has: some seconds of work at most."""
+        """Approximate number of points of a chunk: at most some seconds of work."""
 
     @abstractmethod
     def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
-        """An outcome for every point of a chunk.
+        """Answers at the points of a chunk.
 
-        It depends on the points of the chunk alone, so that neither the number of workers nor an
+        They depend on the points of the chunk only, so that neither the number of workers nor an
         interruption changes a bit.
         """

@@ -18,11 +18,12 @@ _NAMES = (
     *("log_multiplier", "floquet_max", "mode_frequency", "growth_rate", "stable"),
 )
 
-#: Points of a chunk: at least a call of the fast method, at most half a second of it.
+#: Smallest and largest number of points of a chunk: one batch and half a second of the quasi-static
+#: solver.
 _FEWEST, _MOST = 960, 19_200
-#: Chunks that a small plan is cut into, so that several workers have something to do.
+#: Number of chunks of a small plan, so that several workers share it.
 _SHARES = 8
-#: Times that a point takes longer where the mass counts.
+#: Ratio of the solution times of a point with and without inertia.
 _INERTIAL = 16
 
 

@@ -1,4 +1,4 @@
-"""Thresholds of stiffness: where modulated sliding loses stability when its spring is softened."""
+"""Stiffness thresholds: where modulated sliding loses stability when the spring is softened."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
 from asperity.study.threshold import require_scan, search_thresholds
 
-#: Points of a chunk: enough to share the fixed costs of a search, and some seconds of work.
+#: Smallest and largest number of points of a chunk: enough to share the fixed costs of a search,
+#: and at most some seconds of work.
 _FEWEST, _MOST = 24, 480
 #: Codes of the bifurcations, in the order of `flag_meanings`.
 KINDS = ("fold", "period doubling", "Neimark-Sacker")
 
 
 class ThresholdSolve(SolveKind):
-    """`asperity.study.threshold.stiffness_threshold` at every point; K and K/K_c are its answers.
+    """`asperity.study.threshold.stiffness_threshold` at every point; it gives K and K/K_c.
 
-    Stiffnesses are looked for between multiples of K_c = (B - A) W0/D0 of the same point.
+    The limits of the search are multiples of K_c = (B - A) W0/D0 of the same point.
     """
 
     name = "threshold"
@@ -68,7 +69,7 @@ class ThresholdSolve(SolveKind):
             critical = np.full(len(rows), np.nan)
             if {"A", "B", "D0"} <= set(values):
                 critical = (values["B"] - values["A"]) * values["W0"] / values["D0"]
-            # The softest spring stands for the stiffness, which a point has none of.
+            # A point has no stiffness; the softest one of the search is checked in its place.
             values["K"] = between[0] * critical
             sound = solvable(get_law(law), values, rows, answers)
             if len(sound):

@@ -1,4 +1,4 @@
-"""Transients, reduced to named numbers."""
+"""Transients, of which a sweep keeps named numbers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from asperity.parameters.arguments import number
 from asperity.protocol.steps import plan as planned_steps
 from asperity.slider.named import slider_from
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.plan import SweepPlan, TransientTable
+from asperity.study.plan import NumberTable, SweepPlan, TransientTable
 from asperity.study.points import Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
@@ -32,7 +32,7 @@ CHANNELS = {
     "slip_velocity": "m/s",
     "displacement": "m",
 }
-#: What can be taken of a channel.
+#: Statistics of a channel by name.
 TAKEN: dict[str, Callable[[np.ndarray], float]] = {
     "mean": lambda x: float(np.mean(x)),
     "min": lambda x: float(np.min(x)),
@@ -50,7 +50,7 @@ class TransientSolve(SolveKind):
     name = "transient"
     outputs = ()
     defaults = ()
-    # A programme need not have a modulation.
+    # A load programme need not have a modulation.
     supplies = ("epsilon", "frequency")
 
     def settings(self, plan: SweepPlan) -> dict[str, Any]:
@@ -67,7 +67,7 @@ class TransientSolve(SolveKind):
                 "transient.numbers must have at least one number, got none; write it like "
                 "numbers.peak = { of = 'friction', take = 'max' }"
             )
-        numbers = {name: _number(name, one) for name, one in table.numbers.items()}
+        numbers = {name: _number(name, entry) for name, entry in table.numbers.items()}
         _check_steps(plan, table)
         return {
             "steps": list(table.steps),
@@ -89,8 +89,8 @@ class TransientSolve(SolveKind):
     def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
         """As in `SolveKind`."""
         return {
-            name: Output(name, CHANNELS[one["of"]], f"{one['take']} of {one['of']}")
-            for name, one in record["settings"]["numbers"].items()
+            name: Output(name, CHANNELS[entry["of"]], f"{entry['take']} of {entry['of']}")
+            for name, entry in record["settings"]["numbers"].items()
         }
 
     def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
@@ -101,17 +101,17 @@ class TransientSolve(SolveKind):
         """As in `SolveKind`."""
         answers = Answers.empty(record["outputs"], len(points))
         for law, rows in points.by_law():
-            some = points.take(rows)
-            values = _values(some, law)
+            of_law = points.take(rows)
+            values = _values(of_law, law)
             for k in solvable(get_law(law), values, rows, answers):
-                one = {n: float(v[k]) for n, v in values.items()}
-                named = {n: float(v[k]) for n, v in some.values.items()} | one
-                _integrate(law, one, named, int(rows[k]), record["settings"], answers)
+                point = {n: float(v[k]) for n, v in values.items()}
+                named = {n: float(v[k]) for n, v in of_law.values.items()} | point
+                _integrate(law, point, named, int(rows[k]), record["settings"], answers)
         return answers
 
 
 def _values(points: Points, law: str) -> dict[str, np.ndarray]:
-    """Values of the points; without a modulation its amplitude is 0."""
+    """Values of the points, with an amplitude of 0 for points without a modulation."""
     values = points.of_law(law)
     for name, absent in (("epsilon", 0.0), ("frequency", 1.0)):
         values[name] = np.where(np.isnan(values[name]), absent, values[name])
@@ -130,7 +130,7 @@ def _integrate(
     steps, mistakes = planned_steps(lines, Path())
     if mistakes:
         raise InputError("; ".join(map(str, mistakes)))
-    programme = Programme(*(one.step for one in steps), load=values["W0"], velocity=values["V"])
+    programme = Programme(*(s.step for s in steps), load=values["W0"], velocity=values["V"])
     trajectory = transient(
         slider_from(get_law(law), values),
         programme,
@@ -143,24 +143,24 @@ def _integrate(
     if trajectory.termination is not None:
         answers.fail(np.array([row]), SweepOutcome.STOPPED, trajectory.termination.time)
         return
-    for name, one in settings["numbers"].items():
-        answers.numbers[name][row] = _reduced(trajectory, one)
+    for name, entry in settings["numbers"].items():
+        answers.numbers[name][row] = _statistic(trajectory, entry)
     answers.outcome[row] = SweepOutcome.CONVERGED
 
 
-def _reduced(trajectory: Trajectory, one: Mapping[str, Any]) -> float:
-    """A number of a trajectory; NaN where no sample lies between its times."""
-    channel = np.asarray(getattr(trajectory, one["of"]))
+def _statistic(trajectory: Trajectory, entry: Mapping[str, Any]) -> float:
+    """A number of a trajectory; NaN if no sample lies in the time interval of the entry."""
+    channel = np.asarray(getattr(trajectory, entry["of"]))
     inside = np.ones(len(channel), dtype=bool)
-    if one["from"] is not None:
-        inside &= trajectory.time >= one["from"]
-    if one["to"] is not None:
-        inside &= trajectory.time <= one["to"]
-    return TAKEN[one["take"]](channel[inside]) if inside.any() else float("nan")
+    if entry["from"] is not None:
+        inside &= trajectory.time >= entry["from"]
+    if entry["to"] is not None:
+        inside &= trajectory.time <= entry["to"]
+    return TAKEN[entry["take"]](channel[inside]) if inside.any() else float("nan")
 
 
 class _WithUnits(dict[str, Any]):
-    """Values by name as a protocol writes them: with their SI units."""
+    """Values with their SI units as texts, by name, as a protocol writes them."""
 
     def __init__(self, values: Mapping[str, float]) -> None:
         known = all_parameters([])
@@ -168,16 +168,17 @@ class _WithUnits(dict[str, Any]):
         super().__init__({n: f"{v!r} {units[n]}".strip() for n, v in values.items()})
 
 
-def _number(name: str, one: Any) -> dict[str, Any]:
+def _number(name: str, entry: NumberTable) -> dict[str, Any]:
+    """A checked entry of ``transient.numbers`` as JSON values."""
     place = f"transient.numbers.{name}"
-    if one.of not in CHANNELS:
+    if entry.of not in CHANNELS:
         raise InputError(
-            f"{place}.of must be a channel, got '{one.of}'; {closest(one.of, CHANNELS)}"
+            f"{place}.of must be a channel, got '{entry.of}'; {closest(entry.of, CHANNELS)}"
         )
-    if one.take not in TAKEN:
+    if entry.take not in TAKEN:
         raise InputError(
-            f"{place}.take must be one of {', '.join(TAKEN)}, got '{one.take}'; "
-            f"{closest(one.take, TAKEN)}"
+            f"{place}.take must be one of {', '.join(TAKEN)}, got '{entry.take}'; "
+            f"{closest(entry.take, TAKEN)}"
         )
     if not name.isidentifier():
         raise InputError(
@@ -185,13 +186,13 @@ def _number(name: str, one: Any) -> dict[str, Any]:
         )
     times = {
         side: None if value is None else number(value, f"{place}.{side}", "time", "not negative")
-        for side, value in (("from", one.from_), ("to", one.to))
+        for side, value in (("from", entry.from_), ("to", entry.to))
     }
-    return {"of": one.of, "take": one.take, **times}
+    return {"of": entry.of, "take": entry.take, **times}
 
 
 def _check_steps(plan: SweepPlan, table: TransientTable) -> None:
-    """Names in braces are known, and the lines are steps with any numbers in their places."""
+    """Check the names in braces, and the lines with a number in place of each brace."""
     known = {**all_parameters([get_law(plan.law)] if plan.law else []), **EXPERIMENT}
     for line in table.steps:
         for _, name, *_ in string.Formatter().parse(line):

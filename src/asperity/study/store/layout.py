@@ -1,7 +1,7 @@
-"""A store without its answers: arrays, coordinates and attributes, which follow from the plan.
+"""Layout of a store: its arrays, coordinates and attributes, which follow from the plan.
 
-The same plan gives the same files to the last bit. A store is made by writing them all, made longer
-by writing those of the longer plan, and repaired by writing those that differ.
+The same plan gives the same files to the last bit. `lay_out` writes the files that are missing or
+differ; thus it creates a store, extends it to a longer plan, and repairs it.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from zarr.codecs import Crc32cCodec, ZstdCodec
 from zarr.storage import MemoryStore
 
 from asperity.errors import InputError
+from asperity.outputs.written import to_disk
 from asperity.study.axes import TEXTS
 from asperity.study.grid import SweepGrid
 from asperity.study.outcome import SweepOutcome, flag_attributes
@@ -29,21 +30,21 @@ from asperity.study.solve import SOLVES
 from asperity.study.store import durable
 from asperity.study.store.root import FORMAT, KIND, Root, write_root
 
-#: What `status` holds for a chunk that is not done; otherwise its failed points.
+#: `status` of a chunk that is not done; `status` of a chunk that is done is its failed points.
 NOT_DONE = -1
 
-#: What the columns of texts are.
-_TEXTS_ARE = {"law": "friction law", "data": "file of the readings"}
+#: Long names of the columns of texts.
+_TEXT_NAMES = {"law": "friction law", "data": "file of the readings"}
 
-#: Coordinates that follow from ratios are stored where they have at most this many values.
+#: Largest number of values of a stored coordinate that follows from a ratio.
 _MOST_DERIVED = 1_000_000
 
-#: A chunk of fill values would otherwise leave no file, like one that was never computed.
+#: Zarr leaves out files of fill values by default; such a chunk would look as if not computed.
 ALL_CHUNKS: Any = {"write_empty_chunks": True}
 
 
 def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
-    """Make an empty store; it has its name when it is complete.
+    """Make an empty store; it is renamed to `path` when it is complete.
 
     Raises
     ------
@@ -66,20 +67,20 @@ def create(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> None:
 
 
 def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
-    """Give a store the arrays, coordinates and attributes of a plan; answers in it stay.
+    """Write the arrays, coordinates and attributes of a plan; answers in the store stay.
 
     Parameters
     ----------
     path : Path
-        A folder, which may hold all of it already.
+        A folder, empty or with a store.
     grid : SweepGrid
     attributes : mapping
-        Those that do not follow from the grid.
+        Attributes that do not follow from the grid.
 
     Returns
     -------
     list of str
-        Files that were missing or differed, and were written.
+        Files that were written because they were missing or differed.
     """
     written: list[str] = []
     arrays: dict[str, Any] = {}
@@ -92,7 +93,7 @@ def lay_out(path: Path, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[
             checksums.setdefault(array, checksum()).update(content)
         if not _holds(file, content):
             durable.put(file, content)
-            durable.sync_file(file)
+            to_disk(file)
             durable.sync_folder(file.parent)
             written.append(name)
     for folder in {(path / name).parents[1] for name in written}:
@@ -122,24 +123,24 @@ def _holds(file: Path, content: bytes) -> bool:
 
 
 def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any]) -> list[str]:
-    """Give a store more points; can be repeated after an interruption at any moment.
+    """Append points to a store; the call can be repeated after an interruption.
 
-    Chunks that get new points are no longer done; all others keep theirs.
+    Chunks that get new points become "not done"; the other chunks stay as they are.
 
     Parameters
     ----------
     path : Path
     root : Root
-        Of the store as it is.
+        Root of the store before the extension.
     grid : SweepGrid
-        Of a plan for which `is_extension` holds.
+        Grid of a plan for which `is_extension` holds.
     attributes : mapping
-        Of the longer store, besides those that follow from its grid.
+        Attributes of the longer store that do not follow from its grid.
 
     Returns
     -------
     list of str
-        As of `lay_out`.
+        As for `lay_out`.
     """
     pending = {"record": grid.record, "attributes": dict(attributes)}
     write_root(path, {**root.attributes, "extending": pending}, root.arrays)
@@ -149,7 +150,7 @@ def extend(path: Path, root: Root, grid: SweepGrid, attributes: Mapping[str, Any
 
 
 def _touched(old: SweepGrid, new: SweepGrid) -> list[int]:
-    """Chunks at the end of an axis that were not full and get new points."""
+    """Incomplete chunks at the end of an axis that get new points."""
     shape = old.chunk_shape
     touched = np.zeros(shape, dtype=bool) if math.prod(shape) else np.zeros(0, dtype=bool)
     for axis, (before, after, length) in enumerate(
@@ -163,7 +164,7 @@ def _touched(old: SweepGrid, new: SweepGrid) -> list[int]:
 
 
 def fresh_folder(store: Path) -> Path:
-    """Where a store is made, until it is complete."""
+    """Folder of a store until it is complete."""
     return store.with_name(store.name + ".new")
 
 
@@ -173,7 +174,7 @@ def chunk_file(path: Path, name: str, place: tuple[int, ...]) -> Path:
 
 
 def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
-    """Make a chunk of a store not done."""
+    """Set a chunk of a store to "not done"."""
     file = chunk_file(path, "status", grid.place(chunk))
     if file.is_file():
         file.unlink()
@@ -181,14 +182,14 @@ def reset(path: Path, grid: SweepGrid, chunk: int) -> None:
 
 
 def checksum(content: bytes = b"") -> Any:
-    """Of some bytes, and of those it is updated with."""
+    """A checksum of bytes, which can be updated with further bytes."""
     return hashlib.blake2b(content, digest_size=8)
 
 
 def _skeleton(grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
-    """Files by their path in the store: the description of each array, then its values if any.
+    """Files of a store, path and content: metadata of each array, and values of coordinates.
 
-    One block of a coordinate is in memory at a time.
+    A coordinate is made block by block, to save memory.
     """
     arrays = _Arrays()
     dims = [axis.name for axis in grid.axes]
@@ -212,7 +213,7 @@ def _skeleton(grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
 
 
 class _Arrays:
-    """Arrays in memory, whose files are handed out and forgotten."""
+    """Zarr arrays in memory; `files` yields their files and removes them from memory."""
 
     def __init__(self) -> None:
         self._kept: dict[str, Any] = {}
@@ -236,8 +237,8 @@ class _Arrays:
             dtype=dtype,
             fill_value="" if dtype == "string" else fill,
             dimension_names=dims,
-            # The checksum last, over what is on the disk: without it a turned bit is read as a
-            # number.
+            # The checksum covers the compressed bytes: without it a flipped bit on the disk would
+            # change a number unnoticed.
             compressors=[ZstdCodec(level=1), Crc32cCodec()],
             attributes=dict(attributes),
             config=ALL_CHUNKS,
@@ -251,9 +252,9 @@ class _Arrays:
 
 
 def _axes(arrays: _Arrays, grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
-    """Columns of the axes; drawn ones are drawn block by block."""
+    """Columns of the axes; drawn columns are drawn block by block."""
     for axis, chunk in zip(grid.axes, grid.chunks, strict=True):
-        # Few and large: labels are read at once when the store is opened.
+        # Large blocks, because opening a store reads all labels.
         length = min(axis.length, max(chunk, 65_536))
         made = {
             name: arrays.add(
@@ -271,12 +272,12 @@ def _axes(arrays: _Arrays, grid: SweepGrid) -> Iterator[tuple[str, bytes]]:
 
 def _about(name: str, grid: SweepGrid) -> dict[str, Any]:
     if name in TEXTS:
-        return {"units": "1", "long_name": _TEXTS_ARE[name]}
+        return {"units": "1", "long_name": _TEXT_NAMES[name]}
     return dict(grid.known[name].attributes)
 
 
 def _numbers(arrays: _Arrays, grid: SweepGrid) -> None:
-    """Numbers that are the same at every point, and the law if it is."""
+    """Numbers that are the same at every point, and the law if no axis varies it."""
     for name, value in grid.record["numbers"].items():
         about = _about(name, grid)
         if name in grid.record["origins"]:
@@ -307,6 +308,6 @@ def _derived(arrays: _Arrays, grid: SweepGrid) -> None:
 
 
 def _coordinates(metadata: Mapping[str, Any], grid: SweepGrid) -> list[str]:
-    """Arrays that are neither answers nor labels of a dimension."""
+    """Names of the auxiliary coordinates, which are neither answers nor labels of a dimension."""
     others = {*grid.record["outputs"], *OF_POINTS, *OF_CHUNKS, *(axis.name for axis in grid.axes)}
     return [name for name in metadata if name not in others]

@@ -1,4 +1,4 @@
-"""One driver a store: a lock that ends with its process, and a token that workers check."""
+"""The lock of a store: one driver at a time works on a store, and workers check its token."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ try:
 except ImportError:  # pragma: no cover  Windows: the age of the file decides
     fcntl = None  # type: ignore[assignment]
 
-#: Seconds after which a lock of another machine, which nothing has refreshed, counts as left over.
+#: Seconds without refresh after which a lock of another machine is ignored.
 STALE = 60.0
 
-#: What a lock file says of its holder.
+#: Entries of a lock file and their types.
 _HOLDER = {"token": str, "host": str, "process": int, "since": str}
 
 
 class StoreLock:
     """The lock file next to a store, ``STORE.lock``.
 
-    The operating system drops the lock when the process ends, however it ends. Some shared file
-    systems keep locks to one machine: there the driver's refreshing of the file tells others that
-    it is at work.
+    The operating system drops the lock when the process ends, however it ends. On some shared file
+    systems a lock is not seen by other machines; there the time of the file, which the driver
+    refreshes, shows that the driver runs.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ class StoreLock:
     ----------
     path : Path
     token : str
-        Of this driver; workers write nothing for a driver whose token is no longer in the file.
+        Token of this driver; its workers stop writing when the file has another token.
     """
 
     def __init__(self, store: Path) -> None:
@@ -66,7 +66,7 @@ class StoreLock:
                 ) from None
             try:
                 self._lock(descriptor)
-                # The file may have been removed by its last holder before it was locked here.
+                # The last holder may have removed the file between the opening and the locking.
                 same = os.fstat(descriptor).st_ino == self.path.stat().st_ino
             except FileNotFoundError:
                 same = False
@@ -109,17 +109,17 @@ class StoreLock:
             else "another process"
         )
         return InputError(
-            f"out must not be in use, got '{self.path.with_suffix('').name}', on which {who} is "
-            "at work; wait for it or stop it (asperity sweep status shows how far it is)"
+            f"out must not be in use, got '{self.path.with_suffix('').name}', which {who} is "
+            "using; wait for it or stop it (asperity sweep status shows its progress)"
         )
 
     def refresh(self) -> None:
-        """Show that the driver is at work; to be called every few seconds."""
+        """Update the time of the file; the driver calls this every few seconds."""
         if self._descriptor is not None:
             os.utime(self._descriptor)
 
     def release(self) -> None:
-        """Give the lock back and remove its file."""
+        """Release the lock and remove its file."""
         if self._descriptor is not None:
             if holder_of(self.path).get("token") == self.token:
                 self.path.unlink(missing_ok=True)
@@ -135,12 +135,12 @@ class StoreLock:
 
 
 def lock_file(store: Path) -> Path:
-    """The lock file of a store."""
+    """Path of the lock file of a store."""
     return store.with_name(store.name + ".lock")
 
 
 def is_held(path: Path) -> bool:
-    """Whether a driver is at work: a killed one leaves its file, but not its lock."""
+    """Whether a driver runs: a killed driver leaves the lock file, but holds no lock."""
     holder = holder_of(path)
     if not holder:
         return False
@@ -164,7 +164,7 @@ def is_held(path: Path) -> bool:
 
 
 def holder_of(path: Path) -> dict[str, Any]:
-    """What the lock file says of its holder; empty where it says nothing."""
+    """Contents of a lock file; empty if it is missing or invalid."""
     holder = json_content(path)
     if not isinstance(holder, dict):
         return {}
@@ -173,5 +173,5 @@ def holder_of(path: Path) -> dict[str, Any]:
 
 
 def current_token(store: Path) -> str:
-    """Token of the driver that works on a store; empty where none does."""
+    """Token of the driver that works on a store; empty without a driver."""
     return str(holder_of(lock_file(store)).get("token", ""))

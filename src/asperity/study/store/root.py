@@ -1,8 +1,9 @@
-"""The attributes of a store: what it was made for, by what, and who has run it.
+"""The root of a store: attributes with the plan, the versions and the runs.
 
-They are in ``zarr.json``, together with the descriptions of all arrays, and once more, without the
-runs, in those of the empty group ``attributes``. Both carry a seal, so that a store is never taken
-for that of another plan: what neither can tell is refused.
+The attributes are in ``zarr.json`` together with the metadata of all arrays. The empty group
+``attributes`` has a second copy without the runs. Each copy has a checksum, the seal, so that
+damage to one copy is detected and repaired from the other. A store with two damaged copies is
+refused.
 """
 
 from __future__ import annotations
@@ -16,31 +17,32 @@ from typing import Any
 
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
+from asperity.outputs.written import to_disk
 from asperity.study.grid import SweepGrid
 from asperity.study.record import ATTRIBUTES
 from asperity.study.store import durable
 
-#: Attribute that says what kind of group this is, and the format.
+#: Attribute that marks a store of a sweep; its value is the version of the format.
 KIND = "asperity_sweep"
 FORMAT = 2
-#: Attributes that change during a run, and what seals the others.
+#: Attribute that changes during a run, and the attribute with the seal.
 _RUNS, _SEAL = "runs", "seal"
-#: What a run says of itself, when it begins and when it ends.
+#: Required entries of a run and their types: when it begins, and when it ends.
 _BEGUN = dict.fromkeys(("started", "host", "workers", "asperity"), str)
 _ENDED = {"points_solved": int, "seconds": int | float}
 
 
 @dataclass(frozen=True)
 class Root:
-    """The attributes of a store, and the descriptions of its arrays.
+    """The attributes of a store, and the metadata of its arrays.
 
     Attributes
     ----------
     attributes : dict
     arrays : dict of str to dict
-        What ``zarr.json`` of each array holds; empty where the second copy was read.
+        Content of ``zarr.json`` of each array; empty if the second copy was read.
     damage : str
-        Which of the two files is missing or damaged; "" for none.
+        The copy that is missing or damaged; "" if both are complete.
     """
 
     attributes: dict[str, Any]
@@ -60,12 +62,12 @@ class Root:
 
 
 def _is_run(run: Any) -> bool:
-    """Whether a record can be shown: runs are not sealed."""
+    """Whether the entry of a run is valid; the seal does not cover the runs."""
     if not isinstance(run, dict):
         return False
     try:
         json.dumps(run, ensure_ascii=False).encode()
-    except UnicodeEncodeError:  # half of a character
+    except UnicodeEncodeError:  # a lone surrogate
         return False
     needed = _BEGUN | (_ENDED if run.get("ended") else {})
     return all(isinstance(run.get(name), kind) for name, kind in needed.items())
@@ -80,7 +82,7 @@ def write_root(path: Path, attributes: Mapping[str, Any], arrays: Mapping[str, A
 
 
 def _group(attributes: Any, arrays: Any = None) -> dict[str, Any]:
-    """A group as Zarr describes it; with `arrays` consolidated, so that readers open them by it."""
+    """Zarr metadata of a group; `arrays` become its consolidated metadata."""
     group = {"attributes": attributes, "zarr_format": 3, "node_type": "group"}
     if arrays is None:
         return group
@@ -91,7 +93,7 @@ def _group(attributes: Any, arrays: Any = None) -> dict[str, Any]:
 def _write(folder: Path, content: Mapping[str, Any]) -> None:
     file = folder / "zarr.json"
     durable.put(file, json.dumps(content, indent=2).encode())
-    durable.sync_file(file)
+    to_disk(file)
     durable.sync_folder(folder)
     durable.sync_folder(folder.parent)
 
@@ -106,12 +108,12 @@ def _seal(attributes: Mapping[str, Any], arrays: Mapping[str, Any]) -> dict[str,
 
 
 def read_root(path: Path) -> Root:
-    """The attributes of a store, from whichever copy is whole.
+    """The root of a store, from the undamaged copy of the attributes.
 
     Raises
     ------
     InputError
-        If none is: then it is no store, or one whose plan is lost.
+        If no copy is undamaged: the folder is no store, or its plan is lost.
     """
     content, second = (json_content(folder / "zarr.json") for folder in (path, path / ATTRIBUTES))
     first, copy = _sealed(content), _sealed(second)
@@ -122,19 +124,19 @@ def read_root(path: Path) -> Root:
         runs = attributes.get(_RUNS) if isinstance(attributes, dict) else None
         return Root({**copy[0], _RUNS: runs}, {}, damage="zarr.json")
     raise InputError(
-        f"store must be the folder of a sweep, got '{path}', which is none, was made by another "
-        "version, or has lost its plan; give what --out of asperity sweep named, or choose "
-        "another folder and solve it there"
+        f"store must be the folder of a sweep, got '{path}', which is no such folder, was made by "
+        "another version, or has lost its plan; give the folder of --out of asperity sweep, or "
+        "choose another folder and solve it there"
     )
 
 
 def _sealed(content: Any) -> tuple[dict[str, Any], dict[str, Any]] | None:
-    """Attributes and arrays that are as they were sealed; others may have been added to them."""
+    """Attributes and arrays if they agree with their seal; unsealed attributes may be added."""
     try:
         attributes, seal = content["attributes"], content["attributes"][_SEAL]
         gathered = content["consolidated_metadata"]["metadata"] if seal["arrays"] else {}
         kept = {name: attributes[name] for name in seal["attributes"]}
-        # In the order of the file, which is that of the dimensions for readers.
+        # In the order of the file, from which readers take the order of the dimensions.
         arrays = {name: array for name, array in gathered.items() if name in seal["arrays"]}
         whole = (
             content == _group(attributes, gathered if seal["arrays"] else None)

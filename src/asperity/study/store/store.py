@@ -1,8 +1,7 @@
 """Reading and writing the store of a sweep.
 
-Every variable is a Zarr array with named dimensions and units. ``status``, with one number for each
-chunk, alone says which chunks are done: it is written after the data and their folders have
-reached the disk.
+Every variable is a Zarr array with named dimensions and units. A chunk is done if its number in the
+array ``status`` says so; this number is written when the data of the chunk are on the disk.
 """
 
 from __future__ import annotations
@@ -17,13 +16,14 @@ import zarr
 
 from asperity.errors import InputError
 from asperity.outputs.json import json_content
+from asperity.outputs.written import to_disk
 from asperity.study.outcome import Answers
 from asperity.study.record import OF_CHUNKS, OF_POINTS
 from asperity.study.store import durable
 from asperity.study.store.layout import ALL_CHUNKS, NOT_DONE, checksum, chunk_file, reset
 from asperity.study.store.root import Root, read_root, write_root
 
-#: Reading a damaged chunk raises one of these, by the codec that finds out.
+#: Errors of reading a damaged chunk; which one depends on the codec.
 _DAMAGED = (ValueError, RuntimeError, OSError, KeyError, TypeError)
 
 
@@ -34,15 +34,15 @@ class SweepStore:
     ----------
     path : Path
     mode : {"r", "r+"}
-        Whether it is only read. Then all but the answers must be whole; a driver has repaired it
-        before workers write.
+        "r" to read only: all files except the answers must be undamaged. For "r+" the driver has
+        repaired the store before.
 
     Attributes
     ----------
     root : Root
     grid : SweepGrid
     arrays, labels : dict of str to zarr.Array
-        Answers by name; columns of the axes, and numbers that are the same at every point.
+        Answers by name; coordinates by name.
 
     Raises
     ------
@@ -76,7 +76,7 @@ class SweepStore:
         return (*self.arrays, *OF_CHUNKS)
 
     def _require_labels(self) -> None:
-        """Refuse to read a store whose coordinates are not those that were written."""
+        """Refuse to read a store whose coordinates have changed since they were written."""
         for name, array in self.labels.items():
             digest = checksum()
             try:
@@ -93,11 +93,11 @@ class SweepStore:
     # Chunks
 
     def failed_in(self, chunk: int) -> int:
-        """Failed points of a chunk, -1 where it is not done or its status is damaged."""
+        """Failed points of a chunk; -1 if it is not done or its status is damaged."""
         return self._of(self.status, chunk, NOT_DONE)
 
     def share_done(self) -> float:
-        """Share of the chunks that are done, from the number of files."""
+        """Share of the chunks that are done, from the number of files of ``status``."""
         files = sum(len(names) for _, _, names in os.walk(self.path / "status" / "c"))
         return min(1.0, files / self.grid.chunk_count)
 
@@ -106,7 +106,7 @@ class SweepStore:
         return self.failed_in(chunk) != NOT_DONE
 
     def is_sound(self, chunk: int) -> bool:
-        """Whether all files of a chunk are those that were written together with its status."""
+        """Whether the files of a chunk agree with its checksum."""
         try:
             return self._of(self.checksum, chunk, 0) == self._digest(chunk, self.failed_in(chunk))
         except OSError:
@@ -118,7 +118,7 @@ class SweepStore:
         Raises
         ------
         InputError
-            At one whose files are not those that were written.
+            If the files of a chunk do not agree with its checksum.
         """
         for chunk in range(self.grid.chunk_count):
             failed = self.failed_in(chunk)
@@ -128,9 +128,9 @@ class SweepStore:
                 yield chunk, failed
 
     def is_damaged(self, chunk: int) -> bool:
-        """Whether a chunk has the status of one that is done and is not sound.
+        """Whether a chunk is done according to its status, but not sound.
 
-        One that a driver writes just now may look so; looked at again it does not.
+        A chunk that a driver is writing may appear damaged once; a second check is then negative.
         """
         return all(self.is_done(chunk) and not self.is_sound(chunk) for _ in range(2))
 
@@ -141,7 +141,7 @@ class SweepStore:
             return otherwise
 
     def _digest(self, chunk: int, failed: int) -> int:
-        """Of the part of the grid, the failed points and the files of a chunk."""
+        """Checksum of a chunk: its part of the grid, its failed points and its files."""
         digest = checksum(repr((self.grid.slices(chunk), failed)).encode())
         for name in self.arrays:
             content = self._file(name, chunk).read_bytes()
@@ -149,14 +149,14 @@ class SweepStore:
         return int.from_bytes(digest.digest(), "little", signed=True)
 
     def write(self, chunk: int, answers: Answers) -> None:
-        """Write a chunk; when this returns it is on the disk and done.
+        """Write a chunk; when this returns, the chunk is on the disk and done.
 
         Raises
         ------
         OSError
             If the disk is full or cannot be written: the chunk is then not done.
         """
-        self.reset(chunk)
+        reset(self.path, self.grid, chunk)
         slices = self.grid.slices(chunk)
         shape = tuple(s.stop - s.start for s in slices)
         values: dict[str, Any] = {
@@ -173,10 +173,6 @@ class SweepStore:
         self.status[self.grid.place(chunk)] = answers.failed
         self._sync([self._file("status", chunk)])
 
-    def reset(self, chunk: int) -> None:
-        """Make a chunk not done."""
-        reset(self.path, self.grid, chunk)
-
     def read(self, chunk: int, names: tuple[str, ...] | None = None) -> dict[str, Any]:
         """The variables of a chunk as arrays of its shape."""
         slices = self.grid.slices(chunk)
@@ -187,12 +183,12 @@ class SweepStore:
 
     def _sync(self, files: list[Path]) -> None:
         for file in files:
-            durable.sync_file(file)
+            to_disk(file)
         for folder in self._folders(files):
             durable.sync_folder(folder)
 
     def _folders(self, files: list[Path]) -> Iterator[Path]:
-        """Folders of the files, up to their arrays, each once and inner ones first."""
+        """Folders of the files up to those of their arrays, each once, inner folders first."""
         seen = set()
         for file in files:
             folder = file.parent
@@ -202,7 +198,7 @@ class SweepStore:
                 folder = folder.parent
 
     def sweep_orphans(self) -> int:
-        """Remove files that killed writers have left half-written; returns how many."""
+        """Remove half-written files of killed processes; returns their number."""
         count = 0
         for folder, _, names in os.walk(self.path):
             for name in names:
@@ -220,11 +216,11 @@ class SweepStore:
 
 
 def _require_whole(path: Path, root: Root) -> None:
-    """Refuse to read a store whose descriptions of arrays are not those that were written."""
+    """Refuse to read a store whose metadata of arrays have changed since they were written."""
     if root.attributes.get("extending"):
         raise InputError(
-            f"store must be extended to its end, got '{path.name}', on which that is under way or "
-            "was interrupted; wait, or repeat asperity sweep with its plan, --out and --extend"
+            f"store must be completely extended, got '{path.name}', whose extension is under way "
+            "or was interrupted; wait, or repeat asperity sweep with its plan, --out and --extend"
         )
     if root.damage:
         raise _damaged(path, root.damage)
@@ -241,5 +237,5 @@ def _damaged(path: Path, what: str) -> InputError:
 
 
 def _array(group: Any, name: str) -> Any:
-    """An array that writes every chunk, which is no part of its file."""
+    """An array that also writes chunks of fill values; this setting is not stored in its file."""
     return group[name].with_config(ALL_CHUNKS)

@@ -72,12 +72,12 @@ class ParameterLine(NamedTuple):
         return jax.tree.map(lambda x, a, g: (x + a * t) * np.exp(g * t), *self)
 
     def slope(self, t: Float) -> Problem:
-        """Their derivatives by t."""
+        """Derivatives of the parameters by t."""
         return jax.tree.map(lambda x, a, g: (a + g * (x + a * t)) * np.exp(g * t), *self)
 
 
 def still(problem: Problem) -> Problem:
-    """Coefficients of a line that does not move."""
+    """Coefficients of a constant line."""
     return jax.tree.map(np.zeros_like, problem)
 
 
@@ -109,14 +109,14 @@ class ContinuationPoint(NamedTuple):
 
 
 class ArclengthStep(NamedTuple):
-    """One step along a branch.
+    """A step along a branch.
 
     Attributes
     ----------
     orbit : Orbit
         The orbit at the new point, on the mesh of the old one.
     next : ContinuationPoint
-        The same on a mesh made for it, with its tangent.
+        The orbit on an equidistributed mesh, with its tangent.
     error : array, shape (points,)
         Last change in Newton's method, inf where it was not finite.
     iterations : array, shape (points,)
@@ -181,7 +181,7 @@ class Turn(NamedTuple):
 
 
 def first_point(line: ParameterLine, orbit: Orbit, t: Float) -> ContinuationPoint:
-    """A regular point of a branch, to be left in the direction of rising t."""
+    """A regular point of a branch, with its tangent in the direction of rising t."""
     with np.errstate(all="ignore"):
         equations = condensed(line.at(t), orbit, line.slope(t), closed=False)
         units = slip_units(line.origin.system, equations.values)
@@ -228,7 +228,7 @@ def interpolated(nodes: Float, old: Float, new: Float) -> Float:
 def arclength_step(
     line: ParameterLine, point: ContinuationPoint, length: Float, *, max_steps: int
 ) -> ArclengthStep:
-    """One step of the given length along each branch; it counts where `error` is small."""
+    """A step of the length `length` along each branch; valid where `error` is small."""
     with np.errstate(all="ignore"):
         guess, t = moved(point.orbit, point.t, point.tangent, length)
         plane = Plane(weighted_row(point.orbit, point.tangent.nodes, point.units), point.tangent.t)

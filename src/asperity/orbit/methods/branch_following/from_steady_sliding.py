@@ -52,7 +52,7 @@ class BranchMesh(NamedTuple):
     most_steps: int
 
 
-#: For all points, and for those whose outcome the first mesh leaves open.
+#: First mesh, and a finer mesh for points without a definite outcome.
 MESHES = (BranchMesh(216, 200), BranchMesh(648, 1000))
 #: Exponent of the slip rate beyond which a pulse is so narrow, below 1e-7 of the period, that
 #: round-off in the phase limits it.
@@ -62,13 +62,13 @@ RUNAWAY = 13.0
 _NEAR, _ARRIVED = 1e-2, 1e-6
 #: Rise of the exponent beyond `RUNAWAY` for which a branch is still followed there.
 _AHEAD = 0.5
-#: A branch this far back from a fold, as a share of the amplitude, is on its way back.
+#: A branch counts as returning when it is this far behind its fold (share of the amplitude).
 _BACK = 1e-3
 _NEWTON_STEPS = 10
-#: Distance that the moving of the mesh may account for: shorter steps would miss by as much.
+#: Distance that the motion of the mesh may cause; shorter steps do not reduce it.
 _NOISE = 0.15
 _FIRST = 0.02
-#: Failures after which a step starts anew along the tangent.
+#: Number of failures after which a step is predicted along the tangent.
 _RESTART = 4
 #: Exponent from which pulses grow steadily if they do, its rise over which the share is watched,
 #: and how many times farther the share may get than where that leads.
@@ -113,7 +113,7 @@ class SteadyBranch(NamedTuple):
 
     @property
     def folded(self) -> NDArray[np.bool_]:
-        """Whether the branch was left on its way back from its farthest fold."""
+        """Whether the branch was abandoned while it returned from its farthest fold."""
         with np.errstate(invalid="ignore"):
             back = (self.fold >= self.farthest - _BACK) & (self.share < self.farthest - _BACK)
         return ~self.arrived & back
@@ -125,12 +125,12 @@ class SteadyBranch(NamedTuple):
 
     @property
     def sensitive(self) -> NDArray[np.bool_]:
-        """Whether the branch was lost where neither mesh nor experiment can hold its orbits."""
+        """Whether the branch was lost where its orbits are too unstable for mesh and experiment."""
         return ~(self.arrived | self.folded | self.ran_away) & (self.growth > LARGEST_GROWTH)
 
     @property
     def definite(self) -> NDArray[np.bool_]:
-        """Whether a finer mesh would say the same."""
+        """Whether the outcome does not depend on the mesh."""
         return self.arrived | self.folded | (self.fastest >= RUNAWAY)
 
     @property
@@ -142,7 +142,8 @@ class SteadyBranch(NamedTuple):
 def follow_from_steady_sliding(problem: Problem, index: Indices, mesh: BranchMesh) -> SteadyBranch:
     """Follow the points `index` of `problem` (NumPy arrays) from steady sliding.
 
-    Always from the beginning: a coarser mesh resolves a branch poorly long before it is lost.
+    The branch starts at steady sliding on every mesh, because a coarse mesh is inaccurate long
+    before the branch is lost.
     """
     line, points = amplitude_line(problem), len(problem.system.V)
     branches = SteadyBranches(line, _steady_pair(line, points, index, mesh.intervals))
@@ -164,7 +165,7 @@ def follow_from_steady_sliding(problem: Problem, index: Indices, mesh: BranchMes
 
 
 class BranchProgress(NamedTuple):
-    """What is known of each branch so far.
+    """Progress along each branch.
 
     Attributes
     ----------
@@ -282,7 +283,7 @@ class SteadyBranches(Curves):
         near = (last != 0) & (np.abs(left) < _NEAR)
         near |= (last > 0) & ((ratio * last > left) | (left < 0))
         secant = left / np.where(near, last, 1.0)
-        # A step that has just failed is not tried again.
+        # A step that has just failed is not repeated with the same length.
         longest = np.where(failures > 0, np.abs(ratio), 2.0)
         aimed = np.clip(secant, -np.minimum(longest, 1.0), longest)
         return np.where(near, aimed, ratio) * self.span
@@ -299,7 +300,7 @@ class SteadyBranches(Curves):
             yield part, Attempt(step, converged, step.iterations, step.turn, miss, step.length)
 
     def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
-        """Note folds, shares and exponents; a branch ends where it arrives or runs away."""
+        """Update folds, shares and exponents; a branch ends where it arrives or runs away."""
         step, progress = attempt.next, self.progress
         turned = self.pair.point.tangent.t[rows] * step.next.point.tangent.t[chosen] < 0
         extremum = np.where(turned, _extremum(self.pair, step, rows, chosen), np.nan)

@@ -27,9 +27,9 @@ from asperity.orbit.methods.branch_following.arclength import (
 
 Float = NDArray[np.float64]
 
-#: Change at which Newton's method ends and a step is accepted: the error is about its square.
+#: Newton's method ends and a step is accepted at this change; the error is about its square.
 ACCEPTED = 1e-5
-#: Narrowest an interval may be predicted, in parts of what it is.
+#: Smallest ratio of the predicted width of an interval to its present width.
 _NARROWEST = 0.3
 
 
@@ -54,7 +54,7 @@ class MovingMeshStep(NamedTuple):
     miss : array, shape (points,)
         Distance of the new point from the predicted one, in steps.
     length : array, shape (points,)
-        Distance of the new point from the one before, interval by interval.
+        Distance of the new point from the previous point, for each interval.
     fastest : array, shape (points,)
         Largest exponent of the slip rate of the new orbit.
     """

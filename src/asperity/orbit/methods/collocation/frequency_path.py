@@ -1,6 +1,6 @@
 """Orbits followed in frequency, from a modulation so fast that the averaged limit holds.
 
-Each point takes its own steps along its path: longer after a success, shorter after a failure.
+Each point has a step length: it grows after a success and shrinks after a failure.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ Float = NDArray[np.float64]
 
 #: Rate per radian of a perturbation at which the averaged limit is close enough to start from.
 _FAST_MODULATION = 0.02
-#: Steps, in parts of the path: the first, the shortest, and how many there may be.
+#: Lengths of the first and shortest step (fractions of the path), and largest number of steps.
 _FIRST_STEP, _SHORTEST_STEP, _MOST_STEPS = 0.02, 1e-4, 250
 #: Change of the length of a step after a success and after a failure.
 _GROWTH, _SHRINKAGE = 1.6, 0.35
@@ -106,7 +106,7 @@ def _follow(problem: Problem, first: Float, orbit: Orbit, solved: NDArray[np.boo
         omega = first * (np.asarray(problem.system.omega) / first) ** trial
         inputs = (_at_frequency(problem, omega), orbit)
         for part, (moved, error) in run_chunks(_advance, inputs, active, chunk):
-            # The re-meshed orbit must be finite too: it is the next guess.
+            # The re-meshed orbit, which is the next guess, must also be finite.
             good = (error < _ACCEPTED) & np.isfinite(moved.slopes).all((0, 1, 2))
             put(orbit, part[good], take(moved, np.flatnonzero(good)))
             reached[part[good]] = trial[part[good]]

@@ -30,7 +30,7 @@ _GRADING, _NEWTON_STEPS = 0.5, 30
 
 
 class InitialGuess(NamedTuple):
-    """Orbits on a coarse mesh, and what is known of the points without one.
+    """Orbits on a coarse mesh, and outcomes of the points without an orbit.
 
     Attributes
     ----------
@@ -38,7 +38,7 @@ class InitialGuess(NamedTuple):
     solved : bool array, shape (points,)
         Which points have an orbit.
     outcome : int array, shape (points,)
-        `Outcome` of the others.
+        `Outcome` of the points without an orbit.
     detail : array, shape (points,)
         The number in its sentence; 0 where nothing is known.
     """

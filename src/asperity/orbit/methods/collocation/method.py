@@ -32,7 +32,7 @@ from asperity.orbit.outcome import Outcome
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.slider.problem import Problem
 
-#: As `AGREEMENT`, between two meshes of as many intervals.
+#: As `AGREEMENT`, for two meshes with the same number of intervals.
 _CLOSE_AGREEMENT = 1e-8
 
 
@@ -116,7 +116,7 @@ def accept(problem: Problem, solution: Solution, orbit: Orbit, options: SearchOp
     solution : Solution
         Of the points of the problem.
     orbit : Orbit
-        One of every point.
+        An orbit for every point.
     options : SearchOptions
     """
     intervals = orbit.mesh.shape[0] - 1
@@ -164,7 +164,7 @@ def _compare(
     error: NDArray[np.float64],
     agreement: float,
 ) -> NDArray[np.bool_]:
-    """Compare each point with its previous mesh; returns which of them agree."""
+    """Compare each point with its previous mesh; returns a mask of the points that agree."""
     logs = observables.log_multipliers
     known = extreme_multipliers(observables, logs)
     for k, (point, now) in enumerate(zip(part, _rows(observables, logs), strict=True)):
@@ -180,7 +180,7 @@ def _compare(
             solution.detail[point] = multiplier_change
         else:
             solution.outcome[point] = Outcome.CONVERGED
-    # Of orbits whose multipliers are not resolved yet only these are computed again.
+    # Only the multipliers are computed again where mean and harmonics are resolved already.
     outcome = solution.outcome[part]
     written = np.isin(outcome, (Outcome.CONVERGED, Outcome.MULTIPLIERS_NOT_RESOLVED))
     kept = np.flatnonzero(written)
@@ -194,7 +194,7 @@ def _gaps(before: _Compared | None, now: _Compared) -> tuple[float, float]:
     if before is None or not all(np.all(np.isfinite(a)) for a in now[:2]):
         return np.inf, np.inf
     mean = abs(now.mean - before.mean) / abs(now.mean)
-    # Round-off bounds what a harmonic that vanishes beside the first, or beside the mean, can mean.
+    # Harmonics that vanish relative to the first, or to the mean, are compared up to round-off.
     floor = (1e-14 * abs(now.harmonics[0]) + 1e-17 * abs(now.mean)) / AGREEMENT
     scale = np.abs(now.harmonics) + floor
     # Harmonics beyond the second are compared relative to the first.

@@ -43,7 +43,7 @@ from asperity.theory.averaged import averaged_limit
 _LARGEST_CHANGE = 2.0
 #: Change of an exponent below which the matrix of the balance is kept.
 _NEAR = 3e-2
-#: A change this small is round-off of the slip exponent: it no longer shrinks, and need not.
+#: Round-off of the slip exponent; changes do not fall below this value.
 _ROUND_OFF = 1e-11
 #: Nodes of the grid on which the iteration begins, and its tolerance there.
 FIRST_NODES, _COARSE_TOLERANCE = 32, 1e-5
@@ -76,7 +76,7 @@ class _Coefficients(NamedTuple):
 
 
 class Prepared(NamedTuple):
-    """What a step needs, computed at an orbit or near one.
+    """Data of an iteration step, computed at an orbit or near it.
 
     Attributes
     ----------
@@ -164,7 +164,7 @@ class BalanceEquations:
         slow, g = together(unknowns.mean, unknowns.rest), unknowns.friction + moved
         rates = self._rates(problem, cycle, slow, g)
         half = self.nodes // 2
-        # Mirror images first: what is odd in theta then cancels exactly, however large it is.
+        # Sum mirror images first: odd functions of theta then cancel exactly.
         gaps = [cycle.share[:half] @ (r[:half] + r[half:]) for r in rates]
         change = tuple(
             bound(-sum(a * r for a, r in zip(row, gaps, strict=True))) for row in at.mean_inverse
@@ -203,7 +203,7 @@ class BalanceEquations:
     def residual(
         self, parameters: Parameters, unknowns: BalanceUnknowns, at: tuple[Prepared, Array]
     ) -> BalanceUnknowns:
-        """The unknowns less what a step of the iteration makes of them."""
+        """The unknowns minus the result of one iteration step from them."""
         problem, (prepared, _) = parameters[0], at
         cycle, slow = self.cycle(problem), together(unknowns.mean, unknowns.rest)
         gap = self._balance(problem, cycle, slow, unknowns.friction)
@@ -214,7 +214,7 @@ class BalanceEquations:
     def solve(
         self, product: Callable[[Any], Any], right: BalanceUnknowns, at: tuple[Prepared, Array]
     ) -> BalanceUnknowns:
-        """By the contraction that solves for the orbit."""
+        """As in `Equations`, by the contraction that solves for the orbit."""
 
         def contract(y: BalanceUnknowns) -> BalanceUnknowns:
             return jax.tree.map(jnp.subtract, y, product(y))
@@ -224,7 +224,7 @@ class BalanceEquations:
     def solve_transposed(
         self, product: Callable[[Any], Any], right: BalanceUnknowns, at: tuple[Prepared, Array]
     ) -> BalanceUnknowns:
-        """The same: the transpose contracts as fast."""
+        """As in `Equations`; the transposed system contracts as fast."""
         return self.solve(product, right, at)
 
     def steady(self, problem: Problem) -> BalanceUnknowns:
@@ -264,7 +264,7 @@ class BalanceEquations:
         return _derivative(self.nodes, self.grading)
 
     def _balance(self, problem: Problem, cycle: LoadCycle, slow: States, g: Array) -> Array:
-        """What of the balance of forces is left, over W0."""
+        """Residual of the force balance over W0."""
         D, c, at = self.derivative, _coefficients(problem), cycle.at
         slip = _slip(problem, at, g, slow[1:])
         elastic = c.elastic * (D @ g) + slip
@@ -324,7 +324,7 @@ def _derivative(nodes: int, grading: float) -> np.ndarray:
 
 
 class BalancedOrbit(NamedTuple):
-    """Orbits on the grid; of no meaning where `error` is not small."""
+    """Orbits on the grid; undefined where `error` is not small."""
 
     unknowns: BalanceUnknowns
     prepared: Prepared
@@ -400,7 +400,7 @@ def _iterate(
         contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
         error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
         error = jnp.where(change < _ROUND_OFF, change, error)
-        # Converged points stay so while others need more steps: their changes are round-off.
+        # Further steps change converged points by round-off only.
         error = jnp.where(reached <= tolerance, reached, error)
         return new, at, change, error, steps + 1
 

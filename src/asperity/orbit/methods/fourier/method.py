@@ -55,7 +55,7 @@ def _fast_block(
 #: Grids (nodes, grading), each after the sharpness of the slip pulse it is fine enough for: the
 #: nodes that a pulse needs grow with the root of it.
 _GRIDS = ((5.0, 24, 0.3), (18.0, 32, 0.3), (300.0, 128, 0.5))
-#: Points in a call: enough for the time that a call costs, few enough for a single point.
+#: Points in a call: enough to spread the cost of a call, and not too many for a single point.
 _CHUNK = 4 * FAST_BLOCK
 #: Estimated error that is accepted.
 _ERROR = 1e-9
@@ -81,7 +81,7 @@ class Fourier(Method):
         solution = Solution.unsolved(problem, len(points), options)
         rate, sharpness, _ = steady_sliding(problem)
         left = points[rate < LARGEST_CONTRACTING_RATE]
-        # Blocks run until their slowest point is done: points of like difficulty belong together.
+        # A block runs until its slowest point has converged, so points are sorted by difficulty.
         left = left[np.argsort(rate[left], kind="stable")]
         for sharpest, nodes, grading in _GRIDS:
             solve = partial(

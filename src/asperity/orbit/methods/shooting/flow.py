@@ -1,4 +1,4 @@
-"""Shooting over one period: a third method, for equations that are not stiff but do oscillate.
+"""Integration over one period for shooting, for equations that are not stiff but oscillate.
 
 With inertia on elastic asperities the slider swings at a few times the frequency of the modulation.
 The states and their derivatives to the first states are integrated over the period by the explicit
@@ -6,7 +6,7 @@ method of order 8 of Dormand and Prince, all operating points in lock step; Newt
 first states closes the orbit, and the derivatives at its end are the monodromy matrix.
 
 A pass takes the time of some hundred evaluations of the rates, and knows no step control: whether
-the steps were short enough is asked by repeating it with twice as many, see
+the steps were short enough is checked by repeating it with twice as many, see
 `asperity.orbit.methods.shooting.newton`.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
@@ -24,10 +24,10 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from asperity.algebra.kepler import eccentric_phase
 from asperity.algebra.runge_kutta import dormand_prince_8
 from asperity.algebra.small_systems import Matrix, inverse_points, jacobian_columns, product
 from asperity.loads import Excitation
+from asperity.orbit.mesh.mesh import eccentric_phase
 from asperity.orbit.observables import waveform_of
 from asperity.slider import Motion
 from asperity.slider.problem import Problem
@@ -47,7 +47,7 @@ class Steps(NamedTuple):
 
 
 class PeriodIntegration(NamedTuple):
-    """What a pass over the period tells of the orbit through given first states."""
+    """Result of an integration over the period from given initial states."""
 
     step: Array  # (size, points): Newton's, to be added to the first states
     leap: Array  # (points,): what it does to the slip exponent and logarithmic states

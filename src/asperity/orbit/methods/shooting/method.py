@@ -58,7 +58,7 @@ _LEAST = 0.2
 
 @jit_large
 def averaged_start(problem: Problem) -> tuple[Array, Array]:
-    """First states of shooting, (size, points), and the fastest relaxation by slip, per radian."""
+    """Initial states, (size, points), and the fastest relaxation by slip, per radian."""
     system, load = problem
     quasi_static = QuasiStatic(system.slider, system.V, system.omega)
     theta = 2 * np.pi * np.arange(_NODES)[:, None] / _NODES
@@ -142,7 +142,7 @@ _NEWTON_STEPS, _LARGEST_CHANGE, _NEAR = 12, 3.0, 2e-2
 #: Chord steps on a finer division, which shrink a change by a hundred and more, and the change
 #: below which there need be no further one.
 _CHORDS, _NEARLY_CLOSED = 4, 1e-5
-#: Change that Newton's step may still ask for: where two divisions are compared, and on the finer.
+#: Largest remaining Newton change: where two divisions are compared, and on the finer one.
 _CLOSED, _ACCEPTED = 1e-6, 1e-9
 #: Agreement of two divisions, relative; the finer one is then good to 2e-6 / 2^8.
 _AGREEMENT = 2e-6
@@ -198,7 +198,7 @@ class _Refinement:
         self.options, self.divisions = options, divisions
         self.first = guess
         self.inverse = np.zeros((size, size, points))  # of 1 less the monodromy matrix
-        # Of the division before, NaN where it did not close the orbit.
+        # Results on the previous division; NaN where the orbit did not close.
         self.mean_friction = np.full(points, np.nan)
         self.harmonics = np.zeros((options.harmonics, points), dtype=complex)
         self.polynomial = np.zeros((size + 1, points))
@@ -319,11 +319,11 @@ def _joined(parts: list[Indices]) -> Indices:
 def _gap(
     mean_friction: Float, harmonics: NDArray[np.complex128], reached: PeriodIntegration
 ) -> Float:
-    """Relative change of mean and harmonics; inf where there is nothing to compare with."""
+    """Relative change of mean and harmonics; inf without a previous division."""
     with np.errstate(all="ignore"):
         mean = np.abs(mean_friction / reached.mean_friction - 1)
         scale = np.abs(reached.harmonics)
-        # Beyond the second they count beside the first.
+        # Harmonics above the second are compared relative to the first.
         scale[2:] = scale[0]
         gap = np.maximum(mean, (np.abs(harmonics - reached.harmonics) / scale).max(0))
     return np.where(np.isfinite(gap), gap, np.inf)
