@@ -95,7 +95,7 @@ def hold(slider: Slider, V: Array, hold_time: Array) -> tuple[HoldResponse, Reac
     end = jnp.where(lost, End.TOO_MANY_STEPS, reloaded.end)
     maximum = _force(motion, reloaded.Y)
     maximum = jnp.where(end == End.STEADY, jnp.maximum(maximum, level), maximum)
-    way = slider.W0 / slider.K
+    length_scale = slider.W0 / slider.K
     at_end, at_maximum = (
         jnp.exp(ConstantDrive(motion, None).log_slip(end_of.Y.T)) for end_of in (holding, reloaded)
     )
@@ -103,13 +103,13 @@ def hold(slider: Slider, V: Array, hold_time: Array) -> tuple[HoldResponse, Reac
         level,
         _force(motion, holding.Y),
         jnp.where(lost, jnp.nan, maximum),
-        holding.Y[:, -1] * way,
+        holding.Y[:, -1] * length_scale,
         at_end,
         at_maximum,
         holding.Y[:, :-1],
         reloaded.Y[:, :-1],
         jnp.where(lost, jnp.nan, reloaded.t * V),
-        jnp.where(lost, jnp.nan, (reloaded.Y[:, -1] - holding.Y[:, -1]) * way),
+        jnp.where(lost, jnp.nan, (reloaded.Y[:, -1] - holding.Y[:, -1]) * length_scale),
         end,
     )
     # The displacement counts from the beginning of reloading.
@@ -151,13 +151,13 @@ def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reach
     up = jnp.where(V_before < V, 1.0, -1.0)
     reached = drive_many(slider, V, _filled(Drive(up=up, steady=_OVER), one), start)
     lost = reached.end == End.TOO_MANY_STEPS
-    way = slider.W0 / slider.K
+    length_scale = slider.W0 / slider.K
     response = StepResponse(
         _force(motion, start),
         jnp.where(lost, jnp.nan, _force(motion, reached.Y)),
         _force(motion, _from_here(motion.steady())),
         jnp.where(lost, jnp.nan, reached.t * V),
-        jnp.where(lost, jnp.nan, reached.Y[:, -1] * way),
+        jnp.where(lost, jnp.nan, reached.Y[:, -1] * length_scale),
         reached.Y[:, :-1],
         reached.end,
     )
@@ -185,11 +185,11 @@ def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Settl
     on = drive_many(slider, V, _filled(drive, jnp.ones_like(V)), extremum.Y)
     crossing = extremum.end == End.CROSSING
     over = crossing & (on.end == End.STEADY)
-    way = slider.W0 / slider.K
+    length_scale = slider.W0 / slider.K
     return SettlingDistance(
         jnp.where(crossing, on.end, extremum.end),
         jnp.where(over, (extremum.t + on.last) * V, jnp.nan),
-        jnp.where(over, on.last_Y[:, -1] * way, jnp.nan),
+        jnp.where(over, on.last_Y[:, -1] * length_scale, jnp.nan),
     )
 
 

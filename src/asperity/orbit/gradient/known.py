@@ -114,23 +114,23 @@ class KnownOrbits:
         Number of points; calls must have as many, in the same order.
     orbit : Orbit or None
         Points along the last axis; None where no orbit is known.
-    there : bool array, shape (points,)
+    known : bool array, shape (points,)
         Of which points an orbit is known.
     """
 
     points: int
     orbit: Orbit | None = None
-    there: NDArray[np.bool_] = field(init=False)
+    known: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.there = np.zeros(self.points, bool)
+        self.known = np.zeros(self.points, bool)
 
     def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
         """Keep the orbits of the points `index` of a problem, on a mesh of any size."""
         size = problem.system.size
         if self.orbit is None:
             self.orbit = Orbit.empty(orbit.scheme, size, KEPT, self.points)
-        self.there[index] = True
+        self.known[index] = True
         if len(orbit.mesh) == KEPT + 1:
             put(self.orbit, index, orbit)
             return
@@ -143,7 +143,7 @@ class KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
         orbit = None if self.orbit is None else take(self.orbit, index)
         others = KnownOrbits(len(index), orbit)
-        others.there[:] = self.there[index]
+        others.known[:] = self.known[index]
         return others
 
 

@@ -134,7 +134,7 @@ class DirectSearch:
         """Search for the orbits of the points `wanted`."""
         known = self.known
         if known is not None and known.orbit is not None:
-            self._follow(known.orbit, wanted[known.there[wanted]])
+            self._follow(known.orbit, wanted[known.known[wanted]])
         left = self._left(wanted)
         if len(left):
             self._from_averaged_limit(left)

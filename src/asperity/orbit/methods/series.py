@@ -190,9 +190,11 @@ def _solved(jacobian: Float, derivative: Float, gap: Float) -> Float:
 @cache
 def _derivative(nodes: int) -> Float:
     """Derivative at the nodes of the trigonometric polynomial through them."""
-    apart = np.arange(nodes)[:, None] - np.arange(nodes)
-    sine = np.sin(np.pi * apart / nodes)
-    return np.where(apart == 0, 0.0, 0.5 * (-1.0) ** apart / np.where(apart == 0, 1.0, sine))
+    difference = np.arange(nodes)[:, None] - np.arange(nodes)
+    sine = np.sin(np.pi * difference / nodes)
+    return np.where(
+        difference == 0, 0.0, 0.5 * (-1.0) ** difference / np.where(difference == 0, 1.0, sine)
+    )
 
 
 def _last_harmonics(Y: Float) -> Float:

@@ -112,8 +112,8 @@ def _impulses(model: Autoregression, steps: Float) -> tuple[Float, Float]:
     sudden = np.ones(steps.size, bool)
     for wide in _GRADUAL:
         spread = np.convolve(weights, np.ones(wide))
-        apart = np.abs(sums[wide:] - sums[:-wide]) * length / np.sqrt(float(spread @ spread))
+        changes = np.abs(sums[wide:] - sums[:-wide]) * length / np.sqrt(float(spread @ spread))
         # The largest of the gradual changes that contain the sample.
-        around = np.concatenate([np.zeros(wide - 1), apart, np.zeros(wide - 1)])
+        around = np.concatenate([np.zeros(wide - 1), changes, np.zeros(wide - 1)])
         sudden &= np.abs(departure) > _SUDDEN * sliding_window_view(around, wide).max(axis=1)
     return model.innovation / length * departure, np.where(sudden, departure, 0.0)

@@ -126,13 +126,13 @@ class BalanceEquations:
         slow, g = together(unknowns.mean, unknowns.rest), unknowns.friction
         D = self.derivative
         c = _coefficients(problem)
-        one = jnp.ones_like(g)
+        ones = jnp.ones_like(g)
         _, push = jax.linearize(lambda *Y: _slip(problem, cycle.at, Y[0], Y[1:]), g, *slow[1:])
         n, none = range(len(slow)), jnp.zeros_like(g)
 
         def by(j: int) -> Array:
             """Change of slip with the j-th of friction and states of the law."""
-            return push(*(one if i == j else none for i in n))
+            return push(*(ones if i == j else none for i in n))
 
         def drag(slip: Array) -> Array:
             return c.damping * slip + c.inertness * (D @ slip)
@@ -143,10 +143,10 @@ class BalanceEquations:
         diagonal = (cycle.at.w + c.ratio) + c.damping * by(0)
         matrix = matrix + np.eye(self.nodes)[..., None] * diagonal[:, None]
         inverse = inverse_by_elimination(matrix)
-        pulls = [one, *(-drag(by(j)) for j in n[1:])]
+        pulls = [ones, *(-drag(by(j)) for j in n[1:])]
         friction = tuple(_times(inverse, pull) for pull in pulls)
         _, push_rates = jax.linearize(lambda *Y: self._rates(problem, cycle, Y[1:], Y[0]), g, *slow)
-        columns = [push_rates(friction[j], *(one if i == j else none for i in n)) for j in n]
+        columns = [push_rates(friction[j], *(ones if i == j else none for i in n)) for j in n]
         rates = [[columns[j][i] for j in n] for i in n]
         mean = [[cycle.share @ entry for entry in row] for row in rates]
         return Prepared(inverse, friction, rates, inverse_points(mean))

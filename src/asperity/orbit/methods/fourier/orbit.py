@@ -84,8 +84,8 @@ class FourierOrbit(NamedTuple):
     def _interpolated(self, tau: np.ndarray) -> Array:
         """States at a column of `tau`, by trigonometric interpolation."""
         nodes = len(self.rest[0])
-        apart = tau - grid(nodes)[0]
-        kernel = (2 / nodes) * sum(np.cos(k * apart) for k in range(1, nodes // 2))
+        difference = tau - grid(nodes)[0]
+        kernel = (2 / nodes) * sum(np.cos(k * difference) for k in range(1, nodes // 2))
         # NumPy or JAX, as the arrays are.
         xp = self.rest[0].__array_namespace__()
         return xp.stack([m + kernel @ y for m, y in zip(self.mean, self.rest, strict=True)])

@@ -261,8 +261,8 @@ def shot_waveform(
     """
     path = np.asarray(_path(problem, start, steps, count=count))
     theta = even_phases(phases)
-    apart = eccentric_phase(theta, grading) - 2 * np.pi * np.arange(count) / count
+    difference = eccentric_phase(theta, grading) - 2 * np.pi * np.arange(count) / count
     k = np.arange(1, (count + 1) // 2)[:, None, None]
-    interpolate = (1 + 2 * np.cos(k * apart).sum(0)) / count
+    interpolate = (1 + 2 * np.cos(k * difference).sum(0)) / count
     Y = start[:, None] + np.einsum("pk,knb->npb", interpolate, path)
     return waveform_of(problem, Y, theta)
