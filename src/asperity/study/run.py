@@ -129,7 +129,9 @@ def run_sweep(
         if swept:
             log(f"{swept} half-written files of killed processes were removed")
         try:
-            require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
+            # Bytes of the chunks that are not done, uncompressed.
+            missing = (1 - store.share_done()) * store.grid.bytes
+            require_disk(missing, path.parent, "out", f"{store.grid.points:,} points",
                          "choose another disk or fewer outputs")  # fmt: skip
             pool_workers = stack.enter_context(pool)
         except InputError:
@@ -246,11 +248,6 @@ def _require_coordinates(grid: SweepGrid, folder: Path) -> None:
     require_disk(
         8.0 * numbers, folder, "axes", f"{numbers:.3g} numbers along them", "shorten them",
     )  # fmt: skip
-
-
-def _bytes_left(store: SweepStore) -> float:
-    """Bytes that the chunks which are not done will take, uncompressed, at most."""
-    return (1 - store.share_done()) * store.grid.bytes
 
 
 def _run(

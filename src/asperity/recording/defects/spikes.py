@@ -89,10 +89,8 @@ def _usual(steps: Array) -> float:
     # A coarse recorder repeats most values; its single steps then count as usual.
     every = np.abs(steps[np.isfinite(steps)])
     moving = every[every > 0]
-    return float(np.median(moving)) if moving.size > 0.02 * every.size else _smallest(moving)
-
-
-def _smallest(moving: Array) -> float:
+    if moving.size > 0.02 * every.size:
+        return float(np.median(moving))
     return float(moving.min()) if moving.size else 0.0
 
 

@@ -151,11 +151,6 @@ def _is_value(cell: str, decimal: str) -> bool:
     return is_number(cell, decimal) or cell in MISSING or bool(_STAMP.fullmatch(cell))
 
 
-def _has_words(text: str) -> bool:
-    """Whether a line holds letters that belong to no number, date or missing value."""
-    return bool(_WORD.search(text))
-
-
 def digits(cell: str, decimal: str) -> tuple[int, int]:
     """Digits behind the decimal mark and in the exponent; (0, 0) if the cell is no number."""
     if not is_number(cell, decimal):
@@ -409,7 +404,7 @@ def layout_of(
     """
     written = [line for line in lines if not line.blank and not line.comment]
     # The sample excludes headings and the last line, which may be cut.
-    numeric = (line for line in reversed(written) if not _has_words(line.text))
+    numeric = (line for line in reversed(written) if not _WORD.search(line.text))
     last = list(islice(numeric, _SAMPLE)) or written[-_SAMPLE:]
     sample = [line.text for line in last if line.ended] or [line.text for line in last]
     ways = _ways(delimiter, decimal)
