@@ -115,6 +115,10 @@ class InputError(ValueError):
         return type(self)(self.field, self.rule, self.got, self.advice + addition)
 
 
+class InputTypeError(InputError, TypeError):
+    """An argument of another type than its annotation says."""
+
+
 class ConstantLoadError(InputError):
     """A recording that is to have a modulated load has a constant one."""
 

@@ -25,7 +25,6 @@ from asperity.parameters import (
     canonical_name,
     known_name,
     point_parameters,
-    required,
 )
 from asperity.parameters.arguments import shown
 from asperity.slider.named import slider_from
@@ -106,8 +105,22 @@ def sourced_numbers(
     return offered | numbers
 
 
-def numbers_for(law_name: str, numbers: Mapping[str, SourcedNumber]) -> dict[str, SourcedNumber]:
+def numbers_for(
+    law_name: str,
+    numbers: Mapping[str, SourcedNumber],
+    among: Mapping[str, Parameter] | None = None,
+    needed: tuple[str, ...] = (),
+) -> dict[str, SourcedNumber]:
     """The numbers of a point with this law, selected from `numbers`.
+
+    Parameters
+    ----------
+    law_name : str
+    numbers : mapping of str to SourcedNumber
+    among : mapping of str to Parameter, optional
+        Parameters that count; by default all of a point with this law.
+    needed : tuple of str
+        Those that must be there, besides the ones without a default.
 
     Raises
     ------
@@ -115,8 +128,12 @@ def numbers_for(law_name: str, numbers: Mapping[str, SourcedNumber]) -> dict[str
         If the law is unknown or numbers are missing; the message lists all of them.
     """
     law = get_law(law_name)
-    known = point_parameters(law)
-    missing = [name for name in required(law) if name not in numbers]
+    known = point_parameters(law) if among is None else among
+    missing = [
+        name
+        for name, parameter in known.items()
+        if name not in numbers and (parameter.default is None or name in needed)
+    ]
     if missing:
         example = f"{missing[0]}={known[missing[0]].example}"
         raise InputError(

@@ -190,7 +190,7 @@ def test_a_dataset_holds_units_and_provenance(hysteresis, tmp_path):
         ({"parameter": "epsilom"}, "did you mean 'epsilon'"),
         ({"span": (0.1, 0.1)}, "two different ends"),
         ({"span": (0.1, 1.0)}, "at least 0 and below 1"),
-        ({"span": 0.1}, "must be two values"),
+        ({"span": 0.1}, "span must be a tuple"),
         ({"velocity": None}, "velocity must be given"),
         ({"velocity": [1e-6, 2e-6]}, "parameters must be numbers"),
         ({"parameter": "alpha", "span": (0, 1), "epsilon": 0.1}, "a known name"),

@@ -18,11 +18,11 @@ from asperity.ledger.contents import read_contents
 from asperity.parameters import toml_file
 from asperity.parameters.toml_file import parsed_toml
 from asperity.protocol import load_protocol
-from asperity.recording.recipe import load_recipe
+from asperity.questions.recording import ReadingRecipe
 from asperity.study import load_plan
 
 READERS: tuple[Callable[[Path], Any], ...] = (
-    *(load_plan, load_protocol, load_recipe, read_plan, materials.load, read_contents),
+    *(load_plan, load_protocol, ReadingRecipe.from_file, read_plan, materials.load, read_contents),
 )
 
 
@@ -90,7 +90,7 @@ def test_what_a_person_writes_is_read_as_it_is(seed: int) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="no such device")
 def test_files_without_an_end_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for reader in (load_plan, load_protocol, load_recipe, read_plan, materials.load):
+    for reader in (load_plan, load_protocol, ReadingRecipe.from_file, read_plan, materials.load):
         with pytest.raises(InputError, match="must be a readable TOML file, got '/dev/zero'"):
             reader(Path("/dev/zero"))
     with pytest.raises(InputError, match="must be a regular file, got '/dev/zero', a device"):

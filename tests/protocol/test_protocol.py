@@ -62,7 +62,7 @@ def test_a_file_is_what_it_says(write) -> None:
     assert programme.velocity(0.75) == 5e-6
     assert programme.last.velocity == 2e-5
     assert protocol.integration["rtol"] == 1e-8
-    assert protocol.integration["sampling"] == "1 kHz"
+    assert protocol.integration["sampling"] == 1e3
 
 
 def test_the_same_in_python(write) -> None:

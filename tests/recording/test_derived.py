@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from asperity.errors import InputError
+from asperity.questions.recording import ReadingRecipe
 from asperity.recording import Channel, Trace, check, derive, read
-from asperity.recording.recipe import load_recipe
 
 TIME = np.arange(50) / 10
 
@@ -182,7 +182,10 @@ def test_a_recipe_names_everything_once(tmp_path):
     # What is given besides goes before it.
     other = read(recording(tmp_path), recipe=recipe, channels={"force": "'Kanal 3' / (1 m^2)"})
     assert np.allclose(other.channel("F").values * 500, trace.channel("F").values)
-    assert read(recording(tmp_path), recipe=load_recipe(recipe)).provenance == trace.provenance
+    assert (
+        read(recording(tmp_path), recipe=ReadingRecipe.from_file(recipe)).provenance
+        == trace.provenance
+    )
 
 
 @pytest.mark.parametrize(

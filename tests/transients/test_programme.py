@@ -131,7 +131,7 @@ def test_a_recording_is_one_interpolant(name, peer) -> None:
             "programme.load must be positive",
         ),
         (lambda: Programme(StepLoad(8.0), **START), "must take time"),
-        (lambda: Programme("slide", **START), r"steps\[0\] must be a step, got a str"),
+        (lambda: Programme("slide", **START), r"steps\[0\] must be a ProgrammeStep, got 'slide'"),
         (lambda: Programme(Slide("1 s"), Hold(0.0), **START), r"steps\[1\].duration must be posit"),
         (lambda: Programme(Slide("1 N"), **START), r"steps\[0\].duration"),
         (lambda: Programme(Modulate("1 s", 0.2, "10 rad/s"), **START), r"frequency"),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import html
 from functools import cache
-from typing import Any
+from typing import Annotated, Any
 from urllib.parse import urlencode
 
 import numpy as np
@@ -12,10 +12,9 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.laws import registered
 from asperity.parameters import DRIVE
-from asperity.parameters.arguments import whole_number
+from asperity.parameters.arguments import at_least, typed
 from asperity.slider import Slider
 from asperity.slider.named import slider_values
-from asperity.slider.problem import checked_slider
 
 
 class Page:
@@ -44,13 +43,14 @@ class Page:
         )
 
 
+@typed
 def explore(
     slider: Slider | None = None,
     *,
     velocity: Any = None,
     epsilon: Any = None,
     frequency: Any = None,
-    height: int = 900,
+    height: Annotated[int, at_least(100)] = 900,
 ) -> Page:
     """Show the page's Explore tab in a notebook's cell.
 
@@ -77,7 +77,6 @@ def explore(
     """
     given: dict[str, Any] = {}
     if slider is not None:
-        checked_slider(slider)
         law = type(slider.law)
         if registered().get(law.name) is not law:
             raise InputError(
@@ -88,7 +87,6 @@ def explore(
     for name, value in (("V", velocity), ("epsilon", epsilon), ("frequency", frequency)):
         if value is not None:
             given[name] = DRIVE[name].check(value)
-    height = whole_number(height, "height", least=100)
     for name, value in given.items():
         if isinstance(value, str):
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from jax.typing import ArrayLike
@@ -22,9 +22,9 @@ from asperity.branches.parameters import (
 from asperity.branches.steps import BranchFollower, BranchOrbit, ParameterBranch
 from asperity.errors import InputError
 from asperity.loads import Modulation
-from asperity.parameters.arguments import counted, function, whole_number
+from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider import Slider
-from asperity.slider.problem import Problem, checked_slider
+from asperity.slider.problem import Problem
 
 #: Intervals of the mesh of a branch of simple period; a bifurcation is solved on three times as
 #: many.
@@ -124,6 +124,7 @@ class BranchRecorder:
         )
 
 
+@typed
 def continuation(
     slider: Slider,
     *,
@@ -135,8 +136,8 @@ def continuation(
     modulation: Modulation | None = None,
     inertia: bool = False,
     radiation_damping: ArrayLike | str | None = None,
-    harmonics: int = 8,
-    most_steps: int = 1000,
+    harmonics: Annotated[int, at_least(2)] = 8,
+    most_steps: Annotated[int, at_least(1)] = 1000,
     progress: Callable[[int, int], None] | None = None,
 ) -> Branch:
     """Follow the periodic response along one parameter, through folds.
@@ -187,10 +188,6 @@ def continuation(
     Collocation with the arclength condition of Keller (1977), see
     `asperity.orbit.methods.branch_following.arclength`.
     """
-    harmonics = whole_number(harmonics, "harmonics", least=2)
-    most_steps = whole_number(most_steps, "most_steps", least=1)
-    progress = function(progress, "progress")
-    checked_slider(slider)
     problem = one_problem(
         slider,
         start_of(slider, parameter, span),

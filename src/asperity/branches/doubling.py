@@ -10,6 +10,7 @@ Source: R. Seydel, Practical Bifurcation and Stability Analysis, section 7.6.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Annotated
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -31,7 +32,7 @@ from asperity.orbit.methods.branch_following.arclength import (
     slip_units,
     weighted_row,
 )
-from asperity.parameters.arguments import counted, function, instance, whole_number
+from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider.problem import Problem
 
 #: Distances from the bifurcation at which a doubled orbit is searched (exponent of the slip rate).
@@ -68,11 +69,12 @@ class Repeated(Modulation):
         return Repeated(self.load.scaled(share))
 
 
+@typed
 def doubled_branch(
     branch: Branch,
     bifurcation: Bifurcation,
     *,
-    most_steps: int = 1000,
+    most_steps: Annotated[int, at_least(1)] = 1000,
     progress: Callable[[int, int], None] | None = None,
 ) -> Branch:
     """Follow the branch of doubled period that leaves a branch at a period doubling.
@@ -100,11 +102,6 @@ def doubled_branch(
         If the bifurcation is no period doubling, the branch has a doubled period already,
         or there is no doubled orbit next to it.
     """
-    branch = instance(branch, Branch, "branch", "follow one with continuation")
-    advice = "take one of the branch's bifurcations"
-    bifurcation = instance(bifurcation, Bifurcation, "bifurcation", advice)
-    most_steps = whole_number(most_steps, "most_steps", least=1)
-    progress = function(progress, "progress")
     if bifurcation.kind != "period doubling":
         raise InputError(
             f"bifurcation must be a period doubling, got a {bifurcation.kind}; choose another one"

@@ -19,7 +19,7 @@ from asperity.orbit.mesh.mesh import Orbit
 from asperity.orbit.methods.branch_following.arclength import ParameterLine, still
 from asperity.orbit.search import find_orbits
 from asperity.parameters import MODULATION, Parameter, known_name, point_parameters
-from asperity.parameters.arguments import number, pair, shown
+from asperity.parameters.arguments import number
 from asperity.slider import Slider
 from asperity.slider.named import equation_parameters, value_of, with_value
 from asperity.slider.problem import Problem, checked_problem, flatten
@@ -84,7 +84,7 @@ def moving_parameter(
             f"parameter must be one that the equations have, got '{name}'; {closest(name, known)}"
         )
     parameter = known[name]
-    ends = [_end(parameter, end, field) for end in pair_of(span, name, field)]
+    ends = [_end(parameter, end, field) for end in span]
     start, end = ends
     if start == end:
         raise InputError(
@@ -104,10 +104,6 @@ def continued_name(law: type[Law], name: str) -> str:
     InputError
         If neither the law nor the experiment has a parameter of that name.
     """
-    if not isinstance(name, str):
-        raise InputError(
-            f"parameter must be the name of a parameter, got {shown(name)}; write it like 'epsilon'"
-        )
     if name in MODULATION:
         raise InputError(
             f"parameter must be one that continuation can change, got '{name}'; give it as "
@@ -115,17 +111,6 @@ def continued_name(law: type[Law], name: str) -> str:
         )
     known = {n: p for n, p in point_parameters(law).items() if p.path}
     return known_name(name, known)
-
-
-def pair_of(span: Any, name: str, field: str) -> tuple[Any, Any]:
-    """The two ends of a span.
-
-    Raises
-    ------
-    InputError
-        If there are not two.
-    """
-    return pair(span, field)
 
 
 def line_through(
@@ -182,7 +167,7 @@ def start_of(slider: Slider, parameter: str, span: Any, field: str = "span") -> 
     InputError
         If there is no such parameter or a span is not a pair.
     """
-    return {continued_name(type(slider.law), parameter): pair_of(span, parameter, field)[0]}
+    return {continued_name(type(slider.law), parameter): span[0]}
 
 
 def one_problem(

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
 import numpy as np
 from jax.typing import ArrayLike
@@ -43,10 +43,10 @@ from asperity.branches.parameters import (
 from asperity.branches.steps import BranchFollower, BranchOrbit, ParameterBranch
 from asperity.errors import InputError
 from asperity.loads import Modulation
-from asperity.parameters.arguments import counted, function, whole_number
+from asperity.parameters.arguments import at_least, counted, typed
 from asperity.parameters.parameter import Displayed, SummaryLine, count_text, number_line
 from asperity.slider import Motion, Slider
-from asperity.slider.problem import Problem, checked_slider
+from asperity.slider.problem import Problem
 
 if TYPE_CHECKING:
     import xarray
@@ -385,6 +385,7 @@ class StabilityBoundary(Displayed):
         return xarray.Dataset(data, attrs=attributes)
 
 
+@typed
 def stability_boundary(
     slider: Slider,
     *,
@@ -398,7 +399,7 @@ def stability_boundary(
     modulation: Modulation | None = None,
     inertia: bool = False,
     radiation_damping: ArrayLike | str | None = None,
-    lines: int = 5,
+    lines: Annotated[int, at_least(2)] = 5,
     progress: Callable[[int, int], None] | None = None,
 ) -> StabilityBoundary:
     """Curves on which the periodic response changes its stability, in two parameters.
@@ -437,9 +438,6 @@ def stability_boundary(
     Without modulation the curves end at the closed forms of linear stability: K = Kc for a
     slider without inertia, critical frequency (V/D0) sqrt((B - A)/A) for the ageing law.
     """
-    lines = whole_number(lines, "lines", least=2)
-    progress = function(progress, "progress")
-    checked_slider(slider)
     problem = one_problem(
         slider,
         start_of(slider, x, x_span, "x_span") | start_of(slider, y, y_span, "y_span"),

@@ -69,9 +69,9 @@ class FileRows:
         """
         source = self.source.model_dump(mode="json")
         if self.source.recipe is not None:
-            from asperity.recording.recipe import load_recipe
+            from asperity.questions.recording import ReadingRecipe
 
-            source["recipe"] = load_recipe(self.source.recipe).model_dump()
+            source["recipe"] = ReadingRecipe.from_file(self.source.recipe).model_dump()
         return {"source": source, "options": self.question.model_dump(mode="json")}
 
 

@@ -21,7 +21,7 @@ from asperity.laws import Law
 from asperity.loads import Excitation
 from asperity.orbit.response import dimension_names
 from asperity.parameters import MACHINE, law_parameters, obeying
-from asperity.parameters.arguments import instance, switch
+from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import Displayed, SummaryLine, number_line
 from asperity.slider import QuasiStatic, Slider
 from asperity.slider.named import slider_values
@@ -212,6 +212,7 @@ class VelocityStepResponse(Displayed):
         return _dataset(self, drive, dims)
 
 
+@typed
 def hold_response(
     slider: Slider | Law,
     *,
@@ -257,12 +258,11 @@ def hold_response(
             "asperity.theory.memory has the limits of long holds"
         )
     V = obeying(velocity, "hold_response.velocity", "velocity", "positive")
-    follow = switch(settling, "hold_response.settling")
     (flat, V, time), shape = flatten((slider, V, time), "hold_response")
 
     def run(slider: Slider, V: jax.Array, time: jax.Array, runaway: jax.Array) -> tuple:
         response, extremum = hold(slider, V, time)
-        after = settle(slider, V, extremum, runaway) if follow else None
+        after = settle(slider, V, extremum, runaway) if settling else None
         # The derivative by differences of order 4 in ln(hold time).
         others = [hold(slider, V, time * np.exp(n * _STEP))[0].maximum for n in (-2, -1, 1, 2)]
         slope = (others[0] - 8 * others[1] + 8 * others[2] - others[3]) / (12 * _STEP)
@@ -295,6 +295,7 @@ def hold_response(
     )
 
 
+@typed
 def step_response(
     slider: Slider | Law,
     *,
@@ -324,7 +325,6 @@ def step_response(
     slider = _slider(slider, stiffness)
     first = obeying(velocity_before, "step_response.velocity_before", "velocity", "positive")
     V = obeying(velocity, "step_response.velocity", "velocity", "positive")
-    follow = switch(settling, "step_response.settling")
     (flat, first, V), shape = flatten((slider, first, V), "step_response")
     if np.any(first == V):
         raise InputError(
@@ -334,7 +334,7 @@ def step_response(
 
     def run(slider: Slider, V: jax.Array, first: jax.Array, runaway: jax.Array) -> tuple:
         response, extremum = step(slider, first, V)
-        return response, settle(slider, V, extremum, runaway) if follow else None
+        return response, settle(slider, V, extremum, runaway) if settling else None
 
     runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
     response, after = _in_shapes(run, flat, V, first, runaway)
@@ -358,9 +358,7 @@ def step_response(
     )
 
 
-def _slider(slider: Any, stiffness: Any) -> Slider:
-    advice = "give a law with stiffness, or asperity.Slider(law, spring=, load=)"
-    slider = instance(slider, (Slider, Law), "slider", advice)
+def _slider(slider: Slider | Law, stiffness: Any) -> Slider:
     if isinstance(slider, Law):
         if stiffness is None:
             raise InputError(

@@ -23,7 +23,7 @@ from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.laws import Law, get_law, known_law, registered
 from asperity.outputs.targets import require_rereadable
-from asperity.parameters.arguments import file_path, shown
+from asperity.parameters.arguments import FilePath, typed
 from asperity.questions import fit as questions
 from asperity.recording import Trace
 from asperity.recording.readers.from_file import read_source
@@ -38,6 +38,8 @@ _TRENDS = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
 
 #: Sets of data of any kind.
 AnyData = LockInTable | HealingTable | RecordedRun
+#: These, and what is read as one of them.
+Data = AnyData | Trace | FilePath
 
 
 def default_law(data: Sequence[AnyData]) -> str:
@@ -251,13 +253,13 @@ def answer_comparison(
     return compare(read_data(question, read), laws, question.free, **options)
 
 
-def _loaded(data: Any, fixed: Mapping[str, Any] | None) -> list[Any]:
+def _loaded(data: Data | Sequence[Data], fixed: Mapping[str, Any] | None) -> list[Any]:
     """Sets of data as they are, files as what they hold."""
     several = data if isinstance(data, list | tuple) else [data]
     loaded: list[Any] = []
     for one in several:
         if isinstance(one, str | os.PathLike):
-            file = questions.Data(file=Path(file_path(one, "data")))
+            file = questions.Data(file=Path(one))
             question = questions.Fit(data=(file,), fixed=dict(fixed or {}))
             loaded += read_data(question)
         else:
@@ -265,8 +267,12 @@ def _loaded(data: Any, fixed: Mapping[str, Any] | None) -> list[Any]:
     return loaded
 
 
+@typed
 def fit_data(
-    data: Any, law: str | type[Law] | None = None, free: Sequence[str] | None = None, **options: Any
+    data: Data | Sequence[Data],
+    law: str | type[Law] | None = None,
+    free: Sequence[str] | None = None,
+    **options: Any,
 ) -> Fit:
     """Fit a law to files or to data at hand, as ``asperity fit`` does.
 
@@ -290,8 +296,12 @@ def fit_data(
     return fit(loaded, default_law(loaded) if law is None else law, free, **options)
 
 
+@typed
 def compare_data(
-    data: Any, laws: str | Sequence[str] = "all", free: Sequence[str] | None = None, **options: Any
+    data: Data | Sequence[Data],
+    laws: str | Sequence[str] = "all",
+    free: Sequence[str] | None = None,
+    **options: Any,
 ) -> Comparison:
     """Compare laws on files or on data at hand, as ``asperity compare`` does.
 
@@ -311,8 +321,6 @@ def compare_data(
         As of `asperity.inference.compare`, or if a file cannot be read.
     """
     listed = laws.split(",") if isinstance(laws, str) else laws
-    if not isinstance(listed, list | tuple) or not all(isinstance(law, str) for law in listed):
-        raise InputError("laws", "be names of laws", shown(laws), "write 'all' or ['rice-ruina']")
     names = compared_laws([law.strip() for law in listed])
     return compare(_loaded(data, options.get("fixed")), names, free, **options)
 

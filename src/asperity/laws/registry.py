@@ -10,7 +10,7 @@ from asperity.errors import InputError, closest
 from asperity.laws.consistency import checked_class
 from asperity.laws.discovery import installed, law_at, load_installed
 from asperity.laws.law import Law
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import shown, typed
 
 _LAWS: dict[str, type[Law]] = {}
 
@@ -61,6 +61,7 @@ def registered() -> dict[str, type[Law]]:
     return dict(_LAWS)
 
 
+@typed
 def get_law(name: str) -> type[Law]:
     """Look a law up by name: one of the package, registered, or of an installed package.
 
@@ -69,11 +70,6 @@ def get_law(name: str) -> type[Law]:
     InputError
         If no law has that name; the message gives the nearest one.
     """
-    if not isinstance(name, str):
-        raise InputError(
-            f"law must be the name of a registered law, got {shown(name)}; "
-            f"choose one of {', '.join(sorted(_LAWS))}"
-        )
     if name not in _LAWS and name in installed():
         register(load_installed(installed()[name]))
     if name not in _LAWS:

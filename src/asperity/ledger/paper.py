@@ -41,7 +41,7 @@ from asperity.ledger.claims import (
 )
 from asperity.ledger.contents import Contents, read_contents
 from asperity.ledger.figures import FiguresFile, PaperFigure, Section, figure_words
-from asperity.parameters.arguments import instance, shown
+from asperity.parameters.arguments import of_type, shown
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -228,7 +228,7 @@ def _guarded(function: Callable[..., Any], what: str) -> Callable[..., Any]:
 
 def _guarded_section(section: Any, where: str) -> Section:
     """A section of a paper; exceptions of its computations and drawings become `InputError`."""
-    checked: Section = instance(section, Section, where, "yield Sections")
+    checked: Section = of_type(section, Section, where)
     return replace(checked, figures=tuple(_guarded_figure(f, where) for f in checked.figures))
 
 
@@ -238,7 +238,7 @@ def _guarded_figure(compute: Callable[[], Any], where: str) -> Callable[[], Pape
     def run() -> PaperFigure:
         with _running(name):
             made = compute()
-        figure: PaperFigure = instance(made, PaperFigure, name, "return a PaperFigure")
+        figure: PaperFigure = of_type(made, PaperFigure, name)
         return replace(figure, draw=_guarded(figure.draw, f"{name}, draw"))
 
     return run

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from asperity.errors import InputError, printable
 from asperity.loads.modulation import Excitation, Harmonic, Modulation
 from asperity.loads.periodic import Periodic
-from asperity.parameters.arguments import instance, shown
+from asperity.parameters.arguments import shown
 
 #: Numbers of samples of the period; a fault counts if it remains with more samples.
 _SAMPLES = (64, 1024, 16384)
@@ -26,12 +26,12 @@ _MEAN, _SLOPE = 1e-3, 2e-2
 Array = NDArray[np.float64]
 
 
-def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
+def checked_modulation(modulation: Modulation, name: str = "modulation") -> Modulation:
     """A modulation whose members agree with each other.
 
     Parameters
     ----------
-    given : Modulation
+    modulation : Modulation
         Numbers or arrays of any shapes that broadcast. `Harmonic` and `Periodic` agree by their
         construction.
     name : str
@@ -40,14 +40,12 @@ def checked_modulation(given: Any, name: str = "modulation") -> Modulation:
     Raises
     ------
     InputError
-        If it is no `Modulation`, or its fields are no numbers or arrays that broadcast; if over a
+        If its fields are no numbers or arrays that broadcast; if over a
         period a value is not finite, W does not stay positive, the mean of W/W0 or of the pull
         is not 1, `w_slope` is not the derivative of `w`, `amplitude` is not that of the first
         harmonic, `scaled(0)` is not steady sliding, a member fails, or the load is not `even` and
         says so.
     """
-    advice = "give one of asperity.loads, such as modulated(epsilon=0.2)"
-    modulation: Modulation = instance(given, Modulation, name, advice)
     leaves, structure = jax.tree.flatten(modulation)
     for leaf in leaves:
         if isinstance(leaf, str):

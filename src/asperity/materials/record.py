@@ -15,7 +15,7 @@ from pydantic import field_validator
 from asperity.errors import InputError, closest
 from asperity.materials.number import Number
 from asperity.parameters import EXPERIMENT, INTERFACE, law_parameters, obeying
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import shown, typed
 from asperity.questions.record import Question
 from asperity.units import to_si
 
@@ -56,12 +56,8 @@ class Material(Question):
                 _check_rule(name, number.si, number.dimension, "numbers")
         return numbers
 
+    @typed
     def __getitem__(self, name: str) -> Number:
-        if not isinstance(name, str):
-            raise InputError(
-                f"{self.name} must be indexed by the name of a number, got {shown(name)}; "
-                "write it like material['K']"
-            )
         try:
             return self.numbers[_plain(name)]
         except KeyError:
@@ -91,6 +87,7 @@ class Material(Question):
         yield from super().__dir__()
         yield from (f"{n}_" if keyword.iskeyword(n) else n for n in self.numbers)
 
+    @typed
     def law(self, name: str, **overrides: Any) -> Law:
         """Build a friction law from the material's numbers.
 

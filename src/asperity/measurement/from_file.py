@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
@@ -14,6 +13,7 @@ from asperity.measurement.stick_slip.measure import (
     StickSlipMeasurement,
     measure_stick_slip,
 )
+from asperity.parameters.arguments import FilePath, typed
 from asperity.questions.recording import Measurement as Question
 from asperity.recording import Trace
 from asperity.recording.readers import read
@@ -25,8 +25,9 @@ Read = TypeVar("Read")
 _SLIDER, _EVENTS = 0.5, 10
 
 
+@typed
 def measure_recording(
-    recording: Trace | str | os.PathLike[str],
+    recording: Trace | FilePath,
     *,
     modulated: bool | None = None,
     load: str = "W",

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from functools import partial
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -40,7 +40,7 @@ from asperity.orbit.gradient.search import search_orbits
 from asperity.orbit.gradient.searched import derivatives_of, searched_values, values_of
 from asperity.orbit.outcome import Outcome
 from asperity.parameters import obeying
-from asperity.parameters.arguments import switch, whole_number
+from asperity.parameters.arguments import at_least, typed
 from asperity.slider import QuasiStatic
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.radiating import Radiating
@@ -254,16 +254,17 @@ def _cut(values: ResponseValues, points: int | None) -> ResponseValues:
     return jax.tree.map(cut, values)
 
 
+@typed
 def response_function(
     law: str | type[Law],
     *,
     inertia: bool = False,
     radiation_damping: bool = False,
-    harmonics: int = 2,
+    harmonics: Annotated[int, at_least(1)] = 2,
     multipliers: bool = False,
     modulation: Modulation | None = None,
     search: bool | Literal["direct"] = True,
-    least_points: int = _FEWEST,
+    least_points: Annotated[int, at_least(1)] = _FEWEST,
 ) -> ResponseFunction:
     """The periodic response as a function of named parameters, for fits, samplers and designs.
 
@@ -327,12 +328,6 @@ def response_function(
     than 1e-8, the outcome is `Outcome.NOT_RESOLVED`.
     """
     law_type = law if isinstance(law, type) and issubclass(law, Law) else get_law(law)
-    inertia = switch(inertia, "inertia")
-    radiation_damping = switch(radiation_damping, "radiation_damping")
-    multipliers = switch(multipliers, "multipliers")
-    search = search if search == "direct" else switch(search, "search")
-    harmonics = whole_number(harmonics, "harmonics", least=1)
-    least_points = whole_number(least_points, "least_points", least=1)
     if modulation is not None:
         modulation = checked_modulation(modulation)
     if not law_type.rate_dependent:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from asperity.laws import Law, LinkerDieterich
 from asperity.loads import Harmonic
 from asperity.orbit.response import PeriodicResponse
-from asperity.parameters.arguments import instance
+from asperity.parameters.arguments import typed
 
 Float = NDArray[np.float64]
 
@@ -49,6 +49,7 @@ class Period(NamedTuple):
     age: Float | None
 
 
+@typed
 def over_a_period(response: PeriodicResponse) -> Period:
     """Force, velocities and age over one period.
 
@@ -64,7 +65,6 @@ def over_a_period(response: PeriodicResponse) -> Period:
     what accelerates the slider and what it radiates; the state is the one at which the law carries
     that force at that slip velocity.
     """
-    instance(response, PeriodicResponse, "response", "give the result of periodic_response")
     motion, slider = response.motion, response.slider
     V, omega = float(np.ravel(motion.V)[0]), float(np.ravel(motion.omega)[0])
     K, W0, M = (float(np.ravel(getattr(slider, n))[0]) for n in ("K", "W0", "M"))

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Annotated
 
 import jax
 import numpy as np
@@ -27,11 +28,12 @@ from asperity.orbit.search import (
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
 from asperity.parameters import DRIVE
-from asperity.parameters.arguments import counted, function, whole_number
+from asperity.parameters.arguments import at_least, counted, typed
 from asperity.slider import QuasiStatic, Slider
-from asperity.slider.problem import Problem, checked_problem, checked_slider, flatten
+from asperity.slider.problem import Problem, checked_problem, flatten
 
 
+@typed
 def periodic_response(
     slider: Slider,
     *,
@@ -41,11 +43,11 @@ def periodic_response(
     modulation: Modulation | None = None,
     inertia: bool = False,
     radiation_damping: ArrayLike | str | None = None,
-    harmonics: int = 8,
-    waveform: int = 0,
+    harmonics: Annotated[int, at_least(2)] = 8,
+    waveform: Annotated[int, at_least(0)] = 0,
     progress: Callable[[int, int], None] | None = None,
     methods: tuple[str, ...] = CHOICES,
-    workers: int | None = None,
+    workers: Annotated[int, at_least(1)] | None = None,
 ) -> PeriodicResponse:
     """Periodic response to W = W0 (1 + eps cos wt), stable or not.
 
@@ -102,11 +104,7 @@ def periodic_response(
     radian, about the larger of V/(omega D0) and V K/(omega W0 A), is from 1e-9 to 1e15. Points
     outside get the outcome `Outcome.OUT_OF_RANGE` at once.
     """
-    harmonics = whole_number(harmonics, "harmonics", least=2)
-    waveform = whole_number(waveform, "waveform")
     chosen = chosen_methods(methods)
-    workers = None if workers is None else whole_number(workers, "workers", least=1)
-    progress = function(progress, "progress")
     problem = checked_problem(
         slider,
         velocity=velocity,
@@ -164,8 +162,13 @@ def _proportional(problem: Problem, points: int, harmonics: int, phases: int) ->
 _STIFFNESS = 1e-8
 
 
+@typed
 def averaged_response(
-    slider: Slider, *, velocity: ArrayLike | str, epsilon: ArrayLike | str, harmonics: int = 8
+    slider: Slider,
+    *,
+    velocity: ArrayLike | str,
+    epsilon: ArrayLike | str,
+    harmonics: Annotated[int, at_least(2)] = 8,
 ) -> PeriodicResponse:
     """Response to a modulation far faster than the interface: spring force and age are constant.
 
@@ -195,7 +198,6 @@ def averaged_response(
     InputError
         As `periodic_response`.
     """
-    checked_slider(slider)
     V = DRIVE["V"].check(velocity)
     problem, shape = flatten(
         Problem(QuasiStatic(slider, V, np.asarray(1.0)), Harmonic(np.asarray(0.0)))

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from asperity.errors import InputError
 from asperity.orbit.batches import run_chunks, take
 from asperity.orbit.methods.branch_following.from_steady_sliding import BranchFollowing
 from asperity.orbit.methods.collocation.frequency_path import FrequencyPath
@@ -38,7 +39,7 @@ from asperity.orbit.outcome import (
 )
 from asperity.orbit.solution import SearchOptions, Solution
 from asperity.orbit.steady_sliding import steady_sliding
-from asperity.parameters.arguments import some_of
+from asperity.parameters.arguments import one_of
 from asperity.slider.problem import Problem
 from asperity.theory.adiabatic import adiabatic_growth
 
@@ -96,8 +97,10 @@ def chosen_methods(choices: Sequence[str]) -> tuple[Method, ...]:
     InputError
         If there is no method of a name.
     """
-    given = some_of(choices, (*CHOICES, *_SYNONYMS), "methods")
-    names = {_SYNONYMS.get(name, name) for name in given}
+    if not choices:
+        raise InputError("methods", "name a method", "none", "leave it out for all")
+    known = (*CHOICES, *_SYNONYMS)
+    names = {_SYNONYMS.get(n, n) for n in (one_of(c, known, "methods") for c in choices)}
     return tuple(method for method in METHODS if method.choice in names)
 
 

@@ -13,6 +13,7 @@ from asperity.loads import Modulation
 from asperity.orbit.differentiable import ResponseFunction
 from asperity.orbit.gradient.parametrised import ParametrisedProblem, ResponseValues
 from asperity.orbit.outcome import Outcome
+from asperity.parameters.arguments import typed
 from asperity.slider import Slider
 from asperity.slider.problem import checked_problem, flatten
 
@@ -55,6 +56,7 @@ class Sensitivities:
         return np.asarray(self.outcome == Outcome.CONVERGED)
 
 
+@typed
 def sensitivities(
     slider: Slider,
     *,

@@ -1,22 +1,27 @@
-"""Arguments of public functions that are no physical quantities: counts, switches, names, objects.
+"""Arguments of public functions: their annotations are the check (`typed`).
 
-One check each, with one sentence for what does not fit. Physical quantities are checked by
+Physical quantities, numbers in SI or texts with units, are checked where they are converted, by
 `asperity.parameters.Parameter.check` and `asperity.parameters.obeying`.
 """
 
 from __future__ import annotations
 
+import collections.abc
+import inspect
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache, wraps
 from pathlib import Path
-from typing import Any, TypeVar
+from types import GenericAlias, NoneType, UnionType
+from typing import Annotated, Any, Literal, ParamSpec, TypeVar, Union, get_args, get_origin
 
 import numpy as np
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, InputTypeError, closest
 from asperity.parameters.parameter import obeying
 
-T = TypeVar("T")
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def shown(value: Any) -> str:
@@ -39,45 +44,139 @@ def shown(value: Any) -> str:
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
-#: The largest count: as many numbers as a gigabyte holds.
-_MOST = 100_000_000
+def typed(function: Callable[P, R]) -> Callable[P, R]:
+    """Let annotations be the check of the arguments of a function, or of a class.
 
-
-def whole_number(value: Any, label: str, least: int = 0) -> int:
-    """A count from `least` to a hundred million.
-
-    Raises
-    ------
-    InputError
-        For anything that is no whole number; 2.0 is none either.
-    """
-    whole = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    if whole and least <= value <= _MOST:
-        return int(value)
-    raise InputError(
-        label,
-        f"be a whole number of at least {least} and at most {_MOST:,}",
-        shown(value),
-        f"give one such as {max(least, 8)}",
-    )
-
-
-def switch(value: Any, label: str) -> bool:
-    """True or False, of Python or of NumPy; no array.
+    Numbers of NumPy come in as those of Python, lists as tuples. What `Annotated` adds to a type is
+    a rule for its values, a function of value and name such as `file_path` or ``at_least(2)``.
 
     Raises
     ------
+    InputTypeError
+        By the function, for an argument of another type.
     InputError
-        For anything else.
+        By the function, for a value that breaks the rule of its annotation.
     """
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    raise InputError(
-        label,
-        "be True or False",
-        shown(value),
-        "for points of both kinds call the function once for each",
-    )
+    if isinstance(function, type):
+        function.__init__ = typed(function.__init__)  # type: ignore[misc]
+        return function
+    signature = inspect.signature(function)
+    known = cache(lambda: annotations_of(function))
+
+    @wraps(function)
+    def call(*args: P.args, **keywords: P.kwargs) -> R:
+        bound = signature.bind(*args, **keywords)
+        for name, kind in known().items():
+            if name in bound.arguments:
+                bound.arguments[name] = of_type(bound.arguments[name], kind, name)
+        return function(*bound.args, **bound.kwargs)
+
+    return call
+
+
+def annotations_of(function: Callable[..., Any]) -> dict[str, Any]:
+    """What the annotations of a function's arguments stand for, by name."""
+    kinds = {}
+    for name, one in inspect.signature(function).parameters.items():
+        if one.annotation is not one.empty:
+            # Postponed annotations are texts.
+            kind = eval(one.annotation, inspect.unwrap(function).__globals__)
+            several = one.kind is one.VAR_POSITIONAL
+            kinds[name] = GenericAlias(Sequence, kind) if several else kind
+    return kinds
+
+
+def of_type(value: Any, kind: Any, name: str) -> Any:
+    """A value as an annotation has it.
+
+    Raises
+    ------
+    InputTypeError, InputError
+        As `typed`.
+    """
+    try:
+        return _taken(value, kind, name)
+    except _OtherTypeError:
+        raise InputTypeError(name, f"be {_words(kind)}", shown(value)) from None
+
+
+class _OtherTypeError(Exception):
+    """A value that an annotation does not allow."""
+
+
+def _taken(value: Any, kind: Any, name: str) -> Any:
+    origin, parts = get_origin(kind) or kind, get_args(kind)
+    if kind is Any or complex in parts:  # of ArrayLike: who converts it to SI knows what may stand
+        return value
+    if origin in (Union, UnionType):
+        for part in parts:
+            try:
+                return _taken(value, part, name)
+            except _OtherTypeError:
+                continue
+    elif origin is Annotated:
+        return parts[1](_taken(value, parts[0], name), name)
+    elif origin is Literal:
+        if isinstance(value, type(parts[0])):
+            return one_of(value, parts, name)
+    elif origin in (bool, int, float):
+        plain = value.item() if isinstance(value, np.generic) else value
+        number = int | float if origin is float else origin
+        if isinstance(plain, number) and isinstance(plain, bool) == (origin is bool):
+            return plain
+    elif origin in (tuple, Sequence):
+        alike = origin is Sequence or parts[-1] is ...
+        several = isinstance(value, np.ndarray) and value.ndim > 0
+        several = several or isinstance(value, tuple | list | range)
+        if several and (alike or len(value) == len(parts)):
+            kinds = parts[:1] * len(value) if alike else parts
+            each = enumerate(zip(value, kinds, strict=True))
+            return tuple(of_type(part, kind, f"{name}[{i}]") for i, (part, kind) in each)
+    elif origin is type:
+        if isinstance(value, type) and issubclass(value, parts[0]):
+            return value
+    elif isinstance(value, NoneType if origin is None else origin):
+        return value
+    raise _OtherTypeError
+
+
+#: Types in the words of a message.
+_WORDS: Mapping[Any, str] = {
+    bool: "True or False",
+    int: "a whole number",
+    float: "a number",
+    str: "a text",
+    NoneType: "None",
+    os.PathLike: "a path",
+    type: "a class",
+    Literal: "a text",
+    tuple: "a tuple",
+    Sequence: "a list",
+    Mapping: "a dictionary",
+    collections.abc.Callable: "a function",
+}
+
+
+def _words(kind: Any) -> str:
+    origin, parts = get_origin(kind) or kind, get_args(kind)
+    if origin in (Union, UnionType):
+        return " or ".join(dict.fromkeys(map(_words, parts)))
+    if origin is Annotated:
+        return _words(parts[0])
+    return _WORDS.get(origin) or f"a {origin.__name__}"
+
+
+def at_least(least: int) -> Callable[[int, str], int]:
+    """The rule of a count, as in ``Annotated[int, at_least(2)]``: up to a gigabyte of numbers."""
+    most = 100_000_000
+
+    def within(value: int, name: str) -> int:
+        if least <= value <= most:
+            return value
+        rule = f"be a whole number of at least {least} and at most {most:,}"
+        raise InputError(name, rule, shown(value), f"give one such as {max(least, 8)}")
+
+    return within
 
 
 def number(value: Any, label: str, kind: str, rule: str = "finite") -> float:
@@ -94,78 +193,19 @@ def number(value: Any, label: str, kind: str, rule: str = "finite") -> float:
     return float(np.ravel(checked)[0])
 
 
-def instance(value: Any, kinds: type[T] | tuple[type[T], ...], label: str, advice: str) -> T:
-    """An object of a class.
-
-    Raises
-    ------
-    InputError
-        For anything else; an object's class in its place too.
-    """
-    if isinstance(value, kinds):
-        return value
-    names = [k.__name__ for k in (kinds if isinstance(kinds, tuple) else (kinds,))]
-    wanted = f"{'an' if names[0][0] in 'AEIOU' else 'a'} {' or '.join(names)}"
-    raise InputError(label, f"be {wanted}", shown(value), advice)
-
-
 def one_of(value: Any, known: Iterable[str], label: str) -> str:
     """One of several texts.
 
     Raises
     ------
     InputError
-        For anything else; the message suggests the nearest one.
+        For any other text; the message suggests the nearest one.
     """
     known = list(known)
-    if isinstance(value, str) and value in known:
-        return value
-    advice = closest(value, known) if isinstance(value, str) else f"choose {' or '.join(known)}"
-    raise InputError(label, f"be one of {', '.join(known)}", shown(value), advice)
-
-
-def some_of(value: Any, known: Sequence[str], label: str) -> tuple[str, ...]:
-    """Several of some texts, at least one.
-
-    Raises
-    ------
-    InputError
-        For anything else, a single text among it.
-    """
-    if isinstance(value, list | tuple) and value:
-        return tuple(one_of(item, known, label) for item in value)
-    raise InputError(
-        label,
-        f"be a tuple of some of {', '.join(known)}",
-        shown(value),
-        "leave it out for all",
-    )
-
-
-def pair(value: Any, label: str) -> tuple[Any, Any]:
-    """Two values.
-
-    Raises
-    ------
-    InputError
-        For anything that is not two values, a text among it.
-    """
-    if isinstance(value, list | tuple | np.ndarray) and len(value) == 2:
-        return value[0], value[1]
-    raise InputError(label, "be two values", shown(value), "give (start, end)")
-
-
-def function(value: Any, label: str) -> Callable[..., Any] | None:
-    """A function, or None.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
-    if value is None or callable(value):
-        return value
-    raise InputError(label, "be a function", shown(value), "leave it out for none")
+    if value not in known:
+        rule = f"be one of {', '.join(known)}"
+        raise InputError(label, rule, shown(value), closest(value, known))
+    return value
 
 
 def counted(progress: Callable[[int, int], None] | None, total: int) -> Callable[[int], None]:
@@ -211,14 +251,18 @@ def file_path(value: Any, label: str) -> Path:
     InputError
         For anything that is no path, and for a text with a NUL in it.
     """
-    if isinstance(value, str | os.PathLike):
-        text = os.fspath(value)
-        # File systems have a longest name, and answer a longer one with an error of their own.
-        if isinstance(text, str) and text and "\0" not in text and len(text) < 4000:
-            path = Path(text)
-            if all(len(os.fsencode(part)) < 256 for part in path.parts):
-                return path
-        value = text
+    text = os.fspath(value) if isinstance(value, str | os.PathLike) else None
+    # File systems have a longest name, and answer a longer one with an error of their own.
+    if isinstance(text, str) and text and "\0" not in text and len(text) < 4000:
+        path = Path(text)
+        if all(len(os.fsencode(part)) < 256 for part in path.parts):
+            return path
+    value = value if text is None else text
     short = isinstance(value, str | bytes) and len(value) < 60
     what = repr(value) if short else shown(value)
-    raise InputError(label, "be the path of a file", what, "give it as a text")
+    wrong = InputTypeError if text is None else InputError
+    raise wrong(label, "be the path of a file", what, "give it as a text")
+
+
+#: The path of a file, as an annotation.
+FilePath = Annotated[str | os.PathLike[str], file_path]

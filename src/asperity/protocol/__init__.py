@@ -1,12 +1,12 @@
 """Protocols: experiments written as text, and run into a file."""
 
-from asperity.protocol.load import load_protocol
 from asperity.protocol.protocol import (
     Protocol,
     ProtocolError,
     ProtocolStart,
     Repeat,
     SolverSettings,
+    load_protocol,
 )
 from asperity.protocol.recording import RecordingSetup, record_run
 from asperity.protocol.run import RunSummary, run_protocol

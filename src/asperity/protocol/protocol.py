@@ -6,30 +6,33 @@ import hashlib
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import PositiveInt, PrivateAttr, ValidationError, WrapValidator, model_validator
 
 from asperity import materials
-from asperity.errors import InputError, MistakesError, closest
+from asperity.errors import InputError, MistakesError
 from asperity.laws import get_law, registered
 from asperity.loads import Programme, ProgrammeStep
 from asperity.loads.programme.steps import LoadAndVelocity
-from asperity.operating_point import SourcedNumber, sourced_numbers
-from asperity.parameters import MACHINE, canonical_name, law_parameters
+from asperity.operating_point import (
+    SourcedNumber,
+    known_parameters,
+    numbers_for,
+    refuse_foreign,
+    sourced_numbers,
+)
+from asperity.parameters import MACHINE, known_name, law_parameters
+from asperity.parameters.arguments import FilePath, typed
 from asperity.protocol.recording import RecordingSetup, setup_of
 from asperity.protocol.steps import PlannedStep, check_levels, plan
-from asperity.questions.record import Question, Record, shown
+from asperity.questions.record import Given, Question, Record, quantity, shown, without_unit
 from asperity.slider import Slider
 from asperity.slider.named import slider_from
 from asperity.transients import Trajectory, transient
 from asperity.transients.inputs import MOST_STEPS, require_contact
 from asperity.transients.trajectory import planned_rows, row_bytes
-from asperity.units import to_si
-
-#: A number in SI, or a text with its unit.
-Given = float | str
 
 #: Segments whose values are part of the comparison of two protocols.
 _COMPARED = 100
@@ -62,28 +65,12 @@ def numbers_of(
     """
     law = get_law(law_name)
     known = {**law_parameters(law), **MACHINE}
-    names = tuple(known)
+    refuse_foreign(law_name, stated)
     for name in stated:
-        if canonical_name(name, known) is None:
-            owners = [n for n, other in registered().items() if name in law_parameters(other)]
-            raise InputError(
-                f"parameters must belong to {law_name} or the machine, got '{name}'"
-                + (f", which belongs to {', '.join(owners)}; leave it out" if owners else "; ")
-                + ("" if owners else closest(name, names))
-            )
-    source = None
-    if material:
-        source = materials.load_from(folder, material)
+        known_name(name, known, "parameters")
+    source = materials.load_from(folder, material) if material else None
     numbers = sourced_numbers(stated, source, "protocol", law_name)
-    needed = [n for n in names if known[n].default is None or (n == "M" and inertia)]
-    missing = [n for n in needed if n not in numbers]
-    if missing:
-        raise InputError(
-            f"parameters must have all numbers of {law_name}, got none for {', '.join(missing)}; "
-            f"name a material that has them or give each one, like {missing[0]} = "
-            f'"{known[missing[0]].example}"'
-        )
-    return {name: numbers[name] for name in names if name in numbers}
+    return numbers_for(law_name, numbers, known, ("M",) if inertia else ())
 
 
 def slider_of(law_name: str, values: Mapping[str, float]) -> Slider:
@@ -150,8 +137,8 @@ class ProtocolStart(Record):
         `asperity.transients.transient`.
     """
 
-    velocity: Given
-    load: Given | None = None
+    velocity: quantity("velocity")  # type: ignore[valid-type]
+    load: quantity("force") | None = None  # type: ignore[valid-type]
     states: tuple[float, ...] | None = None
 
 
@@ -173,9 +160,9 @@ class SolverSettings(Record):
     """
 
     inertia: bool = False
-    sampling: Given | None = None
+    sampling: quantity("frequency", "positive") | None = None  # type: ignore[valid-type]
     rtol: float = 1e-9
-    method: str = "auto"
+    method: Literal["auto", "explicit", "implicit"] = "auto"
     most_steps: float = MOST_STEPS
 
 
@@ -224,8 +211,14 @@ class Protocol(Question):
 
     @model_validator(mode="after")
     def _free_of_mistakes(self) -> Protocol:
-        planned, mistakes = plan(self.steps, self.folder)
+        planned, wrong = plan(self.steps, self.folder)
         self._planned.extend(planned)
+        known = known_parameters(self.law if self.law in registered() else None)
+        stated = self.parameters.items()
+        mistakes = without_unit(
+            (f"parameters.{n}", known[n].kind, v) for n, v in stated if n in known
+        )
+        mistakes += wrong
         try:
             self._numbers.update(self._sourced_numbers())
             level = self._level()
@@ -250,10 +243,7 @@ class Protocol(Question):
 
     def _level(self) -> LoadAndVelocity:
         load = self._numbers["W0"].value if self.start.load is None else self.start.load
-        return LoadAndVelocity(
-            to_si(load, "force", "start.load"),
-            to_si(self.start.velocity, "velocity", "start.velocity"),
-        )
+        return LoadAndVelocity(load, self.start.velocity)
 
     @property
     def numbers(self) -> dict[str, SourcedNumber]:
@@ -337,3 +327,21 @@ class Protocol(Question):
             **segments,
             "programme": digest.hexdigest(),
         }
+
+
+@typed
+def load_protocol(path: FilePath) -> Protocol:
+    """Read a protocol from a TOML file.
+
+    Parameters
+    ----------
+    path : str or path
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read or is not TOML.
+    ProtocolError
+        An `InputError` that lists all mistakes, with file, step and a valid example.
+    """
+    return Protocol.from_file(path, folder=Path(path).parent)

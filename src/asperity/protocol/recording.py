@@ -5,12 +5,12 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
 from asperity.errors import InputError, closest
-from asperity.parameters.arguments import shown
+from asperity.parameters.arguments import annotations_of, at_least, of_type, shown
 from asperity.recording.roles import candidates
 from asperity.recording.trace import Trace
 from asperity.tribometer.sensors import (
@@ -21,7 +21,6 @@ from asperity.tribometer.sensors import (
     SpringGauge,
 )
 from asperity.tribometer.tribometer import Recorder, Tribometer
-from asperity.units import to_si
 
 #: Sensors by their names in files, each with its possible quantities, the usual one first.
 SENSORS: Mapping[str, tuple[type[Sensor], tuple[str, ...]]] = {
@@ -66,7 +65,7 @@ class RecordingSetup:
 
 
 def setup_of(
-    table: Mapping[str, Any], sampling: float | str | None, stiffness: float = np.nan
+    table: Mapping[str, Any], sampling: float | None, stiffness: float = np.nan
 ) -> RecordingSetup:
     """The tribometer of a table of a protocol.
 
@@ -75,7 +74,7 @@ def setup_of(
     table : mapping
         Fields of `Recorder`, ``seed``, and ``sensors``: a table for each channel, with ``type``,
         the fields of that sensor and, where it can measure several things, ``measures``.
-    sampling : float, str or None
+    sampling : float or None
         At which the motion is written (Hz).
     stiffness : float
         Of the spring (N/m).
@@ -87,8 +86,7 @@ def setup_of(
     """
     settings = dict(table)
     seed, described = settings.pop("seed", 0), settings.pop("sensors", {})
-    if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
-        raise InputError("tribometer.seed", "be a whole number from 0", shown(seed), "correct it")
+    of_type(seed, Annotated[int, at_least(0)], "tribometer.seed")
     if not isinstance(described, Mapping) or not described:
         raise InputError(
             "tribometer.sensors",
@@ -166,41 +164,22 @@ def _sensor(channel: str, fields: Any) -> tuple[Sensor, str]:
 
 
 def _made(kind: type[Any], fields: Mapping[str, Any], place: str) -> Any:
-    known = {f.name: f for f in dataclasses.fields(kind)}
-    for name in fields:
+    known = annotations_of(kind.__init__)
+    for name, value in fields.items():
         if name not in known:
             advice = closest(name, known)
-            raise InputError(f"{place}.{name}", "be a known field", shown(fields[name]), advice)
-        if isinstance(fields[name], list) or (
-            isinstance(fields[name], Mapping) and name != "ranges"
-        ):
-            raise InputError(
-                f"{place}.{name}",
-                "be one value",
-                shown(fields[name]),
-                "give a number or a text with its unit",
-            )
-    for name, field in known.items():
+            raise InputError(f"{place}.{name}", "be a known field", shown(value), advice)
+        of_type(value, known[name], f"{place}.{name}")
+    for field in dataclasses.fields(kind):
         needed = field.default is field.default_factory is dataclasses.MISSING
-        if needed and name not in fields:
-            raise InputError(f"{place}.{name}", "be given", "nothing", "add it")
-    try:
-        return kind(**fields)
-    except TypeError:
-        raise InputError(
-            place,
-            "hold numbers and texts with units",
-            f"{dict(fields)}",
-            "correct the name that is unknown",
-        ) from None
+        if needed and field.name not in fields:
+            raise InputError(f"{place}.{field.name}", "be given", "nothing", "add it")
+    return kind(**fields)
 
 
-def _check_sampling(
-    sampling: float | str | None, recorder: Recorder, sensors: Mapping[str, Sensor]
-) -> None:
+def _check_sampling(rate: float | None, recorder: Recorder, sensors: Mapping[str, Sensor]) -> None:
     """Check, before the computation, the sampling that the tribometer needs of the motion."""
     wanted = max(recorder.rate, *(2 * sensor.bandwidth for sensor in sensors.values()))
-    rate = None if sampling is None else to_si(sampling, "frequency", "solver.sampling")
     if rate is None or rate < wanted:
         shown = "none" if rate is None else f"{rate:g} Hz"
         raise InputError(

@@ -8,7 +8,6 @@ A run that begins with unstable steady sliding reports this.
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields
 from functools import partial
@@ -21,9 +20,8 @@ import numpy as np
 from asperity import materials
 from asperity.errors import InputError
 from asperity.outputs import Interrupted, UnfinishedOutput, output_file, require_disk, undisturbed
-from asperity.parameters.arguments import file_path, function, switch
-from asperity.protocol.load import load_protocol
-from asperity.protocol.protocol import Protocol
+from asperity.parameters.arguments import FilePath, typed
+from asperity.protocol.protocol import Protocol, load_protocol
 from asperity.protocol.run_file import CHUNKS, append, describe
 from asperity.theory import closed_forms as cf
 from asperity.transients import Checkpoint, Trajectory, integrate_blocks
@@ -31,7 +29,7 @@ from asperity.transients import Checkpoint, Trajectory, integrate_blocks
 if TYPE_CHECKING:
     import xarray
 
-    from asperity.protocol.protocol import Protocol
+    from asperity.protocol.protocol import Protocol, load_protocol
 
 
 #: Growth per slip distance (1/m) that counts as zero, far below that of any interface.
@@ -404,9 +402,10 @@ def _attributes(protocol: Protocol, done: RunProgress) -> dict[str, Any]:
     }
 
 
+@typed
 def run_experiment(
-    protocol: Protocol | str | os.PathLike[str],
-    out: str | os.PathLike[str],
+    protocol: Protocol | FilePath,
+    out: FilePath,
     *,
     resume: bool = False,
     progress: Callable[[float, float], None] | None = None,
@@ -433,9 +432,5 @@ def run_experiment(
     InputError
         If the protocol has a mistake, or `out` cannot be written.
     """
-    chosen = protocol
-    if not isinstance(chosen, Protocol):
-        chosen = load_protocol(file_path(chosen, "protocol"))
-    target = file_path(out, "out")
-    resume, progress = switch(resume, "resume"), function(progress, "progress")
-    return run_protocol(chosen, target, resume=resume, progress=progress)
+    chosen = protocol if isinstance(protocol, Protocol) else load_protocol(protocol)
+    return run_protocol(chosen, Path(out), resume=resume, progress=progress)

@@ -142,14 +142,13 @@ def require_unit(value: Any, kind: str, field: str = "") -> Any:
     InputError
         For a bare number in a file.
     """
-    if _units_required.get():
-        for mistake in without_unit([(field, kind, value)]):
-            raise mistake
+    for mistake in without_unit([(field, kind, value)]):
+        raise mistake
     return value
 
 
 def without_unit(numbers: Iterable[tuple[str, str, Any]]) -> list[InputError]:
-    """Mistakes about bare numbers where a unit is needed: a file says what it means.
+    """Mistakes about bare numbers where a unit is needed: in files, which say what they mean.
 
     Parameters
     ----------
@@ -159,7 +158,7 @@ def without_unit(numbers: Iterable[tuple[str, str, Any]]) -> list[InputError]:
     mistakes: dict[str, InputError] = {}
     for place, kind, value in numbers:
         number = isinstance(value, int | float) and not isinstance(value, bool)
-        if number and np.isfinite(value) and KINDS[kind].si:
+        if _units_required.get() and number and np.isfinite(value) and KINDS[kind].si:
             advice = f"write it like '{KINDS[kind].example}'"
             mistake = InputError(place, "carry a unit", shown(value), advice)
             mistakes.setdefault(str(mistake), mistake)

@@ -78,16 +78,16 @@ def record(name: str, seed: int = 0) -> Trace:
     InputError
         If there is no sample of this name, or the seed is no whole number from 0.
     """
-    from asperity.parameters.arguments import whole_number
     from asperity.protocol import record_run, run_protocol
 
-    count = whole_number(seed, "samples.seed", 0)
+    if not (type(seed) is int and seed >= 0):
+        raise InputError("samples.seed", "be a whole number from 0", seed, "correct it")
     wanted = protocol(name)
     assert wanted.setup is not None, f"{name}.toml has no instrument"
     with TemporaryDirectory(prefix="asperity-") as folder:
         motion = Path(folder) / "motion.nc"
         run_protocol(wanted, motion)
-        return record_run(replace(wanted.setup, seed=count), motion)
+        return record_run(replace(wanted.setup, seed=seed), motion)
 
 
 def velocity_steps(seed: int = 0) -> Trace:

@@ -15,7 +15,6 @@ from asperity.errors import InputError
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.parameters import DRIVE, MACHINE, obeying
-from asperity.parameters.arguments import instance, switch
 from asperity.slider.inertial import Inertial, RadiatingAsperities, StiffInertial
 from asperity.slider.motion import Motion
 from asperity.slider.quasi_static import QuasiStatic
@@ -117,8 +116,6 @@ def checked_problem(
     InputError
         If a value breaks its rule; as `equation_of_motion`.
     """
-    checked_slider(slider)
-    inertia = switch(inertia, "inertia")
     V = DRIVE["V"].check(velocity)
     f = DRIVE["frequency"].check(frequency)
     load = chosen_modulation(epsilon, modulation)
@@ -127,17 +124,6 @@ def checked_problem(
         # In a table 0 means no damping; as an argument 0 is a mistake.
         eta = obeying(radiation_damping, MACHINE["eta"].label, "damping", "positive")
     return Problem(equation_of_motion(slider, V, 2 * np.pi * f, inertia=inertia, eta=eta), load)
-
-
-def checked_slider(slider: Any) -> Slider:
-    """Check that an argument is a slider.
-
-    Raises
-    ------
-    InputError
-        For anything else.
-    """
-    return instance(slider, Slider, "slider", "build one as asperity.Slider(law, spring=, load=)")
 
 
 def chosen_modulation(epsilon: Any, modulation: Modulation | None) -> Modulation:

@@ -9,7 +9,7 @@ from jax.typing import ArrayLike
 from asperity.laws import Law
 from asperity.laws.consistency import checked_law
 from asperity.parameters import MACHINE
-from asperity.parameters.arguments import instance
+from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import Displayed, SummaryLine, parameter_line
 
 
@@ -33,6 +33,7 @@ class Slider(Displayed, eqx.Module):
     W0: ArrayLike
     M: ArrayLike
 
+    @typed
     def __init__(
         self,
         law: Law,
@@ -59,9 +60,7 @@ class Slider(Displayed, eqx.Module):
             If a value breaks its rule or has a unit of another kind, or a user's law fails
             `asperity.laws.consistency.checked_law`.
         """
-        # A law with traced fields is an instance of its class, too.
-        advice = "build one such as material.law('elasto-plastic')"
-        self.law = checked_law(instance(law, Law, "slider.law", advice))
+        self.law = checked_law(law)
         self.K = jnp.asarray(MACHINE["K"].check(spring))
         self.W0 = jnp.asarray(MACHINE["W0"].check(load))
         self.M = jnp.asarray(MACHINE["M"].check(mass))

@@ -19,7 +19,7 @@ import numpy as np
 from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters, canonical_name
 from asperity.parameters.arguments import shown
-from asperity.questions.record import without_unit
+from asperity.questions.record import units_required, without_unit
 from asperity.study.axes import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
 from asperity.study.plan import PlanError, SweepPlan
 from asperity.study.points import RATIOS, Points
@@ -44,11 +44,12 @@ def load_plan(path: str | os.PathLike[str]) -> SweepPlan:
     plan = SweepPlan.from_file(path, folder=Path(path).parent)
     # `plan_record` reports mistakes in the laws; here they would be reported twice.
     known = known_names(laws_named(plan, []), plan.solve)
-    mistakes = without_unit(
-        (place, known[name].kind, value)
-        for place, written, value in _numbers(plan)
-        if (name := canonical_name(written, known)) is not None
-    )
+    with units_required():
+        mistakes = without_unit(
+            (place, known[name].kind, value)
+            for place, written, value in _numbers(plan)
+            if (name := canonical_name(written, known)) is not None
+        )
     if mistakes:
         raise PlanError(mistakes, str(path))
     return plan

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, PositiveInt, model_validator
 
@@ -183,7 +183,7 @@ class SweepPlan(Question):
     material: str = ""
     parameters: Mapping[str, Given] = {}
     solve: Literal["periodic", "threshold", "transient", "fit"] = "periodic"
-    outputs: tuple[str, ...] | None = None
+    outputs: Annotated[tuple[str, ...], Field(min_length=1)] | None = None
     seed: int = Field(default=0, ge=0)
     chunk: PositiveInt | None = None
     threshold: ThresholdTable = ThresholdTable()

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from asperity._version import __version__
 from asperity.errors import InputError, listed
@@ -21,7 +21,7 @@ from asperity.laws import get_law
 from asperity.materials import cited_works, load_from
 from asperity.orbit.search import available_cores
 from asperity.outputs import differences, free_disk, require_disk, require_short, size_text
-from asperity.parameters.arguments import file_path, whole_number
+from asperity.parameters.arguments import FilePath, at_least, typed
 from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
 from asperity.study.grid import SweepGrid, load_plan
@@ -67,12 +67,13 @@ class SweepSummary:
     lost: int
 
 
+@typed
 def run_sweep(
     plan: SweepPlan | str | os.PathLike[str],
-    out: str | os.PathLike[str],
+    out: FilePath,
     *,
-    workers: int | Workers | None = None,
-    cluster: int | None = None,
+    workers: Annotated[int, at_least(1)] | Workers | None = None,
+    cluster: Annotated[int, at_least(1)] | None = None,
     address: str | None = None,
     extend_store: bool = False,
     retry_failed: bool = False,
@@ -110,7 +111,7 @@ def run_sweep(
     InputError
         If the plan has mistakes, the store has another plan or is in use, or the disk is full.
     """
-    path = file_path(out, "out").resolve()
+    path = Path(out).resolve()
     require_short(path, (fresh_folder(path), lock_file(path)))
     log = log or _silent
     text = ""
@@ -157,12 +158,12 @@ def _workers(
             "leave all but one out"
         )
     if cluster is not None:
-        return local_cluster(whole_number(cluster, "cluster", least=1))
+        return local_cluster(cluster)
     if address is not None:
         return scheduler(address)
     if isinstance(workers, Workers):
         return nullcontext(workers)
-    count = available_cores() if workers is None else whole_number(workers, "workers", least=1)
+    count = available_cores() if workers is None else workers
     return local_processes(count)
 
 

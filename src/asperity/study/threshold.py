@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import Annotated, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +18,9 @@ from asperity.errors import InputError
 from asperity.laws import Law
 from asperity.outputs import require_memory
 from asperity.parameters import DRIVE, law_parameters
-from asperity.parameters.arguments import number, pair, switch, whole_number
+from asperity.parameters.arguments import at_least, number, typed
 from asperity.slider import Slider
 from asperity.slider.named import slider_values
-from asperity.slider.problem import checked_slider
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.points import POINT_BYTES, Float
 from asperity.study.responses import answers_of_law, bifurcation_kinds
@@ -181,6 +180,7 @@ class StiffnessThreshold:
     result: NDArray[np.object_]
 
 
+@typed
 def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, float]:
     """K_c (N/m) and the stick-slip frequency f_c (Hz) at K_c, of rigid asperities.
 
@@ -199,7 +199,6 @@ def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, fl
     InputError
         If the law has no A, B or D0.
     """
-    checked_slider(slider)
     if not {"A", "B", "D0"} <= set(law_parameters(type(slider.law))):
         raise InputError(
             f"law must have A, B and D0 for a critical stiffness in closed form, got "
@@ -212,6 +211,7 @@ def natural_scales(slider: Slider, velocity: ArrayLike | str) -> tuple[float, fl
     return excess * p["W0"] / p["D0"], float(frequency)
 
 
+@typed
 def stiffness_threshold(
     slider: Slider,
     *,
@@ -221,7 +221,7 @@ def stiffness_threshold(
     inertia: bool = False,
     radiation_damping: ArrayLike | str | None = None,
     between: tuple[Any, Any] | None = None,
-    scan: int = 24,
+    scan: Annotated[int, at_least(2)] = 24,
 ) -> StiffnessThreshold:
     """The highest stiffness at which the leading multiplier passes the unit circle.
 
@@ -248,8 +248,6 @@ def stiffness_threshold(
     InputError
         If a number breaks its rule, or the law has no K_c and `between` is not given.
     """
-    checked_slider(slider)
-    inertia, scan = switch(inertia, "inertia"), whole_number(scan, "scan", least=2)
     eps, f = DRIVE["epsilon"].check(epsilon), DRIVE["frequency"].check(frequency)
     try:
         eps, f = np.broadcast_arrays(eps, f)
@@ -418,9 +416,7 @@ def _ends(slider: Slider, velocity: Any, between: tuple[Any, Any] | None) -> tup
                 f"K_c = {critical:g} N/m; give two stiffnesses"
             )
         return _BETWEEN[0] * critical, _BETWEEN[1] * critical
-    low, high = (
-        number(end, "between", "stiffness", "positive") for end in pair(between, "between")
-    )
+    low, high = (number(end, "between", "stiffness", "positive") for end in between)
     if not low < high:
         raise InputError(
             f"between must go from a softer to a stiffer spring, got {low:g} to {high:g} N/m; "

@@ -32,7 +32,7 @@ from asperity.errors import InputError
 from asperity.laws import Law, PerrinRiceZheng, RiceRuina, RuinaSlip
 from asperity.loads import Excitation
 from asperity.parameters import obeying
-from asperity.parameters.arguments import instance, number
+from asperity.parameters.arguments import number, typed
 from asperity.slider import QuasiStatic, Slider
 
 Float = NDArray[np.float64]
@@ -43,6 +43,7 @@ _BISECTIONS = 60
 _DECADE = math.log(10)
 
 
+@typed
 def decay_rates(law: Law, velocity: float | str) -> NDArray[np.complex128]:
     """Rates per slip (1/m) at which states relax to steady sliding at imposed velocity.
 
@@ -59,7 +60,6 @@ def decay_rates(law: Law, velocity: float | str) -> NDArray[np.complex128]:
         Eigenvalues of -d(state rate)/d(state) over the velocity, by rising real part: 1/D0 of the
         three laws above.
     """
-    law = instance(law, Law, "law", "build one such as material.law('rice-ruina')")
     V = jnp.asarray(number(velocity, "decay_rates.velocity", "velocity", "positive"))
     one = jnp.ones(())
 
@@ -70,6 +70,7 @@ def decay_rates(law: Law, velocity: float | str) -> NDArray[np.complex128]:
     return np.sort_complex(-np.linalg.eigvals(np.asarray(jax.jacfwd(rates)(steady)))) / float(V)
 
 
+@typed
 def critical_stiffness(law: Law, velocity: float | str) -> float:
     """Largest stiffness K/W0 (1/m) at which steady sliding is unstable, without inertia.
 

@@ -33,8 +33,8 @@ from asperity.algebra.small_systems import jacobian_columns, solve_points
 from asperity.errors import InputError
 from asperity.loads import Excitation
 from asperity.parameters import DRIVE, MACHINE, obeying
+from asperity.parameters.arguments import typed
 from asperity.slider import Motion, Slider, equation_of_motion
-from asperity.slider.problem import checked_slider
 
 #: (Y, w, dw/dtheta): the three arguments of the rates.
 RateArguments: TypeAlias = tuple[Array, Array, Array]
@@ -120,6 +120,7 @@ class PerturbationResponse(eqx.Module):
         )
 
 
+@typed
 def perturbation_response(
     slider: Slider,
     *,
@@ -154,7 +155,6 @@ def perturbation_response(
         If the velocity or the frequency is not positive, or has a wrong unit; as
         `asperity.slider.equation_of_motion`.
     """
-    checked_slider(slider)
     V = jnp.asarray(DRIVE["V"].check(velocity))
     f = jnp.asarray(DRIVE["frequency"].check(frequency))
     eta = None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import jax
 import jax.numpy as jnp
@@ -13,12 +13,11 @@ from asperity.algebra.small_systems import jacobian_columns, solve_points
 from asperity.errors import InputError
 from asperity.laws import Law, State
 from asperity.loads import Excitation, Programme
-from asperity.parameters.arguments import instance, number, one_of, switch
+from asperity.parameters.arguments import number, typed
 from asperity.slider import Motion, Slider, equation_of_motion, reversing
-from asperity.slider.problem import checked_slider
 from asperity.transients.equations import SegmentEquations, states_after_jump
 from asperity.transients.events import EventThresholds
-from asperity.transients.integration import METHODS, NO_LOAD, Checkpoint, Integration, Tolerances
+from asperity.transients.integration import NO_LOAD, Checkpoint, Integration, Tolerances
 
 #: Number and largest length of the Newton steps for the states of the law under another load.
 _STEPS, _LEAP = 30, 2.0
@@ -177,6 +176,7 @@ _RUNAWAY, _RUNAWAY_RATIO = 1.0, 1e3
 MOST_STEPS = 200_000_000
 
 
+@typed
 def checked_integration(
     slider: Slider,
     programme: Programme,
@@ -188,7 +188,7 @@ def checked_integration(
     slip_velocity: float | str | None = None,
     runaway_velocity: float | str | None = None,
     steady_tolerance: float = 1e-4,
-    method: str = "auto",
+    method: Literal["auto", "explicit", "implicit"] = "auto",
     most_steps: float = MOST_STEPS,
 ) -> Integration:
     """An integration before its first step; parameters as in `transient`.
@@ -198,10 +198,6 @@ def checked_integration(
     InputError
         If a value breaks its rule.
     """
-    checked_slider(slider)
-    advice = "build one as asperity.loads.Programme(steps..., load=, velocity=)"
-    programme = instance(programme, Programme, "programme", advice)
-    inertia = switch(inertia, "inertia")
     eta = None
     if radiation_damping is not None:
         eta = _positive(radiation_damping, "damping", "radiation_damping")
@@ -211,7 +207,6 @@ def checked_integration(
             f"rtol must lie between 1e-13 and 0.01, got {rtol:g}; give one such as 1e-8"
         )
     atol = rtol / 100 if atol is None else _positive(atol, "dimensionless", "atol")
-    method = one_of(method, METHODS, "method")
     if not slider.law.rate_dependent:
         raise InputError(
             f"law must depend on velocity for a transient, got '{slider.law.name}', whose force "

@@ -139,8 +139,6 @@ def _steps_left(chunk: StepChunk, t: float, end: float) -> float:
     return left / length if length > 0 else math.inf
 
 
-METHODS = ("auto", "explicit", "implicit")
-
 #: Names of the methods in results.
 NAMES = {explicit: "explicit", implicit: "implicit"}
 
@@ -163,7 +161,7 @@ class MethodChoice:
     ----------
     motion : Motion
     method : str
-        One of `METHODS`.
+        "auto", "explicit" or "implicit".
     """
 
     def __init__(self, motion: Motion, method: str) -> None:

@@ -7,16 +7,15 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from asperity._jax import spare_mappings
 from asperity.loads import Programme
 from asperity.outputs import require_memory
-from asperity.parameters.arguments import instance
+from asperity.parameters.arguments import typed
 from asperity.slider import Slider
-from asperity.slider.problem import checked_slider
 from asperity.transients.equations import motion_samples
 from asperity.transients.events import Event
 from asperity.transients.inputs import MOST_STEPS, checked_integration, first_checkpoint
@@ -174,6 +173,7 @@ class _BlockWriter:
         return trajectory
 
 
+@typed
 def transient(
     slider: Slider,
     programme: Programme,
@@ -187,7 +187,7 @@ def transient(
     slip_velocity: float | str | None = None,
     runaway_velocity: float | str | None = None,
     steady_tolerance: float = 1e-4,
-    method: str = "auto",
+    method: Literal["auto", "explicit", "implicit"] = "auto",
     most_steps: float = MOST_STEPS,
     progress: Callable[[float, float], None] | None = None,
 ) -> Trajectory:
@@ -253,9 +253,6 @@ def transient(
     segment, ringing below the velocity sqrt(lambda W0 / M) times the tolerated error of F_i/W is
     left out; `provenance` gives it as ``unresolved_ringing`` (m/s), 0 where all is resolved.
     """
-    slider = checked_slider(slider)
-    advice = "build one as asperity.loads.Programme(steps..., load=, velocity=)"
-    programme = instance(programme, Programme, "programme", advice)
     rows = planned_rows(sampling, programme.duration)
     if rows is not None:
         # The factor 2: the blocks, and the joined trajectory.

@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError
-from asperity.units import KINDS, to_si
+from asperity.parameters.arguments import number
+from asperity.units import KINDS
 
 Array = NDArray[np.float64]
 
@@ -203,7 +204,7 @@ class Sensor:
             kind = _KINDS.get(field.name, self.kind)
             name = f"{type(self).__name__}.{field.name}"
             stated = getattr(self, field.name)
-            value = to_si(stated, "dimensionless" if field.name == "drift" else kind, name)
+            value = number(stated, name, "dimensionless" if field.name == "drift" else kind)
             low = field.name not in ("offset", "drift")
             if low and (value < 0 or (value == 0 and field.name in _POSITIVE)):
                 rule = "positive" if field.name in _POSITIVE else "not negative"

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity.errors import InputError
+from asperity.parameters.arguments import number
 from asperity.recording.defects.check import check
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel, Trace
@@ -68,7 +69,7 @@ class Recorder:
             stated = getattr(self, name)
             if stated is None:
                 continue
-            value = to_si(stated, kind, f"Recorder.{name}")
+            value = number(stated, f"Recorder.{name}", kind)
             if value < 0 or (value == 0 and name != "jitter"):
                 raise InputError(
                     f"Recorder.{name} must be positive, got {value:g} {KINDS[kind].si}; "

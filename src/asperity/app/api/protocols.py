@@ -25,7 +25,6 @@ from asperity.protocol import (
     write_csv,
 )
 from asperity.protocol import run_protocol as run_to_file
-from asperity.protocol.load import protocol_of
 
 #: Rows of a motion (bytes in its file).
 _LARGEST_MOTION = 256 * 1024**2
@@ -48,7 +47,7 @@ def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
     if refused:
         return None, refused
     try:
-        protocol = protocol_of(content)
+        protocol = Protocol.of_content(content)
         _ = protocol.rows  # what the solver's table says is read here
         return protocol, []
     except ProtocolError as error:

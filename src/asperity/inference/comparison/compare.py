@@ -41,6 +41,7 @@ from asperity.inference.unknowns import MissingNumberError
 from asperity.laws import get_law, registered
 from asperity.materials import Material
 from asperity.parameters import law_parameters
+from asperity.parameters.arguments import typed
 
 #: Called with how many laws are done, parts of one included.
 Report = Callable[[float], None]
@@ -123,6 +124,7 @@ class Comparison:
         )
 
 
+@typed
 def compare(
     data: Data | Iterable[Data],
     laws: Sequence[str],

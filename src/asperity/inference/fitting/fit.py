@@ -61,6 +61,7 @@ from asperity.inference.unknowns import Prior, material_priors, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.materials import Material
 from asperity.parameters import law_parameters
+from asperity.parameters.arguments import typed
 from asperity.recording import Trace
 
 #: The level of sliding (dimensionless; m/s), for data that are counted from it.
@@ -69,6 +70,7 @@ _OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
 Data = LockInTable | HealingTable | RecordedRun | Trace
 
 
+@typed
 def fit(
     data: Data | Iterable[Data],
     law: str | type[Law],

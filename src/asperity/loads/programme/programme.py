@@ -14,7 +14,7 @@ from jax.typing import ArrayLike
 from asperity.errors import InputError
 from asperity.loads.programme.segment import ProgrammeSegment
 from asperity.loads.programme.steps import LoadAndVelocity, ProgrammeStep
-from asperity.parameters.arguments import number
+from asperity.parameters.arguments import number, typed
 
 #: Relative distance to a break point within which a time counts as the break point itself: sums of
 #: durations and multiples of a sampling interval are not the same doubles.
@@ -47,6 +47,7 @@ class Programme:
     starts: np.ndarray
     last: LoadAndVelocity
 
+    @typed
     def __init__(
         self,
         *steps: ProgrammeStep,
@@ -80,11 +81,6 @@ class Programme:
         segments: list[ProgrammeSegment] = []
         reached = level
         for i, step in enumerate(steps):
-            if not isinstance(step, ProgrammeStep):
-                raise InputError(
-                    f"{name}.steps[{i}] must be a step, got a {type(step).__name__}; "
-                    "take one of asperity.loads, such as Slide('10 s')"
-                )
             new, reached = step.lay_out(reached, f"{name}.steps[{i}]")
             segments.extend(new)
         if not segments:

@@ -15,7 +15,7 @@ from asperity.loads.modulation import Modulation
 from asperity.loads.programme.formulas import HarmonicSegment, PeriodicSegment
 from asperity.loads.programme.recorded import RecordedSegment, interpolated
 from asperity.loads.programme.segment import ProgrammeSegment
-from asperity.parameters.arguments import number
+from asperity.parameters.arguments import number, typed
 from asperity.units import to_radians, to_si
 
 #: A number in SI, or a text with its unit.
@@ -191,6 +191,7 @@ class Modulate(ProgrammeStep):
         return segments, level
 
 
+@typed
 @dataclass(frozen=True)
 class CyclicLoading(ProgrammeStep):
     """A periodic modulation of any form, relative to the present load and velocity.

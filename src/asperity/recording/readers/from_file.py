@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from asperity.errors import InputError, printable
-from asperity.parameters.arguments import file_path
+from asperity.parameters.arguments import FilePath, typed
+from asperity.questions.recording import ReadingRecipe, Source
 from asperity.recording.derived import derive
 from asperity.recording.finding import Finding
 from asperity.recording.readers.assemble import assemble
@@ -21,8 +22,6 @@ from asperity.recording.readers.formats import raw_recording
 from asperity.recording.roles import role_of
 
 if TYPE_CHECKING:
-    from asperity.questions.recording import Source
-    from asperity.recording.recipe import ReadingRecipe
     from asperity.recording.trace import Trace
 
 
@@ -30,13 +29,14 @@ if TYPE_CHECKING:
 _LONGEST = 1200
 
 
+@typed
 def read(
-    path: str | os.PathLike[str],
+    path: FilePath,
     columns: Mapping[str, str | int] | None = None,
     units: Mapping[str, str] | None = None,
     *,
     channels: Mapping[str, str] | None = None,
-    recipe: ReadingRecipe | str | os.PathLike[str] | None = None,
+    recipe: ReadingRecipe | FilePath | None = None,
     rate: float | str | None = None,
     group: str | None = None,
     delimiter: str | None = None,
@@ -86,15 +86,13 @@ def read(
     InputError
         If the file cannot be read, or can be read in more than one way.
     """
-    from asperity.recording.recipe import ReadingRecipe, load_recipe
-
     if recipe is not None and not isinstance(recipe, ReadingRecipe):
-        recipe = load_recipe(recipe)
+        recipe = ReadingRecipe.from_file(recipe)
     rules = ReadingRecipe() if recipe is None else recipe
     layout = {"group": group, "delimiter": delimiter, "decimal": decimal}
     rate = rules.rate if rate is None else rate
     expressions = {**rules.channels, **(channels or {})}
-    file = file_path(path, "recording.path")
+    file = Path(path)
     with _quiet() as warned:
         clock = [name for name in expressions if role_of(name) == "time"]
         if clock and rate is None:

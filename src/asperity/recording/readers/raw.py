@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, closest
+from asperity.parameters.arguments import typed
 from asperity.recording.finding import Finding, with_cause
 
 #: Names as `plain` has them: of a sampling rate (Hz), of an interval (s), of the lists that name
@@ -31,6 +32,7 @@ _MOST_COLUMNS = 256
 _HEAD = 4096
 
 
+@typed
 @dataclass(frozen=True, eq=False)
 class RawColumn:
     """A column as recorded.
@@ -57,15 +59,10 @@ class RawColumn:
     unit: str | None = None
 
     def __post_init__(self) -> None:
-        label: Any = self.label
-        unit: Any = self.unit
-        values: Any = self.values
-        if not isinstance(label, str) or not (unit is None or isinstance(unit, str)):
-            raise TypeError(f"label and unit of a RawColumn are texts, got {label!r} and {unit!r}")
-        if not isinstance(values, np.ndarray) or values.ndim != 1:
+        if self.values.ndim != 1:
             raise InputError(
-                f"RawColumn.values must be an array of one dimension, got something else in "
-                f"'{label}'; write numpy.asarray around it"
+                f"RawColumn.values must be an array of one dimension, got {self.values.ndim} in "
+                f"'{self.label}'; correct the reader"
             )
 
 

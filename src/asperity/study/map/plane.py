@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from asperity.errors import InputError
 from asperity.laws import Law
 from asperity.operating_point import known_parameters, without_mass
 from asperity.parameters import Parameter, canonical_name, suggestion
-from asperity.parameters.arguments import number, shown, switch, whole_number
+from asperity.parameters.arguments import at_least, number, shown, typed
 from asperity.study.outcome import Answers
 from asperity.study.points import Float
 from asperity.study.responses import answers_of_law
@@ -25,6 +25,7 @@ OUTPUTS = ("mean_friction", "delta_mu", "mu1", "mu2", "phase1", "phase2", *STABI
 _AXIS = re.compile(r"\s*([\w]+)\s*=\s*([^:\s]+)\s*:\s*([^:\s]+)\s*:\s*(\d+)(?:\s+|(?=%))(.*)")
 
 
+@typed
 @dataclass(frozen=True)
 class Axis:
     """A number that varies along a side of a map.
@@ -50,7 +51,7 @@ class Axis:
     name: str
     low: float | str
     high: float | str
-    count: int
+    count: Annotated[int, at_least(0)]
     log: bool = False
 
     def __post_init__(self) -> None:
@@ -60,8 +61,6 @@ class Axis:
             value = getattr(self, end)
             si = number(value, parameter.label, parameter.kind, parameter.rule)
             object.__setattr__(self, end, si)
-        object.__setattr__(self, "count", whole_number(self.count, f"axis of {self.name}", 0))
-        object.__setattr__(self, "log", switch(self.log, "axis.log"))
         if not self._ends[0] < self._ends[1]:
             raise InputError(
                 f"axis of {self.name} must go from a smaller to a larger value, got "

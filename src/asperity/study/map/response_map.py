@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import dataclasses
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from asperity.errors import InputError
@@ -18,7 +17,7 @@ from asperity.operating_point import (
 )
 from asperity.outputs import UnfinishedText, output_file, require_memory, written_file
 from asperity.parameters import MODULATION, point_parameters
-from asperity.parameters.arguments import function, instance, switch
+from asperity.parameters.arguments import FilePath, typed
 from asperity.study.engine import solve_here
 from asperity.study.map.boundary import MapBoundary, trace_boundary
 from asperity.study.map.dataset import as_dataset
@@ -36,6 +35,7 @@ _CHUNK = 4800
 _POINT_BYTES = 500.0
 
 
+@typed
 def response_map(
     law: str,
     numbers: Mapping[str, Any],
@@ -90,13 +90,14 @@ def response_map(
     detected.
     """
     plane, origins = _plane(law, numbers, x, y)
-    grid = _solved(plane, None, function(progress, "progress") or _silent, _CHUNK)
-    traced = trace_boundary(plane, grid) if switch(boundary, "boundary") else MapBoundary.empty()
+    grid = _solved(plane, None, progress or _silent, _CHUNK)
+    traced = trace_boundary(plane, grid) if boundary else MapBoundary.empty()
     return as_dataset(plane, grid, traced, origins)
 
 
+@typed
 def write_map(
-    out: Path,
+    out: FilePath,
     law: str,
     numbers: Mapping[str, Any],
     *,
@@ -171,10 +172,6 @@ def _plane(
     law: str, numbers: Mapping[str, Any], x: Axis, y: Axis
 ) -> tuple[MapPlane, dict[str, str]]:
     """The checked plane, and the origin of each fixed number."""
-    advice = "build one as asperity.study.map.Axis('epsilon', 0.0, 0.5, 20)"
-    x, y = instance(x, Axis, "x", advice), instance(y, Axis, "y", advice)
-    advice = "give a dictionary such as {'V': '1 um/s'}"
-    numbers = instance(numbers, Mapping, "numbers", advice)
     if x.name == y.name:
         raise InputError(
             f"axes must be two numbers, got '{x.name}' on both; choose another one for y"

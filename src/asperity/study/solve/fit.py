@@ -22,7 +22,7 @@ from asperity.parameters import (
     canonical_name,
     point_parameters,
 )
-from asperity.parameters.arguments import some_of
+from asperity.parameters.arguments import one_of
 from asperity.parameters.toml_file import file_content
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.plan import FitTable, SweepPlan
@@ -117,7 +117,7 @@ class FitSolve(SolveKind):
         known = list(_outputs(_free(_table(plan)), {}))
         if plan.outputs is None:
             return tuple(known)
-        return tuple(dict.fromkeys(some_of(plan.outputs, known, "outputs")))
+        return tuple(dict.fromkeys(one_of(o, known, "outputs") for o in plan.outputs))
 
     def known_outputs(self, record: Mapping[str, Any]) -> dict[str, Output]:
         """As in `SolveKind`."""

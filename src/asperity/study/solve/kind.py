@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from asperity.errors import InputError
 from asperity.outputs import require_memory
 from asperity.parameters import Output, Parameter
-from asperity.parameters.arguments import some_of
+from asperity.parameters.arguments import one_of
 from asperity.study.outcome import Answers
 from asperity.study.plan import SweepPlan
 from asperity.study.points import POINT_BYTES, Points
@@ -58,7 +58,7 @@ class SolveKind(ABC):
         if plan.outputs is None:
             return self.defaults
         known = [output.name for output in self.outputs]
-        return tuple(dict.fromkeys(some_of(plan.outputs, known, "outputs")))
+        return tuple(dict.fromkeys(one_of(o, known, "outputs") for o in plan.outputs))
 
     def settings(self, plan: SweepPlan) -> dict[str, Any]:
         """Settings of this kind of solve in a plan, as JSON values."""
