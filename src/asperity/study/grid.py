@@ -124,7 +124,7 @@ class SweepGrid:
         if grid.points > _MOST_POINTS:
             raise PlanError(
                 [
-                    f"axes must come to at most {_MOST_POINTS:.3g} points, got "
+                    f"axes must give at most {_MOST_POINTS:.3g} points, got "
                     f"{' x '.join(map(shown, grid.shape))}; shorten them"
                 ]
             )

@@ -283,7 +283,7 @@ def _run(
         raise InputError(
             f"workers must run until the sweep ends, got no answer any more ({workers.about}) "
             f"after {counts.points:,} of {counts.total:,} points; start a cluster and repeat the "
-            "command, which goes on from there"
+            "command, which continues from there"
         ) from None
     finally:
         with contextlib.suppress(OSError):
@@ -312,7 +312,7 @@ def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
         done = f" after {counts.points:,} of {counts.total:,} points" if counts else ""
         raise InputError(
             f"out must be a folder that can be written, got '{path.name}' ({why}, {room} free)"
-            f"{done}; make room and repeat the command, which goes on from there"
+            f"{done}; make room and repeat the command, which continues from there"
         ) from None
 
 

@@ -1,8 +1,7 @@
 """Known orbits on collocation meshes, initial guesses at nearby parameters.
 
-A fit calls again and again with the same points and parameters that change little. From the orbits
-of the call before, Newton's method needs a few steps, where a search from nothing takes ten times
-as long.
+A fit calls many times with the same points and slightly changed parameters. From the orbits of the
+call before, Newton's method needs a few steps; a search without them takes ten times as long.
 """
 
 from __future__ import annotations
@@ -96,11 +95,11 @@ Float = NDArray[np.float64]
 
 #: Number of intervals of the meshes of stored orbits.
 KEPT = 216
-#: Intervals of the mesh that is compared with the first one on which orbits are differentiated.
+#: Intervals of the mesh that is compared with the first mesh for derivatives.
 COARSER = FIRST_MESH
-#: Largest relative change of mean and harmonics from a mesh to the next at which the finer serves:
-#: its own error is smaller by 3^8, for a stiff orbit by 3^4. The same of the last mesh, as good as
-#: the whole search.
+#: Largest relative change of mean and harmonics between two meshes for which the finer one is
+#: accurate (its error is smaller by 3^8, for a stiff orbit by 3^4); and this limit for the last
+#: mesh, equal to the accuracy of the whole search.
 _AGREEMENT, _LAST_AGREEMENT = 1e-8, AGREEMENT
 
 

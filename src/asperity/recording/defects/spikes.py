@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 #: A spike stands out of both samples at these distances. Next neighbours detect it next to a
-#: fast modulation; those farther off see spikes that last longer than a sample.
+#: fast modulation; more distant samples detect spikes longer than a sample.
 _DISTANCES = (1, 3)
-#: How far it stands out, in usual differences of samples so far apart. White noise of 1e8 samples
-#: reaches seven, a sine 1.6.
+#: Smallest size of a spike, in usual differences of samples at that distance. White noise of 1e8
+#: samples reaches 7, a sine 1.6.
 _OUT = 10.0
 #: Samples of a chunk with a common usual difference; they fit into the second-level cache.
 _CHUNK = 1 << 14
@@ -30,8 +30,9 @@ _CHUNK = 1 << 14
 _SIDE = 16
 #: Stride of the differences from which the usual difference of a chunk is computed.
 _EVERY = 8
-#: Samples on either side of a change of the drive at which a peak is no spike by itself; samples
-#: beside it whose differences are its own; and how many times as far off as all others a spike is.
+#: Samples on either side of a change of the drive where the stricter rule applies; samples next to
+#: a spike whose differences belong to it; and smallest ratio of a spike to all other differences
+#: there.
 _AT_CHANGE, _ITS_OWN, _CLEARLY = 16, 3, 2.0
 
 

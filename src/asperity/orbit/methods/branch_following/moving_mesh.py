@@ -2,9 +2,9 @@
 
 Under slow modulation the orbit follows an unstable state of sliding for part of the period and
 leaves it in a jump (a canard). Along the branch the jump moves through the period, while the
-parameter hardly changes. At a fixed phase that is a violent change, at a fixed interval
-of a mesh that moves with the orbit it is none: so the change from the last point to this one is
-extrapolated interval by interval, phases included.
+parameter hardly changes. At a fixed phase the states then change strongly; at a fixed interval of a
+mesh that moves with the orbit they hardly change. The prediction therefore extrapolates the states
+and the phases of each interval from the last two points.
 """
 
 from __future__ import annotations
