@@ -338,7 +338,7 @@ class PeriodicResponse(Drawn):
 
 
 def dimension_names(
-    shape: tuple[int, ...], shapes: Mapping[str, tuple[int, ...]], given: Any = None
+    shape: tuple[int, ...], shapes: Mapping[str, tuple[int, ...]], names_given: Any = None
 ) -> tuple[str, ...]:
     """Names of the axes of a grid.
 
@@ -356,13 +356,13 @@ def dimension_names(
     InputError
         If there are not as many names as axes, or a name occurs twice.
     """
-    if given is not None:
-        chosen = [given] if isinstance(given, str) else given
+    if names_given is not None:
+        chosen = [names_given] if isinstance(names_given, str) else names_given
         texts = isinstance(chosen, list | tuple) and all(isinstance(n, str) for n in chosen)
         if texts and len(chosen) == len(set(chosen)) == len(shape):
             return tuple(chosen)
         raise InputError(
-            f"dims must be {len(shape)} different names, one for each axis, got {shown(given)}; "
+            f"dims must be {len(shape)} different names, one for each axis, got {shown(names_given)}; "
             "leave it out to have the axes named by what varies"
         )
     along: dict[str, list[int]] = {}

@@ -97,10 +97,10 @@ def _eliminate_stages(rows: Array) -> Array:
     for _ in range(stages):
         pivot, rest = rows[0, :, :n], rows[0, :, n:]
         inverse = inverse_points([list(row) for row in pivot])
-        pivot = product(jnp.stack([jnp.stack(row) for row in inverse]), rest)
+        solution = product(jnp.stack([jnp.stack(row) for row in inverse]), rest)
         below, rows = rows[1:, :, :n], rows[1:, :, n:]
-        rows = rows - (below[:, :, :, None] * pivot[None, None]).sum(2)
-        solved.append(pivot)
+        rows = rows - (below[:, :, :, None] * solution[None, None]).sum(2)
+        solved.append(solution)
     for j in reversed(range(stages - 1)):
         for later in range(stages - 1, j, -1):
             at = (later - j - 1) * n
