@@ -141,7 +141,7 @@ def interpolated(
     ----------
     time : array, shape (n,)
         Seconds.
-    given : array, shape (n,), or None
+    recorded : array, shape (n,), or None
         Samples; None for the constant `level`.
     level : float
         SI.
