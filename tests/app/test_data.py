@@ -83,6 +83,40 @@ def test_columns_and_units_are_corrected_by_hand(measured, modulated):
     assert "--load Ft" in lines[-1]["result"]["command"]
 
 
+@pytest.fixture(scope="module")
+def sawtooth():
+    """Stick-slip of 30 cycles, as CSV: F/W rises for 0.9 s and falls by DROP in 0.1 s."""
+    phase = (np.arange(15000) / 500.0) % 1.0
+    fall = DROP * (1 + np.cos(np.pi * (phase - 0.9) / 0.1)) / 2
+    friction = 0.4 + np.where(phase < 0.9, DROP * phase / 0.9, fall)
+    friction = friction + 1e-3 * np.random.default_rng(5).normal(size=phase.size)
+    rows = (f"{k / 500.0:.7g},{mu:.7g}" for k, mu in enumerate(friction))
+    return ("time (s),friction\n" + "\n".join(rows) + "\n").encode()
+
+
+DROP = 0.08
+
+
+def test_stick_slip_is_recognised_and_its_events_are_counted(measured, sawtooth):
+    last = measured(sawtooth, "events.csv")[-1]["result"]
+    record = last["measured"]["record"]
+    assert record["mode"] == "stick-slip"
+    assert record["regime"] == "regular stick-slip"
+    # The last fall ends with the recording.
+    assert record["events"] in (29, 30)
+    assert record["drop"] == pytest.approx(DROP, rel=0.02)
+    assert record["stick_duration"] == pytest.approx(0.9, rel=0.03)
+    assert last["command"] == "asperity measure events.csv --stick-slip"
+    # The spring of 168 N/m is loaded by DROP * 0.3 N in 0.9 s, and the slip takes 0.1 s.
+    velocity = DROP * 0.3 / 168 / 0.9
+    options = {"stick_slip": True, "stiffness": "168 N/m", "normal_load": 0.3, "velocity": velocity}
+    machine = measured(sawtooth, "events.csv", options=options)[-1]["result"]
+    assert "--set 'K=168.0 N/m'" in machine["command"]
+    assert "--set 'W0=0.3 N'" in machine["command"]
+    slip = velocity * 1.0
+    assert machine["measured"]["record"]["catalogue"][3]["slip"] == pytest.approx(slip, rel=0.1)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_channels_without_a_finite_value_do_not_matter(modulated, tmp_path, seed):
     """A recorder writes columns of inputs to which nothing is connected."""
@@ -411,6 +445,39 @@ def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modul
     page.get_by_label("Role of Fn").select_option("F")
     again.locator(".sentence", has_text="Modulated at 20 Hz").wait_for()
     good.locator(".message", has_text="must").wait_for()
+
+
+def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(visit, sawtooth, tmp_path):
+    page = visit("#data")
+    page.locator(".drop").wait_for()
+    page.set_input_files(
+        "#data-files", [{"name": "events.csv", "mimeType": "text/csv", "buffer": sawtooth}]
+    )
+    sentence = page.locator(".recording .sentence", has_text="Regular stick-slip: ")
+    sentence.wait_for()
+    count = int(sentence.inner_text().split(": ")[1].split()[0])
+    table = page.get_by_role("region", name="Catalogue of events")
+    assert table.locator("tbody tr").count() == count
+    assert page.locator(".panel.drops .plot .point").count() == count - 1
+    with page.expect_download() as waited:
+        page.get_by_role("button", name="Catalogue as CSV").click()
+    waited.value.save_as(tmp_path / "events.csv")
+    head, *rows = (tmp_path / "events.csv").read_text().splitlines()
+    assert head.startswith("onset (s),end (s)")
+    assert len(rows) == count
+    plot = page.locator(".panel.whole .plot")
+    plot.scroll_into_view_if_needed()
+    box = plot.bounding_box()
+    page.mouse.move(box["x"] + 0.3 * box["width"], box["y"] + 60)
+    page.mouse.down()
+    page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 60, steps=4)
+    page.mouse.up()
+    page.get_by_role("button", name="Measure the whole recording again").wait_for()
+    begin, end = (float(t) for t in page.get_by_label("Window (s)").input_value().split(" to "))
+    assert 0 < begin < end < 30
+    onsets = page.locator(".catalogue tbody td:nth-child(2)").all_inner_texts()
+    assert len(onsets) < count
+    assert begin <= float(onsets[0].split()[0]) <= float(onsets[-1].split()[0]) <= end
 
 
 #: Rate-and-state friction of `steps`, of which a fit finds A, B and D0 in few iterations.

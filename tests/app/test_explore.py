@@ -23,6 +23,33 @@ def test_numbers_are_those_of_the_package(explored):
     assert mean == pytest.approx(float(found.mean_friction), rel=1e-3)
 
 
+def test_the_motion_below_the_threshold_is_stick_slip(ask):
+    """On average the slider moves at V, and what the spring lets go of is the slip."""
+    numbers = {"V": 1e-5, "epsilon": 0.0, "frequency": 120.0, "K": 5e4, "W0": 7.0}
+    question = {"law": "rice-ruina", "numbers": numbers, "growth_rate": 10.0}
+    motion = ask("explore/motion", question).lines[-1]["result"]
+    found = motion["stick_slip"]
+    assert motion["inertia"]
+    assert found["cycles"] > 3
+    assert found["slip"] / found["period"] == pytest.approx(1e-5, rel=0.15)
+    assert found["drop"] * 7.0 / 5e4 == pytest.approx(found["slip"], rel=0.15)
+    assert len(motion["frames"]["place"]) == len(motion["frames"]["force"])
+
+
+def test_the_motion_above_the_threshold_settles_to_the_orbit(ask, explored):
+    numbers = {"V": 1e-5, "epsilon": 0.1, "frequency": 120.0, "K": 1e6}
+    point = explored({"law": "rice-ruina", "numbers": numbers})["point"]
+    question = {"law": "rice-ruina", "numbers": numbers, "growth_rate": point["growth_rate"]}
+    motion = ask("explore/motion", question).lines[-1]["result"]
+    assert "stick_slip" not in motion
+    force = motion["curves"]["force"]
+    last = np.array(force["x"]) > motion["reached"] - 3 / 120
+    low, high = min(point["force"]), max(point["force"])
+    reached = np.array(force["y"])[last]
+    assert reached.min() == pytest.approx(low, abs=0.1 * (high - low))
+    assert reached.max() == pytest.approx(high, abs=0.1 * (high - low))
+
+
 def test_the_link_shows_the_view_and_a_slider_changes_it(visit, record_property):
     page = visit("#explore?law=rice-ruina&laws=&epsilon=0.1&V=2e-6")
     sentence = page.locator(".sentence")

@@ -26,7 +26,7 @@ def stiffness(slow):
         slow.slider,
         x="epsilon",
         y="K",
-        x_span=(0, 0.4),
+        x_span=(0, 0.2),
         y_span=("0.1 N/um", "0.3 N/um"),
         velocity=slow.V,
         frequency=slow.frequency,

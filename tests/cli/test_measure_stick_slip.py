@@ -45,7 +45,7 @@ def test_a_campaign_has_one_row_a_file(asperity, recording, tmp_path) -> None:
     assert [row["kind"] for row in rows] == ["stick-slip"] * 2
     assert float(rows[0]["recurrence"]) == pytest.approx(0.51, rel=0.01)
     assert rows[0]["regime"] == "regular stick-slip"
-    assert float(rows[0]["stiffness"]) == 168
+    assert float(rows[0]["K"]) == 168
 
 
 @pytest.mark.parametrize(

@@ -3,6 +3,7 @@
 import csv
 import importlib.util
 import json
+import math
 import re
 import runpy
 import sys
@@ -21,8 +22,10 @@ sys.modules["snippets"] = pages
 _spec.loader.exec_module(pages)
 
 ROOT = pages.ROOT
-#: Pages whose code takes more than about ten seconds.
+#: Pages whose code takes more than about ten seconds; tests of fits have the same recording as the
+#: tutorial on velocity steps.
 SLOW = {
+    "docs/tutorials/velocity_step.md",
     *("docs/theory/numerical_method.md", "docs/findings.md", "docs/theory/stabilisation.md"),
     "docs/healing.md",
 }
@@ -49,6 +52,8 @@ def workplace(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(registry, "_LAWS", dict(registry._LAWS))
     mpl.use("agg")
+    # However slow the machine is, no page shows a progress bar.
+    monkeypatch.setattr("asperity.cli.progress._IN_LOG", math.inf)
     return tmp_path
 
 

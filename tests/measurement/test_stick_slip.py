@@ -144,7 +144,7 @@ DEFECTS = {
         "sampling",
     ),
     "a drift larger than the drops": (lambda: saw(0, wave=20).force, "drift"),
-    "saturated": (lambda: np.minimum(saw(0, noise=0.02).force, 0.32), "saturation"),
+    "saturated": (lambda: np.minimum(saw(0, events=50, noise=0.02).force, 0.32), "saturation"),
 }
 
 
@@ -160,11 +160,53 @@ def test_the_same_names_without_these_defects_are_ok() -> None:
     assert {c.verdict for c in checks if c.name != "saturation"} == {"ok"}
 
 
-def test_uneven_sampling_is_one_sentence() -> None:
-    trace = recorded(saw(0, events=10).force)
-    uneven = Trace(trace.time + 2e-4 * np.sin(trace.time * 700) ** 2, trace.channels)
-    with pytest.raises(InputError, match="must be sampled evenly"):
-        measure_stick_slip(uneven)
+def test_uneven_sampling_is_resampled_and_a_gap_is_one_sentence() -> None:
+    truth = saw(0, noise=0.02, impulses=0.0)
+    # Up to two fifths of the interval early or late.
+    jitter = np.random.default_rng(1).uniform(-2e-4, 2e-4, truth.time.size)
+    when = np.sort(truth.time + jitter)
+    force = np.interp(when, truth.time, truth.force)
+    force[::250] += 0.06 * np.random.default_rng(3).standard_normal(force[::250].size)
+    keep = np.random.default_rng(2).random(when.size) > 0.002
+    trace = recorded(force)
+    result = measure_stick_slip(
+        Trace(when[keep], {"mu": replace(trace.channels["mu"], values=force[keep])})
+    )
+    assert len(result.events) == truth.onset.size
+    assert np.mean(result.events.drop) == pytest.approx(np.mean(truth.drop), rel=5e-3)
+    np.testing.assert_allclose(result.events.onset, truth.onset, atol=2e-3)
+    gap = (truth.time < 10.0) | (truth.time > 10.01)
+    with pytest.raises(InputError, match=r"without gaps of more than 4 samples .* at 10 s|at 9.9"):
+        measure_stick_slip(
+            Trace(truth.time[gap], {"mu": replace(trace.channels["mu"], values=force[gap])})
+        )
+
+
+def test_the_slip_is_that_of_the_recorded_slider() -> None:
+    """Slips that the stiffness does not tell: the displacement goes before the spring."""
+    truth = saw(0, events=60, noise=0.02)
+    slips = 1e-5 * (1 + 0.3 * np.random.default_rng(3).standard_normal(60))
+    position = np.zeros(truth.time.size)
+    for onset, end, slip in zip(truth.onset, truth.end, slips, strict=True):
+        u = np.clip((truth.time - onset) / (end - onset), 0, 1)
+        position += slip * (1 - np.cos(np.pi * u)) / 2
+    # Moving backwards is a convention of the gauge.
+    gauge = -position + 5e-8 * np.random.default_rng(4).standard_normal(position.size)
+    trace = recorded(truth.force)
+    channels = {**trace.channels, "x": Channel(gauge, "length", "m", "displacement", "m")}
+    result = measure_stick_slip(
+        Trace(trace.time, channels, roles={"displacement": "x"}),
+        machine=Machine(2e4, 1e-5, None, 5.0),
+    )
+    np.testing.assert_allclose(result.slip, slips, atol=1.2e-7)
+    # Half a cosine is steepest in its middle: pi/2 of its mean, by a quarter of it 0.97 of that;
+    # means over a quarter, 5 samples, have noise of 1.3e-5 m/s.
+    fastest = np.pi / 2 * slips / (truth.end - truth.onset)
+    np.testing.assert_allclose(result.slip_velocity, fastest, rtol=0.1, atol=6e-5)
+    # A load point that moves evenly tells no slip.
+    even = Channel(1e-5 * trace.time, "length", "m", "displacement", "m")
+    imposed = Trace(trace.time, {**trace.channels, "x": even}, roles={"displacement": "x"})
+    assert np.isnan(measure_stick_slip(imposed).slip).all()
 
 
 def test_a_force_over_the_weight_goes_by_its_name() -> None:

@@ -9,7 +9,7 @@ from benchmarks.residual import LAWS, answer, draw, faults, faults_marched
 pytestmark = pytest.mark.slow
 
 SAMPLES = 4096
-POINTS = 50
+POINTS = 25
 
 
 @dataclasses.dataclass(frozen=True)

@@ -8,6 +8,7 @@ import pytest
 from asperity import Slider, periodic_response, perturbation_response, sensitivities
 from asperity.errors import InputError
 from asperity.laws import ElastoPlastic, law_parameters
+from references.populations import population
 
 pytestmark = pytest.mark.slow
 
@@ -23,7 +24,8 @@ LAWS = {"elasto-plastic": (ElastoPlastic, BASE | {"lambda_": 7e-7})}
 #: V, frequency, epsilon: a complex pair of multipliers, a real one; a negative one, at an orbit
 #: that only the search finds.
 DRIVES = {"elasto-plastic": [(1e-6, 120.0, 0.24), (1e-5, 120.0, 0.5), (1e-6, 0.4, 0.24)]}
-CASES = [(law, row) for law, drives in DRIVES.items() for row in range(len(drives))]
+#: The derivatives of an orbit of the search by two parameters are in `test_response_function`.
+CASES = population([(law, row) for law in LAWS for row in range(len(DRIVES[law]))], short=2)
 SCALARS = ("mean_friction", "mu1", "mu2", "phase1", "phase2")
 STEP = 4e-3
 

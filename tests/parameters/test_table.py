@@ -14,15 +14,20 @@ from asperity.laws import Law, parameter, registered
 from asperity.loads import Harmonic
 from asperity.orbit import PeriodicResponse
 from asperity.parameters import (
+    DRIVE,
     EXPERIMENT,
     INTERFACE,
+    MACHINE,
     OUTPUTS,
     RESULT_COLUMNS,
     all_parameters,
     canonical_name,
+    display_name,
+    in_names,
     known_name,
     law_parameters,
     point_parameters,
+    symbol_of,
 )
 from asperity.slider import equation_of_motion
 from asperity.slider.named import equation_parameters, value_of, with_value
@@ -161,3 +166,26 @@ def test_every_kind_and_rule_is_known() -> None:
     for p in all_parameters(registered().values()).values():
         assert p.kind in KINDS
         assert p.example
+
+
+def test_names_of_geophysics_are_those_of_the_table() -> None:
+    two_state = registered()["two-state"]
+    texts = ("A - B", "D0", "K/W0", "B2", "D2", "step_time_1", "mu1", "alpha")
+    shown = [display_name(text, "geophysics", two_state) for text in texts]
+    assert shown == ["a - b", "D_c", "k/sigma_n", "b_2", "L_2", "step_time_1", "mu1", "alpha"]
+    assert symbol_of(MACHINE["W0"], "geophysics") == r"\bar\sigma_n"
+    assert symbol_of(DRIVE["frequency"], "geophysics") == "f"
+    assert [display_name(text) for text in texts] == list(texts)
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("A is not determined beside B: fix one", "a is not determined beside b: fix one"),
+        ("A law is excluded. A stretch is steep", "A law is excluded. A stretch is steep"),
+        ("D0 is at its bound; give it by --fix D0=1", "D_c is at its bound; give it by --fix D0=1"),
+    ],
+)
+def test_sentences_in_names_of_geophysics(text: str, shown: str) -> None:
+    assert in_names(text, "geophysics") == shown
+    assert in_names(text) == text

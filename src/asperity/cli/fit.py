@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, law_options, settings_of
+from asperity.cli.options import (
+    json_option,
+    law_options,
+    names_option,
+    plot_option,
+    settings_of,
+)
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.words import fields_as_options
 from asperity.errors import InputError
@@ -18,6 +24,7 @@ from asperity.outputs import require_folder
 if TYPE_CHECKING:
     from asperity.inference import Fit
     from asperity.inference.posterior import Posterior
+    from asperity.parameters import Names
 
 _EPILOG = """\b
 Examples:
@@ -167,9 +174,17 @@ def _question_options(*own: Any) -> Callable[[Callable[..., Any]], Callable[...,
             (
                 click.argument("data", nargs=-1, required=True, type=Path),
                 law_options(),
+                plot_option(),
+                click.option(
+                    "--report",
+                    type=Path,
+                    metavar="DIR",
+                    help="Folder for a page with pictures, the numbers, and a material.",
+                ),
+                names_option(),
+                json_option(),
                 *_FIRST,
                 *own,
-                json_option(),
                 *_THEN,
             )
         ):
@@ -179,11 +194,6 @@ def _question_options(*own: Any) -> Callable[[Callable[..., Any]], Callable[...,
     return with_options
 
 
-_REPORT = click.option(
-    "--report", type=Path, metavar="DIR", help="Folder for a page, materials, and draws."
-)
-
-
 @click.command(epilog=_EPILOG)
 @_question_options(
     click.option(
@@ -191,7 +201,6 @@ _REPORT = click.option(
         metavar="SPANS|auto",
         help="Fit a recording in several windows, like 100:400,120:380; their spread is reported.",
     ),
-    _REPORT,
     click.option("--posterior", is_flag=True, help="Sample the posterior (extra 'bayes')."),
     click.option("--chains", default=4, show_default=True, metavar="N", help="Chains."),
     click.option(
@@ -209,6 +218,8 @@ def fit(
     seed: int,
     out: Path | None,
     report: Path | None,
+    plot: Path | None,
+    names: Names,
     as_json: bool,
 ) -> int:
     """Fit a friction law to tables of lock-in readings and to recordings.
@@ -217,12 +228,11 @@ def fit(
     describes them.
     """
     from asperity.cli.progress import bar
-    from asperity.cli.report import to_json
+    from asperity.cli.report import require_picture, sections_text, to_json, write_picture
     from asperity.inference import WindowedFit
     from asperity.inference.answers import answer_fit
     from asperity.inference.fitting.result import fit_record
     from asperity.inference.report import fit_report, posterior_sections, windows_sections
-    from asperity.outputs.tables import as_text
     from asperity.questions.fit import Fit as Question
 
     if len(laws) > 1:
@@ -233,6 +243,7 @@ def fit(
     _check_sampling(posterior, sampling, out)
     if report is not None:
         require_folder(report, "--report")
+    require_picture(plot, *(d["file"] for d in fields["data"]))
     question = Question(law=laws[0] if laws else None, **fields)
     with bar("window" if question.windows else "step", raising=False) as update:
         answer = answer_fit(question, progress=update)
@@ -251,10 +262,17 @@ def fit(
         sections = fit_report(result)
         sections += windows_sections(over) if over else []
         sections += posterior_sections(sampled) if sampled else []
-        click.echo(as_text(sections))
+        click.echo(sections_text(sections, names, result.law))
     if report is not None and result.converged:
-        click.echo(f"asperity: the report is {report / 'report.html'}", err=True)
+        _say_written(report)
+    if result.converged:
+        write_picture(result, plot, names)
     return 0 if result.converged and (sampled is None or sampled.converged) else 1
+
+
+def _say_written(report: Path) -> None:
+    files = ", ".join(sorted(p.name for p in report.iterdir() if p.name != "report.html"))
+    click.echo(f"asperity: the report is {report / 'report.html'}, with {files}", err=True)
 
 
 def _check_sampling(posterior: bool, sampling: dict[str, int], out: Path | None) -> None:
@@ -313,7 +331,6 @@ if its AICc exceeds the lowest by 10 or more.
         metavar="NAMES",
         help="The same as several --law: a,b,c or all.",
     ),
-    _REPORT,
     click.option("--windows", hidden=True, metavar="SPANS"),
 )
 def compare(
@@ -321,15 +338,16 @@ def compare(
     listed: str,
     fields: dict[str, Any],
     report: Path | None,
+    plot: Path | None,
+    names: Names,
     as_json: bool,
 ) -> int:
     """Fit several laws to the same readings and say which the data exclude."""
     from asperity.cli.progress import bar
-    from asperity.cli.report import to_json
+    from asperity.cli.report import require_picture, sections_text, to_json, write_picture
     from asperity.inference.answers import answer_comparison
     from asperity.inference.comparison.record import comparison_record
     from asperity.inference.report import comparison_report
-    from asperity.outputs.tables import as_text
     from asperity.questions.fit import Comparison as Question
 
     if fields.pop("windows") is not None:
@@ -340,19 +358,22 @@ def compare(
         )
     if report is not None:
         require_folder(report, "--report")
+    require_picture(plot, *(d["file"] for d in fields["data"]))
     fields["laws"] = laws or listed
     question = Question(**fields)
     with bar("%", raising=False) as update:
         comparison = answer_comparison(
             question, progress=lambda done, total: update(round(100 * done / total), 100)
         )
-    if report is not None and any(j.fit.converged for j in comparison.laws.values()):
-        from asperity.fit_report import write_comparison
-
-        write_comparison(report, comparison)
-        click.echo(f"asperity: the report is {report / 'report.html'}", err=True)
     if as_json:
         click.echo(to_json(comparison_record(comparison)))
     else:
-        click.echo(as_text(comparison_report(comparison)))
+        click.echo(sections_text(comparison_report(comparison), names, comparison.best))
+    if report is not None and comparison.best:
+        from asperity.fit_report import write_comparison
+
+        write_comparison(report, comparison)
+        _say_written(report)
+    if comparison.best:
+        write_picture(comparison, plot, names)
     return 0 if all(j.fit.converged for j in comparison.laws.values()) else 1

@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, set_option, settings_of
+from asperity.cli.options import (
+    json_option,
+    names_option,
+    plot_option,
+    set_option,
+    settings_of,
+)
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.words import in_options
 from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
     from asperity.measurement.verdicts.verdict import Check
+    from asperity.parameters import Names
     from asperity.questions.recording import Measurement as Question
     from asperity.questions.recording import Source
 
@@ -30,14 +37,18 @@ class FileRows:
     ----------
     source : Source
     question : Question
+    conditions : dict of Path to dict
+        Fields of the question that are those of one file.
     """
 
     source: Source
     question: Question
+    conditions: dict[Path, dict[str, Any]] = field(default_factory=dict)
 
     def __call__(self, path: Path) -> Rows:
         """Rows of a file; one row with the reason if it cannot be measured."""
         from asperity.measurement.campaign import failed_row, modulated_rows, sliding_rows
+        from asperity.measurement.conditions import MACHINE_FIELDS
         from asperity.measurement.from_file import measured_parts
         from asperity.measurement.stick_slip.catalogue import stick_slip_row
         from asperity.measurement.stick_slip.measure import StickSlipMeasurement
@@ -45,17 +56,27 @@ class FileRows:
 
         with naming(in_options):
             try:
-                result = measured_parts(read_source(path, self.source), self.question)
-                if isinstance(result, list):
-                    return modulated_rows(path, result)
+                question = self.question_of(path)
+                result = measured_parts(read_source(path, self.source), question)
                 if isinstance(result, StickSlipMeasurement):
                     return [stick_slip_row(path, result)]
-                return sliding_rows(path, result)
+                modulated = isinstance(result, list)
+                rows: Any = modulated_rows if modulated else sliding_rows
+                known = {n: getattr(question, f) for n, f in MACHINE_FIELDS.items()}
+                known = {name: value for name, value in known.items() if value is not None}
+                return [{**known, **row} for row in rows(path, result)]
             except InputError as error:
                 return [failed_row(path, 1, str(error))]
             except Exception as error:  # one damaged file must not cost the others
                 reason = f"{type(error).__name__}: {' '.join(str(error).split())}"
                 return [failed_row(path, 1, f"the recording could not be measured ({reason})")]
+
+    def question_of(self, path: Path) -> Question:
+        """The question with the conditions of a file."""
+        own = self.conditions.get(path)
+        return (
+            type(self.question)(**{**self.question.model_dump(), **own}) if own else self.question
+        )
 
     def inputs(self) -> dict[str, Any]:
         """All that rows depend on besides the files, as JSON values.
@@ -72,7 +93,9 @@ class FileRows:
             from asperity.questions.recording import ReadingRecipe
 
             source["recipe"] = ReadingRecipe.from_file(self.source.recipe).model_dump()
-        return {"source": source, "options": self.question.model_dump(mode="json")}
+        options = self.question.model_dump(mode="json")
+        conditions = {str(path): fields for path, fields in self.conditions.items()}
+        return {"source": source, "options": options, "conditions": conditions}
 
 
 _EPILOG = """\b
@@ -85,6 +108,8 @@ Examples:
   asperity measure stick_slip.mat --set "K=168 N/m" --set "V=42 um/s" \\
       --set "M=30.7 g" --events events.csv --plot events.png
   asperity measure day1/*.csv --out campaign.csv
+  asperity measure run_*.csv --stick-slip --set "W0=7 N" --out campaign.csv \\
+      --conditions "run_k{K N/m}_v{V um/s}" --thresholds bifurcation.csv
 
 \b
 Convention: W/W0 = 1 + epsilon cos phi, phi from the measured load,
@@ -98,6 +123,8 @@ in place of numbers; 2: bad input.
 
 @click.command(epilog=_EPILOG)
 @click.argument("recordings", type=Path, nargs=-1, required=True)
+@plot_option()
+@names_option()
 @source_options
 @click.option(
     "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
@@ -143,6 +170,12 @@ in place of numbers; 2: bad input.
 )
 @set_option('--set "K=168 N/m" --set "V=42 um/s"', "K, V, M or W0 of the machine, for slip events")
 @click.option(
+    "--conditions",
+    metavar="CSV|PATTERN",
+    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
+    'names like "run_k{K N/m}_v{V um/s}".',
+)
+@click.option(
     "--events",
     type=Path,
     metavar="CSV|NC|JSON",
@@ -157,6 +190,12 @@ in place of numbers; 2: bad input.
     metavar="CSV|NC",
     help="Measure all recordings into one table: a row for each amplitude, step and hold.",
 )
+@click.option(
+    "--thresholds",
+    type=Path,
+    metavar="CSV",
+    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+)
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
 @click.option(
     "--jobs",
@@ -165,7 +204,6 @@ in place of numbers; 2: bad input.
     help="Processes of a table; as many as cores if not given.",
 )
 @json_option()
-@click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
@@ -180,19 +218,23 @@ def measure(
     holds: str | None,
     stick_slip: bool,
     settings: tuple[str, ...],
+    conditions: str | None,
     events: Path | None,
     amplitudes: bool,
     out: Path | None,
+    thresholds: Path | None,
     resume: bool,
     jobs: int | None,
     as_json: bool,
     plot: Path | None,
+    names: Names,
 ) -> int:
     """Harmonics of the friction force against the measured load, with uncertainties and verdicts.
 
     RECORDINGS are files of a laboratory: CSV or other text, HDF5, MATLAB, TDMS or LOOK. Several
     are measured into one table with --out.
     """
+    from asperity.cli.report import require_picture, write_picture
     from asperity.questions.recording import Measurement as Question
 
     fields: dict[str, Any] = {
@@ -217,25 +259,27 @@ def measure(
                 "--plot, --events, --steps and --holds must go with one recording without --out, "
                 "got both; measure that recording by itself"
             )
-        return _campaign(recordings, source, question, out, resume, jobs, as_json)
+        rows_of = _file_rows(recordings, source, question, conditions)
+        return _campaign(recordings, rows_of, out, thresholds, resume, jobs, as_json)
     if len(recordings) > 1:
         raise InputError(
             f"--out must be given with several recordings, got {len(recordings)} without; name "
             "the table, like --out campaign.csv"
         )
-    if resume or jobs is not None:
+    if resume or jobs is not None or thresholds is not None:
         raise InputError(
-            "--resume and --jobs must go with --out, got no table; name it or leave them out"
+            "--resume, --jobs and --thresholds must go with --out, got no table; name it or leave "
+            "them out"
         )
     (recording,) = recordings
+    question = _file_rows(recordings, source, question, conditions).question_of(recording)
     if amplitudes:
         if no_modulation or plot is not None:
             raise InputError(
                 "--amplitudes must go without --no-modulation and --plot, got both; leave one out"
             )
         return _amplitudes(recording, source, question, as_json)
-    if plot is not None:
-        _check_picture(plot, recording)
+    require_picture(plot, recording)
     if events is not None:
         _check_catalogue(events, recording)
     from asperity.measurement.from_file import answer_measurement
@@ -247,9 +291,8 @@ def measure(
         click.echo(f"asperity: {why}", err=True)
     if events is not None:
         _catalogue(result, events)
-    _print(result, recording, trace.provenance, as_json)
-    if plot is not None:
-        _plot(result, plot)
+    _print(result, recording, trace.provenance, as_json, names)
+    write_picture(result, plot, names)
     return _verdict(result.checks)
 
 
@@ -268,11 +311,33 @@ def _amplitudes(recording: Path, source: Source, question: Question, as_json: bo
     return int(any(row["reason"] or row["verdict"] == "bad" for row in rows))
 
 
+def _file_rows(
+    recordings: tuple[Path, ...], source: Source, question: Question, conditions: str | None
+) -> FileRows:
+    """What measures each file, its conditions checked before anything is read."""
+    from asperity.measurement.conditions import MACHINE_FIELDS, conditions_of
+
+    if conditions is None:
+        return FileRows(source, question)
+    rows_of = FileRows(source, question, conditions_of(recordings, conditions))
+    for path, fields in rows_of.conditions.items():
+        twice = [n for n, f in MACHINE_FIELDS.items() if f in fields and getattr(question, f)]
+        if twice:
+            raise InputError(
+                f"{twice[0]} must be given once, got it by --set and by --conditions; leave one out"
+            )
+        try:
+            rows_of.question_of(path)
+        except InputError as error:
+            raise InputError(f"{error} (--conditions, '{path.name}')") from None
+    return rows_of
+
+
 def _campaign(
     recordings: tuple[Path, ...],
-    source: Source,
-    question: Question,
+    rows_of: FileRows,
     out: Path,
+    thresholds: Path | None,
     resume: bool,
     jobs: int | None,
     as_json: bool,
@@ -282,8 +347,21 @@ def _campaign(
     from asperity.cli.progress import bar
     from asperity.cli.report import to_json
     from asperity.measurement.campaign import run_campaign
+    from asperity.measurement.stick_slip.threshold import thresholds as ends_of_stick_slip
+    from asperity.measurement.stick_slip.threshold import write_thresholds
+    from asperity.outputs import output_files, written_file
 
-    rows_of = FileRows(source, question)
+    question = rows_of.question
+    if thresholds is not None:
+        if not question.stick_slip:
+            raise InputError(
+                "--thresholds must go with --stick-slip, got it without; add it: where stick-slip "
+                "ends, steady sliding counts too"
+            )
+        output_files(
+            {"--thresholds": thresholds, "--out": out},
+            inputs={f"recording '{f}'": f for f in recordings},
+        )
     with bar("files") as update:
         done = run_campaign(
             recordings,
@@ -297,7 +375,17 @@ def _campaign(
     if as_json:
         numbers = {"files": done.files, "rows": done.rows, "failed": done.failed}
         click.echo(to_json({**numbers, "out": str(out)}))
-    if done.sliding and question.modulated is None:
+    untold = []
+    if thresholds is not None:
+        ends = ends_of_stick_slip(done.table)
+        untold = [end.reason for end in ends if end.reason]
+        if not ends:
+            untold = ["no row has a regime, K, V and W0; give them by --set or --conditions"]
+        with written_file(thresholds, "--thresholds") as file:
+            write_thresholds(file, ends)
+        for reason in untold:
+            click.echo(f"asperity: cannot tell where stick-slip ends: {reason}", err=True)
+    if done.sliding and question.modulated is None and not question.stick_slip:
         click.echo(
             f"asperity: {done.sliding} of {done.files} files have a constant load: their velocity "
             "steps and holds are in the table, as with --no-modulation",
@@ -309,16 +397,7 @@ def _campaign(
             f"{out} says why",
             err=True,
         )
-    return int(done.failed > 0)
-
-
-def _check_picture(path: Path, recording: Path) -> None:
-    """Check the picture's path before anything is read."""
-    from asperity.outputs import output_files
-
-    if path.suffix.lower() != ".png":
-        raise InputError(f"--plot must be a PNG file, got '{path}'; write it like --plot out.png")
-    output_files({"--plot": path}, inputs={"recording": recording})
+    return int(done.failed > 0 or bool(untold))
 
 
 def _check_catalogue(path: Path, recording: Path) -> None:
@@ -353,7 +432,9 @@ def _machine(settings: tuple[str, ...]) -> dict[str, str]:
     return {fields[name]: text for name, text in given.items()}
 
 
-def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bool) -> None:
+def _print(
+    result: Any, recording: Path, provenance: dict[str, Any], as_json: bool, names: Names
+) -> None:
     from asperity._version import __version__
     from asperity.cli.measurement_text import modulated_text, sliding_text, stick_slip_text
     from asperity.cli.report import to_json
@@ -372,20 +453,7 @@ def _print(result: Any, recording: Path, provenance: dict[str, Any], as_json: bo
         provenance_record = {"recording": str(recording), "version": __version__, **provenance}
         click.echo(to_json({**record_of(result), "provenance": provenance_record}))
     else:
-        click.echo(text_of(result, recording.name))
-
-
-def _plot(result: Any, path: Path) -> None:
-    from asperity.figures.recording import draw_modulated, draw_sliding
-    from asperity.figures.stick_slip import draw_stick_slip
-    from asperity.figures.style import style
-    from asperity.outputs import written_file
-
-    draw: Any = draw_modulated if hasattr(result, "reading") else draw_sliding
-    if hasattr(result, "regimes"):
-        draw = draw_stick_slip
-    with style(), written_file(path, "--plot") as file:
-        draw(result).savefig(file, metadata={"Software": None})
+        click.echo(text_of(result, recording.name, names))
 
 
 def _verdict(checks: tuple[Check, ...]) -> int:

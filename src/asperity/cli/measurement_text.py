@@ -6,7 +6,8 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from asperity.outputs.tables import aligned, rounded
+from asperity.outputs.tables import Row, aligned, rounded
+from asperity.parameters import Names, display_name, in_names
 
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 _STILL = 1e-15
 
 
-def modulated_text(measurement: Measurement, name: str) -> str:
+def modulated_text(measurement: Measurement, name: str, names: Names = "friction") -> str:
     """A reading, as the command prints it.
 
     Parameters
@@ -28,6 +29,7 @@ def modulated_text(measurement: Measurement, name: str) -> str:
     measurement : Measurement
     name : str
         Of the recording.
+    names : {"friction", "geophysics"}
     """
     reading, unit = measurement.reading, measurement.samples.unit
     rows = [
@@ -70,7 +72,7 @@ def modulated_text(measurement: Measurement, name: str) -> str:
     return "\n".join(
         [
             head,
-            aligned(rows, "  "),
+            _named(rows, names),
             *_quality(measurement.checks),
             *_findings(measurement.samples.findings),
             *_unread(measurement.samples.unread),
@@ -110,7 +112,7 @@ def amplitudes_text(rows: list[dict[str, Any]], name: str) -> str:
     return "\n".join([count, aligned(table, "  "), *reasons, *named])
 
 
-def sliding_text(measurement: SlidingMeasurement, name: str) -> str:
+def sliding_text(measurement: SlidingMeasurement, name: str, names: Names = "friction") -> str:
     """A recording without modulation, as the command prints it.
 
     Parameters
@@ -118,6 +120,7 @@ def sliding_text(measurement: SlidingMeasurement, name: str) -> str:
     measurement : SlidingMeasurement
     name : str
         Of the recording.
+    names : {"friction", "geophysics"}
     """
     friction = measurement.friction
     rates = ", ".join(f"{rate:.4g} Hz ({100 * share:.0f} %)" for rate, share in measurement.rates)
@@ -140,13 +143,13 @@ def sliding_text(measurement: SlidingMeasurement, name: str) -> str:
         head,
         aligned(rows, "  "),
         *_segments(measurement),
-        *_steps(measurement),
+        *_steps(measurement, names),
         *_holds(measurement),
     ]
     return "\n".join([*lines, *_quality(measurement.checks), *_unread(measurement.unread)])
 
 
-def stick_slip_text(measurement: StickSlipMeasurement, name: str) -> str:
+def stick_slip_text(measurement: StickSlipMeasurement, name: str, names: Names = "friction") -> str:
     """A stick-slip recording, as the command prints it.
 
     Parameters
@@ -154,6 +157,7 @@ def stick_slip_text(measurement: StickSlipMeasurement, name: str) -> str:
     measurement : StickSlipMeasurement
     name : str
         Of the recording.
+    names : {"friction", "geophysics"}
     """
     from asperity.measurement.stick_slip.catalogue import summary_rows
 
@@ -178,7 +182,7 @@ def stick_slip_text(measurement: StickSlipMeasurement, name: str) -> str:
             "regimes",
             aligned([("from (s)", "to (s)", "regime", "evidence"), *parts], "  "),
             "slip events",
-            aligned(rows, "  "),
+            _named(rows, names),
             *_quality(measurement.checks),
         ]
     )
@@ -211,7 +215,7 @@ def velocity_text(velocity: float) -> str:
     return "0 m/s" if abs(velocity) < _STILL else format_si(velocity, "velocity", 4)
 
 
-def _steps(measurement: SlidingMeasurement) -> list[str]:
+def _steps(measurement: SlidingMeasurement, names: Names) -> list[str]:
     lines = []
     for k, step in enumerate(measurement.steps, 1):
         rows = [
@@ -246,7 +250,7 @@ def _steps(measurement: SlidingMeasurement) -> list[str]:
                 )
             )
         speeds = f"{velocity_text(step.velocity_before)} to {velocity_text(step.velocity_after)}"
-        lines += [f"step {k} at {step.time:.10g} s, {speeds}", aligned(rows, "  ")]
+        lines += [f"step {k} at {step.time:.10g} s, {speeds}", _named(rows, names)]
     return lines
 
 
@@ -293,6 +297,15 @@ def _row(name: str, value: float, doubt: float, unit: str, meaning: str) -> tupl
     """A number with as many digits as its uncertainty allows: two uncertain ones."""
     number, uncertain = rounded(value, doubt)
     return name, f"{number} {unit}".strip(), uncertain, meaning
+
+
+def _named(rows: Iterable[Row], names: Names) -> str:
+    """Rows in a set of names; a load that is a force is no stress."""
+    texts = [list(row) for row in rows]
+    for row in texts if names == "geophysics" else ():
+        row[0] = "load" if row[0] == "W0" and "Pa" not in row[1] else display_name(row[0], names)
+        row[-1] = in_names(row[-1], names)
+    return aligned(texts, "  ")
 
 
 def _quality(checks: Iterable[Check]) -> list[str]:

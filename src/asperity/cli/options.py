@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from functools import wraps
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from asperity.errors import InputError
-from asperity.parameters import DRIVE, MACHINE, Parameter
+from asperity.parameters import DRIVE, MACHINE, NAMES, Parameter
 
 if TYPE_CHECKING:
     from asperity.materials import Material
@@ -44,6 +45,21 @@ def set_option(
 def json_option() -> Decorator:
     """``--json``."""
     return click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+
+
+def names_option() -> Decorator:
+    """``--names``."""
+    return click.option(
+        "--names",
+        type=click.Choice(NAMES),
+        default=NAMES[0],
+        help="Names on screen and in figures: A, B, D0, K/W0, or geophysics: a, b, D_c, k/sigma_n.",
+    )
+
+
+def plot_option() -> Decorator:
+    """``--plot``."""
+    return click.option("--plot", type=Path, metavar="PNG", help="Where a figure goes.")
 
 
 def point_options(command: Command) -> Command:

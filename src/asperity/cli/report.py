@@ -1,14 +1,20 @@
-"""Records for programs: responses as JSON has them."""
+"""Answers as they leave: records for programs, sections for people, pictures."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import click
 import numpy as np
 
-from asperity.outputs import json
-from asperity.parameters import OUTPUTS
+from asperity.errors import InputError
+from asperity.outputs import json, output_files, written_file
+from asperity.outputs.tables import Section, as_text
+from asperity.parameters import OUTPUTS, Names, in_names
+from asperity.parameters.parameter import Drawn
 
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
@@ -18,6 +24,34 @@ if TYPE_CHECKING:
 def to_json(record: Mapping[str, Any]) -> str:
     """JSON for people and programs, indented; a number that is not finite becomes null."""
     return json.to_json(record, indent=2)
+
+
+def sections_text(sections: Iterable[Section], names: Names, law: str = "") -> str:
+    """Sections as text, the parameters in a set of names."""
+    from asperity.laws import get_law
+
+    chosen = get_law(law) if law else None
+    return as_text(s.worded(partial(in_names, names=names, law=chosen)) for s in sections)
+
+
+def require_picture(path: Path | None, *inputs: Path) -> None:
+    """Check the path of ``--plot`` before anything is computed."""
+    if path is None:
+        return
+    if path.suffix.lower() != ".png":
+        raise InputError(f"--plot must be a PNG file, got '{path}'; write it like --plot out.png")
+    output_files({"--plot": path}, inputs={f"the file {p}": p for p in inputs})
+
+
+def write_picture(drawn: Drawn, path: Path | None, names: Names) -> None:
+    """Draw an answer where ``--plot`` was given."""
+    if path is None:
+        return
+    from asperity.figures.style import style
+
+    with style(), written_file(path, "--plot") as file:
+        drawn.plot(names).savefig(file, metadata={"Software": None})
+    click.echo(f"asperity: the figure is {path}", err=True)
 
 
 #: Outputs in the order of the JSON; complex ones are pairs of real and imaginary part.

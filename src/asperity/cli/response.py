@@ -7,12 +7,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from asperity.cli.options import json_option, law_named, material_named, point_options
+from asperity.cli.options import (
+    json_option,
+    law_named,
+    material_named,
+    names_option,
+    plot_option,
+    point_options,
+)
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
+    from asperity.parameters import Names
 
 _EPILOG = """\b
 Examples:
@@ -48,6 +56,8 @@ _SHOWN = (
 
 @click.command(epilog=_EPILOG)
 @point_options
+@plot_option()
+@names_option()
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
 @click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
@@ -59,6 +69,8 @@ def response(
     table: Path | None,
     out: Path | None,
     resume: bool,
+    plot: Path | None,
+    names: Names,
     as_json: bool,
 ) -> int:
     """Periodic response to a modulated normal load.
@@ -69,16 +81,25 @@ def response(
     if table is not None:
         if out is None:
             raise InputError("--out must be given with --table, got nothing; name the output file")
+        if plot is not None:
+            raise InputError("--plot must go with one point, got a table; leave one of them out")
         return _table(table, out, law, material, given, resume, as_json)
     if out is not None or resume:
         raise InputError(
             "--out and --resume must go with --table, got no table; name it or leave them out"
         )
-    return _point(law, material, given, as_json)
+    return _point(law, material, given, as_json, plot, names)
 
 
-def _point(law: str | None, material: str | None, given: dict[str, str], as_json: bool) -> int:
-    from asperity.cli.report import response_record, to_json
+def _point(
+    law: str | None,
+    material: str | None,
+    given: dict[str, str],
+    as_json: bool,
+    plot: Path | None,
+    names: Names,
+) -> int:
+    from asperity.cli.report import require_picture, response_record, to_json, write_picture
     from asperity.laws import get_law
     from asperity.operating_point import (
         numbers_for,
@@ -88,6 +109,7 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
     )
 
     law = law_named(law)
+    require_picture(plot)
     refuse_foreign(law, given)
     numbers = numbers_for(
         law, sourced_numbers(given, material_named(material), "command line", law)
@@ -96,21 +118,30 @@ def _point(law: str | None, material: str | None, given: dict[str, str], as_json
     if as_json:
         click.echo(to_json(response_record(result, numbers)))
     elif result.converged:
-        click.echo(_text(law, result, numbers))
+        click.echo(_text(law, result, numbers, names))
+    if result.converged:
+        write_picture(result, plot, names)
     if not result.converged:
         click.echo(f"asperity: {result.result[()]}", err=True)
     return 0 if result.converged else 1
 
 
-def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber]) -> str:
+def _text(
+    law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber], names: Names
+) -> str:
     from asperity.laws import get_law
     from asperity.outputs.tables import aligned
-    from asperity.parameters import OUTPUTS, point_parameters
+    from asperity.parameters import OUTPUTS, display_name, point_parameters
     from asperity.units import format_si
 
-    kinds = point_parameters(get_law(law))
+    chosen = get_law(law)
+    kinds = point_parameters(chosen)
     inputs = [
-        (name, format_si(number.value, kinds[name].kind, 6), number.origin)
+        (
+            display_name(name, names, chosen),
+            format_si(number.value, kinds[name].kind, 6),
+            number.origin,
+        )
         for name, number in numbers.items()
     ]
     outputs = []
@@ -120,7 +151,8 @@ def _text(law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber])
         if isinstance(value, float):
             text = f"{value:.9g} {OUTPUTS[name].unit}".removesuffix(" 1")
         outputs.append((name, text, OUTPUTS[name].meaning))
-    return f"{law}\n{aligned(inputs, '  ')}\nresponse\n{aligned(outputs, '  ')}"
+    title = f"{law}, of forces per square metre: N for Pa" if names == "geophysics" else law
+    return f"{title}\n{aligned(inputs, '  ')}\nresponse\n{aligned(outputs, '  ')}"
 
 
 def _table(

@@ -15,17 +15,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from asperity._version import __version__
-from asperity.algebra.small_systems import jacobian_columns, spectral_abscissa
 from asperity.errors import InputError
 from asperity.laws import Law
-from asperity.loads import Excitation
 from asperity.orbit.response import dimension_names
 from asperity.parameters import MACHINE, law_parameters, obeying
 from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import Displayed, SummaryLine, number_line
-from asperity.slider import QuasiStatic, Slider
+from asperity.slider import Slider
 from asperity.slider.named import slider_values
 from asperity.slider.problem import flatten
+from asperity.theory.memory import steady_growth
 from asperity.transients.batch import End
 from asperity.transients.hold_and_step import (
     SETTLED,
@@ -264,7 +263,8 @@ def hold_response(
         response, extremum = hold(slider, V, time)
         after = settle(slider, V, extremum, runaway) if settling else None
         # The derivative by differences of order 4 in ln(hold time).
-        others = [hold(slider, V, time * np.exp(n * _STEP))[0].maximum for n in (-2, -1, 1, 2)]
+        moved = (hold(slider, V, time * np.exp(n * _STEP))[0] for n in (-2, -1, 1, 2))
+        others = [np.asarray(there.maximum) for there in moved]
         slope = (others[0] - 8 * others[1] + 8 * others[2] - others[3]) / (12 * _STEP)
         return response, after, np.log(10) * slope
 
@@ -392,10 +392,8 @@ def _in_shapes(run: Any, slider: Slider, V: Float, other: Float, runaway: Float)
 
 def _stable(slider: Slider, V: Float) -> NDArray[np.bool_]:
     """Whether a small disturbance of steady sliding dies out."""
-    motion = QuasiStatic(slider, V, 1.0)
-    at = Excitation(jnp.ones(len(V)))
-    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), motion.steady())
-    return np.asarray(spectral_abscissa(jnp.stack(columns, axis=1)) < 0)
+    run = lambda *arguments: steady_growth(*arguments[:2])  # noqa: E731
+    return np.asarray(_in_shapes(run, slider, V, V, V) < 0)
 
 
 class _Shaped:

@@ -256,30 +256,42 @@ def _runs(kinds: NDArray[np.str_]) -> list[tuple[int, int, str]]:
     return [(a, b, str(kinds[a])) for a, b in zip(starts, ends, strict=True)]
 
 
-def _draw_unmodulated(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+def unmodulated(dataset: xarray.Dataset) -> tuple[Float, Float] | None:
+    """The line K = K_c of an unmodulated load, x and y in SI; None where it is not known."""
     if "critical_stiffness" not in dataset:
-        return
+        return None
     Kc = dataset["critical_stiffness"]
     other = str(Kc.dims[0])
-    sides = [dataset.attrs[s] for s in "xy"]
-    along = dataset[other].values / units[sides.index(other)][0]
-    stiffness = Kc.values / units[sides.index("K")][0]
-    pair = (along, stiffness) if sides[0] == other else (stiffness, along)
+    pair = dataset[other].values, Kc.values
+    return pair if dataset.attrs["x"] == other else pair[::-1]
+
+
+def _draw_unmodulated(axis: Axes, dataset: xarray.Dataset, units: list[tuple[float, str]]) -> None:
+    line = unmodulated(dataset)
+    if line is None:
+        return
+    pair = [values / unit[0] for values, unit in zip(line, units, strict=True)]
     halo = [patheffects.withStroke(linewidth=2.2, foreground="white", alpha=0.7)]
     axis.plot(*pair, zorder=3, path_effects=halo, **_UNMODULATED)
 
 
-def _name_regions(axis: Axes, dataset: xarray.Dataset) -> None:
-    """The words stable and unstable, each where its region is widest."""
+def region_names(dataset: xarray.Dataset) -> list[tuple[str, float, float]]:
+    """The words stable and unstable, each where its region is widest: shares of both axes."""
     solved = dataset["converged"].values.astype(bool)
     stable = dataset["stable"].values.astype(bool)
     room = _ROOM * min(stable.shape)
+    places = []
     for word, region in (("stable", solved & stable), ("unstable", solved & ~stable)):
         depth = np.asarray(distance_transform_edt(np.pad(region, 1)))[1:-1, 1:-1]
         if depth.max() < room:
             continue
         row, column = np.unravel_index(np.argmax(depth), depth.shape)
-        at = ((column + 0.5) / stable.shape[1], (row + 0.5) / stable.shape[0])
+        places.append((word, (column + 0.5) / stable.shape[1], (row + 0.5) / stable.shape[0]))
+    return places
+
+
+def _name_regions(axis: Axes, dataset: xarray.Dataset) -> None:
+    for word, *at in region_names(dataset):
         axis.text(
             *at, word, transform=axis.transAxes, ha="center", va="center", zorder=5,
             path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white", alpha=0.8)],

@@ -7,8 +7,10 @@ from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
+from matplotlib.figure import Figure
+
 from asperity.errors import InputError
-from asperity.fit_report.bands import bands_of
+from asperity.fit_report.bands import Series, bands_of
 from asperity.fit_report.folder import (
     RUN_CAPTION,
     data_tables,
@@ -17,11 +19,12 @@ from asperity.fit_report.folder import (
     material_text,
     provenance,
 )
-from asperity.fit_report.pictures import laws_figure, run_figure, svg
-from asperity.inference import Fit
+from asperity.fit_report.pictures import Float, laws_figure, run_figure, svg
+from asperity.inference import Fit, LockInTable
 from asperity.inference.comparison.compare import Comparison
 from asperity.inference.comparison.record import comparison_record
 from asperity.inference.report import comparison_report, estimates
+from asperity.inference.runs.run import RecordedRun
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.tables.term import LockInTerm
 from asperity.outputs.tables import as_html
@@ -83,25 +86,55 @@ def page(comparison: Comparison, fits: Mapping[str, Fit]) -> str:
     return document(f"Laws compared on {names}", "A comparison", f"Laws on {names}", sections)
 
 
+def draw_comparison(comparison: Comparison) -> Figure:
+    """The first recording with the motion of each law, or the first table with bands of each.
+
+    Parameters
+    ----------
+    comparison : Comparison
+
+    Raises
+    ------
+    InputError
+        If no fit has converged, or the data are of another kind.
+    """
+    fits = {name: j.fit for name, j in comparison.laws.items() if j.fit.converged}
+    for fit in fits.values():
+        if fit.objective.terms_of(RunTerm):
+            return run_figure(*_motions(fits, 0))
+        if fit.objective.terms_of(LockInTerm):
+            return laws_figure(*_predictions(fits, 0))
+    raise InputError(
+        "plot must be asked of laws compared on a recording or a table of readings, got another "
+        "kind of data or no fit; plot the residuals of the fits yourself"
+    )
+
+
+def _predictions(fits: Mapping[str, Fit], i: int) -> tuple[LockInTable, dict[str, list[Series]]]:
+    """The table of a number, which is the same for all laws, and bands of each."""
+    terms = {name: own.objective.terms_of(LockInTerm)[i] for name, own in fits.items()}
+    table = next(iter(terms.values())).table
+    return table, {name: bands_of(own, terms[name], None) for name, own in fits.items()}
+
+
+def _motions(fits: Mapping[str, Fit], i: int) -> tuple[RecordedRun, dict[str, Float]]:
+    """The recording of a number, which is the same for all laws, and the motion of each."""
+    terms = {name: own.objective.terms_of(RunTerm)[i] for name, own in fits.items()}
+    run = next(iter(terms.values())).run
+    return run, {name: terms[name].fitted_friction(own.values) for name, own in fits.items()}
+
+
 def _figures(fits: Mapping[str, Fit]) -> str:
     first = next(iter(fits.values()))
     parts = []
-    # All laws have the same data.
-    for i, term in enumerate(first.objective.terms_of(LockInTerm)):
-        predicted = {
-            name: bands_of(fit, fit.objective.terms_of(LockInTerm)[i], None)
-            for name, fit in fits.items()
-        }
+    for i in range(len(first.objective.terms_of(LockInTerm))):
+        table, predicted = _predictions(fits, i)
         caption = (
             "Readings with standard uncertainties; medians and 95 % bands of the prediction of "
             "each law, by the normal approximation."
         )
         many = len(next(iter(predicted.values()))) > _MOST_NARROW
-        parts.append(figure(svg(laws_figure(term.table, predicted)), caption, wide=many))
-    for i, run in enumerate(first.objective.terms_of(RunTerm)):
-        curves = {
-            name: fit.objective.terms_of(RunTerm)[i].fitted_friction(fit.values)
-            for name, fit in fits.items()
-        }
-        parts.append(figure(svg(run_figure(run.run, curves)), RUN_CAPTION))
+        parts.append(figure(svg(laws_figure(table, predicted)), caption, wide=many))
+    for i in range(len(first.objective.terms_of(RunTerm))):
+        parts.append(figure(svg(run_figure(*_motions(fits, i))), RUN_CAPTION))
     return "\n".join(parts)

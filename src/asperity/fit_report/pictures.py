@@ -114,7 +114,7 @@ def run_figure(run: RecordedRun, curves: Mapping[str, Float]) -> Figure:
         for k, (law, curve) in enumerate(curves.items()):
             above.plot(run.time[thin], curve[thin], color=f"C{k}", lw=1, label=law)
             below.plot(run.time[thin], (run.friction - curve)[thin], color=f"C{k}", lw=0.5)
-        above.set_ylabel("F/W")
+        above.set_ylabel("friction $F/W$")
         above.legend(fontsize=8)
         below.set_ylabel("data - law")
         below.set_xlabel("time (s)")

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from asperity.inference.comparison.compare import Comparison
 from asperity.inference.comparison.record import laws_table
-from asperity.inference.fitting.result import Estimate, Fit
+from asperity.inference.fitting.result import NOT_DETERMINED, Estimate, Fit, Shown
 from asperity.inference.fitting.windows import WindowedFit
+from asperity.inference.holds.term import HoldTerm
 from asperity.inference.posterior import Posterior
 from asperity.inference.runs.term import RunTerm
-from asperity.outputs.tables import Section, rounded
+from asperity.outputs.tables import Section
+from asperity.units import quantity_text
 
-#: Of a parameter whose numbers say nothing.
-NOT_DETERMINED = "not determined"
 #: Probability of chi-squared below which law or uncertainties are wrong.
 _MISFIT = 0.01
 #: Standard errors from which the sign of A - B is known.
@@ -47,10 +49,17 @@ def fit_in_words(fit: Fit) -> tuple[str, ...]:
     difference = rate_dependence(fit)
     if difference is not None:
         value, error = difference
-        shown = " ".join(rounded(value, error))
+        # Both with as many decimals as the error bears: two uncertain digits.
+        places = max(0, 1 - math.floor(math.log10(error))) if error else 6
+        shown = f"{value:.{places}f} +- {error:.{places}f}"
         kind = "velocity weakening" if value < 0 else "velocity strengthening"
         known = abs(value) > _KNOWN_SIGN * error
         sentences.append(f"A - B = {shown}: {kind if known else 'its sign is not determined'}")
+    values = {**fit.objective.fixed, **fit.values}
+    mu0, V0 = (np.unique(values.get(name, math.nan)) for name in ("mu0", "V0"))
+    # Holds are counted from the level of sliding, which is assumed.
+    if mu0.size == V0.size == 1 and np.isfinite(mu0 + V0) and not fit.parts(HoldTerm):
+        sentences.append(f"mu0 = {mu0[0]:.4g} at V0 = {quantity_text(V0[0], 'm/s')}")
     if fit.undetermined:
         sentences.append(f"not determined by these data: {', '.join(fit.undetermined)}")
     return tuple(sentences)
@@ -85,7 +94,7 @@ def estimates(fit: Fit) -> Section:
     """Estimates with standard errors and intervals; "not determined" stands for those without."""
     head = ("", "estimate", "std. error", "68 % interval", "95 % interval", "", "")
     rows = tuple(
-        _estimate_row(name, p, name in fit.undetermined)
+        _estimate_row(name, p, name.removesuffix("/W0") in fit.undetermined)
         for name, p in {**fit.parameters, **fit.over_load}.items()
     )
     return Section("", (), head, rows)
@@ -94,19 +103,16 @@ def estimates(fit: Fit) -> Section:
 def _estimate_row(name: str, p: Estimate, undetermined: bool) -> tuple[str, ...]:
     if undetermined:
         return name, NOT_DETERMINED, "", "", "", p.unit, "by these data"
+    shown = Shown.of(p.value, p.se, p.unit)
     notes = "at its bound" if p.at_bound else ""
     if p.prior is not None:
-        notes = f"prior {p.prior.mean:.4g} +- {p.prior.sd:.2g} ({p.prior.source})"
-    intervals = (interval(p.interval_68), interval(p.interval_95))
-    return name, f"{p.value:.6g}", f"{p.se:.2g}", *intervals, p.unit, notes
-
-
-def interval(ends: tuple[float, float]) -> str:
-    """An interval in words; one that the data do not bound on either side is none."""
-    low, high = ends
-    if not math.isfinite(high):
-        return f"above {low:.5g}" if math.isfinite(low) and low > 0 else NOT_DETERMINED
-    return f"{low:.5g} to {high:.5g}"
+        mean, sd, unit = p.prior.mean, p.prior.sd, p.prior.unit
+        if unit in ("", p.unit):
+            mean, sd, unit = mean * 10.0**-shown.power, sd * 10.0**-shown.power, shown.unit
+        unit = f" {unit}" if unit else ""
+        notes = f"prior {mean:.4g} +- {sd:.2g}{unit} ({p.prior.source})"
+    intervals = (shown.interval(p.interval_68), shown.interval(p.interval_95))
+    return name, shown.value, shown.error(p.se), *intervals, shown.unit, notes
 
 
 def quality(fit: Fit) -> Section:
@@ -149,8 +155,9 @@ def windows_sections(over: WindowedFit) -> list[Section]:
         if name in over.undetermined:
             rows.append((name, NOT_DETERMINED, "", "", "", "", p.unit, "by these data"))
             continue
-        errors = (f"{p.se:.2g}", f"{p.se_noise:.2g}", f"{p.se_window:.2g}")
-        rows.append((name, f"{p.value:.6g}", *errors, interval(p.interval_95), p.unit, ""))
+        shown = Shown.of(p.value, p.se, p.unit)
+        errors = [shown.error(se) for se in (p.se, p.se_noise, p.se_window)]
+        rows.append((name, shown.value, *errors, shown.interval(p.interval_95), shown.unit, ""))
     first = set(over.fits[0].warnings)
     new = tuple(w for w in over.warnings if w.partition(" s: ")[2] not in first)
     title = f"over {len(over.windows)} windows ({spans} s)"
@@ -161,22 +168,14 @@ def posterior_sections(posterior: Posterior) -> list[Section]:
     """Means, standard deviations and diagnostics of a posterior."""
     chains, draws = posterior.log_density.shape
     head = ("", "mean", "sd", "95 % interval", "", "R-hat", "ESS bulk", "ESS tail")
-    rows = tuple(
-        (
-            name,
-            f"{p.mean:.6g}",
-            f"{p.sd:.2g}",
-            interval(p.interval_95),
-            p.unit,
-            f"{p.r_hat:.4f}",
-            f"{p.ess_bulk:.0f}",
-            f"{p.ess_tail:.0f}",
-        )
-        for name, p in posterior.parameters.items()
-    )
+    rows = []
+    for name, p in posterior.parameters.items():
+        shown = Shown.of(p.mean, p.sd, p.unit)
+        numbers = (shown.value, shown.error(p.sd), shown.interval(p.interval_95), shown.unit)
+        rows.append((name, *numbers, f"{p.r_hat:.4f}", f"{p.ess_bulk:.0f}", f"{p.ess_tail:.0f}"))
     diverging = int(posterior.diverging.sum())
     title = f"posterior, {chains} chains of {draws} draws, {diverging} diverging"
-    return [Section(title, (), head, rows, tuple(posterior.warnings))]
+    return [Section(title, (), head, tuple(rows), tuple(posterior.warnings))]
 
 
 def comparison_report(comparison: Comparison, *, reasons: bool = False) -> list[Section]:

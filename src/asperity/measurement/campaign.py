@@ -71,6 +71,8 @@ class CampaignSummary:
         Files measured, rows of the table, rows without result among them, and files that were read
         without modulation.
     out : Path
+    table : list of dict
+        The rows.
     """
 
     files: int
@@ -78,6 +80,7 @@ class CampaignSummary:
     failed: int
     sliding: int
     out: Path
+    table: list[Row]
 
 
 def run_campaign(
@@ -139,7 +142,7 @@ def run_campaign(
         unfinished.discard()
     failed = sum(bool(row["reason"]) for row in table)
     sliding = {row["file"] for row in table if row["kind"] in _SLIDING_KINDS}
-    return CampaignSummary(len(files), len(table), failed, len(sliding), out)
+    return CampaignSummary(len(files), len(table), failed, len(sliding), out, table)
 
 
 def _stamp(path: Path) -> str:
@@ -315,10 +318,11 @@ def _unit(name: str) -> str:
         "settling_slip": "m",
         "reload_slope": "1/m",
         "loading_slope": "1/s",
-        "stiffness": "N/m",
+        "K": "N/m",
+        "V": "m/s",
+        "M": "kg",
         "stiffness_from_slope": "N/m",
-        "mass": "kg",
-        "load": "N",
+        "linear_frequency": "Hz",
     }
     if stem.startswith("velocity"):
         return "m/s"

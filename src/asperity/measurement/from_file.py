@@ -9,6 +9,7 @@ from asperity.errors import Argument, ConstantLoadError, InputError
 from asperity.measurement.measure import Measurement, measure, measure_amplitudes
 from asperity.measurement.sliding.measure import SlidingMeasurement, measure_sliding
 from asperity.measurement.stick_slip.measure import (
+    SLIDER,
     Machine,
     StickSlipMeasurement,
     measure_stick_slip,
@@ -20,9 +21,8 @@ from asperity.recording.readers import read
 
 Read = TypeVar("Read")
 
-#: Share of the displacement in the slips above which it is the slider's, and slip events for each
-#: velocity step or hold above which these are read within stick-slip.
-_SLIDER, _EVENTS = 0.5, 10
+#: Slip events for each velocity step or hold above which these are read within stick-slip.
+_EVENTS = 10
 
 
 @typed
@@ -287,7 +287,7 @@ def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
     """
     if not events.clear:
         return False
-    if not changes or events.slip_share > _SLIDER:
+    if not changes or events.slip_share > SLIDER:
         return True
     return any(r.sticks for r in events.regimes) and len(events.events) > _EVENTS * changes
 

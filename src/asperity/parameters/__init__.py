@@ -4,7 +4,8 @@ Command line, tables, maps, sweeps, continuation, materials, JSON and the page o
 every name from here.
 """
 
-from asperity.parameters.parameter import RULES, Output, Parameter, Rule, obeying
+from asperity.parameters.names import display_name, in_names, symbol_of
+from asperity.parameters.parameter import NAMES, RULES, Names, Output, Parameter, Rule, obeying
 from asperity.parameters.table import (
     DRIVE,
     EXPERIMENT,
@@ -29,14 +30,18 @@ __all__ = [
     "INTERFACE",
     "MACHINE",
     "MODULATION",
+    "NAMES",
     "OUTPUTS",
     "RESULT_COLUMNS",
     "RULES",
+    "Names",
     "Output",
     "Parameter",
     "Rule",
     "all_parameters",
     "canonical_name",
+    "display_name",
+    "in_names",
     "known_name",
     "law_parameters",
     "obeying",
@@ -44,4 +49,5 @@ __all__ = [
     "point_parameters",
     "required",
     "suggestion",
+    "symbol_of",
 ]

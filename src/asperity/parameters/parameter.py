@@ -252,6 +252,12 @@ class Output:
         return {"units": self.unit, "long_name": self.meaning}
 
 
+Names = Literal["friction", "geophysics"]
+#: Sets of names that tables, figures and sentences are written in. "friction": the letters of
+#: Bureau, Baumberger and Caroli (2000).
+NAMES: tuple[Names, ...] = ("friction", "geophysics")
+
+
 class SummaryLine(NamedTuple):
     """A line of a summary: name, value as text, and what it is."""
 
@@ -291,8 +297,13 @@ class Drawn(Displayed):
     #: round.
     _drawn_by: ClassVar[str]
 
-    def plot(self) -> Figure:
+    def plot(self, names: Names = "friction") -> Figure:
         """The object as a Matplotlib figure, to be changed, shown, or written by its ``savefig``.
+
+        Parameters
+        ----------
+        names : {"friction", "geophysics"}
+            Symbols of the labels: F/W, A, B, D0; or tau/sigma_n, a, b, D_c.
 
         Raises
         ------
@@ -304,6 +315,10 @@ class Drawn(Displayed):
         module, name = self._drawn_by.split(":")
         with import_module("asperity.figures.style").style():
             figure: Figure = getattr(import_module(module), name)(self)
+        if names == "geophysics":
+            in_symbols: Any = import_module("asperity.parameters.names").in_symbols
+            for text in figure.findobj(lambda artist: hasattr(artist, "set_text")):
+                text.set_text(in_symbols(text.get_text()))
         return figure
 
 

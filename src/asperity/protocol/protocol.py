@@ -14,6 +14,7 @@ from pydantic import PositiveInt, PrivateAttr, ValidationError, WrapValidator, m
 from asperity import materials
 from asperity.errors import InputError, MistakesError
 from asperity.laws import get_law, registered
+from asperity.laws.uneven_track import on_uneven_track
 from asperity.loads import Programme, ProgrammeStep
 from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.operating_point import (
@@ -142,6 +143,27 @@ class ProtocolStart(Record):
     states: tuple[float, ...] | None = None
 
 
+class Track(Record):
+    """A friction level that varies along the track; see `asperity.laws.uneven_track`.
+
+    Attributes
+    ----------
+    amplitude : float
+        Standard deviation of mu0.
+    length : float or str
+        Over which mu0 forgets itself (m).
+    exponent : float
+        Of the power law of its spectrum beyond one over that length.
+    origin : float or str
+        Where on the track the slider begins (m).
+    """
+
+    amplitude: float
+    length: quantity("length")  # type: ignore[valid-type]
+    exponent: float = 2.0
+    origin: quantity("length") = 0.0  # type: ignore[valid-type]
+
+
 class SolverSettings(Record):
     """Settings of the integration and of the output.
 
@@ -181,6 +203,8 @@ class Protocol(Question):
     parameters : mapping of str to float or str
         Numbers of the law, and K, W0, M and eta (radiation damping), by the names of tables.
     solver : SolverSettings
+    track : Track, optional
+        By default mu0 is the same everywhere.
     tribometer : mapping, optional
         Recording of the run: fields of `Recorder`, ``seed``, and ``sensors``.
     title : str
@@ -202,6 +226,7 @@ class Protocol(Question):
     material: str = ""
     parameters: Mapping[str, Given] = {}
     solver: SolverSettings = SolverSettings()
+    track: Track | None = None
     tribometer: Mapping[str, Any] | None = None
     title: str = ""
     folder: Path = Path()
@@ -222,6 +247,7 @@ class Protocol(Question):
         try:
             self._numbers.update(self._sourced_numbers())
             level = self._level()
+            _ = self.slider
         except InputError as error:
             mistakes.append(error)
         else:
@@ -265,7 +291,11 @@ class Protocol(Question):
     @cached_property
     def slider(self) -> Slider:
         """The law with its parameters, spring, mass and mean load."""
-        return slider_of(self.law, {name: n.value for name, n in self._numbers.items()})
+        even = slider_of(self.law, {name: n.value for name, n in self._numbers.items()})
+        if self.track is None:
+            return even
+        law = on_uneven_track(even.law, **self.track.model_dump())
+        return Slider(law, spring=even.K, load=even.W0, mass=even.M)
 
     @cached_property
     def setup(self) -> RecordingSetup | None:
@@ -324,6 +354,7 @@ class Protocol(Question):
             "parameters": {name: number.value for name, number in self._numbers.items()},
             "start": {**self._level()._asdict(), "states": self.start.states},
             "solver": self.solver.model_dump(),
+            "track": None if self.track is None else self.track.model_dump(),
             **segments,
             "programme": digest.hexdigest(),
         }

@@ -53,7 +53,9 @@ def stability_statement(protocol: Protocol) -> str:
     """
     numbers: dict[str, Any] = {name: number.value for name, number in protocol.numbers.items()}
     level, heavy = protocol.programme.level, protocol.solver.inertia
-    if protocol.start.states is not None or not level.velocity > 0:
+    # An uneven track perturbs the sliding from the beginning.
+    even = protocol.track is None
+    if protocol.start.states is not None or not level.velocity > 0 or not even:
         return ""
     lambda_ = numbers.get("lambda", 0.0)
     kc = cf.critical_stiffness_form(protocol.law, elastic=lambda_ != 0, inertia=heavy)

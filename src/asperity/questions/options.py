@@ -36,6 +36,7 @@ MEASURE_OPTIONS: Mapping[str, str] = {
     "velocity": "--set V",
     "mass": "--set M",
     "normal_load": "--set W0",
+    "conditions": "--conditions",
 }
 
 FIT_OPTIONS: Mapping[str, str] = {
@@ -51,7 +52,16 @@ FIT_OPTIONS: Mapping[str, str] = {
 }
 
 #: Units of fields that are numbers in SI.
-_UNITS = {"frequency": "Hz", "gauge": "Hz", "velocities": "m/s", "area": "m^2"}
+_UNITS = {
+    "frequency": "Hz",
+    "gauge": "Hz",
+    "velocities": "m/s",
+    "area": "m^2",
+    "stiffness": "N/m",
+    "velocity": "m/s",
+    "mass": "kg",
+    "normal_load": "N",
+}
 
 
 def as_options(fields: Mapping[str, Any], options: Mapping[str, str]) -> list[str]:
@@ -75,7 +85,10 @@ def as_options(fields: Mapping[str, Any], options: Mapping[str, str]) -> list[st
             texts = (_pair(key, one) for key, one in value.items())
             parts += [f"{option} {shlex.quote(text)}" for text in texts]
         else:
-            parts.append(f"{option} {shlex.quote(_text(value, _UNITS.get(name, '')))}")
+            # A number of the machine is one of several of an option, as --set K=...
+            option, _, key = option.partition(" ")
+            text = _text(value, _UNITS.get(name, ""))
+            parts.append(f"{option} {shlex.quote(f'{key}={text}' if key else text)}")
     return parts
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from jax.typing import ArrayLike
 
 from asperity.errors import InputError
+from asperity.laws.uneven_track import POSITION
 from asperity.loads import Harmonic, Modulation
 from asperity.loads.consistency import checked_modulation
 from asperity.parameters import DRIVE, MACHINE, obeying
@@ -116,6 +117,13 @@ def checked_problem(
     InputError
         If a value breaks its rule; as `equation_of_motion`.
     """
+    if POSITION in slider.law.state_names:
+        raise InputError(
+            "slider.law",
+            "be the same everywhere for a periodic response",
+            "one on an uneven track",
+            "integrate it as a transient",
+        )
     V = DRIVE["V"].check(velocity)
     f = DRIVE["frequency"].check(frequency)
     load = chosen_modulation(epsilon, modulation)

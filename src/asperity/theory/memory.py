@@ -39,7 +39,7 @@ Float = NDArray[np.float64]
 
 #: Stiffnesses of the stability scan, over the scale of the law: decades and number of points.
 _DECADES, _POINTS = 8, 400
-_BISECTIONS = 60
+_REFINEMENTS = 8
 _DECADE = math.log(10)
 
 
@@ -99,23 +99,35 @@ def critical_stiffness(law: Law, velocity: float | str) -> float:
             "its sliding has no critical stiffness"
         )
     k = scale * np.logspace(-_DECADES, _DECADES, _POINTS)
-    unstable = np.flatnonzero(_growth(law, V, k) > 0)
-    if not unstable.size:
-        return 0.0
-    low, high = k[unstable[-1]], k[min(unstable[-1] + 1, _POINTS - 1)]
-    for _ in range(_BISECTIONS):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if _growth(law, V, np.array([middle]))[0] > 0 else (low, middle)
-    return float(low)
+    low = 0.0
+    for _ in range(_REFINEMENTS):
+        unstable = np.flatnonzero(_growth(law, V, k) > 0)
+        if not unstable.size:
+            break
+        low, high = (float(k[i]) for i in (unstable[-1], min(unstable[-1] + 1, _POINTS - 1)))
+        k = np.geomspace(low, high, _POINTS)
+    return low
 
 
 def _growth(law: Law, V: float, k: Float) -> Float:
     """Growth rate of a small disturbance of steady sliding, at stiffnesses `k`."""
-    wide = jax.tree.map(lambda a: jnp.broadcast_to(jnp.asarray(a, float), k.shape), law)
-    motion = QuasiStatic(Slider(wide, spring=k, load=np.ones_like(k)), jnp.full(k.shape, V), 1.0)
-    at = Excitation(jnp.ones(k.shape))
+    wide = jax.tree.map(lambda a: np.broadcast_to(np.asarray(a, float), k.shape), law)
+    slider = Slider(wide, spring=k, load=np.ones_like(k))
+    return np.asarray(steady_growth(slider, np.full(k.shape, V)))
+
+
+@jax.jit
+def steady_growth(slider: Slider, V: Array) -> Array:
+    """Growth rate of a small disturbance of steady sliding without inertia, over its phase.
+
+    Parameters
+    ----------
+    slider : Slider
+        Parameters of shape (points,), as `V` (m/s).
+    """
+    motion, at = QuasiStatic(slider, V, 1.0), Excitation(jnp.ones_like(V))
     _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), motion.steady())
-    return np.asarray(spectral_abscissa(jnp.stack(columns, axis=1)))
+    return spectral_abscissa(jnp.stack(columns, axis=1))
 
 
 def state_after_step(law: RiceRuina, ratio: ArrayLike, slip: ArrayLike | str) -> Array:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import jax
 import jax.numpy as jnp
 from jax import Array
 
@@ -84,13 +85,25 @@ def hold(slider: Slider, V: Array, hold_time: Array) -> tuple[HoldResponse, Reac
     (HoldResponse, Reached)
         Observables of the hold, and the motion at the maximum, for `settle`.
     """
-    motion = QuasiStatic(slider, V, 1.0)
-    one, steady = jnp.ones_like(V), _from_here(motion.steady())
-    level = _force(motion, steady)
-    still = _filled(Drive(pull=0.0, until=hold_time), one)
+    steady, still, again = _before_hold(slider, V, hold_time)
     holding = drive_many(slider, V, still, steady)
-    again = _filled(Drive(up=1.0, steady=_OVER), one)
-    reloaded = drive_many(slider, V, again, holding.Y)
+    return _after_hold(slider, V, steady, holding, drive_many(slider, V, again, holding.Y))
+
+
+@jax.jit
+def _before_hold(slider: Slider, V: Array, hold_time: Array) -> tuple[Array, Drive, Drive]:
+    """States of steady sliding, and the drives of hold and reloading."""
+    still = _filled(Drive(pull=0.0, until=hold_time), jnp.ones_like(V))
+    again = _filled(Drive(up=1.0, steady=_OVER), jnp.ones_like(V))
+    return _from_here(QuasiStatic(slider, V, 1.0).steady()), still, again
+
+
+@jax.jit
+def _after_hold(
+    slider: Slider, V: Array, steady: Array, holding: Reached, reloaded: Reached
+) -> tuple[HoldResponse, Reached]:
+    motion = QuasiStatic(slider, V, 1.0)
+    level = _force(motion, steady)
     lost = (holding.end != End.TIME) | (reloaded.end == End.TOO_MANY_STEPS)
     end = jnp.where(lost, End.TOO_MANY_STEPS, reloaded.end)
     maximum = _force(motion, reloaded.Y)
@@ -146,13 +159,25 @@ def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reach
 
     Shapes and the second result as of `hold`.
     """
-    before, motion = (QuasiStatic(slider, speed, 1.0) for speed in (V_before, V))
-    one, start = jnp.ones_like(V), _from_here(before.steady())
+    start, drive = _before_step(slider, V_before, V)
+    reached = drive_many(slider, V, drive, start)
+    return _after_step(slider, V, start, reached), reached
+
+
+@jax.jit
+def _before_step(slider: Slider, V_before: Array, V: Array) -> tuple[Array, Drive]:
+    """States of steady sliding, and the drive after the step."""
     up = jnp.where(V_before < V, 1.0, -1.0)
-    reached = drive_many(slider, V, _filled(Drive(up=up, steady=_OVER), one), start)
+    drive = _filled(Drive(up=up, steady=_OVER), jnp.ones_like(V))
+    return _from_here(QuasiStatic(slider, V_before, 1.0).steady()), drive
+
+
+@jax.jit
+def _after_step(slider: Slider, V: Array, start: Array, reached: Reached) -> StepResponse:
+    motion = QuasiStatic(slider, V, 1.0)
     lost = reached.end == End.TOO_MANY_STEPS
     length_scale = slider.W0 / slider.K
-    response = StepResponse(
+    return StepResponse(
         _force(motion, start),
         jnp.where(lost, jnp.nan, _force(motion, reached.Y)),
         _force(motion, _from_here(motion.steady())),
@@ -161,7 +186,6 @@ def step(slider: Slider, V_before: Array, V: Array) -> tuple[StepResponse, Reach
         reached.Y[:, :-1],
         reached.end,
     )
-    return response, reached
 
 
 def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> SettlingDistance:
@@ -176,13 +200,24 @@ def settle(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Settl
     runaway : array, shape (points,)
         ln(v_pl / V) at which a motion counts as a runaway.
     """
+    on = drive_many(slider, V, _to_steady(slider, V, extremum, runaway), extremum.Y)
+    return _settling(slider, V, extremum, on)
+
+
+@jax.jit
+def _to_steady(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> Drive:
+    """The drive from an extremum on."""
     motion = QuasiStatic(slider, V, 1.0)
     level = _force(motion, _from_here(motion.steady()))
     width = SETTLED * jnp.abs(_force(motion, extremum.Y) - level)
     # Where all logarithms are this close to steady sliding the force stays within the width.
     close = jnp.minimum(1e-3, 0.05 * width)
     drive = Drive(level=level, width=width, runaway=runaway, steady=close)
-    on = drive_many(slider, V, _filled(drive, jnp.ones_like(V)), extremum.Y)
+    return _filled(drive, jnp.ones_like(V))
+
+
+@jax.jit
+def _settling(slider: Slider, V: Array, extremum: Reached, on: Reached) -> SettlingDistance:
     crossing = extremum.end == End.CROSSING
     over = crossing & (on.end == End.STEADY)
     length_scale = slider.W0 / slider.K

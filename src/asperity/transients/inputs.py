@@ -12,6 +12,7 @@ from jax import Array
 from asperity.algebra.small_systems import jacobian_columns, solve_points
 from asperity.errors import InputError
 from asperity.laws import Law, State
+from asperity.laws.uneven_track import POSITION
 from asperity.loads import Excitation, Programme
 from asperity.parameters.arguments import number, typed
 from asperity.slider import Motion, Slider, equation_of_motion, reversing
@@ -153,8 +154,11 @@ def _steady_state(law: Law, v: Array, w: Array) -> State:
     """States of the law at `v` under the load `w`, by Newton's method from those under w = 1."""
     start = jnp.stack([jnp.asarray(s, float) for s in law.steady_state(v)])
 
+    moves = np.array([name == POSITION for name in law.state_names])
+
     def rates(packed: Array) -> Array:
-        return jnp.stack(law.state_rate(v, v, tuple(packed), w))
+        # A position has no steady value: it stays where it is.
+        return jnp.where(moves, packed - start, jnp.stack(law.state_rate(v, v, tuple(packed), w)))
 
     def step(_: int, packed: Array) -> Array:
         value, columns = jacobian_columns(rates, packed)

@@ -3,7 +3,23 @@
 Conversion is decimal, so ``"0.4 um"`` is exactly the double nearest to 4e-7.
 """
 
-from asperity.units.convert import format_si, from_si, to_radians, to_si
+from asperity.units.convert import (
+    display_unit,
+    format_si,
+    from_si,
+    quantity_text,
+    to_radians,
+    to_si,
+)
 from asperity.units.kinds import KINDS, Kind
 
-__all__ = ["KINDS", "Kind", "format_si", "from_si", "to_radians", "to_si"]
+__all__ = [
+    "KINDS",
+    "Kind",
+    "display_unit",
+    "format_si",
+    "from_si",
+    "quantity_text",
+    "to_radians",
+    "to_si",
+]

@@ -11,7 +11,7 @@ from typing import Any, overload
 import numpy as np
 
 from asperity.errors import InputError
-from asperity.units.kinds import Kind, kind_of
+from asperity.units.kinds import KINDS, Kind, kind_of
 from asperity.units.scale import EXACT, normalised, unit_factor
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))(?:[eE]([+-]?\d+))?(?![\d.])\s*(.*?)\s*", re.S)
@@ -116,16 +116,37 @@ def format_si(value: float, kind: str, digits: int = 4) -> str:
     digits : int
         Significant digits.
     """
-    spec = kind_of(kind)
+    return quantity_text(value, kind_of(kind).si, digits)
+
+
+def quantity_text(value: float, unit: str, digits: int = 4) -> str:
+    """Text of a value, in an SI unit, in the unit that reads best."""
     value = float(value)
-    unit, power = spec.si, 0
+    shown, power = display_unit(value, unit, digits)
     if value and math.isfinite(value):
-        # The largest unit that the rounded value reaches, so that 0.99999 um is written 1 um.
-        size = abs(float(f"{value:.{digits}g}"))
-        fitting = [rung for rung in spec.ladder if size >= float(f"1e{rung[1]}")]
-        unit, power = fitting[-1] if fitting else spec.ladder[0]
         value = float(Decimal(repr(value)).scaleb(-power))
-    return f"{value:.{digits}g} {unit}".rstrip()
+    return f"{value:.{digits}g} {shown}".rstrip()
+
+
+def display_unit(value: float, unit: str, digits: int = 4) -> tuple[str, int]:
+    """The unit in which a value reads best, and its power of ten over the SI unit.
+
+    Parameters
+    ----------
+    value : float
+        In the SI unit.
+    unit : str
+        An SI unit of a kind of `KINDS`; any other is kept.
+    digits : int
+        Significant digits that are shown.
+    """
+    spec = next((kind for kind in KINDS.values() if kind.si == unit), None)
+    if spec is None or not value or not math.isfinite(value):
+        return unit, 0
+    # The last unit not larger than the value as rounded, so that 0.99999 um reads 1 um.
+    size = abs(float(f"{value:.{digits}g}"))
+    fitting = [rung for rung in spec.ladder if size >= float(f"1e{rung[1]}")]
+    return fitting[-1] if fitting else spec.ladder[0]
 
 
 def is_traced(value: Any) -> bool:

@@ -59,11 +59,9 @@ KINDS: Mapping[str, Kind] = MappingProxyType(
             "a stiffness",
             "Pa/m",
             "0.06 MPa/um",
-            (("Pa/m", 0), ("kPa/m", 3), ("MPa/m", 6), ("GPa/m", 9), ("MPa/um", 12)),
+            (("Pa/m", 0), ("kPa/m", 3), ("MPa/m", 6), ("MPa/mm", 9)),
         ),
-        "per_length": Kind(
-            "a stiffness over a load", "1/m", "0.003 1/um", (("1/m", 0), ("1/mm", 3), ("1/um", 6))
-        ),
+        "per_length": Kind("a stiffness over a load", "1/m", "0.003 1/um", (("1/um", 6),)),
         "damping": Kind(
             "a damping",
             "N*s/m",

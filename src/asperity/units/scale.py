@@ -24,6 +24,8 @@ _ALSO_KNOWN = {
     "angular_frequency": {"1/s": 0, "s^-1": 0},
     "length": {"cm": -2},
     "pressure": {"mbar": 2, "bar": 5},
+    "stress_per_length": {"GPa/m": 9, "MPa/um": 12},
+    "per_length": {"1/m": 0, "1/mm": 3},
 }
 
 #: Characters of a unit; texts with other characters are not given to pint's expression parser.

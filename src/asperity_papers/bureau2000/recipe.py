@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -123,7 +124,8 @@ def paper_procedure(
     ----------
     readings : LockInTable
         Rows with epsilon = 0 and mean_friction, at two velocities or more, for step 1; rows with
-        epsilon > 0 and delta_mu for steps 3 and 5, and mu1 for step 4.
+        epsilon > 0 and delta_mu for steps 3 and 5, and mu1 for step 4. A step without rows is left
+        out, and a warning says so.
     thresholds : Thresholds
         For step 2.
     fixed : mapping, optional
@@ -139,7 +141,7 @@ def paper_procedure(
     Raises
     ------
     InputError
-        If rows for a step are missing, or friction does not weaken with velocity.
+        If rows for step 1 are missing, or friction does not weaken with velocity.
     """
     report = progress or (lambda done, total, label: None)
     material = printed()
@@ -150,14 +152,20 @@ def paper_procedure(
     base = _steady_and_threshold(steady, thresholds, float(material["V0"].si), warnings)
     steps = _SingleFits(base, constants, warnings)
     numbers: list[RecipeNumber] = [*base.numbers]
+    result = partial(RecipeResult, PAPER.name, data=(readings.name, thresholds.name))
+    if drop is None:
+        warnings.append("no rows have epsilon above 0 and delta_mu: steps 3 to 5 are left out")
+        return result({n.name: n for n in numbers}, tuple(warnings))
     report(1, 4, "eps_ratio from the drop")
     ratio = steps.fitted(3, drop, "rice-ruina", "eps_ratio", {}, "the drop, by Rice-Ruina")
     numbers.append(ratio.number)
     later = {"eps_ratio": (ratio.number.value, ratio)}
     report(2, 4, "lambda from mu1")
-    numbers.append(
-        steps.fitted(4, first, "elasto-plastic", "lambda", later, "mu1, elasto-plastic law").number
-    )
+    if first is None:
+        warnings.append("no rows have epsilon above 0 and mu1: step 4 is left out")
+    else:
+        how = "mu1, elasto-plastic law"
+        numbers.append(steps.fitted(4, first, "elasto-plastic", "lambda", later, how).number)
     report(3, 4, "alpha from the drop")
     at_ratio = steps.fitted(
         5, drop, "linker-dieterich", "alpha", later, "the drop, at that eps_ratio", same=True
@@ -168,9 +176,7 @@ def paper_procedure(
     )
     numbers.append(replace(_limited(free.number), name="alpha, eps_ratio free"))
     report(4, 4, "alpha from the drop")
-    return RecipeResult(
-        PAPER.name, {n.name: n for n in numbers}, tuple(warnings), (readings.name, thresholds.name)
-    )
+    return result({n.name: n for n in numbers}, tuple(warnings))
 
 
 def _limited(number: RecipeNumber) -> RecipeNumber:
@@ -179,38 +185,31 @@ def _limited(number: RecipeNumber) -> RecipeNumber:
     return replace(number, upper_limit=limit)
 
 
-def _rows(readings: LockInTable) -> tuple[LockInTable, LockInTable, LockInTable]:
+def _rows(
+    readings: LockInTable,
+) -> tuple[LockInTable, LockInTable | None, LockInTable | None]:
     """Rows of steady sliding, of the drop and of mu1, each with its observable alone."""
     modulated = readings.points["epsilon"] > 0
-    parts = []
-    for name, wanted, what in (
-        ("mean_friction", ~modulated, "epsilon = 0"),
-        ("delta_mu", modulated, "epsilon above 0"),
-        ("mu1", modulated, "epsilon above 0"),
-    ):
-        if name not in readings.values:
-            raise InputError(
-                f"{readings.name} must have the column {name} (rows with {what}), got none; add it "
-                f"with {name}_err"
-            )
-        keep = wanted & np.isfinite(readings.values[name])
+
+    def part(name: str, wanted: NDArray[np.bool_]) -> LockInTable | None:
+        keep = wanted & np.isfinite(readings.values.get(name, np.nan))
         if not keep.any():
-            raise InputError(
-                f"{readings.name} must have rows with {what} and {name}, got none; measure some"
-            )
-        part = LockInTable(
-            readings.name,
-            readings.points,
-            {name: readings.values[name]},
-            {name: readings.errors[name]},
+            return None
+        columns = ({name: a[name]} for a in (readings.values, readings.errors))
+        return LockInTable(readings.name, readings.points, *columns).without(~keep)
+
+    steady = part("mean_friction", ~modulated)
+    if steady is None:
+        raise InputError(
+            f"{readings.name} must have rows with epsilon = 0 and mean_friction, got none; measure "
+            "steady sliding"
         )
-        parts.append(part.without(~keep))
-    if np.unique(parts[0].points["V"]).size < 2:
+    if np.unique(steady.points["V"]).size < 2:
         raise InputError(
             f"{readings.name} must have rows with epsilon = 0 at two velocities or more, got one; "
             "the slope with ln V needs them"
         )
-    return parts[0], parts[1], parts[2]
+    return steady, part("delta_mu", modulated), part("mu1", modulated)
 
 
 @dataclass(frozen=True, eq=False)

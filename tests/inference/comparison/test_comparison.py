@@ -258,7 +258,7 @@ def test_outliers_that_hide_each_other_are_named_and_left_out(made, pmma, outlie
     assert right >= draws - 1
 
 
-@draws(2, 6)
+@draws(1, 6)
 def test_clean_tables_have_no_outliers_even_under_a_wrong_law(made, pmma, draws):
     for seed in range(draws):
         _, table, _ = spoiled_table(made, seed, outliers=0)

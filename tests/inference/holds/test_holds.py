@@ -37,8 +37,13 @@ def table(exact, healing, **more):
     return healing_table({"hold_time": time, "healing": healing, "V": V, "K": K, **more})
 
 
-def test_the_numbers_come_back(exact, noise):
-    done = fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=16)
+@pytest.fixture(scope="module")
+def fitted(exact, noise):
+    return fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=16)
+
+
+def test_the_numbers_come_back(fitted):
+    done = fitted
     assert done.converged
     assert done.p_value > 0.001
     for name, true in (("A", A), ("B", B), ("D0", D0)):
@@ -47,9 +52,9 @@ def test_the_numbers_come_back(exact, noise):
         assert p.se < 0.15 * true
 
 
-def test_an_error_that_is_not_given_is_that_of_the_residuals(exact, noise):
+def test_an_error_that_is_not_given_is_that_of_the_residuals(exact, noise, fitted):
     """The same estimate; the error as rms of what is left, and intervals of Student's t."""
-    given = fit(table(exact, exact[1] + noise, healing_err=ERROR), "rice-ruina", starts=16)
+    given = fitted
     done = fit(table(exact, exact[1] + noise), "rice-ruina", starts=16)
     (term,) = done.objective.terms_of(HoldTerm)
     expected = ERROR * np.sqrt(given.chi2 / given.dof)
@@ -131,13 +136,6 @@ def test_what_holds_cannot_say_is_refused(exact):
         fit(few, "rice-ruina", ["A", "B", "D0"])
 
 
-def test_a_posterior_is_refused(exact):
-    done = fit(
-        table(exact, exact[1], healing_err=ERROR),
-        "rice-ruina",
-        ["B"],
-        fixed={"A": A, "D0": D0},
-        starts=2,
-    )
+def test_a_posterior_is_refused(fitted):
     with pytest.raises(InputError, match="profile likelihood"):
-        sample_posterior(done)
+        sample_posterior(fitted)

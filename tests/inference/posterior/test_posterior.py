@@ -151,24 +151,28 @@ def steps():
     return run
 
 
+#: Means over blocks, behind the low-pass of a gauge.
+THROUGH_GAUGE = RunOptions(fit_rate=2.5, gauge=(2, 1.0))
+
+
 def fit_of_steps(run, options=None, prior=None):
     free = ["A", "B", "D0"]
     return fit(run, "rice-ruina", free, start=TRUE, starts=1, runs=options, prior=prior)
 
 
-def test_a_posterior_of_nothing_is_refused(steps):
-    found = replace(fit_of_steps(steps), parameters={})
+def test_a_posterior_of_nothing_is_refused(found):
     with pytest.raises(InputError, match="posterior must be of free parameters, got none"):
-        sample_posterior(found)
+        sample_posterior(replace(found, parameters={}))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("options", "samples"),
     [
-        pytest.param(RunOptions(fit_rate=2.5), 350, marks=pytest.mark.long),
-        (RunOptions(fit_rate=2.5, gauge=(2, 1.0)), 350),
+        (RunOptions(fit_rate=2.5), 350),
+        (THROUGH_GAUGE, 350),
         # At 14 Hz: between the samples, and as many times as the other gauge has, filled up.
-        pytest.param(RunOptions(gauge=(1, 1.75)), 1400, marks=pytest.mark.long),
+        (RunOptions(gauge=(1, 1.75)), 1400),
     ],
 )
 def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, options, samples):
@@ -199,7 +203,7 @@ def test_the_likelihood_of_means_and_through_a_gauge_is_that_of_the_fit(steps, o
 
 
 def test_the_density_of_a_recording_is_that_of_its_fit(steps):
-    found = fit_of_steps(steps, prior={"gain": Prior(1.0, 0.02, "calibration")})
+    found = fit_of_steps(steps, THROUGH_GAUGE, {"gain": Prior(1.0, 0.02, "calibration")})
     whitened = whitened_posterior(found)
     density, data = whitened.compiled()
     both = jax.jit(jax.value_and_grad(density))

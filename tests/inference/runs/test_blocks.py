@@ -12,6 +12,8 @@ from asperity.inference import RunOptions, fit, recorded_run
 from asperity.inference.runs.blocks import averaged, reduced
 from asperity.inference.runs.cleaning import cleaned
 from asperity.inference.runs.reading import reading_at
+from asperity.inference.runs.term import RunTerm
+from asperity.laws import get_law
 from asperity.recording import Channel, Trace
 
 #: Ten seconds at 2.4 kHz: D0/V is 65 ms after the step up, and the spring takes 23 ms.
@@ -95,8 +97,9 @@ def test_intervals_agree_with_those_of_every_sample(by_blocks, clean, ringing):
         assert one.se == pytest.approx(other.se, rel=0.15)
 
 
-def test_what_was_averaged_is_said_in_one_sentence(by_blocks):
-    said = by_blocks.objective.terms[0].noise["averaged"]
+def test_what_was_averaged_is_said_in_one_sentence(clean, ringing):
+    run = recorded(clean + ringing + mains(np.arange(24_000) / CASE.rate))
+    said = RunTerm(cleaned(run), get_law("rice-ruina"), {}).noise["averaged"]
     assert said.startswith("24000 samples are compared as ")
     assert "means over blocks of" in said
     assert "lines at 50" in said

@@ -8,6 +8,7 @@ from asperity.inference.runs.drive import Drive
 from asperity.inference.runs.motion import RunMotion
 from asperity.inference.runs.reading import reading_at
 from asperity.laws import get_law
+from references.populations import population
 
 VALUES = {"mu0": 0.6, "A": 0.009, "B": 0.0105, "D0": 6.5e-6, "V0": 3e-6, "K": 4e3, "W0": 1.0}
 #: A step up, a hold, and sliding again under a load that ramps up by 20 %.
@@ -94,12 +95,12 @@ def test_means_over_blocks_are_those_of_an_independent_integration(computed):
 
 def test_a_motion_that_runs_away_is_no_motion():
     drive = Drive(EDGES, PULL, np.zeros(4), np.ones(4), np.zeros(4))
-    motion = RunMotion(get_law("rice-ruina"), 3e-6)
+    motion = RunMotion(get_law("linker-dieterich"), 3e-6)
     # A twentieth of the critical stiffness (B - A)/D0.
-    assert motion({**VALUES, "K": 12.0}, ("A",), drive, reading_at(TIMES)) is None
+    assert motion({**AT, "K": 12.0}, FREE, drive, reading_at(TIMES)) is None
 
 
-@pytest.mark.parametrize("name", ["regularised", "linker-dieterich", "rice-ruina"])
+@pytest.mark.parametrize("name", population(["regularised", "linker-dieterich", "rice-ruina"]))
 def test_derivatives_of_steady_sliding_do_not_grow_from_their_rounding(name):
     """However long it is, steps stay where the integrator is stable: F/W is mu_ss there."""
     for seed in range(6):

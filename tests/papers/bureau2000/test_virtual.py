@@ -205,5 +205,5 @@ def test_names_of_quantities_are_columns(experiment):
 
 
 def test_the_same_seeds_make_the_same_points(experiment):
-    again = recordings._points(study.all_series()[1])
-    pd.testing.assert_frame_equal(again, experiment[FAST])
+    shortest = min(study.all_series(), key=lambda series: len(experiment[series.name]))
+    pd.testing.assert_frame_equal(recordings._points(shortest), experiment[shortest.name])

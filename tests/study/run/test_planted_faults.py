@@ -15,6 +15,7 @@ from click.testing import CliRunner, Result
 import asperity.study.run as run_module
 from asperity.cli.main import main
 from references.closed_form_sweep import ClosedForm, ThisProcess
+from references.populations import draws
 
 PLAN = """
 law = "rice-ruina"
@@ -247,13 +248,16 @@ def can_have(plant: Plant, file: str) -> bool:
 
 
 @pytest.mark.parametrize("plant", [*ANY, *DESCRIPTION])
-def test_a_planted_fault_is_repaired_or_refused(whole: Whole, tmp_path: Path, plant: Plant) -> None:
+@draws(2, 4)
+def test_a_planted_fault_is_repaired_or_refused(
+    whole: Whole, tmp_path: Path, plant: Plant, draws: int
+) -> None:
     seed = [*ANY, *DESCRIPTION].index(plant)
     draw = np.random.default_rng(seed)
     kinds: dict[str, list[str]] = {}
     for file in whole.files:
         if can_have(plant, file):
             kinds.setdefault(kind_of(file), []).append(file)
-    for kind in draw.permutation(sorted(kinds))[:4]:
+    for kind in draw.permutation(sorted(kinds))[:draws]:
         file = kinds[kind][draw.integers(len(kinds[kind]))]
         check(whole, tmp_path / "s.zarr", file, plant, seed)

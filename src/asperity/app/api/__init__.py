@@ -1,8 +1,8 @@
-"""What the page asks for: one module a tab, and the catalogue that all tabs share.
+"""What the page asks for: one module a tab or a panel, and the catalogue that all tabs share.
 
-A tab's module has ``ENDPOINTS``, a tuple of `asperity.app.endpoints.Answer` and `Job`, and may have
+Such a module has ``ENDPOINTS``, a tuple of `asperity.app.endpoints.Answer` and `Job`, and may have
 ``preparations()``, see `asperity.app.preparation`.
 """
 
 #: Modules of this package with endpoints, in the order of the tabs.
-TABS = ("explore", "map", "data", "paper")
+TABS = ("explore", "motion", "map", "data", "by_hand", "paper")

@@ -17,7 +17,15 @@ from asperity.materials import Material
 from asperity.materials.loader import packaged
 from asperity.operating_point import known_parameters
 from asperity.outputs.json import to_json
-from asperity.parameters import MODULATION, OUTPUTS, Parameter, point_parameters, required
+from asperity.parameters import (
+    MODULATION,
+    OUTPUTS,
+    Parameter,
+    display_name,
+    point_parameters,
+    required,
+    symbol_of,
+)
 from asperity.parameters.parameter import plain_text
 from asperity.units import KINDS, to_si
 
@@ -48,6 +56,11 @@ def as_json() -> str:
             },
             "materials": {name: _material(materials.load(name)) for name in sorted(packaged())},
             "laws": {name: _law(name) for name in registered()},
+            "geophysics": {
+                name: usual
+                for name in known_parameters()
+                if (usual := display_name(name, "geophysics")) != name
+            },
             "outputs": {
                 name: {"unit": o.unit, "meaning": o.meaning, "symbol": mathml(o.symbol)}
                 for name, o in OUTPUTS.items()
@@ -96,6 +109,7 @@ def _parameter(parameter: Parameter) -> dict[str, Any]:
         "rule": parameter.rule,
         "meaning": plain_text(parameter.meaning),
         "symbol": mathml(parameter.symbol),
+        "geophysics": mathml(symbol_of(parameter, "geophysics")),
         "place": parameter.place,
         "default": parameter.default,
         "example": to_si(parameter.example, parameter.kind, parameter.name),

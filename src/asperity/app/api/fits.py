@@ -8,11 +8,14 @@ import math
 import shlex
 import tempfile
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from asperity.app.api.catalogue import known_materials
@@ -23,12 +26,19 @@ from asperity.app.jobs.worker import limited
 from asperity.app.uploads import Uploads
 from asperity.app.words import in_labels
 from asperity.errors import InputError, closest, naming
+from asperity.outputs.tables import Section
+from asperity.parameters import Names, in_names
 from asperity.questions.fit import FitOptions
 from asperity.questions.options import FIT_OPTIONS, as_options, source_options
 from asperity.recording.readers.from_file import read_source
 
 #: Blocks of a curve that is shown.
 _BLOCKS = 700
+#: Transients that are shown enlarged, samples that one has, and the share of its largest departure
+#: from the line after it at which it has settled.
+_MOST_TRANSIENTS, _FEWEST, _SETTLED = 6, 8, 0.05
+
+Array = NDArray[np.float64]
 
 
 class Table(Question):
@@ -75,6 +85,8 @@ class Fitted(Question, FitOptions):
         Whether to sample the posterior of the one law, and how.
     report : bool
         Whether to write the folder of the fit or of the comparison.
+    names : {"friction", "geophysics"}
+        Of the parameters in sentences and tables.
     """
 
     laws: Annotated[tuple[str, ...], Field(min_length=1, max_length=20)]
@@ -85,6 +97,7 @@ class Fitted(Question, FitOptions):
     chains: Annotated[int, Field(ge=2, le=8)] = 4
     draws: Annotated[int, Field(ge=100, le=10_000)] = 1000
     report: bool = False
+    names: Names = "friction"
 
 
 def check(question: Fitted) -> None:
@@ -129,13 +142,16 @@ def _refuse_law(law: str, known: Mapping[str, Any]) -> None:
 def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, Any]:
     """Fit a law, or compare several; the share of the work that is done is reported.
 
-    The result has ``fit`` or ``comparison``; of the fit or the best one the pictures ``bands``,
+    The result has ``fit`` or ``comparison``, and ``sections``, what these say in words and tables,
+    of a comparison with ``laws``, those of each law; of the fit or the best one the pictures ``bands``,
     ``residuals`` and ``runs``; and, where they were asked for, ``posterior`` and ``report``, the
     folder as a ZIP file in base64.
     """
     from asperity.inference.answers import answer_comparison, answer_fit
     from asperity.inference.comparison.record import comparison_record
     from asperity.inference.fitting.result import fit_record
+    from asperity.inference.report import comparison_report, fit_report, posterior_sections
+    from asperity.laws import get_law
     from asperity.questions import fit as questions
 
     question = Fitted(**argument["asked"])
@@ -143,6 +159,10 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
 
     def on_progress(done: int, total: int) -> None:
         report(share=done / total)
+
+    def described(sections: Iterable[Section], law: str = "") -> list[dict[str, Any]]:
+        words = partial(in_names, names=question.names, law=get_law(law) if law else None)
+        return [section.worded(words).record() for section in sections]
 
     report(share=0.0)
     options = {name: getattr(question, name) for name in FitOptions.model_fields}
@@ -153,19 +173,26 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
             one = questions.Fit(**{**options, "law": question.laws[0]})
             whole: Any = answer_fit(one, read=_read, progress=on_progress)
             best = whole
-            record = {"fit": fit_record(whole)}
+            record = {"fit": fit_record(whole), "sections": described(fit_report(whole), best.law)}
         else:
             several = questions.Comparison(**{**options, "laws": question.laws})
             whole = answer_comparison(several, read=_read, progress=on_progress)
             judged = whole.laws.get(whole.best)
             best = None if judged is None else judged.fit
-            record = {"comparison": comparison_record(whole)}
+            record = {
+                "comparison": comparison_record(whole),
+                "sections": described(comparison_report(whole)),
+                "laws": {
+                    name: described(fit_report(j.fit), j.fit.law) for name, j in whole.laws.items()
+                },
+            }
     pictures: list[dict[str, Any]] = []
     posterior = None
     if best is not None and best.converged:
         if question.posterior:
             posterior = _sampled(best, question, report)
             record["posterior"] = {**posterior.record(), "histograms": _histograms(posterior)}
+            record["sections"] += described(posterior_sections(posterior), best.law)
         report(stage="figures")
         record["bands"] = _bands(best, posterior)
         record["residuals"] = _residuals(best)
@@ -290,17 +317,43 @@ def _residuals(result: Any) -> dict[str, list[Any]]:
 
 
 def _run_pictures(result: Any) -> list[dict[str, Any]]:
-    """Friction of each recording, as recorded and as fitted."""
+    """Friction of each recording, as recorded and as fitted, whole and after each change."""
     from asperity.inference.runs.term import RunTerm
 
     pictures = []
     for term in result.objective.terms_of(RunTerm):
         fitted = term.fitted_friction(result.values)
-        time, recorded = term.run.time, term.run.friction
+        run = term.run
+        time, recorded = run.time + run.origin, run.friction
         curves = {"recorded": recorded, "fitted": fitted, "difference": recorded - fitted}
         shown = {name: extremes(time, values, _BLOCKS) for name, values in curves.items()}
-        pictures.append({"name": term.name, **shown})
+        transients = []
+        edges = np.append(run.drive.edges[list(run.cuts)], np.inf)
+        for begin, end in pairwise(edges[: _MOST_TRANSIENTS + 1]):
+            near = _around(run.time, fitted, begin, end)
+            transients.append(
+                {
+                    "time": begin + run.origin,
+                    "recorded": extremes(time[near], recorded[near], _BLOCKS),
+                    "fitted": extremes(time[near], fitted[near], _BLOCKS),
+                }
+            )
+        pictures.append({"name": term.name, **shown, "transients": transients})
     return pictures
+
+
+def _around(time: Array, fitted: Array, begin: float, end: float) -> slice:
+    """Samples around a change of the drive until the fitted friction has settled again."""
+    a, b = np.searchsorted(time, (begin, end))
+    after = fitted[a:b]
+    if after.size < _FEWEST:
+        return slice(max(a - _FEWEST, 0), b)
+    last = slice(2 * after.size // 3, None)
+    line = np.polynomial.Polynomial.fit(time[a:b][last], after[last], 1)
+    far = np.abs(after - line(time[a:b]))
+    settled = max(int(np.flatnonzero(far > _SETTLED * far.max())[-1]) + 1, _FEWEST)
+    length = 1.3 * (time[a + settled - 1] - time[a])
+    return slice(*np.searchsorted(time, (begin - length / 3, min(begin + length, end))))
 
 
 def _fit_command(question: Fitted, recordings: list[str]) -> str:

@@ -132,6 +132,8 @@ def warm(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, 
 
 
 def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, Any]:
+    from asperity.figures.map import region_names, unmodulated
+
     values = result[question.show].values
     line = result["boundary_line"].values
     kinds = result["boundary_kind"].values.astype(str)
@@ -156,6 +158,8 @@ def _record(result: Any, question: MapQuestion, x: Axis, y: Axis) -> dict[str, A
         # As many digits as a colour and a readout need: a grid is the longest answer of all.
         "values": [[_short(v) for v in row] for row in values.tolist()],
         "stable": result["stable"].values.astype(int),
+        "regions": region_names(result),
+        "unmodulated": unmodulated(result),
         "failed": int(failed.sum()),
         "reasons": list(reasons)[:5],
         "boundaries": lines,

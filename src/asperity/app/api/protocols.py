@@ -51,9 +51,9 @@ def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
         _ = protocol.rows  # what the solver's table says is read here
         return protocol, []
     except ProtocolError as error:
-        return None, [{"sentence": m, "line": _line_of(m, lines, text)} for m in error.mistakes]
+        return None, [{"sentence": str(m), "line": _line_of(m, lines, text)} for m in error.errors]
     except InputError as error:
-        return None, [{"sentence": str(error), "line": _line_of(str(error), lines, text)}]
+        return None, [{"sentence": str(error), "line": _line_of(error, lines, text)}]
 
 
 def run(text: str, out: Path, report: Callable[..., None]) -> dict[str, Any]:
@@ -179,13 +179,12 @@ def _lines(text: str, content: dict[str, Any]) -> dict[str, int]:
     return result
 
 
-def _line_of(sentence: str, lines: dict[str, int], text: str) -> int | None:
-    """The line that a sentence is about: of the longest place that it begins with."""
-    begun = [place for place in lines if re.match(rf"{re.escape(place)}(?![\w])", sentence)]
-    if begun:
-        return lines[max(begun, key=len)]
-    if wrong := re.search(r"got '([^']+)'", sentence):
-        there = text.find(wrong[1])
-        if there >= 0:
-            return text.count("\n", 0, there) + 1
-    return None
+def _line_of(error: InputError, lines: dict[str, int], text: str) -> int | None:
+    """The line of the field that a mistake is about, else of the value that it has."""
+    place = error.field.name
+    while place:
+        if place in lines:
+            return lines[place]
+        place = place.rpartition(".")[0]
+    there = text.find(error.got.strip("'")) if error.got else -1
+    return text.count("\n", 0, there) + 1 if there >= 0 else None

@@ -29,6 +29,7 @@ from asperity.recording.roles import ROLES, candidates
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
 
 #: Address space (bytes) and processor time (s) of a process that reads a recording.
@@ -37,6 +38,8 @@ LIMITS = {"memory": 6 * 1024**3, "seconds": 240}
 _BLOCKS = 700
 #: Channels that are drawn, and findings and rows that are listed.
 _MOST_CHANNELS, _MOST_LISTED = 24, 200
+#: Slip events at close range.
+_CLOSE = 8
 #: Largest lock-in table (bytes).
 LARGEST_TABLE = 1024**2
 
@@ -121,9 +124,9 @@ def _measured(
     trace: Any, argument: Mapping[str, Any], report: Callable[..., None]
 ) -> dict[str, Any]:
     from asperity.measurement.from_file import answer_measurement
+    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
-    # The page shows modulated recordings, velocity steps and holds.
-    question = questions.Measurement(**{**argument["options"], "stick_slip": False})
+    question = questions.Measurement(**argument["options"])
     name = argument["name"]
     report(stage="measuring")
     measurement: Any
@@ -132,14 +135,17 @@ def _measured(
     measured: dict[str, Any]
     if modulated:
         measured = _modulated(trace, measurement, question, name)
+    elif isinstance(measurement, StickSlipMeasurement):
+        measured = _stick_slip_record(measurement, name)
+        question = question.model_copy(update={"stick_slip": True, "modulated": None})
     else:
         measured = {**_sliding_record(measurement, name), "note": note}
     source = Source(**argument["source"])
     command = ["asperity measure", shlex.quote(name), *source_options(source)]
-    command += measure_options(question, modulated=modulated)
+    command += measure_options(question, modulated=modulated or bool(question.stick_slip))
     return {
         "measured": measured,
-        "python": _python(name, source, question, modulated=modulated),
+        "python": _python(name, source, question, modulated=modulated or bool(question.stick_slip)),
         "command": " ".join(command),
     }
 
@@ -176,6 +182,25 @@ def _sliding_record(measurement: SlidingMeasurement, name: str) -> dict[str, Any
         "record": sliding_record(measurement),
         "rows": sliding_rows(Path(name), measurement),
         "curves": {"friction": extremes(measurement.time, measurement.values, _BLOCKS)},
+    }
+
+
+def _stick_slip_record(measurement: StickSlipMeasurement, name: str) -> dict[str, Any]:
+    from asperity.measurement.stick_slip.catalogue import stick_slip_record, stick_slip_row
+
+    time, friction, events = measurement.time, measurement.friction, measurement.events
+    curves = {"friction": extremes(time, friction, _BLOCKS)}
+    if len(events):
+        first = max((len(events) - _CLOSE) // 2, 0)
+        last = min(first + _CLOSE, len(events)) - 1
+        begin, end = float(events.onset[first]), float(events.end[last])
+        around = max((end - begin) / (2 * _CLOSE), float(events.slip_duration[first]))
+        near = (time >= begin - around) & (time <= end + around)
+        curves["close"] = extremes(time[near], friction[near], _BLOCKS)
+    return {
+        "record": stick_slip_record(measurement),
+        "rows": [stick_slip_row(Path(name), measurement)],
+        "curves": curves,
     }
 
 

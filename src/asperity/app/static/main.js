@@ -3,6 +3,7 @@
 import { redrawAll } from "./lib/charts.js";
 import { el, fill } from "./lib/dom.js";
 import { dropLink, flushLink, linkTo, readLink, writeLink } from "./lib/link.js";
+import { names, setNames, useNames } from "./lib/names.js";
 import { get } from "./lib/server.js";
 import { useKinds } from "./lib/units.js";
 import * as data from "./tabs/data.js";
@@ -12,7 +13,7 @@ import * as paper from "./tabs/paper.js";
 
 // A tab's module has `name`, `title`, and `create(page)`, which returns its element and
 // `show(parameters)`, called each time that the tab is opened with the parameters of the link, and may
-// have `hide()`, called when another tab is opened.
+// have `hide()`, called when another tab is opened, and `renamed()`, called when numbers get other names.
 const TABS = [explore, map, data, paper];
 
 const content = document.getElementById("content");
@@ -25,6 +26,7 @@ const page = {
   catalogue: null,
   /** Write a view of the tab into the address. */
   setLink(tab, parameters) {
+    if (names() === "geophysics") parameters.set("names", names());
     if (current === tab) writeLink(tab, parameters);
     opened.get(tab).parameters = parameters;
   },
@@ -43,6 +45,8 @@ function show() {
   dropLink();
   const { tab, parameters } = readLink();
   const module = TABS.find((t) => t.name === tab) || TABS[0];
+  if (parameters.has("names")) setNames(parameters.get("names"));
+  nameNames();
   if (current && current !== module.name) opened.get(current)?.hide?.();
   current = module.name;
   for (const link of bar.querySelectorAll("a")) {
@@ -69,11 +73,35 @@ function changeTheme() {
   }
 }
 
+function nameNames() {
+  const button = document.getElementById("names");
+  const geophysics = names() === "geophysics";
+  button.textContent = geophysics ? "a, b, D_c" : "A, B, D₀";
+  button.setAttribute("aria-label", geophysics ? "Names of geophysics: a, b, D_c. Change to A, B, D0" : "Names: A, B, D0. Change to those of geophysics, a, b, D_c");
+}
+
+function changeNames() {
+  setNames(names() === "geophysics" ? "friction" : "geophysics");
+  nameNames();
+  for (const [tab, { renamed, parameters, show: again }] of opened) {
+    parameters.delete("names");
+    if (renamed) renamed();
+    else if (tab === current) again(parameters);
+  }
+}
+
+/** Full screen, with letters for a lecture. */
+function changeScreen() {
+  if (document.fullscreenElement) document.exitFullscreen();
+  else document.documentElement.requestFullscreen();
+}
+
 let resized = 0;
 
 async function start() {
   page.catalogue = await get("catalogue");
   useKinds(page.catalogue.kinds);
+  useNames(page.catalogue);
   fill(bar, TABS.map((t) => el("li", {}, el("a", {
     href: `#${t.name}`, "data-tab": t.name,
     click: (event) => {
@@ -87,6 +115,12 @@ async function start() {
     },
   }, t.title))));
   document.getElementById("theme").addEventListener("click", changeTheme);
+  document.getElementById("names").addEventListener("click", changeNames);
+  document.getElementById("full").addEventListener("click", changeScreen);
+  document.addEventListener("fullscreenchange", () => {
+    document.documentElement.classList.toggle("lecture", Boolean(document.fullscreenElement));
+    redrawAll();
+  });
   addEventListener("hashchange", show);
   addEventListener("resize", () => {
     clearTimeout(resized);

@@ -27,6 +27,7 @@ from asperity.inference.comparison.scale import (
 )
 from asperity.inference.fitting.fit import Data, fit, listed_data
 from asperity.inference.fitting.inputs import free_by_default
+from asperity.inference.fitting.minima import FAR_OFF
 from asperity.inference.fitting.plausibility import stiffness_that_describes
 from asperity.inference.fitting.result import Fit
 from asperity.inference.runs.assembly import RunOptions
@@ -42,6 +43,7 @@ from asperity.laws import get_law, registered
 from asperity.materials import Material
 from asperity.parameters import law_parameters
 from asperity.parameters.arguments import typed
+from asperity.parameters.parameter import Drawn, SummaryLine
 
 #: Called with how many laws are done, parts of one included.
 Report = Callable[[float], None]
@@ -82,8 +84,8 @@ class Judged:
     cross_validation: CrossValidation | None = None
 
 
-@dataclass(frozen=True)
-class Comparison:
+@dataclass(frozen=True, repr=False)
+class Comparison(Drawn):
     """Laws fitted to the same data.
 
     Attributes
@@ -101,12 +103,22 @@ class Comparison:
         Laws of which no fit could be made, and why.
     """
 
+    _drawn_by = "asperity.fit_report.comparison:draw_comparison"
+
     laws: Mapping[str, Judged]
     decided: bool
     best: str
     verdict: str
     left_out: tuple[str, ...] = ()
     not_compared: Mapping[str, str] = field(default_factory=dict)
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """The verdict, and where each law stands."""
+        lines = [SummaryLine("verdict", self.verdict)]
+        for name in self.laws:
+            word, number = self.standing(name)
+            lines.append(SummaryLine(name, "lowest AICc" if name == self.best else word, number))
+        return "Comparison of laws", lines
 
     def standing(self, name: str) -> Standing:
         """Where a law stands on the scale of verdicts, and by which number."""
@@ -319,14 +331,15 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
 def _examined(comparison: Comparison, report: Report) -> Comparison:
     """The comparison with evidence and cross-validation of every law.
 
-    Orbits that are searched for, and motions through recordings, take minutes for it: of an
-    excluded law, only the normal approximation of the evidence.
+    Orbits that are searched for, and motions through recordings, take minutes for it: of a law that
+    is excluded or far from the data, only the normal approximation of the evidence.
     """
     judged = {}
     for k, (name, j) in enumerate(comparison.laws.items(), 1):
         terms = j.fit.objective.terms
         slow = any(term.searches or term.profiled for term in terms)
-        if j.fit.converged and j.excluded and slow:
+        far_off = j.fit.judged_by_chi2 and j.fit.p_value < FAR_OFF
+        if j.fit.converged and slow and (j.excluded or far_off):
             j = replace(j, evidence=evidence_of(j.fit, samples=0))
         elif j.fit.converged:
             j = replace(j, evidence=evidence_of(j.fit), cross_validation=leave_one_run_out(j.fit))

@@ -17,7 +17,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import multivariate_t
 
 from asperity.inference.fitting.result import Fit
 from asperity.inference.objective import log_density
@@ -95,6 +94,9 @@ def evidence_of(fit: Fit, *, samples: int | None = None, seed: int = 0) -> Evide
     laplace = at_mode + 0.5 * n * math.log(2 * math.pi)
     if samples == 0:
         return Evidence(laplace, math.nan, 0.0, laplace, 0, whitened.prior.record())
+    # The whole of scipy.stats takes longer to load than a fit of a velocity step to begin.
+    from scipy.stats import multivariate_t
+
     proposal = multivariate_t(np.zeros(n), np.eye(n), df=_TAILS, seed=seed)
     z = np.asarray(proposal.rvs(samples)).reshape(samples, n)
     log_weights = _log_target(fit, whitened, z) - proposal.logpdf(z).reshape(samples)

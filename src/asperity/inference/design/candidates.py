@@ -13,8 +13,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
-from scipy.stats.qmc import Sobol
+from scipy.special import ndtri
 
 from asperity.inference.design.plan import DesignPlan, Hypothesis
 from asperity.inference.tables.term import on_contacts
@@ -132,10 +131,13 @@ def drawn_values(plan: DesignPlan) -> tuple[dict[str, float], ...]:
     if not plan.draws:
         return ()
     rules = {u.name: RULES[u.parameter.rule] for u in plan.truth.unknowns}
+    # Slow to load, and wanted only here.
+    from scipy.stats.qmc import Sobol
+
     sequence = Sobol(len(names), seed=plan.seed)
     result: list[dict[str, float]] = []
     while len(result) < plan.draws:
-        for row in norm.ppf(sequence.random(max(8, 1 << (plan.draws - 1).bit_length()))):
+        for row in ndtri(sequence.random(max(8, 1 << (plan.draws - 1).bit_length()))):
             drawn = {
                 n: plan.truth.values[n] + plan.uncertainty[n] * float(z)
                 for n, z in zip(names, row, strict=True)

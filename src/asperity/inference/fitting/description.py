@@ -8,9 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi_squared
-from scipy.stats import norm
-from scipy.stats import t as student
+from scipy.special import chdtri, ndtri, stdtrit
 
 from asperity.inference.fitting.intervals import (
     LEVELS,
@@ -29,6 +27,7 @@ from asperity.inference.objective import Objective, Residuals, log_density
 from asperity.inference.tables.outliers import outlying_rows
 from asperity.inference.tables.term import LockInTerm
 from asperity.inference.unknowns import Unknown
+from asperity.units import quantity_text
 
 Float = NDArray[np.float64]
 
@@ -215,7 +214,7 @@ def _ends(
     ends = []
     for level in LEVELS:
         # By how much estimated noise widens an interval under known noise.
-        wider = float(student.ppf((1 + level) / 2, at.freedom[i]) / norm.ppf((1 + level) / 2))
+        wider = float(stdtrit(at.freedom[i], (1 + level) / 2) / ndtri((1 + level) / 2))
         wider *= float(at.se[i] / at.sd[i])
         if along is not None:
             ends.append(along.interval(level, wider))
@@ -432,7 +431,7 @@ def _hull(
         Coordinates and rise of chi-squared above the lowest minimum.
     """
     low, high = interval
-    threshold = float(chi_squared.ppf(level, 1))
+    threshold = float(chdtri(1, 1 - level))
     bounds = objective.unknowns[i].bounds
     for v, rise in rivals:
         if rise >= threshold:
@@ -478,10 +477,10 @@ def _with_warnings(fit: Fit, said: list[str]) -> Fit:
         said.append(_why_undetermined(fit, name))
     for name, estimate in fit.parameters.items():
         if estimate.at_bound:
-            said.append(f"{name} is at its bound {estimate.value:.4g} {estimate.unit}".rstrip())
+            said.append(f"{name} is at its bound {quantity_text(estimate.value, estimate.unit)}")
     for other in fit.optima:
         at = ", ".join(
-            f"{n} {other.values[n]:.4g} {p.unit}".rstrip() for n, p in fit.parameters.items()
+            f"{n} {quantity_text(other.values[n], p.unit)}" for n, p in fit.parameters.items()
         )
         said.append(
             f"another minimum of chi-squared lies {other.chi2 - fit.chi2:.3g} higher, at {at}: "

@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from scipy.stats import chi2 as chi_squared
-from scipy.stats import norm
+from scipy.special import chdtrc, ndtr, ndtri
 
 from asperity.inference.objective import Objective, Residuals
 
@@ -41,19 +40,19 @@ def bounded_threshold(distance: float, level: float) -> float:
     For an estimate x that is normal about mu >= 0 with unit variance, the ratio to the best
     allowed value is (x - mu)^2 where x >= 0 and mu^2 - 2 x mu elsewhere.
     """
-    far = float(norm.isf((1 - level) / 2)) ** 2
+    far = float(ndtri((1 - level) / 2)) ** 2
     if distance > _FAR:
         return far
     if distance <= 0:
         # Every negative estimate has the ratio 0 there; half of all estimates.
-        return float(norm.isf(1 - level)) ** 2 if level > 0.5 else 0.0
+        return float(ndtri(1 - level)) ** 2 if level > 0.5 else 0.0
 
     def covered(threshold: float) -> float:
         root = math.sqrt(threshold)
         lowest = distance - root
         if lowest < 0:
             lowest = (distance**2 - threshold) / (2 * distance)
-        return float(norm.cdf(root) - norm.cdf(lowest - distance)) - level
+        return float(ndtr(root) - ndtr(lowest - distance)) - level
 
     return float(brentq(covered, 0.0, far + 1e-9, xtol=1e-12)) if covered(far) > 0 else far
 
@@ -79,7 +78,7 @@ def bounded_interval(
     -------
     (float, float)
     """
-    root = float(norm.isf((1 - level) / 2))
+    root = -float(ndtri((1 - level) / 2))
     if upper - lower < 2 * root * sd:
         return lower, upper
     low, high = estimate - root * sd, estimate + root * sd
@@ -183,7 +182,7 @@ class Parabola:
     @property
     def p_value(self) -> float:
         """Probability of as large a chi-squared by chance; NaN without degrees of freedom."""
-        return float(chi_squared.sf(self.chi2, self.dof)) if self.dof > 0 else math.nan
+        return float(chdtrc(self.dof, self.chi2)) if self.dof > 0 else math.nan
 
 
 def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:

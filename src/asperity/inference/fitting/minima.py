@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi_squared
-from scipy.stats.qmc import Sobol
+from scipy.special import chdtrc
 
 from asperity.inference.objective import Minimum, Objective
 from asperity.laws import Law
@@ -137,7 +136,10 @@ def _beginnings(
     middle = np.array([float(u.to_coordinate(u.middle)) for u in unknowns])
     low = np.array([u.to_coordinate(u.start[0]) for u in unknowns])
     high = np.array([u.to_coordinate(u.start[1]) for u in unknowns])
-    shares = Sobol(len(unknowns), seed=seed).random(drawn)
+    # A Latin hypercube. (Sobol's sequence would load the whole of scipy.stats for it.)
+    generator = np.random.default_rng(seed)
+    strata = generator.permuted(np.tile(np.arange(drawn), (len(unknowns), 1)), axis=1)
+    shares = (strata + generator.random(strata.shape)).T / max(drawn, 1)
     candidates = [middle, *(low + (high - low) * shares)]
     chi2 = objective.chi2_of_many(np.array(candidates))
     at = np.flatnonzero(np.isfinite(chi2))
@@ -312,7 +314,7 @@ def _p_value(objective: Objective, minimum: Minimum) -> float:
     if not math.isfinite(minimum.chi2):
         return 0.0
     r, _ = objective.residuals(minimum.u)
-    return float(chi_squared.sf(minimum.chi2, max(r.size - minimum.u.size, 1)))
+    return float(chdtrc(max(r.size - minimum.u.size, 1), minimum.chi2))
 
 
 def _few_rows(objective: Objective) -> Objective | None:

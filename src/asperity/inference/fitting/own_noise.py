@@ -25,11 +25,15 @@ _ROUNDS, _STILL = 8, 0.03
 _ONE_END = 1.0
 #: Standard deviations of the parameters within which two starts lead to the same minimum.
 _ALLOWED = 5.0
+#: Relative change of the coordinates that ends the way to a minimum of a drift, which only tells
+#: starts apart: along its valleys chi-squared falls by less than `_ALLOWED` leaves open.
+_COARSE = 1e-4
 
 
 def under_drift(objective: Objective) -> Objective:
     """The objective with recordings whose noise is taken for a slow drift."""
-    drifting = replace(objective, terms=tuple(copy(term) for term in objective.terms))
+    terms = tuple(copy(term) for term in objective.terms)
+    drifting = replace(objective, terms=terms, tolerance=_COARSE)
     for term in drifting.terms_of(RunTerm):
         term.expect_slow_noise()
     return drifting

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +16,17 @@ from asperity.inference.objective import Objective, Residuals
 from asperity.inference.runs.term import RunTerm
 from asperity.inference.unknowns import EPS_RATIO, Prior
 from asperity.outputs.json import plain
+from asperity.outputs.tables import rounded
 from asperity.parameters import point_parameters
 from asperity.parameters.parameter import Drawn, SummaryLine
+from asperity.units import display_unit
 
 Float = NDArray[np.float64]
 T = TypeVar("T")
 
 
+#: Of a parameter whose numbers say nothing.
+NOT_DETERMINED = "not determined"
 #: Loads of recordings that differ by less, as a share, are one.
 _ONE_LOAD = 1e-3
 
@@ -52,6 +56,45 @@ class Estimate:
     interval_95: Interval
     at_bound: bool
     prior: Prior | None
+
+
+class Shown(NamedTuple):
+    """How an estimate is written: in the unit that reads best, with the digits its error bears.
+
+    Attributes
+    ----------
+    value, unit : str
+    power : int
+        Of ten, of the unit over the SI unit.
+    se : float
+        Standard error, in that unit.
+    """
+
+    value: str
+    unit: str
+    power: int
+    se: float
+
+    @classmethod
+    def of(cls, value: float, se: float, unit: str) -> Shown:
+        """Of a value and its standard error in SI."""
+        shown, power = display_unit(value, unit)
+        scale = 10.0**-power
+        return cls(rounded(value * scale, se * scale)[0], shown, power, se * scale)
+
+    def error(self, se: float) -> str:
+        """A standard error in SI as text."""
+        return f"{se * 10.0**-self.power:.2g}"
+
+    def interval(self, ends: Interval) -> str:
+        """An interval in SI in words; one that the data do not bound on either side is none."""
+        low, high = ends
+        if not (math.isfinite(high) or (math.isfinite(low) and low > 0)):
+            return NOT_DETERMINED
+        low_text, high_text = (rounded(end * 10.0**-self.power, self.se)[0] for end in ends)
+        if not math.isfinite(high):
+            return f"above {low_text}"
+        return f"{low_text} to {high_text}" if math.isfinite(low) else f"below {high_text}"
 
 
 @dataclass(frozen=True)
@@ -172,16 +215,20 @@ class Fit(Drawn):
         title = f"Fit of {self.law}"
         if not self.converged:
             return title, [SummaryLine("result", self.message)]
-        lines = [
-            SummaryLine(
-                name,
-                f"{p.value:.6g} {p.unit}".rstrip(),
-                f"95 %: {p.interval_95[0]:.4g} to {p.interval_95[1]:.4g}"
-                + (", at its bound" if p.at_bound else "")
-                + (", not determined by these data" if name in self.undetermined else ""),
+        lines = []
+        for name, p in {**self.parameters, **self.over_load}.items():
+            if name in self.undetermined:
+                lines.append(SummaryLine(name, NOT_DETERMINED, "by these data"))
+                continue
+            shown = Shown.of(p.value, p.se, p.unit)
+            bound = ", at its bound" if p.at_bound else ""
+            lines.append(
+                SummaryLine(
+                    name,
+                    f"{shown.value} {shown.unit}".rstrip(),
+                    f"95 %: {shown.interval(p.interval_95)}{bound}",
+                )
             )
-            for name, p in {**self.parameters, **self.over_load}.items()
-        ]
         lines.append(SummaryLine("chi2", f"{self.chi2:.6g}", f"{self.dof} degrees of freedom"))
         lines.append(SummaryLine("p_value", f"{self.p_value:.3g}", "probability of a larger chi2"))
         return title, lines + [SummaryLine("warning", text) for text in self.warnings]

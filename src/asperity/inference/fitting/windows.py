@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from asperity.errors import InputError
 from asperity.inference.fitting.fit import fit
@@ -237,7 +237,7 @@ def _over(unknown: Any, fits: Sequence[Fit]) -> tuple[WindowEstimate, bool]:
     slope = abs(float(unknown.slope(value)))
 
     def interval(level: float) -> Interval:
-        reach = float(norm.isf((1 - level) / 2)) * total
+        reach = -float(ndtri((1 - level) / 2)) * total
         low, high = unknown.bounds
         return unknown.end(max(mean - reach, low)), unknown.end(min(mean + reach, high))
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +12,7 @@ from numpy.typing import NDArray
 
 from asperity.errors import InputError
 from asperity.parameters import obeying
+from asperity.parameters.columns import read_headed_columns
 from asperity.units import to_si
 
 Float = NDArray[np.float64]
@@ -29,8 +28,6 @@ _KINDS = {
     "W0": ("force", "positive"),
 }
 _REQUIRED = ("hold_time", HEALING, "V", "K")
-#: ``K (1/um)`` or ``K [1/um]``: a name and its unit.
-_HEADING = re.compile(r"\s*(\w+)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,47 +83,8 @@ def read_healing(path: str | Path, given: Mapping[str, Any] | None = None) -> He
         If the file cannot be read, a column is missing, or a cell breaks its rule.
     """
     path = Path(path)
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        why = (getattr(error, "strerror", None) or "not UTF-8 text").lower()
-        raise InputError(
-            f"data must be a CSV that can be read, got '{path}': {why}; check the path"
-        ) from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    separator = ";" if lines and ";" in lines[0] and "," not in lines[0] else ","
-    rows = [[cell.strip() for cell in row] for row in csv.reader(lines, delimiter=separator)]
-    if len(rows) < 2:
-        raise InputError(
-            f"{path.name} must have a heading and a hold a row, got {len(rows)} lines; add them"
-        )
-    columns: dict[str, Any] = {}
-    for place, heading in enumerate(rows[0]):
-        match = _HEADING.fullmatch(heading)
-        if match is None or match[1] not in _KINDS:
-            continue
-        name, unit = match[1], match[2] or ""
-        if name in columns:
-            raise InputError(
-                f"{path.name} must have one column for {name}, got two; remove one of them"
-            )
-        columns[name] = [
-            _cell(row, place, name, unit, f"{path.name}, row {n}")
-            for n, row in enumerate(rows[1:], 1)
-        ]
+    columns = read_headed_columns(path, _KINDS, row="a hold")
     return healing_table({**(given or {}), **columns}, name=path.name)
-
-
-def _cell(row: list[str], place: int, name: str, unit: str, where: str) -> float | str:
-    text = row[place] if place < len(row) else ""
-    try:
-        number = float(text)
-    except ValueError:
-        raise InputError(
-            f"{where} must have a number in column {name}, got '{text}'; correct the cell, and "
-            "write the unit into the heading"
-        ) from None
-    return f"{number!r} {unit}" if unit else number
 
 
 def healing_table(columns: Mapping[str, Any], *, name: str = "holds") -> HealingTable:

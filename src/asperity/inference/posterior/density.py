@@ -25,7 +25,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from asperity.inference.objective import Likelihood, Objective
 from asperity.inference.unknowns import Unknown
@@ -175,7 +175,7 @@ class PriorDensity:
                 log_norm -= math.log(b - a)
             else:
                 z = (np.array(k.to_value(np.array([a, b]))) - k.prior.mean) / k.prior.sd
-                log_norm -= math.log(norm.cdf(z[1]) - norm.cdf(z[0]))
+                log_norm -= math.log(ndtr(z[1]) - ndtr(z[0]))
                 log_norm -= math.log(k.prior.sd * math.sqrt(2 * math.pi))
                 log_norm += 0.0 if k.logarithmic else math.log(k.scale)
         return cls(tuple(unknowns), low, high, mean, 1 / sds, log_norm)

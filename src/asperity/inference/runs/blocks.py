@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from asperity.errors import InputError
 from asperity.inference.runs.run import LONGEST, Blocks, RecordedRun
@@ -252,7 +252,7 @@ def _within(run: RecordedRun, length: float) -> float:
     for k in _AFTER:
         count = int(np.isfinite(squares[:, :k]).sum())
         total = float(np.nansum(squares[:, :k]))
-        if chi2.sf(total, max(count, 1)) < _CHANCE:
+        if chdtrc(max(count, 1), total) < _CHANCE:
             best = max(best, total - count)
     return best
 

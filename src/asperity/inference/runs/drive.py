@@ -72,13 +72,9 @@ def filled_up(drive: Drive) -> Drive:
 
 
 def shifted(drive: Drive, values: Mapping[str, Array]) -> Drive:
-    """The drive whose j-th edge is later by the value `shift_j` (s)."""
+    """The drive whose edges are later by the values `shift` (s)."""
     drive = Drive(*map(jnp.asarray, drive))
-    edges = drive.edges
-    for name, value in values.items():
-        if name.startswith("shift_"):
-            edges = edges.at[int(name.removeprefix("shift_"))].add(value)
-    return drive._replace(edges=edges)
+    return drive._replace(edges=drive.edges + values["shift"])
 
 
 def excitation(drive: Drive, values: Mapping[str, Array], piece: Array, t: Array) -> Excitation:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 Float = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def misfit_after_changes(white: Float, first: Sequence[int]) -> tuple[float, flo
             continue
         other = float(np.mean(white[~inside] ** 2))
         ratio = float(np.mean(white[inside] ** 2)) / max(other, 1e-300)
-        chance = float(chi2.sf(ratio * inside.sum(), int(inside.sum())))
+        chance = float(chdtrc(int(inside.sum()), ratio * inside.sum()))
         if chance < lowest:
             lowest, size = chance, ratio**0.5
     return min(1.0, len(_AFTER) * lowest), size

@@ -22,7 +22,14 @@ from numpy.typing import NDArray
 from asperity.inference.runs.drive import Drive, excitation, filled_up, shifted
 from asperity.inference.runs.noise import innovations
 from asperity.inference.runs.reading import GAIN, Reading
-from asperity.inference.runs.steps import Curve, integrated, law_fields, numbers, with_values
+from asperity.inference.runs.steps import (
+    Curve,
+    Free,
+    arranged,
+    integrated,
+    law_fields,
+    with_values,
+)
 from asperity.laws import Law
 from asperity.recording.defects.autoregression import Whitening
 from asperity.slider import Slider
@@ -99,18 +106,15 @@ class RunMotion:
         reading : Reading
         """
         given: dict[str, Any] = {name: np.float64(value) for name, value in values.items()}
+        motion, drive = self.equations(given), filled_up(drive)
+        arrays, wanted = arranged(given, free, motion.size, len(drive.edges))
         friction, slopes, steps, done = through(
-            self.equations(given),
-            free,
-            given,
-            filled_up(drive),
-            reading.filled_up(),
-            room=self.room,
+            motion, wanted, arrays, drive, reading.filled_up(), room=self.room
         )
         if not bool(done):
             return None
         n = len(reading.index)
-        f, jacobian = np.asarray(friction)[:n], np.asarray(slopes).T[:n]
+        f, jacobian = np.asarray(friction)[:n], np.asarray(slopes).T[:n, : len(free)]
         # NaN and infinity are not below it either.
         if not (np.isfinite(f).all() and (np.abs(jacobian) < _STEEPEST).all()):
             return None
@@ -149,7 +153,7 @@ class RunMotion:
 @eqx.filter_jit
 def through(
     motion: Motion,
-    free: tuple[str, ...],
+    free: Free,
     given: dict[str, Any],
     drive: Drive,
     reading: Reading,
@@ -162,10 +166,10 @@ def through(
     ----------
     motion : Motion
         Whose numbers are replaced by `given`.
-    free : tuple of str
-        Names for derivatives.
-    given : dict of str to array, shape ()
-        All parameters, as of `RunMotion`.
+    free : Free
+        What derivatives are taken to.
+    given : dict of str to array
+        All parameters, as `arranged` returns them.
     drive : Drive
     reading : Reading
         Of n samples.
@@ -175,33 +179,32 @@ def through(
     Returns
     -------
     friction : array, shape (n,)
-    derivatives : array, shape (parameters, n)
-        In the order of `free`.
+    derivatives : array, shape (derivatives, n)
+        Along the directions of `free`.
     steps : array, shape ()
     done : array, shape ()
         Whether the end was reached.
     """
-    x = numbers(free, given)
+    x = free.numbers(given)
     curve, slopes, steps, done = integrated(motion, free, given, drive, room)
 
     def friction(curve: Curve, x: Array) -> Array:
-        values = {**given, **dict(zip(free, x, strict=True))}
-        return _recorded(motion, drive, values, curve, steps, reading)
+        return _recorded(motion, drive, free.values(given, x), curve, steps, reading)
 
     f = friction(curve, x)
-    if not free:
+    if not len(free.directions):
         return f, jnp.zeros((0, f.size)), steps, done
 
     def along(change: Curve, direction: Array) -> Array:
         return jax.jvp(friction, (curve, x), (change, direction))[1]
 
-    return f, jax.vmap(along)(slopes, jnp.eye(len(free))), steps, done
+    return f, jax.vmap(along)(slopes, free.directions), steps, done
 
 
 def density_through(
     density: Callable[[Array], Array],
     motion: Motion,
-    free: tuple[str, ...],
+    free: Free,
     given: dict[str, Any],
     drive: Drive,
     reading: Reading,
@@ -224,17 +227,18 @@ def density_through(
     -------
     value : array, shape ()
         NaN where the end was not reached.
-    gradient : array, shape (parameters,)
-        In the order of `free`.
+    gradient : array, shape (derivatives,)
+        Along the directions of `free`.
     """
-    x = numbers(free, given)
+    x = free.numbers(given)
     curve, slopes, steps, done = integrated(motion, free, given, drive, room)
 
     def value_of(curve: Curve, x: Array) -> Array:
-        values = {**given, **dict(zip(free, x, strict=True))}
+        values = free.values(given, x)
         return density(_recorded(motion, drive, values, curve, steps, reading))
 
-    value, (back, gradient) = jax.value_and_grad(value_of, argnums=(0, 1))(curve, x)
+    value, (back, direct) = jax.value_and_grad(value_of, argnums=(0, 1))(curve, x)
+    gradient = free.directions @ direct
     for weight, slope in zip(back, slopes, strict=True):
         gradient += jnp.sum(weight * slope, axis=tuple(range(1, slope.ndim)))
     return jnp.where(done, value, jnp.nan), gradient
@@ -252,7 +256,7 @@ def _recorded(
     shown = _averaged if reading.means else _observed
     changed, moved = with_values(motion, values), shifted(drive, values)
     friction = shown(changed, moved, values, curve, steps, reading.times)
-    return values.get(GAIN, 1.0) * reading.recorded(friction)
+    return values[GAIN] * reading.recorded(friction)
 
 
 def _observed(
@@ -394,10 +398,13 @@ class RunLikelihood:
             return -0.5 * jnp.sum(white**2)
 
         def both(x: Array) -> tuple[Array, Array]:
-            given = {**data.fixed, **dict(zip(names, x, strict=True))}
-            return density_through(
-                density, motion, names, given, data.drive, data.reading, room=self.room
+            values = {**data.fixed, **dict(zip(names, x, strict=True))}
+            edges = len(data.drive.edges)
+            given, free = arranged(values, names, motion.size, edges, jnp)
+            value, gradient = density_through(
+                density, motion, free, given, data.drive, data.reading, room=self.room
             )
+            return value, gradient[: len(names)]
 
         @jax.custom_vjp
         def likelihood(x: Array) -> Array:

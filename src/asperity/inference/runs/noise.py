@@ -17,9 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.linalg import toeplitz
-from scipy.signal import lfilter
-from scipy.stats import chi2
+from scipy.linalg import solve_banded, toeplitz
+from scipy.special import chdtrc
 
 from asperity.recording.defects.autoregression import Autoregression, LaggedProducts, Whitening
 
@@ -93,7 +92,7 @@ def whiteness(innovations: Sequence[Float], fitted_order: int) -> Whiteness:
     products = sum(LaggedProducts(x[None], lags).sums for x in innovations)
     r = products[1 : lags + 1] / products[0]
     q = float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
-    portmanteau = float(chi2.sf(n * (n + 2) * q, max(lags - fitted_order, 1)))
+    portmanteau = float(chdtrc(max(lags - fitted_order, 1), n * (n + 2) * q))
     worst = peak = 1.0
     for x in innovations:
         spectrum = np.abs(np.fft.rfft(x))[1 : (x.size - 1) // 2 + 1] ** 2
@@ -158,7 +157,8 @@ def added_by_noise(
     root = np.linalg.cholesky(s**2 / n * np.linalg.inv(lagged))
     a = np.concatenate([[1.0], -model.coefficients[-1]])
     before = np.vstack([np.zeros((p, covariance.shape[0])), curves @ covariance])
-    ahead = lfilter([1.0], a, weights[::-1], axis=0)[::-1]
+    bands = np.repeat(a[:, None], n, axis=1)
+    ahead = solve_banded((p, 0), bands, weights[::-1])[::-1]
     ahead = np.vstack([ahead, np.zeros((p + 1, covariance.shape[0]))])
     square = np.zeros_like(covariance)
     along = np.zeros((p, covariance.shape[0]))

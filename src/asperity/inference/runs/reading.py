@@ -23,7 +23,7 @@ Float = NDArray[np.float64]
 
 #: Name of the gauge's gain in the motion of a run, and of that of every run in priors.
 GAIN = "gain"
-#: Computed times, and samples, are filled up to a multiple of this.
+#: Computed times, and samples, are filled up to this times a power of two, or 3/2 of it.
 _ROUNDED = 1024
 #: Samples ahead that the filter of evenly spaced samples reads.
 _AHEAD = 2
@@ -65,7 +65,7 @@ class Reading(eqx.Module):
 
     def filled_up(self) -> Reading:
         """The same with the last sample repeated, up to one of a few lengths."""
-        extra = -len(self.index) % _ROUNDED
+        extra = _filling(len(self.index))
 
         def filled(rows: Float) -> Float:
             return np.concatenate([rows, np.repeat(rows[-1:], extra, axis=0)])
@@ -149,4 +149,10 @@ def reading_at(times: Float, gauge: tuple[int, float] | None = None) -> Reading:
 
 def _filled(times: Float) -> Float:
     """Times with the last one repeated, up to one of a few lengths."""
-    return np.concatenate([times, np.full(-times.size % _ROUNDED, times[-1])])
+    return np.concatenate([times, np.full(_filling(times.size), times[-1])])
+
+
+def _filling(size: int) -> int:
+    """How many are missing to one of a few lengths."""
+    power = _ROUNDED << max(math.ceil(math.log2(size / _ROUNDED)), 0)
+    return (power * 3 // 4 if power > _ROUNDED and size <= power * 3 // 4 else power) - size

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solveh_banded
 from scipy.optimize import minimize_scalar
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from asperity.errors import InputError
 from asperity.inference.runs.drive import Drive
@@ -355,7 +355,7 @@ def _load_knots(t: Float, W: Float, noise: float, least: float) -> list[int]:
     """
     if t.size <= LONGEST:
         return _line_knots(t, W, max(_LOAD_NOISE * noise, least))
-    chance = float(norm.isf(_LOAD_BY_CHANCE / t.size))
+    chance = -float(ndtri(_LOAD_BY_CHANCE / t.size))
     knots = _line_knots(t, W, max(2 * chance * noise, least))
     result = set(knots)
     for a, b in pairwise(knots):

@@ -20,6 +20,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from asperity.inference.runs.drive import Drive, excitation, shifted
+from asperity.inference.runs.reading import GAIN
 from asperity.laws import Law
 from asperity.parameters import law_parameters
 from asperity.slider.motion import Motion
@@ -34,6 +35,12 @@ _SQUARINGS = 8
 _SHARE_STEADY = 4.0
 #: Steps that are differentiated side by side.
 _SIDE_BY_SIDE = 64
+#: Keys of the departures of the initial states, and of the delays of the edges of the drive.
+START, SHIFT = "start", "shift"
+#: Parameters that programs can always differentiate to, so that few differ in their names.
+_EVER_FREE = ("K", GAIN)
+#: Numbers of derivatives are filled up to a multiple of this.
+_TOGETHER = 4
 #: Dormand and Prince: nodes, coefficients of the stages, error of the step.
 _NODES = np.array([0.0, 0.2, 0.3, 0.8, 8 / 9, 1.0, 1.0])
 _STAGES = np.zeros((7, 7))
@@ -58,6 +65,68 @@ _DENSE = np.array(
 )
 
 
+class Free(eqx.Module):
+    """What derivatives are taken to.
+
+    Compiled programs know the names of laws, machine and gauge. Which of the initial states and of
+    the changes of the drive are free, and how many derivatives there are, is in numbers: recordings
+    of few and many changes share a program.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Free parameters of law, machine and gauge.
+    directions : array, shape (derivatives, names + states + edges)
+        In the space of these parameters, the initial states and the edges of the drive; filled up
+        by zeros.
+    """
+
+    names: tuple[str, ...] = eqx.field(static=True)
+    directions: Any
+
+    def numbers(self, given: Mapping[str, Any]) -> Array:
+        """All that may be differentiated to: parameters, initial states, edges."""
+        named = jnp.array([given[name] for name in self.names], float)
+        return jnp.concatenate([named, given[START], given[SHIFT]])
+
+    def values(self, given: Mapping[str, Any], x: Array) -> dict[str, Array]:
+        """The given numbers with `x` in place of those of `numbers`."""
+        edges = x.size - given[SHIFT].size
+        named = dict(zip(self.names, x, strict=False))
+        return {**given, **named, START: x[len(self.names) : edges], SHIFT: x[edges:]}
+
+
+def arranged(
+    values: Mapping[str, Any], wanted: Sequence[str], states: int, edges: int, module: Any = np
+) -> tuple[dict[str, Any], Free]:
+    """Numbers with those of initial states and edges as arrays, and the derivatives to some.
+
+    Parameters
+    ----------
+    values : mapping of str to float or array, shape ()
+        By name; `start_force` and `start_state_i` are departures of the initial states, `shift_j`
+        the delay of the j-th edge of the drive, 0 where not given.
+    wanted : sequence of str
+        Names for derivatives.
+    states, edges : int
+    module : module
+        NumPy, or JAX where values are traced.
+    """
+    starts = ("start_force", *(f"start_state_{i}" for i in range(states - 1)))
+    shifts = tuple(f"shift_{j}" for j in range(edges))
+    in_arrays = {*starts, *shifts}
+    names = tuple(sorted({*wanted, *_EVER_FREE} - in_arrays))
+    place = {name: i for i, name in enumerate((*names, *starts, *shifts))}
+    directions = np.zeros((-(-len(wanted) // _TOGETHER) * _TOGETHER, len(place)))
+    for row, name in enumerate(wanted):
+        directions[row, place[name]] = 1.0
+    # As an array: a plain number would be part of the program.
+    given = {n: v for n, v in {GAIN: np.ones(()), **values}.items() if n not in in_arrays}
+    for key, members in ((START, starts), (SHIFT, shifts)):
+        given[key] = module.stack([module.asarray(values.get(n, 0.0), float) for n in members])
+    return given, Free(names, directions)
+
+
 class Curve(NamedTuple):
     """Steps with the coefficients of the continuous extension, filled up to the room for them."""
 
@@ -67,29 +136,30 @@ class Curve(NamedTuple):
 
 
 def integrated(
-    motion: Motion, free: tuple[str, ...], given: dict[str, Any], drive: Drive, room: int
+    motion: Motion, free: Free, given: dict[str, Any], drive: Drive, room: int
 ) -> tuple[Curve, Curve, Array, Array]:
     """The motion, its derivatives, its number of steps, and whether the end was reached.
 
     Of a step the derivatives depend on those of the steps before it only through the states at its
     beginning: they are computed for many steps side by side, and then added up along them. Their
-    first axis is that of the parameters.
+    first axis is that of the directions.
     """
 
     def begun(x: Array) -> tuple[Motion, Drive, Mapping[str, Array]]:
-        values = {**given, **dict(zip(free, x, strict=True))}
+        values = free.values(given, x)
         return with_values(motion, values), shifted(drive, values), values
 
     def first_states(x: Array) -> Array:
         now, _, values = begun(x)
         return _first_states(now, values)
 
-    x = numbers(free, given)
+    x = free.numbers(given)
     taken, curve, steps, done = _steps_taken(*begun(x), room)
-    count, m = x.size, taken.states.shape[1]
+    count, m = len(free.directions), taken.states.shape[1]
     nothing = jax.tree.map(lambda all_: jnp.zeros((count, *all_.shape)), curve)
-    if not free:
+    if not count:
         return curve, nothing, steps, done
+    ahead = jax.scipy.linalg.block_diag(free.directions, jnp.eye(m))
 
     def slopes_of(part: _Step, change: Array) -> tuple[Array, Curve]:
         """Of the states after a part of the steps, and of the motion at these."""
@@ -104,11 +174,11 @@ def integrated(
                 new, _, rows = _stepped(now, drawn, values, step.piece, begin, length, y)
                 return new, Curve(begin, length, rows)
 
-            along = direction[:count], direction[count:]
+            along = direction[: x.size], direction[x.size :]
             return jax.jvp(moved, (x, step.states), along)[1]
 
         each_direction = jax.vmap(one, (None, 0))
-        after, result = jax.vmap(each_direction, (0, None), 1)(part, jnp.eye(count + m))
+        after, result = jax.vmap(each_direction, (0, None), 1)(part, ahead)
 
         def onwards(dy: Array, own: Array) -> tuple[Array, Array]:
             return own[:count] + jnp.sum(dy[:, :, None] * own[count:], axis=1), dy
@@ -133,7 +203,8 @@ def integrated(
         )
         return first + _SIDE_BY_SIDE, change, slopes
 
-    start = jnp.asarray(0), jax.jacfwd(first_states)(x).T, nothing
+    begin = jax.vmap(lambda direction: jax.jvp(first_states, (x,), (direction,))[1])
+    start = jnp.asarray(0), begin(free.directions), nothing
     *_, slopes = jax.lax.while_loop(lambda carry: carry[0] < steps, body, start)
     return curve, slopes, steps, done
 
@@ -161,9 +232,7 @@ class _Step(NamedTuple):
 
 def _first_states(motion: Motion, values: Mapping[str, Array]) -> Array:
     """States at the beginning: those of steady sliding and the departures from it."""
-    steady = motion.steady()
-    names = ("start_force", *(f"start_state_{i}" for i in range(steady.shape[0] - 1)))
-    return steady + jnp.stack([jnp.asarray(values.get(n, 0.0), float) for n in names])
+    return motion.steady() + values[START]
 
 
 def _stepped(
@@ -270,11 +339,6 @@ def _combined(weights: Float, rates: Sequence[Array]) -> Array:
     return functools.reduce(
         jnp.add, [w * k for w, k in zip(weights, rates, strict=False) if w != 0.0]
     )
-
-
-def numbers(names: tuple[str, ...], given: Mapping[str, Any]) -> Array:
-    """Values of the named parameters, shape (parameters,)."""
-    return jnp.array([given[name] for name in names], float)
 
 
 def with_values(motion: Motion, values: Mapping[str, Array]) -> Motion:

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from asperity.inference.objective import Residuals
 
@@ -128,7 +128,7 @@ def _p_value(residuals: Residuals, out: Collection[int]) -> float:
     """Probability of chi-squared of the rows that are kept; NaN without degrees of freedom."""
     kept = ~np.isin(residuals.row, list(out))
     dof = int(kept.sum()) - int(residuals.jacobian.any(0).sum())
-    return float(chi2.sf(_chi2(residuals, out), dof)) if dof > 0 else math.nan
+    return float(chdtrc(dof, _chi2(residuals, out))) if dof > 0 else math.nan
 
 
 def _chi2(residuals: Residuals, out: Collection[int]) -> float:
@@ -145,7 +145,7 @@ def _chance(residuals: Residuals, row: int, out: Collection[int]) -> float:
     inverse = np.linalg.pinv(J[kept].T @ J[kept], hermitian=True)
     spread = np.eye(int(here.sum())) + J[here] @ inverse @ J[here].T
     away = residuals.values[here]
-    return float(chi2.sf(away @ np.linalg.solve(spread, away), away.size))
+    return float(chdtrc(away.size, away @ np.linalg.solve(spread, away)))
 
 
 def standardised(residuals: Residuals, information: Float) -> Float:

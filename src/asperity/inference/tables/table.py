@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
+from scipy.special import chdtr
 
 from asperity.errors import InputError
 from asperity.laws import registered
@@ -191,7 +191,9 @@ def read_table(
             )
     places = {n: i for i, n in enumerate(names) if n not in _OF_RESPONSES}
     texts = {n: [row[places[n]].strip() for row in rows] for n in _TEXTS if n in places}
-    lost = [i for i in range(len(rows)) if _not_a_reading(texts, i)]
+    at = places.get("epsilon")
+    zero = [at is not None and row[at].strip() in ("0", "0.0") for row in rows]
+    lost = [i for i in range(len(rows)) if _not_a_reading(texts, i, zero[i])]
     remarks = []
     if lost:
         if len(lost) == len(rows):
@@ -217,10 +219,11 @@ def read_table(
     return replace(table, row_names=np.array([f"row {i}" for i in places_in_file]))
 
 
-def _not_a_reading(texts: Mapping[str, Sequence[str]], row: int) -> bool:
-    """Whether a campaign says that a row is no lock-in reading."""
+def _not_a_reading(texts: Mapping[str, Sequence[str]], row: int, unmodulated: bool = False) -> bool:
+    """Whether a campaign says that a row is no reading; a level with an epsilon of 0 is one."""
     kind = texts[_KIND][row] if _KIND in texts else ""
-    return bool(texts[_REASON][row] if _REASON in texts else "") or kind not in ("", "amplitude")
+    failed = bool(texts[_REASON][row]) if _REASON in texts else False
+    return failed or not (kind in ("", "amplitude") or (kind == "level" and unmodulated))
 
 
 def _loads_in_si(table: str, loads: Float, units: Sequence[str]) -> Float:
@@ -316,6 +319,7 @@ def table_of(
         if key not in _OF_RESPONSES
     }
     rows = max((a.size for a in arrays.values()), default=0)
+    _fill_frequency(arrays)
     points: dict[str, Float] = {}
     observed: dict[str, Float] = {}
     covariances: dict[tuple[str, str], Float] = {}
@@ -359,6 +363,17 @@ def table_of(
     _refuse_duplicates(table)
     _refuse_impossible(table)
     return _without_copies(table)
+
+
+def _fill_frequency(arrays: dict[str, Float]) -> None:
+    """Give rows without modulation a frequency, on which nothing depends."""
+    names = {canonical_name(key, _known()): key for key in arrays}
+    epsilon = arrays.get(names.get("epsilon", ""), np.empty(0))
+    if np.any(epsilon == 0):
+        key = names.get("frequency", "frequency")
+        frequency = arrays.get(key, np.full(epsilon.size, np.nan))
+        if frequency.size == epsilon.size:
+            arrays[key] = np.where((epsilon == 0) & np.isnan(frequency), 1.0, frequency)
 
 
 def _observable_of(column: str) -> str | None:
@@ -528,7 +543,7 @@ def _without_copies(table: LockInTable) -> LockInTable:
     columns = np.vander(x - x.mean(), degree + 1) / doubt[:, None]
     y = steady[both] / doubt
     left = y - columns @ np.linalg.lstsq(columns, y)[0]
-    if chi2.cdf(float(left @ left), dof) > _SAME_NOISE:
+    if chdtr(dof, float(left @ left)) > _SAME_NOISE:
         return table
     kept = np.where(both, np.nan, table.values["delta_mu"])
     values = {**table.values, "delta_mu": kept}

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from asperity.inference.objective import Residuals
 from asperity.inference.tables.outliers import standardised
@@ -188,7 +188,7 @@ class LockInTerm:
                 f"{'that is an outlier' if len(outliers) == 1 else 'those are outliers'}, which "
                 "may shift every estimate; check the measurement, or fit without it"
             )
-        expected = norm.isf(0.005 / residuals.values.size)
+        expected = -ndtri(0.005 / residuals.values.size)
         apart = np.abs(standardised(residuals, information))
         beyond = np.flatnonzero(apart > expected)
         # So many are no outliers: the law or the uncertainties are wrong, as chi-squared says.

@@ -96,7 +96,7 @@ def sliding_signals(
     InputError
         If neither force and load nor friction is recorded, or fewer than 32 samples are left.
     """
-    trace = _with_normalised_force(trace)
+    trace = with_normalised_force(trace)
     if window is not None:
         _check_window(window, trace)
     friction, weight, unit, read, signs = _friction(trace, load, force)
@@ -148,7 +148,7 @@ def sliding_signals(
     )
 
 
-def _with_normalised_force(trace: Trace) -> Trace:
+def with_normalised_force(trace: Trace) -> Trace:
     """The same recording, with a force that is named as F/(m g) in the role of the friction.
 
     Only where it is the only channel: next to others such a name is the normal force.

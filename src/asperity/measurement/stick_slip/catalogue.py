@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import Argument, InputError
+from asperity.measurement.series import mean_level
+from asperity.measurement.stick_slip.threshold import linear_frequency
 from asperity.measurement.verdicts.verdict import percent
 from asperity.outputs import json, written_file
 
@@ -25,7 +27,8 @@ Array = NDArray[np.float64]
 CONVENTIONS = (
     "forces are F/W; drop = force_before - force_after; recurrence and stick_duration run from the "
     "onset and the end of the event before to the onset; creep is what the force at onset lacks to "
-    "the line of the first half of the stick; slip_velocity = V - dF/dt/K; uncertainties are "
+    "the line of the first half of the stick; slip and slip_velocity are those of the slider's "
+    "displacement where it is recorded, else slip_velocity = V - dF/dt/K; uncertainties are "
     "standard uncertainties"
 )
 #: Columns of the catalogue: unit and meaning.
@@ -177,24 +180,36 @@ def means(measurement: StickSlipMeasurement) -> dict[str, float]:
         "stiffness_from_slope_uncertainty": doubt,
         "smallest_drop": measurement.smallest_drop,
     }
-    for name in ("stiffness", "velocity", "mass", "load"):
-        value = getattr(machine, name)
-        row[name] = math.nan if value is None else value
+    frequency, error = linear_frequency(events)
+    row |= {"linear_frequency": frequency, "linear_frequency_uncertainty": error}
+    known = (machine.stiffness, machine.velocity, machine.mass, machine.load)
+    row |= {n: v for n, v in zip(("K", "V", "M", "W0"), known, strict=True) if v is not None}
     return row
 
 
 def stick_slip_row(path: Path, measurement: StickSlipMeasurement) -> dict[str, Any]:
-    """The row of a recording in the table of a campaign."""
+    """The row of a recording in the table of a campaign.
+
+    One that ends in steady sliding is a level too: a reading of the mean friction at epsilon = 0.
+    """
+    last = measurement.regimes[-1]
+    level: dict[str, Any] = {}
+    if last.kind == "steady sliding":
+        part = slice(*np.searchsorted(measurement.time, (last.start, last.end)))
+        mean = mean_level(measurement.time[part], measurement.friction[part])
+        level = {"mean_friction": mean.value, "mean_friction_uncertainty": mean.uncertainty}
+        level["epsilon"] = 0.0
     doubts = "; ".join(f"{c.name}: {c.verdict}" for c in measurement.checks if c.verdict != "ok")
     return {
         "file": str(path),
         "part": 1,
-        "kind": "stick-slip",
+        "kind": "level" if level else "stick-slip",
         "start": float(measurement.time[0]),
         "end": float(measurement.time[-1]),
         "verdict": measurement.verdict,
         "reason": "",
         "regime": measurement.kind,
+        **level,
         **means(measurement),
         "checks": doubts,
     }

@@ -287,7 +287,7 @@ def _measured(
         slope_uncertainty=slope_doubt / step,
         creep=creep,
         creep_uncertainty=creep_doubt,
-        fall_rate=_steepest(force, onset, end, drop) / step,
+        fall_rate=steepest_fall(force, onset, end, drop) / step,
         resolved=duration >= 2.0,
     )
 
@@ -313,8 +313,16 @@ def _of_mean(scatter: Array, samples: Index) -> Array:
     return np.asarray(inside * 2.0 ** (-np.maximum(octave - known[-1], 0.0) / 2))
 
 
-def _steepest(force: Array, onset: Array, end: Array, drop: Array) -> Array:
-    """Largest fall per sample over a quarter of the slip; of an unresolved slip its drop."""
+def steepest_fall(force: Array, onset: Array, end: Array, drop: Array) -> Array:
+    """Largest fall per sample over a quarter of the slip; of an unresolved slip its drop.
+
+    Parameters
+    ----------
+    force : array, (n,)
+    onset, end : array, (k,)
+        In samples.
+    drop : array, (k,)
+    """
     total = np.concatenate([[0.0], np.cumsum(force)])
     duration = np.maximum(end - onset, 1.0)
     width = np.maximum(duration / 4, 1.0)

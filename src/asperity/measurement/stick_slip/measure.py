@@ -10,14 +10,18 @@ from numpy.typing import NDArray
 
 from asperity.errors import Argument, InputError
 from asperity.measurement.samples import about_channels
-from asperity.measurement.sliding.signals import SlidingSignals, sliding_signals
+from asperity.measurement.sliding.signals import (
+    SlidingSignals,
+    sliding_signals,
+    with_normalised_force,
+)
 from asperity.measurement.stick_slip.detection import Falls, find_falls
-from asperity.measurement.stick_slip.events import SlipEvents, read_events
+from asperity.measurement.stick_slip.events import SlipEvents, read_events, steepest_fall
 from asperity.measurement.stick_slip.noise import estimate, without_impulses
 from asperity.measurement.stick_slip.regimes import Regime, regimes
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, percent, worst
-from asperity.parameters.parameter import Displayed, SummaryLine
+from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.recording.defects.sampling import even_rate
 from asperity.recording.trace import Channel
 
@@ -28,6 +32,10 @@ Array = NDArray[np.float64]
 
 #: Events that tell no regime.
 _FEW = 2
+#: Share of the displacement in the slips above which it is the slider's.
+SLIDER = 0.5
+#: Usual intervals of uneven times up to which the force between two samples is a straight line.
+_LONGEST_GAP = 4.0
 #: Standard gravity (m/s^2), by which F/(m g) is a friction coefficient.
 GRAVITY = 9.80665
 #: Where suspicious and bad begin.
@@ -64,7 +72,7 @@ class Machine:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class StickSlipMeasurement(Displayed):
+class StickSlipMeasurement(Drawn):
     """Events of a recording and what they say.
 
     Attributes
@@ -89,12 +97,15 @@ class StickSlipMeasurement(Displayed):
         Share of the recorded displacement that falls into the slips: near 1 where it is the
         slider's, small where it is the load point's; NaN where none is recorded.
     slip, slip_velocity, energy : array, (k,)
-        Of each event: slip (m), largest slip velocity (m/s), energy that the spring releases (J);
-        NaN where stiffness, velocity or load are not known.
+        Of each event: slip (m), largest slip velocity (m/s), energy that the spring releases (J).
+        Slips and velocities are those of the recorded displacement where it is the slider's, else
+        those of the spring; NaN where stiffness, velocity or load are not known.
     names : tuple of str
         Channels that were read.
     checks : tuple of Check
     """
+
+    _drawn_by = "asperity.figures.stick_slip:draw_stick_slip"
 
     time: Array
     friction: Array
@@ -174,20 +185,17 @@ def measure_stick_slip(
     Raises
     ------
     InputError
-        If neither force and load nor friction is recorded, or the sampling is uneven.
+        If neither force and load nor friction is recorded, or there are gaps.
+
+    Notes
+    -----
+    Samples at uneven times are interpolated to even ones.
     """
     machine = machine or Machine()
     if machine.load is not None:
         trace = _with_load(trace, machine.load)
-    signals = sliding_signals(trace, load, force, window)
+    signals = _at_even_times(sliding_signals(trace, load, force, window))
     time = signals.time
-    if even_rate(time) is None:
-        raise InputError(
-            Argument("measure.trace"),
-            "be sampled evenly for slip events",
-            "uneven times or gaps",
-            "give a window without gaps, or resample the recording",
-        )
     machine = _completed(machine, signals)
     friction, impulses = without_impulses(signals.friction)
     falls = find_falls(friction, estimate(friction))
@@ -199,7 +207,10 @@ def measure_stick_slip(
         period = 2 * np.pi * np.sqrt(machine.mass / machine.stiffness)
     share = impulses.size / time.size
     parts = regimes(time, friction, events, smallest, impulses=share, natural_period=period)
+    slip_share = _slip_share(signals, events)
     slip, speed, energy = _spring(events, machine)
+    if signals.displacement is not None and slip_share > SLIDER:
+        slip, speed = _recorded_slip(time, signals.displacement, events)
     result = StickSlipMeasurement(
         time=time,
         friction=friction,
@@ -211,7 +222,7 @@ def measure_stick_slip(
         smallest_drop=smallest,
         noise=float(falls.scatter[0]),
         impulses=impulses,
-        slip_share=_slip_share(signals, events),
+        slip_share=slip_share,
         slip=slip,
         slip_velocity=speed,
         energy=energy,
@@ -224,11 +235,39 @@ def measure_stick_slip(
     return replace(result, checks=tuple(checks))
 
 
+def _at_even_times(signals: SlidingSignals) -> SlidingSignals:
+    """Signals at even times, by straight lines between samples at uneven ones."""
+    time = signals.time
+    if even_rate(time) is not None:
+        return signals
+    steps = np.diff(time)
+    usual, widest = float(np.median(steps)), int(steps.argmax())
+    if steps[widest] > _LONGEST_GAP * usual:
+        raise InputError(
+            Argument("measure.trace"),
+            f"be without gaps of more than {_LONGEST_GAP:g} samples for slip events",
+            f"one of {steps[widest]:.4g} s at {time[widest]:.10g} s",
+            "give a window without it",
+        )
+    even = np.linspace(time[0], time[-1], round((time[-1] - time[0]) / usual) + 1)
+    moved = signals.displacement
+    # A line would make an impulse of one sample one of two or three.
+    friction, _ = without_impulses(signals.friction)
+    return replace(
+        signals,
+        time=even,
+        friction=np.interp(even, time, friction),
+        displacement=None if moved is None else np.interp(even, time, moved),
+    )
+
+
 def _with_load(trace: Trace, load: float) -> Trace:
     """The recording with a constant load, where none is recorded."""
     try:
         trace.channel("W")
     except InputError:
+        # A lone F/(m g) is known by its name before it has company.
+        trace = with_normalised_force(trace)
         constant = Channel(np.full(len(trace), load), "force", "N", "load", "N")
         return replace(trace, channels={**trace.channels, "load": constant})
     return trace
@@ -287,6 +326,27 @@ def _spring(events: SlipEvents, machine: Machine) -> tuple[Array, Array, Array]:
     speed = velocity + events.fall_rate * compliance
     energy = machine.load * compliance * (events.force_before**2 - events.force_after**2) / 2
     return slip, speed, energy
+
+
+def _recorded_slip(time: Array, displacement: Array, events: SlipEvents) -> tuple[Array, Array]:
+    """Slip and largest slip velocity of each event from the displacement of the slider.
+
+    Means over a quarter of its duration, before the onset and after the end, tell the slip: a
+    slider creeps ever faster before its onset.
+    """
+    step = float(time[-1] - time[0]) / (time.size - 1)
+    forward = displacement * np.sign(displacement[-1] - displacement[0])
+    onset, end = ((t - time[0]) / step for t in (events.onset, events.end))
+    total = np.concatenate([[0.0], np.cumsum(forward - forward[0])])
+
+    def mean(low: Array, high: Array) -> Array:
+        first = np.clip(np.rint(low).astype(np.intp), 0, time.size - 1)
+        stop = np.clip(np.rint(high).astype(np.intp), first + 1, time.size)
+        return np.asarray((total[stop] - total[first]) / (stop - first))
+
+    width = np.maximum((end - onset) / 4, 1.0)
+    slip = mean(end + 1, end + 1 + width) - mean(onset - width, onset)
+    return slip, steepest_fall(-forward, onset, end, slip) / step
 
 
 def _checks(result: StickSlipMeasurement) -> list[Check]:

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from asperity.recording.defects.autoregression import Autoregression, fitted
 
@@ -80,7 +80,7 @@ def find_jumps(
     used = [k for k, d in enumerate(steps) if d.size >= _SHORTEST]
     if not used:
         return []
-    limit = float(norm.isf(chance / (2 * sum(steps[k].size for k in used))))
+    limit = -float(ndtri(chance / (2 * sum(steps[k].size for k in used))))
     result: list[Jump] = []
     while len(result) < _MOST:
         model = fitted([steps[k] - np.mean(steps[k]) for k in used])

@@ -10,7 +10,6 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import median_filter, uniform_filter1d
-from scipy.signal import welch
 
 Float = NDArray[np.float64]
 
@@ -34,6 +33,9 @@ def find_lines(x: Float, step: float, lowest: float) -> list[float]:
     size = min(2 ** round(math.log2(1 / (_RESOLUTION * step))), x.size // 4)
     if size < 4 * _ABOUT:
         return []
+    # scipy.signal loads the whole of scipy.stats, and short recordings need neither.
+    from scipy.signal import welch
+
     frequency, power = welch(x, 1 / step, nperseg=size, detrend="linear")
     height = power / np.maximum(median_filter(power, _ABOUT), 1e-300)
     height[frequency < lowest] = 0.0

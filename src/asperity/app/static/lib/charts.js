@@ -3,6 +3,7 @@
 // print need no redrawing.
 
 import { el, fresh } from "./dom.js";
+import { worded } from "./names.js";
 import { csv, saveFile } from "./save.js";
 import { digits } from "./units.js";
 
@@ -19,6 +20,11 @@ const CHARACTER = 6.6;
 const TOP = 10;
 const BOTTOM = 42;
 const GAP = 16;
+/** Room (px) for a colour bar with its numbers. */
+const BAR = 92;
+
+/** Size of letters over that for which the room is. */
+const letters = () => parseFloat(getComputedStyle(document.documentElement).fontSize) / 15;
 
 /** Class of the colour of a series, counted from 0. */
 export function series(index) {
@@ -30,10 +36,11 @@ export function series(index) {
  *
  * `columns()` returns what the CSV holds: arrays by name. `options` are elements beside the title.
  * `ownLabel` says what the keyboard does on the chart where that is not reading values.
+ * `onSpan(from, to)` is called with the ends, in units of x, of what is dragged over with the mouse.
  */
 export class Figure {
-  constructor({ name, title, height = 240, columns, options, caption = "", ownLabel = "" }) {
-    Object.assign(this, { name, title, height, columns, ownLabel });
+  constructor({ name, title, height = 240, columns, options, caption = "", ownLabel = "", onSpan = null }) {
+    Object.assign(this, { name, title, height, columns, ownLabel, onSpan });
     this.readout = el("div", { class: "readout", "aria-hidden": "true" });
     this.spoken = el("div", { class: "visually-hidden", "aria-live": "polite" });
     this.plot = el("div", {
@@ -48,7 +55,7 @@ export class Figure {
     const button = (text, what, act) => el("button", {
       type: "button", class: "quiet small", "aria-label": `${title}: save ${what}`, click: act,
     }, text);
-    this.heading = el("h3", { id: label }, title);
+    this.heading = el("h3", { id: label }, worded(title));
     this.element = el(
       "figure",
       { class: `panel ${name}`, "aria-labelledby": label },
@@ -61,6 +68,7 @@ export class Figure {
       this.note,
       caption && el("p", { class: "note caption" }, caption),
     );
+    if (onSpan) this.#spans();
     figures.add(this);
   }
 
@@ -70,18 +78,20 @@ export class Figure {
    * `chart.x` is an axis and `chart.rows` are panels above each other, each with an axis `y`. An
    * axis has `label`, `log`, `range` (else that of the data) and `format`, from a number to a text.
    * A row has `lines` and `points` ({x, y, cls, name, title}), `bars` ({x, y, cls, name}), `marks`
-   * (x of vertical lines), `circle` (its radius), `image` ({url, x, y}: corners), `equal` (both axes
-   * in one scale) and `text` (in the middle).
+   * (x of vertical lines), `circle` (its radius), `image` ({url, x, y}: corners), `words` ([text, x, y]
+   * in shares of the axes), `colours` ({stops, low, high, label}: a colour bar), `equal` (both axes in
+   * one scale) and `text` (in the middle). A line may be `thick`, `dashed` or `smooth`.
    * `description` says in words what there is to see.
    */
   draw(chart, description = "") {
     this.chart = chart;
     this.description = description;
-    this.plot.style.minHeight = `${this.height}px`;
+    const height = this.height * letters();
+    this.plot.style.minHeight = `${height}px`;
     if (!this.ownLabel) this.plot.setAttribute("aria-label", `${this.heading.textContent}: arrow keys read its values`);
     const width = printing ? this.#printedWidth() : this.plot.clientWidth;
     if (!width) return;
-    const drawn = drawChart(chart, width, this.height, description);
+    const drawn = drawChart(chart, width, height, description);
     this.plot.innerHTML = drawn.svg;
     this.frames = drawn.frames;
     if (this.cursor) this.#showCursor();
@@ -93,14 +103,46 @@ export class Figure {
     return beside ? PRINTED / 2 - 20 : PRINTED;
   }
 
-  /** Position of an event on the first row, in units of the axes; null outside. */
+  /** Position of an event in units of the axes of its row; null outside. */
   at(event) {
     const box = this.plot.getBoundingClientRect();
-    const frame = this.frames?.[0];
-    if (!frame) return null;
     const [px, py] = [event.clientX - box.left, event.clientY - box.top];
-    if (px < frame.left || px > frame.right || py < frame.top || py > frame.bottom) return null;
-    return [frame.x.back(px), frame.y.back(py)];
+    const frame = this.frames?.find((f) => px >= f.left && px <= f.right && py >= f.top && py <= f.bottom);
+    return frame ? [frame.x.back(px), frame.y.back(py)] : null;
+  }
+
+  /** Let the mouse drag over a stretch of x. A finger scrolls the page. */
+  #spans() {
+    const band = el("div", { class: "span", hidden: true });
+    let from = null;
+    const inside = (event) => {
+      const { left, right } = this.frames[0];
+      return Math.max(left, Math.min(right, event.clientX - this.plot.getBoundingClientRect().left));
+    };
+    const show = (event) => {
+      const ends = [from, inside(event)].sort((a, b) => a - b);
+      band.hidden = ends[1] - ends[0] < 4;
+      band.style.left = `${ends[0]}px`;
+      band.style.width = `${ends[1] - ends[0]}px`;
+      return ends;
+    };
+    this.plot.classList.add("spans");
+    this.plot.after(band);
+    this.plot.addEventListener("pointerdown", (event) => {
+      if (event.pointerType === "touch" || event.button || !this.at(event)) return;
+      from = inside(event);
+      this.plot.setPointerCapture(event.pointerId);
+    });
+    this.plot.addEventListener("pointermove", (event) => { if (from !== null) show(event); });
+    this.plot.addEventListener("pointerup", (event) => {
+      if (from === null) return;
+      const ends = show(event);
+      const wide = !band.hidden;
+      from = null;
+      band.hidden = true;
+      if (wide) this.onSpan(...ends.map((px) => Number(this.frames[0].x.back(px).toPrecision(6))));
+    });
+    this.plot.addEventListener("pointercancel", () => { from = null; band.hidden = true; });
   }
 
   #hover(event) {
@@ -235,7 +277,7 @@ export class Figure {
     const gone = [];
     copy.querySelectorAll("*").forEach((node, i) => {
       const style = getComputedStyle(from[i]);
-      for (const property of ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linecap", "font-size", "font-family", "opacity"]) {
+      for (const property of ["fill", "stroke", "stroke-width", "stroke-dasharray", "stroke-linecap", "paint-order", "font-size", "font-family", "opacity"]) {
         const value = style.getPropertyValue(property);
         if (value) node.setAttribute(property, value);
       }
@@ -271,28 +313,30 @@ export function redrawAll(onPaper = false) {
 
 function drawChart(chart, width, height, description) {
   const { rows } = chart;
-  const each = (height - TOP - BOTTOM - GAP * (rows.length - 1)) / rows.length;
+  const size = letters();
+  const below = BOTTOM * size;
+  const each = (height - TOP - below - GAP * (rows.length - 1)) / rows.length;
   const frames = [];
   const parts = [];
   const yRanges = rows.map((row) => row.y.range || extent(itemsOf(row).flatMap((i) => i.y), row.y.log, 0.06));
   const longest = Math.max(2, ...rows.flatMap((row, k) =>
-    ticks(scale(yRanges[k], 1, 0, row.y.log), row.y, each / 30).map((t) => t.label.length)));
-  const LEFT = Math.min(0.4 * width, LABEL + CHARACTER * longest);
+    ticks(scale(yRanges[k], 1, 0, row.y.log), row.y, each / 30 / size).map((t) => t.label.length)));
+  const LEFT = Math.min(0.4 * width, size * (LABEL + CHARACTER * longest));
   let xRange = chart.x.range || extent(rows.flatMap((r) => itemsOf(r).flatMap((i) => i.x)), chart.x.log, 0);
   rows.forEach((row, k) => {
     const top = TOP + k * (each + GAP);
-    const frame = { left: LEFT, right: width - RIGHT, top, bottom: top + each };
+    const frame = { left: LEFT, right: width - RIGHT - (row.colours ? BAR * size : 0), top, bottom: top + each };
     let yRange = yRanges[k];
     if (row.equal) [xRange, yRange] = equal(frame, xRange, yRange);
     frame.x = scale(xRange, frame.left, frame.right, chart.x.log);
     frame.y = scale(yRange, frame.bottom, frame.top, row.y.log);
     frames.push(frame);
-    parts.push(drawRow(row, frame, chart.x, k === rows.length - 1));
+    parts.push(drawRow(row, frame, chart.x, k === rows.length - 1, size));
   });
   const foot = frames[frames.length - 1];
   // A label that is longer than its axis has the whole width.
-  const long = 6.4 * chart.x.label.length > foot.right - foot.left;
-  parts.push(text(long ? width / 2 : (foot.left + foot.right) / 2, height - 6, chart.x.label, "axis-label", "middle"));
+  const long = 6.4 * size * chart.x.label.length > foot.right - foot.left;
+  parts.push(text(long ? width / 2 : (foot.left + foot.right) / 2, height - 6, worded(chart.x.label), "axis-label", "middle"));
   return {
     frames,
     svg: `<svg width="${width}" height="${height}" viewBox="0 0 ${width} ${height}" role="img" aria-label="${escape(description)}">${parts.join("")}</svg>`,
@@ -303,20 +347,20 @@ function itemsOf(row) {
   return [...(row.lines || []), ...(row.points || []), ...(row.bars || [])];
 }
 
-function drawRow(row, frame, x, last) {
+function drawRow(row, frame, x, last, size) {
   const { left, right, top, bottom } = frame;
   const parts = [];
   const clip = fresh("clip");
   parts.push(`<clipPath id="${clip}"><rect x="${left}" y="${top - 1}" width="${right - left}" height="${bottom - top + 2}"/></clipPath>`);
-  for (const t of ticks(frame.y, row.y, (bottom - top) / 30)) {
+  for (const t of ticks(frame.y, row.y, (bottom - top) / 30 / size)) {
     const y = round(frame.y.to(t.value));
     parts.push(`<path class="grid" d="M${left} ${y}H${right}"/>`);
     parts.push(text(left - 7, y + 4, t.label, "tick-label", "end"));
   }
-  for (const t of ticks(frame.x, x, (right - left) / 70)) {
+  for (const t of ticks(frame.x, x, (right - left) / 70 / size)) {
     const px = round(frame.x.to(t.value));
     parts.push(`<path class="grid" d="M${px} ${top}V${bottom}"/>`);
-    if (last) parts.push(text(px, bottom + 17, t.label, "tick-label", "middle"));
+    if (last) parts.push(text(px, bottom + 17 * size, t.label, "tick-label", "middle"));
   }
   parts.push(`<g clip-path="url(#${clip})">`);
   if (row.image?.url) parts.push(drawImage(row.image, frame));
@@ -350,12 +394,52 @@ function drawRow(row, frame, x, last) {
   }
   parts.push("</g>", `<path class="frame" d="M${left} ${top}V${bottom}H${right}"/>`);
   const middle = (top + bottom) / 2;
-  parts.push(`<text class="axis-label" text-anchor="middle" transform="translate(14 ${round(middle)}) rotate(-90)">${escape(row.y.label)}</text>`);
+  parts.push(`<text class="axis-label" text-anchor="middle" transform="translate(${round(14 * size)} ${round(middle)}) rotate(-90)">${escape(worded(row.y.label))}</text>`);
+  for (const [word, sx, sy] of row.words || []) parts.push(text(left + sx * (right - left), bottom - sy * (bottom - top) + 4, word, "region", "middle"));
+  if (row.colours) parts.push(drawColours(row.colours, frame, size));
   if (row.text) parts.push(text((left + right) / 2, middle, row.text, "nothing", "middle"));
   return parts.join("");
 }
 
+/** A colour bar to the right of a frame. */
+function drawColours({ stops, low, high, label }, { right, top, bottom }, size) {
+  const id = fresh("colours");
+  const x = right + 14;
+  const to = scale([low, high], bottom, top);
+  const marks = ticks(to, {}, (bottom - top) / 45 / size)
+    .map((t) => `<path class="frame" d="M${x + 14} ${round(to.to(t.value))}h4"/>${text(x + 21, to.to(t.value) + 4, t.label, "tick-label", "start")}`);
+  return `<defs><linearGradient id="${id}" x1="0" y1="1" x2="0" y2="0">${stops.map((s) => `<stop offset="${s.offset}" stop-color="${s.colour}"/>`).join("")}</linearGradient></defs>`
+    + `<rect x="${x}" y="${top}" width="14" height="${bottom - top}" fill="url(#${id})"/>${marks.join("")}`
+    + `<text class="axis-label" text-anchor="middle" transform="translate(${round(right + (BAR - 4) * size)} ${round((top + bottom) / 2)}) rotate(-90)">${escape(label)}</text>`;
+}
+
+/** Cubic curves through points that rise and fall where the points do (Fritsch and Carlson, 1980). */
+function smoothPath(points) {
+  const n = points.length;
+  const slope = points.slice(1).map(([x, y], i) => (y - points[i][1]) / (x - points[i][0]));
+  const at = points.map((_, i) => {
+    if (i === 0) return slope[0];
+    if (i === n - 1) return slope[n - 2];
+    return slope[i - 1] * slope[i] <= 0 ? 0 : (2 * slope[i - 1] * slope[i]) / (slope[i - 1] + slope[i]);
+  });
+  return points.map(([x, y], i) => {
+    if (i === 0) return `M${round(x)} ${round(y)}`;
+    const [px, py] = points[i - 1];
+    const third = (x - px) / 3;
+    return `C${round(px + third)} ${round(py + third * at[i - 1])} ${round(x - third)} ${round(y - third * at[i])} ${round(x)} ${round(y)}`;
+  }).join("");
+}
+
 function drawLine(line, frame) {
+  if (line.smooth) {
+    const runs = [[]];
+    line.x.forEach((x, i) => {
+      if (isKnown(line.y[i])) runs.at(-1).push([frame.x.to(x), clampPixel(frame.y.to(line.y[i]))]);
+      else if (runs.at(-1).length) runs.push([]);
+    });
+    const d = runs.filter((r) => r.length > 1).map(smoothPath).join("");
+    return d ? `<path class="line ${line.cls} ${line.thick ? "thick" : ""} ${line.dashed ? "dashed" : ""}" d="${d}"/>` : "";
+  }
   let path = "";
   let pen = "M";
   for (let i = 0; i < line.x.length; i += 1) {

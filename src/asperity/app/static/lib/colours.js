@@ -35,8 +35,7 @@ export function picture(values, scale, [low, high]) {
   return canvas.toDataURL();
 }
 
-/** A bar with the colours of a scale, as SVG. */
-export function bar(scale) {
-  const stops = SCALES[scale].map((c, i) => `<stop offset="${i / (SCALES[scale].length - 1)}" stop-color="${c}"/>`);
-  return `<svg class="colour-bar" viewBox="0 0 100 6" preserveAspectRatio="none" aria-hidden="true"><defs><linearGradient id="bar-${scale}">${stops.join("")}</linearGradient></defs><rect width="100" height="6" fill="url(#bar-${scale})"/></svg>`;
+/** Stops of a gradient with the colours of a scale. */
+export function stops(scale) {
+  return SCALES[scale].map((colour, i) => ({ offset: i / (SCALES[scale].length - 1), colour }));
 }

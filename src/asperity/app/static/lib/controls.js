@@ -1,6 +1,7 @@
 // Sliders with number fields.
 
 import { el, fill, formula, fresh } from "./dom.js";
+import { nameOf, symbolOf } from "./names.js";
 import { parse, quantity } from "./units.js";
 
 const STEPS = 400;
@@ -29,7 +30,7 @@ export class Quantity {
     this.element = el(
       "div", { class: "quantity" },
       el("label", { for: id, title: parameter.meaning },
-        parameter.symbol ? formula(parameter.symbol) : parameter.name,
+        parameter.symbol ? formula(symbolOf(parameter)) : parameter.name,
         el("span", { class: "meaning" }, parameter.meaning)),
       this.field, this.range,
     );
@@ -92,7 +93,7 @@ export class Dock {
   /** Offer the sliders of a form; the same number as before stays, else the one named `first`. */
   offer(quantities, first) {
     this.quantities = quantities;
-    fill(this.list, quantities.map(({ parameter: p }) => el("option", {}, `${p.label || p.name} – ${p.meaning}`)));
+    fill(this.list, quantities.map(({ parameter: p }) => el("option", {}, `${p.label || nameOf(p.name)} – ${p.meaning}`)));
     for (const q of quantities) {
       q.onShown = () => { if (q === this.chosen) this.#show(); };
       q.element.addEventListener("focusin", () => this.#choose(q));
@@ -133,7 +134,7 @@ export class Entry {
     field.value = text(value);
     this.element = el("div", { class: "entry" },
       el("label", { for: id, title: parameter.meaning },
-        label || [parameter.symbol ? formula(parameter.symbol) : parameter.name, el("span", { class: "meaning" }, parameter.meaning)]),
+        label || [parameter.symbol ? formula(symbolOf(parameter)) : parameter.name, el("span", { class: "meaning" }, parameter.meaning)]),
       field);
   }
 }

@@ -1,10 +1,12 @@
-// A drawing of slider and spring that moves as the computed orbit does.
+// A drawing of slider and spring that moves as the computed orbit does, or as stick-slip in time.
 
 import { el } from "./dom.js";
 
 const SVG = "http://www.w3.org/2000/svg";
 /** Duration (s) of one period on the screen: the true one is too short to be seen. */
 const SHOWN_PERIOD = 4;
+/** Duration (s) of one cycle of stick-slip on the screen. */
+const SHOWN_CYCLE = 3;
 /** Length (px) of the load's arrow at the mean load, and of the spring at the mean force. */
 const ARROW = 46, SPRING = 150;
 /** Place of the block (px): its left edge when it is where the mean motion has it. */
@@ -59,8 +61,11 @@ export class Machine {
 
   /** Show an orbit: the phases of a period with slip velocity over V, force and load over W0. */
   show(point, epsilon) {
-    this.element.hidden = !point.converged;
-    if (!point.converged) return;
+    if (!point.converged) {
+      this.orbit = null;
+      this.#begin();
+      return;
+    }
     const n = point.phase.length;
     // Position against the mean motion: the integral of slip velocity less V.
     const place = [0];
@@ -72,11 +77,40 @@ export class Machine {
     const mean = point.force.reduce((a, b) => a + b, 0) / n;
     const pull = Math.max(...point.force.map((f) => Math.abs(f - mean)), 1e-12);
     const most = Math.max(...point.slip);
-    this.orbit = { n, epsilon, mean, pull, force: point.force, slip: point.slip, place: place.map((v) => (v - middle) / swing) };
-    this.note.textContent = "One period of the load in four seconds; excursions of the block and of the spring are enlarged. "
-      + (most > 2
-        ? `The slider ${Math.min(...point.slip) < 0.1 ? "nearly stops under high load and " : ""}slips at ${most.toPrecision(2)} V when the load is low.`
-        : "The slider moves nearly evenly.");
+    this.orbit = {
+      n, seconds: SHOWN_PERIOD, ground: 40, epsilon,
+      place: place.map((v) => (v - middle) / swing), pull: point.force.map((f) => (f - mean) / pull),
+      note: "One period of the load in four seconds; excursions of the block and of the spring are enlarged. "
+        + (most > 2
+          ? `The slider ${Math.min(...point.slip) < 0.1 ? "nearly stops under high load and " : ""}slips at ${most.toPrecision(2)} V when the load is low.`
+          : "The slider moves nearly evenly."),
+    };
+    this.#begin();
+  }
+
+  /** Follow a motion in time where it is stick-slip; null, or a motion without, is the orbit again. */
+  follow(motion) {
+    const frames = motion?.frames;
+    if (!frames && !this.stickSlip) return;
+    this.stickSlip = frames ? this.#sequence(frames) : null;
+    this.#begin();
+  }
+
+  #sequence({ cycles, duration, travel, place, force }) {
+    const swing = Math.max(...place.map(Math.abs));
+    const [low, high] = [Math.min(...force), Math.max(...force)];
+    return {
+      n: place.length, seconds: SHOWN_CYCLE * cycles, ground: (SWING * travel) / swing, epsilon: 0,
+      place: place.map((v) => v / swing), pull: force.map((f) => (2 * f - low - high) / (high - low)),
+      note: `Stick-slip: ${cycles} cycles of ${(duration / cycles).toPrecision(3)} s each, shown in ${SHOWN_CYCLE} s each. The block rests on the track while the spring is drawn out, then it slips.`,
+    };
+  }
+
+  #begin() {
+    this.shown = this.stickSlip || this.orbit;
+    this.element.hidden = !this.shown;
+    if (!this.shown) return;
+    this.note.textContent = this.shown.note;
     this.#draw();
     this.#next();
   }
@@ -89,21 +123,21 @@ export class Machine {
   }
 
   #next() {
-    if (!this.playing || !this.seen || !this.orbit || this.waiting) return;
+    if (!this.playing || !this.seen || !this.shown || this.waiting) return;
     this.waiting = true;
     requestAnimationFrame((now) => {
       this.waiting = false;
       // A pause of the page is no jump of the slider.
       const passed = Math.min(now - (this.last ?? now), 100) / 1000;
       this.last = now;
-      this.phase += passed / SHOWN_PERIOD;
+      this.phase += passed / this.shown.seconds;
       if (this.element.isConnected) this.#draw();
       this.#next();
     });
   }
 
   #draw() {
-    const { n, epsilon, mean, pull, force, place } = this.orbit;
+    const { n, epsilon, ground, pull, place } = this.shown;
     const turn = this.phase % 1;
     const i = Math.min(n - 1, Math.floor(turn * n));
     const { x, width, height, floor } = BLOCK;
@@ -111,14 +145,14 @@ export class Machine {
     const load = 1 + epsilon * Math.cos(2 * Math.PI * turn);
     this.block.setAttribute("x", left);
     // The track runs under the mean motion.
-    this.ground.setAttribute("transform", `translate(${-(this.phase * 40) % 20} 0)`);
+    this.ground.setAttribute("transform", `translate(${-(this.phase * ground) % 20} 0)`);
     const [top, middle] = [floor - height, left + width / 2];
     const tail = top - 8 - ARROW * load;
     for (const [name, value] of [["x1", middle], ["x2", middle], ["y1", tail], ["y2", top - 12]]) this.shaft.setAttribute(name, value);
     this.head.setAttribute("points", `${middle - 6},${top - 13} ${middle + 6},${top - 13} ${middle},${top - 2}`);
     this.load.setAttribute("x", middle + 10);
     this.load.setAttribute("y", tail + 12);
-    const length = SPRING + 24 * ((force[i] - mean) / pull);
+    const length = SPRING + 24 * pull[i];
     this.spring.setAttribute("points", coil(left + width, floor - height / 2, length));
     this.hand.setAttribute("cx", left + width + length);
     this.hand.setAttribute("cy", floor - height / 2);

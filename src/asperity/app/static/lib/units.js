@@ -61,3 +61,12 @@ export function parse(text, kind) {
   if (!found || !Number.isFinite(number)) return null;
   return found[1] < 0 ? number / 10 ** -found[1] : number * 10 ** found[1];
 }
+
+/** A value with the digits that its standard uncertainty leaves. */
+export function withDoubt(value, doubt) {
+  if (value === null || value === undefined) return "–";
+  if (!doubt || !Number.isFinite(doubt)) return digits(value, 5);
+  const places = Math.max(0, Math.min(12, 1 - Math.floor(Math.log10(doubt))));
+  if (places > 7 || Math.abs(value) >= 1e6) return `${digits(value, 5)} ± ${digits(doubt, 2)}`;
+  return `${value.toFixed(places).replace("-", "−")} ± ${doubt.toFixed(places)}`;
+}

@@ -3,6 +3,7 @@
 import { el } from "../lib/dom.js";
 import { copyText } from "../lib/save.js";
 import { ask, Refused } from "../lib/server.js";
+import { capital } from "../lib/words.js";
 import { FitPanel } from "./data/fit.js";
 import { ProtocolPanel } from "./data/protocol.js";
 import { RecordingCard } from "./data/recording.js";
@@ -106,9 +107,4 @@ export function create(page) {
       fit.refresh();
     },
   };
-}
-
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

@@ -4,9 +4,12 @@ import { Figure, series } from "../lib/charts.js";
 import { choice, Dock, group, Quantity, tick } from "../lib/controls.js";
 import { el, fill, formula } from "../lib/dom.js";
 import { Machine } from "../lib/machine.js";
+import { worded } from "../lib/names.js";
 import { copyText } from "../lib/save.js";
 import { get, Latest, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
+import { capital } from "../lib/words.js";
+import { MotionPanel } from "./explore/motion.js";
 
 export const name = "explore";
 export const title = "Explore";
@@ -22,6 +25,7 @@ export function create(page) {
   const view = fresh();
   let figures = null;
   let machine = null;
+  let motion = null;
   let searching = null;
   let resting = 0;
   let answer = null;
@@ -102,6 +106,7 @@ export function create(page) {
   }
 
   function stopSearch() {
+    motion.stop();
     clearTimeout(resting);
     if (searching) searching.abort();
     searching = null;
@@ -123,7 +128,9 @@ export function create(page) {
       performance.clearMeasures("slider to picture");
     }
     const open = !found.point.searched || Object.values(found.curves).some((c) => c.left.length);
-    if (open && !more && !latest.pending && !found.preparing) resting = setTimeout(search, REST);
+    if (more || latest.pending || found.preparing) return;
+    if (open) resting = setTimeout(search, REST);
+    if (found.point.searched) motion.ask(question(), found.point);
   }
 
   function refused(error) {
@@ -138,8 +145,11 @@ export function create(page) {
     try {
       await run("explore/search", question(), (part) => {
         if (signal.aborted) return;
-        if (part.point) answer.point = part.point;
-        else if (part.curve) {
+        if (part.point) {
+          const known = answer.point.searched;
+          answer.point = part.point;
+          if (!known) motion.ask(question(), answer.point);
+        } else if (part.curve) {
           const curve = answer.curves[part.curve];
           part.rows.forEach((row, i) => {
             for (const n of ["mean_friction", "mu1", "mu2", "phase1", "phase2"]) {
@@ -241,7 +251,7 @@ export function create(page) {
         ["μ₂", digits(point.mu2, 4)], ["ε on the contacts", digits(answer.epsilon, 4)],
       ]
       : [["ε on the contacts", digits(answer.epsilon, 4)]];
-    fill(readings, shown.map(([label, value]) => el("div", {}, el("dt", {}, label), el("dd", {}, value))));
+    fill(readings, shown.map(([label, value]) => el("div", {}, el("dt", {}, worded(label)), el("dd", {}, value))));
   }
 
   function drawPeriod() {
@@ -300,16 +310,17 @@ export function create(page) {
     const rows = shown.map(([label, key]) => ({
       y: { label },
       marks: [answer.epsilon],
+      // Dashed over full lines: curves that coincide show both.
       lines: curves.map(([law, curve], k) => ({
-        x: answer.amplitudes, y: curve[key], cls: series(k), name: law, thick: law === view.law,
-      })),
+        x: answer.amplitudes, y: curve[key], cls: series(k), name: law, thick: law === view.law, dashed: law !== view.law, smooth: true,
+      })).sort((a, b) => b.thick - a.thick),
       points: curves.filter(([, curve]) => curve.lost?.row > 0).map(([law, curve]) => ({
         x: [answer.amplitudes[curve.lost.row - 1]], y: [curve[key][curve.lost.row - 1]], cross: true,
         cls: series(curves.findIndex(([n]) => n === law)), title: `${law}: ${curve.lost.why}`,
       })),
     }));
     fill(figures.amplitude.note,
-      curves.map(([law, curve], k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)}` }), law,
+      curves.map(([law, curve], k) => el("p", { class: "key" }, el("span", { class: `swatch ${series(k)} ${law === view.law ? "" : "dashed"}` }), law,
         curve.lost ? el("span", { class: "lost" }, ` – lost at ε = ${digits(curve.lost.at, 3)}: ${curve.lost.why}`)
           : curve.left.length ? " …" : "")));
     const high = Math.max(answer.amplitudes.at(-1), answer.epsilon * 1.03);
@@ -379,7 +390,7 @@ export function create(page) {
       choice("Law", laws.map((n) => [n, n]), view.law, (value) => { view.law = value; rebuild(); }).element,
       group("Drive and machine", false,
         FIRST.filter((n) => byName[n]).map((n) => sliderOf(byName[n])),
-        tick("The mass counts (inertia)", Boolean(view.numbers.inertia),
+        tick("With the mass of the slider (inertia)", Boolean(view.numbers.inertia),
           (on) => { if (on) view.numbers.inertia = 1; else delete view.numbers.inertia; changed(); }).element),
       group("Law", false, own.map(sliderOf)),
       group("Air layer", false,
@@ -419,12 +430,15 @@ export function create(page) {
 
   return {
     element,
+    renamed() { buildControls(); changed(); },
     show(parameters) {
       if (!figures) {
         figures = makeFigures();
         machine = new Machine();
+        motion = new MotionPanel((moved) => machine.follow(moved));
         results.append(el("div", { class: "summary" }, sentence, readings, onPaper, message, copies),
-          el("div", { class: "panels" }, Object.values(figures).map((f) => f.element), machine.element),
+          el("div", { class: "panels" }, figures.period.element, figures.amplitude.element, machine.element, motion.element,
+            figures.harmonics.element, figures.multipliers.element, figures.air.element),
           el("section", { class: "law", "aria-label": "Equations" }, el("h3", {}, "Equations"), equations));
       }
       fromParameters(parameters);
@@ -433,8 +447,4 @@ export function create(page) {
       changed();
     },
   };
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

@@ -1,12 +1,14 @@
 // Map: stability and response over two numbers.
 
 import { Figure } from "../lib/charts.js";
-import { bar, picture } from "../lib/colours.js";
+import { picture, stops } from "../lib/colours.js";
 import { choice, Entry, group, tick } from "../lib/controls.js";
 import { el, fill } from "../lib/dom.js";
+import { nameOf } from "../lib/names.js";
 import { copyText } from "../lib/save.js";
 import { ask, Refused, run } from "../lib/server.js";
 import { digits, quantity } from "../lib/units.js";
+import { capital } from "../lib/words.js";
 
 export const name = "map";
 export const title = "Map";
@@ -156,20 +158,22 @@ export function create(page) {
     const limits = signed ? [-far, far] : [at(0.02), at(0.98) > at(0.02) ? at(0.98) : at(0.02) + 1];
     const colours = signed ? "vik" : "batlow";
     const [x, y] = [axisOf(withSi(shown.x, grid.x)), axisOf(withSi(shown.y, grid.y))];
+    const critical = grid.unmodulated && { x: grid.unmodulated[0], y: grid.unmodulated[1] };
     const output = catalogue.outputs[shown.show];
     figure.draw({
       x,
       rows: [{
         y,
         image: { url: known.length ? picture(grid.values, colours, limits) : "", x: corners(grid.x, x.log), y: corners(grid.y, y.log) },
-        lines: (grid.boundaries || []).flatMap((line) => ["boundary-halo", "boundary"].map((cls) => ({ x: line.x, y: line.y, cls, thick: true }))),
+        words: grid.regions,
+        colours: { stops: stops(colours), low: limits[0], high: limits[1], label: `${output.meaning}${output.unit === "1" ? "" : ` (${output.unit})`}` },
+        lines: [critical && { ...critical, cls: "boundary", dashed: true, name: "K = Kc without modulation" }, ...(grid.boundaries || []).flatMap((line) => ["boundary-halo", "boundary"].map((cls) => ({ x: line.x, y: line.y, cls, thick: true })))].filter(Boolean),
         points: marker ? [{ x: [marker[0]], y: [marker[1]], cls: "ink", size: 6 }] : [],
         readout: (px, py) => readAt(px, py),
       }],
     }, description());
     fill(figure.note,
-      el("div", { class: "scale" }, el("span", {}, digits(limits[0], 3)), scaleBar(colours), el("span", {}, digits(limits[1], 3)),
-        el("span", { class: "what" }, `${output.meaning}${output.unit === "1" ? "" : ` (${output.unit})`}`)),
+      critical && el("p", { class: "key" }, el("span", { class: "swatch dashed boundary" }), "K = Kc: without modulation sliding is stable above it"),
       grid.boundaries === null && el("p", {}, "The stability boundary comes with the next, finer grid."),
       (grid.boundaries || []).map((line) => el("p", {}, el("span", { class: "swatch boundary" }), describeLine(line))),
       grid.boundaries === null || grid.boundaries.length || !known.length ? null : el("p", {}, grid.stable.flat().some(Boolean) ? "No stability boundary here: stable wherever an orbit was found." : "No stability boundary here: unstable everywhere."),
@@ -192,12 +196,6 @@ export function create(page) {
 
   function description() {
     return `Map of ${catalogue.outputs[shown.show].meaning} for ${shown.law}. ${(grid.boundaries || []).map(describeLine).join(". ")}`;
-  }
-
-  function scaleBar(colours) {
-    const holder = el("span", { class: "bar-holder" });
-    holder.innerHTML = bar(colours);
-    return holder;
   }
 
   function corners(values, log) {
@@ -261,7 +259,7 @@ export function create(page) {
   }, "Cancel");
 
   function buildControls() {
-    const names = parametersOf(view.law).map((p) => [p.name, `${p.name} – ${p.meaning}`]);
+    const names = parametersOf(view.law).map((p) => [p.name, `${nameOf(p.name)} – ${p.meaning}`]);
     const rebuild = () => { buildControls(); changed(); };
     const axisControls = (side, label) => {
       const p = parameter(view[side].name);
@@ -295,7 +293,7 @@ export function create(page) {
         choice("Shows", SHOWN.map((n) => [n, catalogue.outputs[n].meaning]), view.show, (value) => { view.show = value; changed(); }).element,
         choice("Finest grid", FINEST.map((n) => [n, `${n} × ${n}`]), view.count, (value) => { view.count = Number(value); changed(); }).element),
       group("Other numbers", false,
-        tick("The mass counts (inertia)", Boolean(view.numbers.inertia), (on) => {
+        tick("With the mass of the slider (inertia)", Boolean(view.numbers.inertia), (on) => {
           if (on) view.numbers.inertia = 1; else delete view.numbers.inertia;
           changed();
         }).element,
@@ -320,6 +318,7 @@ export function create(page) {
 
   return {
     element,
+    renamed() { buildControls(); draw(); },
     show(parameters) {
       if (!figure) {
         figure = new Figure({
@@ -357,8 +356,4 @@ export function create(page) {
 /** A number of the address, or its text where it has a unit. */
 function number(text) {
   return text !== "" && Number.isFinite(Number(text)) ? Number(text) : text;
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

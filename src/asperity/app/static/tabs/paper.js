@@ -5,7 +5,9 @@ import { choice, Dock, group, Quantity } from "../lib/controls.js";
 import { el, fill, fresh } from "../lib/dom.js";
 import { copyText, csv, saveFile } from "../lib/save.js";
 import { ask, Latest, Refused, run } from "../lib/server.js";
+import { table } from "../lib/tables.js";
 import { digits, quantity } from "../lib/units.js";
+import { capital } from "../lib/words.js";
 import { elementDrawing } from "./paper/element.js";
 
 export const name = "paper";
@@ -30,7 +32,7 @@ export function create(page) {
   const message = el("p", { class: "message", role: "alert" });
   const controls = el("form", { class: "controls", "aria-label": "Figure and numbers", submit: (e) => e.preventDefault() });
   const sentence = el("p", { class: "sentence", role: "status" });
-  const ends = el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": "At the end of each curve" });
+  const ends = el("div", {});
   const figure = new Figure({ name: "paper-figure", title: "Figure", height: 460, columns: figureColumns });
   const drawing = el("div", { class: "element" });
   const massStatus = el("p", { class: "status", role: "status" });
@@ -202,11 +204,9 @@ export function create(page) {
     const all = [...moved.map((curve, k) => [curve, printed[k]]), ...inertia.map((m) => [m.curve, m.printed])];
     const said = rows.flatMap((row) => (stated[row.column] || []).map((s) =>
       el("li", {}, `${row.label} at ${digits(s.x, 3)}: ${s.ends.map((v) => digits(v, 3)).join(" to ")} (${s.text})`)));
-    fill(ends, el("table", {},
-      el("thead", {}, el("tr", {}, ["Curve", "Quantity", "As printed", "Moved"].map((t) => el("th", { scope: "col" }, t)))),
-      el("tbody", {}, all.flatMap(([curve, before]) => rows.map((row) => el("tr", {},
-        el("th", { scope: "row" }, curve.name), el("td", {}, row.label),
-        el("td", {}, digits(last(before, row.column), 4)), el("td", {}, digits(last(curve, row.column), 4))))))),
+    fill(ends, table(["Curve", "Quantity", "As printed", "Moved"],
+      all.flatMap(([curve, before]) => rows.map((row) => [curve.name, row.label, digits(last(before, row.column), 4), digits(last(curve, row.column), 4)])),
+      "At the end of each curve"),
     said.length > 0 && el("ul", { class: "said" }, said));
   }
 
@@ -388,8 +388,4 @@ export function create(page) {
     },
     hide: stopMass,
   };
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

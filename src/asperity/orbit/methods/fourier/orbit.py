@@ -17,9 +17,9 @@ Grid: theta = tau + g sin(tau) puts the nodes where the load is lightest and the
 States and rates are tuples with an array for each state, not stacks: a stack is written to memory
 before it is read, and access to memory limits these programs.
 
-Mean, harmonics and the logarithm of the monodromy matrix are read on the same grid. The fundamental
-matrix is Q(tau) exp(L tau) with Q periodic of mean 1, which obeys dQ/dtau = J Q - Q L and is found
-by the iteration that finds the orbit; the multipliers are exp(2 pi eig L).
+Mean, harmonics and the logarithm of the monodromy matrix are read on the same grid. A periodic
+change of variables makes the linearised equations ones of constant coefficients L (Floquet); the
+multipliers are exp(2 pi eig L).
 """
 
 from __future__ import annotations
@@ -249,8 +249,8 @@ def fourier_orbit(
     )
 
 
-#: On the estimated error of L.
-_FLOQUET_TOLERANCE = 1e-12
+#: Estimated error of L.
+_FLOQUET_ERROR = 1e-10
 
 
 def fourier_observables(
@@ -279,10 +279,9 @@ def fourier_observables(
     mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.zero_mean, harmonics)
     states = together(orbit.mean, orbit.zero_mean)
     _, push = jax.linearize(rates_on(system, cycle), *states)
-    stretch = cycle.stretch[:, None]
-    J = [[stretch * entry for entry in row] for row in jacobian(push, states)]
-    trace = sum(row[i].mean(0) for i, row in enumerate(J))
-    exponent, floquet_error = _floquet_exponent(cycle, J, max_steps)
+    J = jacobian(push, states)
+    trace = sum(cycle.share @ row[i] for i, row in enumerate(J))
+    exponent, converged = _floquet_exponent(cycle, J, max_steps)
     error = orbit_error(system, cycle, orbit, harmonics)
     zero = jnp.zeros_like(mean)
     observables = Observables(
@@ -295,7 +294,7 @@ def fourier_observables(
         jnp.full_like(mean, jnp.inf),
         orbit.start,
     )
-    return observables, jnp.maximum(error, floquet_error)
+    return observables, jnp.where(converged, error, jnp.inf)
 
 
 def orbit_error(
@@ -354,46 +353,54 @@ def truncation(waves: Array, harmonics: int) -> Array:
 
 
 def _floquet_exponent(cycle: LoadCycle, J: Matrix, max_steps: int) -> tuple[Array, Array]:
-    """L, shape (size, size, points), and 0 where it converged, else inf.
+    """A matrix L such that exp(2 pi L) is similar to the monodromy matrix.
 
-    The iteration for Q gains an order of smallness a step. In the states y = Q z of an
-    approximate Q,
+    Parameters
+    ----------
+    cycle : LoadCycle
+    J : matrix of arrays, shape (nodes, points)
+        Derivatives of the rates to the states, from `jacobian`.
+    max_steps : int
+        Bound on the number of steps.
 
-        dz/dtau = R z,      R = Q^-1 (J Q - dQ/dtau),
+    Returns
+    -------
+    L : array, shape (size, size, points)
+    converged : bool array, shape (points,)
 
-    and R is constant but for the error of Q: by averaging, its mean is L to twice the order.
+    Notes
+    -----
+    Let J be per unit of tau, L its mean and q the zero-mean antiderivative of J - L. With
+    y = (1 + q) z, the equation dy/dtau = J y becomes
+
+        dz/dtau = R z,      R = (1 + q)^-1 (L + J q),
+
+    and R varies less than J by a factor of the size of L and q. A step does this with the R of the
+    last one. By averaging, the error of L is the square of what still varies.
     """
     n = range(len(J))
 
-    def product(q: Matrix) -> Matrix:
-        """J (1 + q)."""
-        return [[J[i][c] + sum(J[i][j] * q[j][c] for j in n) for c in n] for i in n]
-
-    def body(carry: tuple) -> tuple:
-        q, _, last, change, _, steps = carry
-        P = product(q)
-        L = _means(P)
-        slope = [[P[i][c] - L[i][c] - sum(q[i][k] * L[k][c] for k in n) for c in n] for i in n]
-        q = [[cycle.integral @ entry for entry in row] for row in slope]
-        moved = jnp.stack([jnp.abs(L[i][c] - last[i][c]) for i in n for c in n]).max(0)
-        # The next change would be smaller by the contraction; averaging leaves its square.
-        error = jnp.minimum(moved, moved**2 / (change + 1e-300)) ** 2
-        return q, slope, L, moved, error, steps + 1
+    def step(carry: tuple) -> tuple:
+        R, L, last, _, steps = carry
+        q = [[cycle.integral @ (R[i][j] - L[i][j]) for j in n] for i in n]
+        driven = [[L[i][j] + sum(R[i][k] * q[k][j] for k in n) for j in n] for i in n]
+        inverse = inverse_points([[q[i][j] + float(i == j) for j in n] for i in n])
+        R = [[sum(inverse[i][k] * driven[k][j] for k in n) for j in n] for i in n]
+        new = _means(R)
+        change = jnp.stack([jnp.abs(new[i][j] - L[i][j]) for i in n for j in n]).max(0)
+        return R, new, change, jnp.minimum(change, change**2 / (last + 1e-300)), steps + 1
 
     def unfinished(carry: tuple) -> Array:
         *_, change, error, steps = carry
-        return (steps < max_steps) & jnp.any((error > _FLOQUET_TOLERANCE) & (change < 1e3))
+        # What diverges becomes large or NaN, and ends the iteration.
+        going = (error > _FLOQUET_ERROR) & (change < 1e3)
+        return (steps < max_steps) & jnp.any(going)
 
-    zero = [[jnp.zeros_like(entry) for entry in row] for row in J]
+    J = [[cycle.stretch[:, None] * entry for entry in row] for row in J]
     none = jnp.zeros(J[0][0].shape[1])
-    start = (zero, zero, [[none for _ in n] for _ in n], none, none + jnp.inf, 0)
-    q, slope, _, _, error, _ = jax.lax.while_loop(unfinished, body, start)
-    P = product(q)
-    zero_mean = [[P[i][c] - slope[i][c] for c in n] for i in n]
-    inverse = inverse_points([[q[i][c] + float(i == c) for c in n] for i in n])
-    R = [[sum(inverse[i][k] * zero_mean[k][c] for k in n) for c in n] for i in n]
-    exponent = jnp.stack([jnp.stack(row) for row in _means(R)])
-    return exponent, jnp.where(error < _FLOQUET_TOLERANCE, 0.0, jnp.inf)
+    start = (J, _means(J), none + 1.0, none + 1.0, 0)
+    _, L, _, error, _ = jax.lax.while_loop(unfinished, step, start)
+    return jnp.stack([jnp.stack(row) for row in L]), error <= _FLOQUET_ERROR
 
 
 def _means(entries: Matrix) -> Matrix:

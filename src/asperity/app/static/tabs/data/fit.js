@@ -3,9 +3,13 @@
 import { Figure, series } from "../../lib/charts.js";
 import { choice, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
+import { nameOf, names as chosenNames } from "../../lib/names.js";
 import { copyText, csv, saveFile } from "../../lib/save.js";
 import { Refused, run } from "../../lib/server.js";
+import { sections } from "../../lib/tables.js";
 import { digits } from "../../lib/units.js";
+import { capital } from "../../lib/words.js";
+import { ByHand } from "./by_hand.js";
 
 /** What a fit begins with, by the kind of data; without free parameters, all that the data may show. */
 const DEFAULTS = {
@@ -30,12 +34,13 @@ export class FitPanel {
     this.status = el("p", { class: "sentence", role: "status" });
     this.message = el("p", { class: "message", role: "alert" });
     this.results = el("div", { class: "card-body" });
+    this.byHand = new ByHand(page, (start) => this.start(start));
     this.fitButton = el("button", { type: "button", class: "primary", click: () => this.start() }, "Fit");
     this.cancel = el("button", { type: "button", click: () => this.work?.abort() }, "Cancel");
     this.cancel.hidden = true;
     this.bar = el("progress", { max: 1, "aria-label": "Progress of the draws", hidden: true });
     this.element = el("section", { class: "recording fit", "aria-label": "Fit and compare" },
-      el("h3", {}, "Fit and compare"), this.data, this.form,
+      el("h3", {}, "Fit and compare"), this.data, this.form, this.byHand.element,
       el("div", { class: "actions" }, this.fitButton, this.cancel), this.status, this.bar, this.message, this.results);
     this.element.hidden = true;
     this.#build();
@@ -68,7 +73,13 @@ export class FitPanel {
     this.runOptions.hidden = !runs;
     this.#begin(runs && !rows && !tables ? "runs" : "tables");
     const parts = [rows && `${rows} measured ${rows === 1 ? "amplitude" : "amplitudes"}`, tables && `${tables} ${tables === 1 ? "table" : "tables"}`, runs && `${runs} whole ${runs === 1 ? "recording" : "recordings"}`].filter(Boolean);
+    this.#hand();
     this.data.textContent = `Data: ${parts.join(" and ")}.`;
+  }
+
+  #hand() {
+    const runs = this.runs();
+    this.byHand.use(runs.length === 1 ? runs[0].recording : null, this.settings.laws[0]);
   }
 
   /** The defaults of another kind of data, where those of the earlier one were left as they are. */
@@ -90,6 +101,7 @@ export class FitPanel {
     const toggle = (key, n, order) => (on) => {
       settings[key] = order.filter((m) => (m === n ? on : settings[key].includes(m)));
       this.#free();
+      if (settings.laws.length) this.#hand();
       this.fitButton.textContent = settings.laws.length > 1 ? "Compare" : "Fit";
       this.changed();
     };
@@ -139,7 +151,7 @@ export class FitPanel {
     const { laws } = this.page.catalogue;
     const own = [...new Set(this.settings.laws.flatMap((l) => laws[l].parameters.filter((p) => p.place !== "drive").map((p) => p.name)))];
     const names = ["eps_ratio", ...own.filter((n) => !["V0", "inertia", "epsilon", "frequency", "V"].includes(n))];
-    fill(this.freeHolder, names.map((n) => tick(n, this.settings.free.includes(n), (on) => {
+    fill(this.freeHolder, names.map((n) => tick(nameOf(n), this.settings.free.includes(n), (on) => {
       this.settings.free = names.filter((m) => (m === n ? on : this.settings.free.includes(m)));
       this.changed();
     }).element));
@@ -152,7 +164,8 @@ export class FitPanel {
     return free.length ? free : null;
   }
 
-  async start() {
+  /** Fit or compare, of one law from start values if there are some. */
+  async start(start = {}) {
     this.work?.abort();
     this.work = new AbortController();
     const { signal } = this.work;
@@ -170,11 +183,11 @@ export class FitPanel {
     }
     const asked = {
       laws: settings.laws, free: this.#freed(),
-      rows: this.rows(), tables: this.tables(), fixed,
+      rows: this.rows(), tables: this.tables(), fixed, start,
       runs: this.runs().map((r) => r.asked),
       trend: settings.trend, drift: settings.drift, initial: settings.initial, gauge: settings.gauge || null,
       fit_rate: settings.fit_rate || null,
-      report: settings.report,
+      report: settings.report, names: chosenNames(),
       material: settings.material || null, prior: settings.prior ? settings.material || null : null,
       profile: settings.profile, inertia: settings.inertia,
     };
@@ -231,7 +244,7 @@ export class FitPanel {
     if (on) this.status.textContent = "Fitting…";
   }
 
-  #draw({ fit, comparison, posterior, bands, residuals, runs, report, command }) {
+  #draw({ fit, comparison, sections: described, laws, posterior, bands, residuals, runs, report, command }) {
     this.figures = [];
     const python = () => this.#python();
     const record = fit || comparison;
@@ -241,26 +254,20 @@ export class FitPanel {
       el("button", { type: "button", click: () => saveFile(fit ? "fit.json" : "comparison.json", JSON.stringify(posterior ? { ...record, posterior } : record, null, 2), "application/json") }, "JSON"),
       report && el("button", { type: "button", click: () => saveFile("report.zip", fromBase64(report)) }, "Report folder (ZIP)"),
       el("button", { type: "button", click: () => this.#saveCsv(fit ? { [fit.law]: fit } : comparison.laws) }, "CSV"));
-    if (fit) {
-      this.status.textContent = fitSentence(fit);
-      fill(this.results, buttons, ...fitTables(fit), ...this.#posterior(posterior), ...this.#bands(bands), ...this.#runs(runs), this.#residuals(residuals));
-    } else {
-      this.status.textContent = capital(comparison.verdict);
-      const laws = Object.entries(comparison.laws);
-      const lowest = Math.min(...laws.filter(([, l]) => l.aicc !== null).map(([, l]) => l.aicc));
-      fill(this.results, buttons,
-        table(["Law", "χ²", "degrees of freedom", "p", "AICc − lowest", "weight", ""],
-          laws.map(([n, l]) => [n, digits(l.chi2), String(l.dof), digits(l.p_value, 2), l.aicc === null ? "–" : digits(l.aicc - lowest), digits(l.weight, 3), l.converged ? (n === comparison.best ? "lowest AICc" : `${l.standing}: ${l.deciding}`) : l.message]), "Comparison"),
-        ...laws.filter(([, l]) => l.converged).map(([n, l]) => el("details", { open: n === comparison.best }, el("summary", {}, n), el("p", {}, fitSentence(l)), ...fitTables(l))),
-        ...this.#bands(bands), ...this.#runs(runs), this.#residuals(residuals));
-    }
+    if (fit?.converged) this.byHand.take(fit);
+    // What the fit says first stands beside the button, then its picture, then its numbers.
+    const [first, ...others] = described;
+    this.status.textContent = first.sentences.length ? `${first.sentences.join(". ")}.` : first.title;
+    const ofLaws = Object.entries(laws || {}).map(([n, own]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(own)));
+    fill(this.results, ...this.#runs(runs), ...this.#bands(bands), buttons,
+      ...sections([{ ...first, sentences: [] }, ...others]), ...ofLaws, ...this.#posterior(posterior), this.#residuals(residuals));
     for (const draw of this.figures) draw();
   }
 
-  /** Summary and densities of the draws, as the report of `asperity fit --posterior` has them. */
+  /** Densities of the draws. */
   #posterior(posterior) {
     if (!posterior) return [];
-    const { chains, draws, parameters, divergences, histograms, warnings } = posterior;
+    const { parameters, histograms } = posterior;
     const shown = Object.entries(histograms).map(([n, { x, y }]) => {
       const p = parameters[n];
       const figure = new Figure({ name: `posterior-${n}`, title: `Posterior of ${n}`, height: 230, columns: () => ({ [n]: x, density: y }) });
@@ -272,16 +279,7 @@ export class FitPanel {
       }, `Posterior of ${n}: mean ${digits(p.mean, 4)}, standard deviation ${digits(p.sd, 2)}.`));
       return figure.element;
     });
-    return [
-      el("h4", {}, "Posterior"),
-      el("p", { class: "note" }, `${chains} chains of ${draws} draws, ${divergences} diverging; ${posterior.converged ? "the chains agree" : "the chains do not agree yet, or there are too few draws"}.`),
-      ...warnings.map((w) => el("p", { class: "message" }, capital(`${w}.`))),
-      table(["Parameter", "Mean", "Standard deviation", "95 % interval", "Unit", "R-hat", "ESS bulk", "ESS tail"], Object.entries(parameters).map(([n, p]) => [
-        n, digits(p.mean, 5), digits(p.sd, 2), `${digits(p.interval_95[0])} to ${digits(p.interval_95[1])}`, p.unit || "1",
-        p.r_hat === null ? "–" : p.r_hat.toFixed(4), digits(p.ess_bulk && Math.round(p.ess_bulk), 4), digits(p.ess_tail && Math.round(p.ess_tail), 4),
-      ]), "Posterior"),
-      el("div", { class: "panels" }, shown),
-    ];
+    return [el("div", { class: "panels" }, shown)];
   }
 
   /** Readings with their uncertainties, and what the law predicts between them. */
@@ -313,15 +311,23 @@ export class FitPanel {
     });
   }
 
+  /** Recordings as fitted: whole, and each transient enlarged. */
   #runs(runs) {
-    return (runs || []).map(({ name, recorded, fitted, difference }, k) => {
-      const figure = new Figure({ name: `run-${k + 1}`, title: `${name}: recorded and fitted`, height: 330, columns: () => ({ time: recorded.x, friction: recorded.y }) });
+    return (runs || []).map(({ name, recorded, fitted, difference, transients }, k) => {
+      const figure = new Figure({ name: `run-${k + 1}`, title: `${name}: recorded and fitted`, height: 330, columns: () => ({ time: recorded.x, friction: recorded.y, time_of_fitted: fitted.x, fitted: fitted.y }) });
       fill(figure.note, el("p", { class: "key" }, el("span", { class: "swatch s6" }), "recorded"), el("p", { class: "key" }, el("span", { class: "swatch s2" }), "fitted"));
+      const both = (of) => [{ ...of.recorded, cls: "s6", name: "recorded" }, { ...of.fitted, cls: "s2", name: "fitted", thick: true }];
       this.figures.push(() => figure.draw({ x: { label: "time (s)" }, rows: [
-        { y: { label: "friction" }, lines: [{ ...recorded, cls: "s6", name: "recorded" }, { ...fitted, cls: "s2", name: "fitted", thick: true }] },
-        { y: { label: "difference" }, lines: [{ ...difference, cls: "s6", name: "recorded − fitted" }] },
+        { y: { label: "F/W" }, marks: transients.map((t) => t.time), lines: both({ recorded, fitted }) },
+        { y: { label: "recorded − fitted" }, lines: [{ ...difference, cls: "s6", name: "recorded − fitted" }] },
       ] }, `Friction of ${name} as recorded and as fitted.`));
-      return figure.element;
+      const near = transients.map((transient) => {
+        const title = `After ${digits(transient.time, 6)} s`;
+        const one = new Figure({ name: "transient", title, height: 250, columns: () => ({ time: transient.recorded.x, friction: transient.recorded.y }) });
+        this.figures.push(() => one.draw({ x: { label: "time (s)" }, rows: [{ y: { label: "F/W" }, marks: [transient.time], lines: both(transient) }] }, `Recorded and fitted friction ${title.toLowerCase()}.`));
+        return one.element;
+      });
+      return el("div", { class: "panels" }, figure.element, near);
     });
   }
 
@@ -377,42 +383,7 @@ function fromBase64(text) {
   return new Blob([Uint8Array.from(atob(text), (c) => c.charCodeAt(0))], { type: "application/zip" });
 }
 
-function fitSentence(fit) {
-  if (!fit.converged) return capital(fit.message);
-  // The level of the noise of recordings is estimated: chi-squared does not judge the law then.
-  if (fit.noise.model?.includes("AR(")) return `${capital(fit.law)}: ${fit.noise.model}, ${digits(fit.noise.effective_samples, 4)} effective samples. The noise is estimated, so that χ² does not judge the law; AICc compares laws.`;
-  const p = fit.p_value;
-  const judged = p === null ? "" : p < 0.01 ? ": the law or the uncertainties are wrong" : ": the law describes the data";
-  return `${capital(fit.law)}: χ² = ${digits(fit.chi2)} for ${fit.dof} degrees of freedom, p = ${digits(p, 2)}${judged}.`;
-}
-
-function fitTables(fit) {
-  if (!fit.converged) return [];
-  const names = Object.keys(fit.parameters);
-  const end = (v, low) => (v === null ? (low ? "−∞" : "∞") : digits(v));
-  return [
-    ...fit.warnings.map((w) => el("p", { class: "message" }, capital(`${w}.`))),
-    table(["Parameter", "Estimate", "Standard error", "95 % interval", "Unit", ""], Object.entries(fit.parameters).map(([n, p]) => [
-      n, digits(p.value, 5), digits(p.se, 2), `${end(p.interval_95[0], true)} to ${end(p.interval_95[1], false)}`, p.unit || "1",
-      fit.undetermined.includes(n) ? "not determined by these data" : p.at_bound ? "at its bound" : p.prior ? `prior ${digits(p.prior.mean)} ± ${digits(p.prior.sd, 2)}` : "",
-    ]), "Parameters"),
-    names.length > 1 ? table(["Correlation", ...names], names.map((n, i) => [n, ...names.map((_, j) => (j > i ? "" : digits(fit.correlation.matrix[i][j], 2)))]), "Correlations") : null,
-    table(["Observable", "χ²", "data"], Object.entries(fit.observables).map(([n, o]) => [n, digits(o.chi2), String(o.n)]), "Chi-squared of each observable"),
-    el("p", { class: "note" }, `Log-likelihood ${digits(fit.log_likelihood, 6)}, AICc ${digits(fit.aicc, 6)}, BIC ${digits(fit.bic, 6)}. Noise: ${fit.noise.model}.`),
-  ].filter(Boolean);
-}
-
 function priorText({ kind, ...numbers }) {
   const given = Object.entries(numbers).filter(([, v]) => typeof v === "number").map(([n, v]) => `${n} ${digits(v, 3)}`);
   return `Prior: ${kind}${given.length ? `, ${given.join(", ")}` : ""}.`;
-}
-
-function table(head, rows, label) {
-  return el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": label }, el("table", {},
-    el("thead", {}, el("tr", {}, head.map((t) => (t ? el("th", { scope: "col" }, t) : el("td", {}))))),
-    el("tbody", {}, rows.map(([first, ...rest]) => el("tr", {}, el("th", { scope: "row" }, first), rest.map((t) => el("td", {}, t)))))));
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

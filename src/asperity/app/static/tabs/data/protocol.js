@@ -6,6 +6,7 @@ import { el, fill, fresh } from "../../lib/dom.js";
 import { copyText } from "../../lib/save.js";
 import { Refused, run } from "../../lib/server.js";
 import { digits } from "../../lib/units.js";
+import { capital } from "../../lib/words.js";
 
 /** Time (ms) without a key after which the text is checked. */
 const REST = 350;
@@ -160,8 +161,4 @@ export class ProtocolPanel {
   #python() {
     return 'from asperity.protocol import load_protocol, record_run, run_protocol\n\nprotocol = load_protocol("protocol.toml")\nrun_protocol(protocol, "run.nc")\nif protocol.setup is not None:\n    trace = record_run(protocol.setup, "run.nc")\n    print(trace)\n';
   }
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
 }

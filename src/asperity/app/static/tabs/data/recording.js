@@ -5,7 +5,10 @@ import { choice, tick } from "../../lib/controls.js";
 import { el, fill, fresh } from "../../lib/dom.js";
 import { copyText, csv, saveFile } from "../../lib/save.js";
 import { Refused, run, sendFile } from "../../lib/server.js";
-import { digits, quantity } from "../../lib/units.js";
+import { scrolling, table } from "../../lib/tables.js";
+import { digits, quantity, withDoubt } from "../../lib/units.js";
+import { capital, count } from "../../lib/words.js";
+import { stickSlip, stickSlipSentence } from "./stick_slip.js";
 
 const ROLE_NAMES = {
   time: "time", W: "normal load", F: "shear force", velocity: "velocity",
@@ -49,15 +52,17 @@ export class RecordingCard {
   run() {
     const { key, name, source, options } = this.state;
     if (this.result?.measured?.record.mode !== "sliding" || !this.fitted) return null;
+    const { record, curves } = this.result.measured;
+    this.traced ||= { curve: curves.friction, segments: record.segments, level: record.friction.value, load: record.load?.value ?? 1 };
     return {
-      name, python: this.recording?.python || "",
+      name, python: this.recording?.python || "", recording: this.traced,
       asked: { recording: key, source, window: options.window || null, steps: options.steps || null },
     };
   }
 
   table() {
-    const table = this.result?.table;
-    return table ? { name: table.name, text: table.text } : null;
+    const sent = this.result?.table;
+    return sent ? { name: sent.name, text: sent.text } : null;
   }
 
   remove() {
@@ -93,7 +98,8 @@ export class RecordingCard {
     try {
       const { source } = this.state;
       const { mode, ...options } = this.state.options;
-      if (mode && mode !== "auto") options.modulated = mode === "modulated";
+      if (mode === "stick-slip") options.stick_slip = true;
+      else if (mode && mode !== "auto") options.modulated = mode === "modulated";
       const last = await run("data/measure", { recording: this.state.key, source, options }, (part) => {
         if (signal.aborted) return;
         if (part.waiting) this.#says("Waiting for another recording…");
@@ -102,6 +108,7 @@ export class RecordingCard {
       }, signal, `r${this.number}`);
       if (signal.aborted || !last.result) return;
       this.result = last.result;
+      this.traced = null;
       this.chosen.clear();
       this.bar.hidden = true;
       this.#draw();
@@ -152,7 +159,7 @@ export class RecordingCard {
       el("summary", {}, "Channels, units and options"),
       ...channels,
       el("form", { class: "filters", submit: (e) => e.preventDefault() },
-        choice("What it is", [["auto", "found by the program"], ["modulated", "a modulated load"], ["sliding", "velocity steps and holds"]],
+        choice("What it is", [["auto", "found by the program"], ["modulated", "a modulated load"], ["sliding", "velocity steps and holds"], ["stick-slip", "stick-slip"]],
           mode, (v) => { options.mode = v; again(); }).element,
         text("Frequency", options.frequency, optional(options, "frequency"), "found, or 120 Hz"),
         tick("Take it as exact", Boolean(options.exact_frequency), (on) => { if (on) options.exact_frequency = true; else delete options.exact_frequency; again(); }).element,
@@ -168,6 +175,8 @@ export class RecordingCard {
           const f = v.split(/[,;]+/).map((h) => numbers(h.replace(":", " "))).filter((h) => h.length === 2);
           if (f.length) options.holds = f; else delete options.holds;
         }, "found, or 100:110"),
+        ...[["Spring stiffness K", "stiffness", "for slips and energies, 168 N/m"], ["Pulling velocity V", "velocity", "of stick-slip, 42 um/s"], ["Mass M", "mass", "of stick-slip, 30.7 g"], ["Normal load W0", "normal_load", "M g, or 3 N"]]
+          .map(([label, key, example]) => text(label, options[key], optional(options, key), example)),
         text("Time column", source.columns.time, optional(source.columns, "time"), "named in the file, or column 0"),
         text("Sampling rate", source.rate, optional(source, "rate"), "from the file, or 10 kHz"),
         text("Area", source.area, optional(source, "area"), "makes stresses forces, 25 cm^2"),
@@ -208,10 +217,10 @@ export class RecordingCard {
         el("td", {}, channel.curve ? sparkline(channel.curve) : ""));
     });
     const rate = recording.rate ? `${digits(recording.rate, 6)} Hz` : "uneven sampling";
-    return el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": "Channels as understood" },
+    return scrolling("Channels as understood", [
       el("p", { class: "note" }, `${recording.samples.toLocaleString("en")} samples, ${digits(recording.start, 6)} s to ${digits(recording.end, 6)} s, ${rate}; ${recording.provenance.format || ""}`),
       el("table", {}, el("thead", {}, el("tr", {}, ["Channel", "Role", "Unit", "Understood", "Values", ""].map((t) => el("th", { scope: "col" }, t)))),
-        el("tbody", {}, rows)));
+        el("tbody", {}, rows))]);
   }
 
   // --- Results ---------------------------------------------------------------------------------
@@ -221,7 +230,7 @@ export class RecordingCard {
     const { measured } = this.result;
     const { record } = measured;
     this.#says(this.#sentence(record, measured.note), record.verdict === "ok" ? "stable" : "unstable");
-    const figures = record.mode === "modulated" ? this.#modulated(measured) : this.#sliding(measured);
+    const figures = this.#figures(measured);
     fill(this.body,
       el("div", { class: "actions" },
         copy("Copy as Python", () => this.result.python), copy("Copy as command", () => this.result.command),
@@ -230,21 +239,29 @@ export class RecordingCard {
       figures.readings,
       record.mode === "sliding" && tick("Fit the recording as a whole", this.fitted, (on) => { this.fitted = on; this.changed(); },
         "It goes into the fit below, with the window and the velocity steps above").element,
-      this.#rowTable(measured.rows),
+      record.mode !== "stick-slip" && this.#rowTable(measured.rows),
       el("div", { class: "panels" }, figures.list.map((f) => f.element)),
+      ...figures.tables || [],
       this.#checks(record.checks), this.#findings());
     for (const [figure, chart, description] of figures.charts) figure.draw(chart, description);
     return undefined;
   }
 
   #sentence(record, note) {
-    const bad = record.checks.filter((c) => c.verdict === "bad").map((c) => c.name);
-    const doubtful = record.checks.filter((c) => c.verdict === "suspicious").map((c) => c.name);
+    const named = (verdict) => [...new Set(record.checks.filter((c) => c.verdict === verdict).map((c) => c.name))];
+    const [bad, doubtful] = [named("bad"), named("suspicious")];
     const verdict = bad.length ? `bad: ${bad.join(", ")}` : doubtful.length ? `doubtful: ${doubtful.join(", ")}` : "all checks are good";
-    const what = record.mode === "modulated"
+    const what = record.mode === "stick-slip" ? stickSlipSentence(record) : record.mode === "modulated"
       ? `Modulated at ${digits(record.frequency, 6)} Hz by ${digits(100 * record.epsilon, 3)} %`
       : `No modulation: ${count(record.steps.length, "velocity step")}, ${count(record.holds.length, "hold")}`;
     return `${what}; ${verdict}.${note && record.mode === "sliding" && this.state.options.mode === "sliding" ? ` ${note}` : ""}`;
+  }
+
+  #figures(measured) {
+    if (measured.record.mode === "modulated") return this.#modulated(measured);
+    if (measured.record.mode === "sliding") return this.#sliding(measured);
+    const whole = this.#figure("whole", "The recording with its slip events", measured.curves.friction, ["time", "F/W"]);
+    return stickSlip(measured, whole, this.state.name);
   }
 
   #modulated({ record, curves }) {
@@ -289,8 +306,12 @@ export class RecordingCard {
         ...(record.healing ? [["healing per decade", withDoubt(record.healing.per_decade, record.healing.uncertainty)]] : [])]
         .map(([t, v]) => el("div", {}, el("dt", {}, t), el("dd", {}, v))));
     const whole = this.#figure("whole", "Friction, segments, steps and holds", curves.friction, ["time", "friction"]);
-    whole.height = 320;
-    const levels = record.segments.filter((s) => !s.hold).map((s) => ({ x: [s.steady.start, s.end], y: [s.steady.value, s.steady.value], cls: series(1), thick: true, name: `${quantity(s.velocity ?? 0, "velocity", 3)}` }));
+    const levels = record.segments.filter((s) => !s.hold).flatMap((s) => {
+      // The steady level with its drift, and what both are at the beginning of the segment.
+      const at = (t) => s.steady.value + (s.slope ?? 0) * (t - (s.steady.start + s.end) / 2);
+      const line = (from, to, style) => ({ x: [from, to], y: [at(from), at(to)], cls: series(1), name: `steady level and drift at ${quantity(s.velocity ?? 0, "velocity", 3)}`, ...style });
+      return [line(s.start, s.steady.start, { dashed: true }), line(s.steady.start, s.end, { thick: true })];
+    });
     const rate = this.#figure("rates", "Rate dependence A − B", { x: record.steps.map((s) => s.velocity_after), y: record.steps.map((s) => s.rate_dependence) }, ["velocity after", "rate dependence"]);
     const healing = this.#figure("healing", "Healing after holds", { x: record.holds.map((h) => h.hold_time), y: record.holds.map((h) => h.healing) }, ["hold time", "healing"]);
     const charts = [[whole, { x: { label: "time (s)" }, rows: [{
@@ -313,7 +334,18 @@ export class RecordingCard {
   }
 
   #figure(kind, title, curve, [x, y]) {
-    return new Figure({ name: kind, title, height: kind === "whole" ? 360 : 260, columns: () => ({ [x]: curve.x, [y]: curve.y }) });
+    const columns = () => ({ [x]: curve.x, [y]: curve.y });
+    if (kind !== "whole") return new Figure({ name: kind, title, height: 260, columns });
+    const { window } = this.state.options;
+    const measure = (part) => {
+      if (part) this.state.options.window = part; else delete this.state.options.window;
+      this.measure();
+    };
+    return new Figure({
+      name: kind, title, height: 360, columns, onSpan: (from, to) => measure([from, to]),
+      options: window && el("button", { type: "button", class: "small", click: () => measure(null) }, "Measure the whole recording again"),
+      caption: "Drag over a part of the trace with the mouse to measure that part only.",
+    });
   }
 
   /** Rows of the table that a fit takes, to be left out one by one. */
@@ -329,7 +361,7 @@ export class RecordingCard {
       if (n.startsWith("velocity")) return quantity(value, "velocity", 3);
       return withDoubt(value, row[`${n}_uncertainty`] ?? (n === "rate_dependence" ? row.rate_uncertainty : null));
     };
-    return el("div", { class: "table-holder", tabindex: "0", role: "region", "aria-label": "What was measured" }, el("table", {},
+    return scrolling("What was measured", el("table", {},
       el("thead", {}, el("tr", {}, [modulated ? "In fits" : "", "From (s)", ...columns.map(([, t]) => t), "Verdict"].map((t) => (t ? el("th", { scope: "col" }, t) : el("td", {}))))),
       el("tbody", {}, rows.map((row, i) => {
         const box = el("input", {
@@ -356,12 +388,10 @@ export class RecordingCard {
   }
 
   #drawTable() {
-    const { table } = this.result;
-    this.#says(table.json ? "A lock-in reading." : `A lock-in table of ${count(table.count, "row")}.`, "stable");
+    const sent = this.result.table;
+    this.#says(sent.json ? "A lock-in reading." : `A lock-in table of ${count(sent.count, "row")}.`, "stable");
     fill(this.forms);
-    fill(this.body, table.json ? [] : el("div", { class: "table-holder tall", tabindex: "0", role: "region", "aria-label": table.name }, el("table", {},
-      el("thead", {}, el("tr", {}, table.header.map((h) => el("th", { scope: "col" }, h)))),
-      el("tbody", {}, table.rows.map((row) => el("tr", {}, row.map((v) => el("td", {}, v)))))))); 
+    fill(this.body, sent.json ? [] : table(sent.header, sent.rows, sent.name, true));
   }
 }
 
@@ -399,19 +429,3 @@ function saveRows(name, rows) {
   saveFile(name, csv(Object.fromEntries(names.map((n) => [n, rows.map((r) => r[n])]))), "text/csv");
 }
 
-/** A value with the digits that its standard uncertainty leaves. */
-export function withDoubt(value, doubt) {
-  if (value === null || value === undefined) return "–";
-  if (!doubt || !Number.isFinite(doubt)) return digits(value, 5);
-  const places = Math.max(0, Math.min(12, 1 - Math.floor(Math.log10(doubt))));
-  if (places > 7 || Math.abs(value) >= 1e6) return `${digits(value, 5)} ± ${digits(doubt, 2)}`;
-  return `${value.toFixed(places).replace("-", "−")} ± ${doubt.toFixed(places)}`;
-}
-
-function count(number, word) {
-  return `${number || "no"} ${word}${number === 1 ? "" : "s"}`;
-}
-
-function capital(text) {
-  return text.charAt(0).toUpperCase() + text.slice(1);
-}

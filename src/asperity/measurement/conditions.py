@@ -1,0 +1,100 @@
+"""Machine conditions of the recordings of a campaign: a table, or the names of the files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from asperity.errors import Argument, InputError, closest
+from asperity.parameters.columns import read_headed_columns
+
+#: Fields of a measurement's question by the names that tables have.
+MACHINE_FIELDS = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "normal_load"}
+_LABEL = "measure.conditions"
+_NUMBER = r"([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)"
+_EXAMPLE = "write it like run_k{K N/m}_v{V um/s}, or name a table with a column file"
+
+
+def conditions_of(files: Sequence[Path], text: str) -> dict[Path, dict[str, float | str]]:
+    """K, V, M and W0 of each recording.
+
+    Parameters
+    ----------
+    files : sequence of Path
+    text : str
+        A CSV with a column ``file``, a row a recording, and columns K, V, M or W0 in SI or with
+        the unit in the heading. Or a pattern of the files' names with quantities in braces, like
+        ``run_k{K N/m}_v{V um/s}``.
+
+    Returns
+    -------
+    dict of Path to dict
+        By the fields of `asperity.questions.recording.Measurement`; numbers in SI, or texts.
+
+    Raises
+    ------
+    InputError
+        If the table cannot be read, or does not have one row for each recording, or a name does
+        not fit the pattern.
+    """
+    return _of_names(files, text) if "{" in text else _of_table(files, Path(text))
+
+
+def _of_names(files: Sequence[Path], text: str) -> dict[Path, dict[str, float | str]]:
+    # Literal parts, then a name and its unit, in turn.
+    literal, *parts = re.split(r"\{\s*(\w+)\s*([^{}]*?)\s*\}", text)
+    names, units = parts[::3], parts[1::3]
+    pattern = re.escape(literal)
+    for following in parts[2::3]:
+        pattern += _NUMBER + re.escape(following)
+    for name in names or [text]:
+        if name not in MACHINE_FIELDS or names.count(name) > 1:
+            raise InputError(
+                Argument(_LABEL),
+                f"name each of {', '.join(MACHINE_FIELDS)} once at most",
+                f"'{name}'",
+                _EXAMPLE,
+            )
+    result: dict[Path, dict[str, float | str]] = {}
+    for file in files:
+        # The whole name, or all of it but the ending.
+        match = re.fullmatch(pattern, file.name) or re.fullmatch(pattern, file.stem)
+        if match is None:
+            raise InputError(
+                Argument(_LABEL), "fit the names of all recordings", f"'{file.name}'", _EXAMPLE
+            )
+        result[file] = {
+            MACHINE_FIELDS[name]: f"{value} {unit}".strip()
+            for name, value, unit in zip(names, match.groups(), units, strict=True)
+        }
+    return result
+
+
+def _of_table(files: Sequence[Path], path: Path) -> dict[Path, dict[str, float | str]]:
+    columns: Mapping[str, list[Any]] = read_headed_columns(
+        path, MACHINE_FIELDS, texts=("file",), label=_LABEL, row="a recording"
+    )
+    if "file" not in columns or len(columns) < 2:
+        raise InputError(
+            f"{path.name} must have the column file and some of {', '.join(MACHINE_FIELDS)}, got "
+            f"{', '.join(columns) or 'none'}; add them"
+        )
+    result = {}
+    for file in files:
+        rows = [
+            n for n, name in enumerate(columns["file"]) if Path(name).name in (file.name, file.stem)
+        ]
+        if len(rows) != 1:
+            names = [Path(name).name for name in columns["file"]]
+            advice = closest(file.name, names) if not rows else "leave one out"
+            raise InputError(
+                f"{path.name} must have one row for each recording, got {len(rows)} for "
+                f"'{file.name}'; {advice}"
+            )
+        result[file] = {
+            field: columns[name][rows[0]] for name, field in MACHINE_FIELDS.items()
+            if name in columns
+        }  # fmt: skip
+    return result

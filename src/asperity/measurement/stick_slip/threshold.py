@@ -1,0 +1,254 @@
+"""Where stick-slip ends: the stiffness over the load at which a campaign passes to steady sliding.
+
+At each velocity the threshold lies between the stiffest machine that sticks and slips and the
+softest that slides steadily. The frequency there is that of oscillations whose drops vanish:
+
+    T = T0 + c drop^2,       T0 proportional to 1/sqrt(K)
+
+near the threshold, where the cycles are those of the linear equation of motion (Bureau et al.,
+2000, Eqs. 16 and 17: omega^2 = K V^2 / (A W0 D0)). Cycles that grow out of steady sliding or die
+away to it give T0; where no recording has such cycles, the regular ones of several stiffnesses do.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.measurement.stick_slip.events import SlipEvents
+
+Array = NDArray[np.float64]
+
+#: Periods of growing or dying cycles that are read together: up to this share longer than those of
+#: the smallest, and drops that change by this factor.
+_LONGER, _RANGE = 1.25, 1.3
+#: Fewest such cycles, and the factor by which drops grow or die that do so by no chance.
+_FEWEST, _GROWTH = 3, 3.0
+#: Velocities that differ by less are one.
+_SAME_VELOCITY = 0.02
+#: Ratio of the two ends beyond which a bracket says little, and of a stiffness to the threshold
+#: beyond which its cycles do not tell the frequency there.
+_WIDEST, _NEAR = 2.0, 1.6
+#: Share by which a period is extrapolated at most.
+_FARTHEST = 0.4
+
+#: Columns as `asperity recipe` takes them, and the bracket.
+COLUMNS = (
+    "V",
+    "K_over_W0",
+    "K_over_W0_err",
+    "frequency",
+    "frequency_err",
+    "sticks_at",
+    "slides_at",
+)
+
+
+@dataclass(frozen=True)
+class Threshold:
+    """The end of stick-slip at one velocity, in SI.
+
+    Attributes
+    ----------
+    V : float
+        m/s.
+    K_over_W0, K_over_W0_err : float
+        Threshold (1/m) and its standard uncertainty: the bracket's middle, and its width over
+        sqrt(12). Velocities that have one bracket in common, as the machine had the same springs,
+        have one error in common: n of them have sqrt(n) times the uncertainty, so that their mean
+        is no surer than each. NaN where there is no bracket.
+    frequency, frequency_err : float
+        Of vanishing oscillations at the threshold (Hz); NaN where it cannot be told.
+    sticks_at, slides_at : float
+        The bracket: largest K/W0 with stick-slip and smallest with steady sliding (1/m); NaN where
+        there is none.
+    reason : str
+        Why it cannot be told; empty where it can.
+    """
+
+    V: float
+    K_over_W0: float
+    K_over_W0_err: float
+    frequency: float
+    frequency_err: float
+    sticks_at: float
+    slides_at: float
+    reason: str
+
+
+def linear_frequency(events: SlipEvents) -> tuple[float, float]:
+    """Frequency (Hz) of cycles as their drops vanish, with its standard uncertainty.
+
+    Parameters
+    ----------
+    events : SlipEvents
+
+    Returns
+    -------
+    (float, float)
+        NaN where no drops grow or die away.
+    """
+    drop, period = events.drop, events.recurrence
+    best = (np.nan, np.nan)
+    if drop.size <= _FEWEST:
+        return best
+    change, cycles = np.diff(drop) > 0, np.arange(1, drop.size)
+    # The beginning, as long as drops grow, and the end, since they only die away.
+    for run in (cycles[np.cumprod(change) > 0], cycles[np.cumprod(~change[::-1])[::-1] > 0]):
+        if run.size < _FEWEST or np.ptp(np.log(drop[run[0] - 1 : run[-1] + 1])) < np.log(_GROWTH):
+            continue
+        square = (drop[run] ** 2 + drop[run - 1] ** 2) / 2
+        order = run[np.argsort(square)]
+        smallest = np.median(period[order[:_FEWEST]])
+        near = order[period[order] < _LONGER * smallest]
+        if near.size < _FEWEST:
+            continue
+        x = (drop[near] ** 2 + drop[near - 1] ** 2) / 2
+        if x.max() < _RANGE**2 * x.min():
+            continue
+        doubt = np.hypot(events.timing_uncertainty[near], events.timing_uncertainty[near - 1])
+        value, error = _without_drop(x, period[near], doubt)
+        if not np.isfinite(best[1]) or error / value < best[1] / best[0]:
+            best = value, error
+    return 1 / best[0], best[1] / best[0] ** 2
+
+
+def _without_drop(square: Array, period: Array, doubt: Array) -> tuple[float, float]:
+    """Period at no drop, by a weighted line, and its standard uncertainty.
+
+    Half of what the line adds to the period of the smallest drop counts as uncertain.
+    """
+    doubt = np.maximum(doubt, 1e-12 * period)
+    matrix = np.stack([np.ones_like(square), square / square.max()], 1) / doubt[:, None]
+    inverse = np.linalg.pinv(matrix.T @ matrix)
+    beta = inverse @ (matrix.T @ (period / doubt))
+    left = period / doubt - matrix @ beta
+    scatter = max(float(left @ left) / max(period.size - 2, 1), 1.0)
+    extrapolated = beta[1] * square.min() / square.max() / 2
+    return float(beta[0]), float(np.hypot(np.sqrt(inverse[0, 0] * scatter), extrapolated))
+
+
+def thresholds(rows: Sequence[Mapping[str, Any]]) -> list[Threshold]:
+    """The end of stick-slip at each velocity of a campaign.
+
+    Parameters
+    ----------
+    rows : sequence of mapping
+        Of the campaign's table: ``V``, ``K``, ``W0``, ``regime``, ``linear_frequency`` and its
+        uncertainty, ``drop``, ``recurrence`` and their uncertainties. Rows without V, K, W0 or a
+        regime are left out.
+
+    Returns
+    -------
+    list of Threshold
+        In rising velocity; one with a `reason` where it cannot be told.
+    """
+    table = [_Row.of(row) for row in rows if all(row.get(n) for n in ("V", "K", "W0", "regime"))]
+    table.sort(key=lambda row: row.V)
+    groups: list[list[_Row]] = []
+    for row in table:
+        if groups and row.V <= groups[-1][0].V * (1 + _SAME_VELOCITY):
+            groups[-1].append(row)
+        else:
+            groups.append([row])
+    ends = [_threshold(group) for group in groups]
+    brackets = [(end.sticks_at, end.slides_at) for end in ends]
+    return [
+        replace(end, K_over_W0_err=end.K_over_W0_err * np.sqrt(brackets.count(bracket)))
+        for end, bracket in zip(ends, brackets, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class _Row:
+    V: float
+    stiffness: float
+    sticks: bool | None
+    row: Mapping[str, Any]
+
+    @classmethod
+    def of(cls, row: Mapping[str, Any]) -> _Row:
+        # What the motion comes to counts, not how it begins.
+        last = row["regime"].rpartition(", then ")[2]
+        sticks = None
+        if last in ("steady sliding", "loading"):
+            sticks = False if last == "steady sliding" else None
+        elif last.startswith(("regular", "irregular", "growing", "oscillation")):
+            sticks = True
+        return cls(row["V"], row["K"] / row["W0"], sticks, row)
+
+
+def _threshold(group: list[_Row]) -> Threshold:
+    V = float(np.mean([row.V for row in group]))
+    sticking = [row.stiffness for row in group if row.sticks]
+    sliding = [row.stiffness for row in group if row.sticks is False]
+    low, high = max(sticking, default=np.nan), min(sliding, default=np.nan)
+    reason = ""
+    if not sticking or not sliding:
+        missing = "stick-slip" if not sticking else "steady sliding"
+        reason = f"no recording at {V:.4g} m/s shows {missing}"
+    elif max(low, high) > _WIDEST * min(low, high):
+        reason = f"at {V:.4g} m/s K/W0 is only known to lie between {low:.4g} and {high:.4g} 1/m"
+    if reason:
+        return Threshold(V, *[np.nan] * 4, low, high, reason)
+    centre, doubt = (low + high) / 2, abs(high - low) / np.sqrt(12.0)
+    frequency, error = _frequency(group, centre)
+    if not np.isfinite(frequency):
+        reason = f"at {V:.4g} m/s no cycles near the threshold are small enough for its frequency"
+    return Threshold(V, centre, doubt, frequency, error, low, high, reason)
+
+
+def _frequency(group: list[_Row], centre: float) -> tuple[float, float]:
+    """Frequency (Hz) at the threshold, and its standard uncertainty."""
+    values, doubts, squares, periods, errors = [], [], [], [], []
+    for one in group:
+        ratio = one.stiffness / centre
+        if not 1 / _NEAR < ratio < _NEAR:
+            continue
+        row, root = one.row, np.sqrt(ratio)
+        frequency, error = (row.get(f"linear_frequency{s}") for s in ("", "_uncertainty"))
+        if frequency is not None and np.isfinite(frequency):
+            values.append(frequency / root)
+            # Half of the step to the threshold counts as uncertain.
+            doubts.append(np.hypot(error / root, values[-1] * abs(root - 1) / 2))
+        elif one.sticks and row["regime"] == "regular stick-slip":
+            squares.append(row["drop"] ** 2)
+            periods.append(row["recurrence"] * root)
+            errors.append(row["recurrence_uncertainty"])
+    if values:
+        weight = 1 / np.array(doubts) ** 2
+        mean = float(weight @ np.array(values) / weight.sum())
+        scatter = float(weight @ (np.array(values) - mean) ** 2) / max(len(values) - 1, 1)
+        return mean, float(np.sqrt(max(scatter, 1.0) / weight.sum()))
+    if len(squares) < 2:
+        return np.nan, np.nan
+    period, doubt = _without_drop(*(np.array(a) for a in (squares, periods, errors)))
+    if period < (1 - _FARTHEST) * min(periods):
+        return np.nan, np.nan
+    return 1 / period, doubt / period**2
+
+
+def write_thresholds(path: Path, table: Sequence[Threshold]) -> None:
+    """Write thresholds as `asperity recipe` takes them; what cannot be told is a comment.
+
+    Parameters
+    ----------
+    path : Path
+        CSV in SI without units.
+    table : sequence of Threshold
+    """
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        for one in table:
+            if one.reason:
+                stream.write(f"# cannot tell: {one.reason}\n")
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for one in table:
+            if not one.reason:
+                writer.writerow([f"{getattr(one, name):.8g}" for name in COLUMNS])

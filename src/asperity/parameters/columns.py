@@ -1,0 +1,88 @@
+"""Tables of a laboratory: a CSV whose headings carry units, as ``K (N/m)`` or ``V [um/s]``."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Collection
+from pathlib import Path
+
+from asperity.errors import Argument, InputError
+from asperity.parameters.toml_file import file_content
+
+#: A name and its unit.
+_HEADING = re.compile(r"\s*(\w+)\s*(?:[(\[]([^)\]]*)[)\]])?\s*")
+
+
+def read_headed_columns(
+    path: Path,
+    numbers: Collection[str],
+    *,
+    texts: Collection[str] = (),
+    label: str = "data",
+    row: str = "a row",
+) -> dict[str, list[float | str]]:
+    """Columns of a CSV by name.
+
+    Parameters
+    ----------
+    path : Path
+        Separated by commas or semicolons; lines that begin with ``#`` are skipped.
+    numbers, texts : collection of str
+        Columns that are read; others are left out.
+    label : str
+        What messages call the argument.
+    row : str
+        What a row is, such as ``"a hold"``.
+
+    Returns
+    -------
+    dict
+        Numbers of a heading with a unit are texts with that unit.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, has no rows, a column twice, or a cell that is no number.
+    """
+    try:
+        text = file_content(path).decode("utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        why = (getattr(error, "strerror", None) or "not UTF-8 text").lower()
+        raise InputError(
+            Argument(label), "be a CSV that can be read", f"'{path}': {why}", "check the path"
+        ) from None
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    separator = ";" if lines and ";" in lines[0] and "," not in lines[0] else ","
+    rows = [[cell.strip() for cell in cells] for cells in csv.reader(lines, delimiter=separator)]
+    if len(rows) < 2:
+        raise InputError(
+            f"{path.name} must have a heading and {row} a row, got {len(rows)} lines; add them"
+        )
+    columns: dict[str, list[float | str]] = {}
+    for place, heading in enumerate(rows[0]):
+        match = _HEADING.fullmatch(heading)
+        if match is None or match[1] not in {*numbers, *texts}:
+            continue
+        name, unit = match[1], match[2] or ""
+        if name in columns:
+            raise InputError(
+                f"{path.name} must have one column for {name}, got two; remove one of them"
+            )
+        cells = [cells[place] if place < len(cells) else "" for cells in rows[1:]]
+        columns[name] = [
+            cell if name in texts else _number(cell, name, unit, f"{path.name}, row {n}")
+            for n, cell in enumerate(cells, 1)
+        ]
+    return columns
+
+
+def _number(cell: str, name: str, unit: str, where: str) -> float | str:
+    try:
+        number = float(cell)
+    except ValueError:
+        raise InputError(
+            f"{where} must have a number in column {name}, got '{cell}'; correct the cell, and "
+            "write the unit into the heading"
+        ) from None
+    return f"{number!r} {unit}" if unit else number
