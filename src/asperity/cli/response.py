@@ -243,7 +243,7 @@ def _table(
     if law is not None:
         get_law(law)
     filled = sourced_numbers(given, material_named(material), law=law)
-    with bar("point") as update:
+    with bar("point", "responses") as update:
         done = run_table(
             table,
             out,

@@ -1,14 +1,13 @@
-"""Steps of controlled length, one after the other, whatever the method that makes them.
+"""Step-size control, common to the explicit and the implicit method.
 
 Loops over small arrays are compiled as one kernel of the processor. XLA runs every operation of the
-body of a loop as a separate kernel. For arrays of a few numbers, calling the kernels
-takes several times as long as what they compute. A call that carries the attributes below is
-compiled to a single kernel, control flow included; compilers that do not know them run it as they
-run any call.
+body of a loop as a separate kernel. For arrays of a few numbers, calling the kernels takes several
+times as long as their computation. A call with the attributes below is compiled to a single kernel
+with its control flow; compilers without these attributes ignore them.
 
-XLA cannot compile all programs so, and may abort the process (jaxlib 0.10.2). Only programs made
-of element-wise operations on scalar parameters are compiled this way: every law with a closed
-form for its velocity, under any load that is not a table.
+XLA cannot compile every program to one kernel, and may abort the process (jaxlib 0.10.2). Only
+programs of element-wise operations on scalar parameters are compiled this way: every law with a
+closed form for its velocity, under any load except a table.
 """
 
 from __future__ import annotations
