@@ -51,9 +51,7 @@ def checked(text: str) -> tuple[Protocol | None, list[Mistake]]:
         _ = protocol.rows  # what the solver's table says is read here
         return protocol, []
     except ProtocolError as error:
-        return None, [
-            {"sentence": str(m), "line": _line_of(m, lines, text)} for m in error.errors
-        ]
+        return None, [{"sentence": str(m), "line": _line_of(m, lines, text)} for m in error.errors]
     except InputError as error:
         return None, [{"sentence": str(error), "line": _line_of(error, lines, text)}]
 
