@@ -60,7 +60,7 @@ class CycleTerm:
         widths = np.diff(cycle.edges)
         shares = (np.arange(_IN_BIN) + 0.5) / _IN_BIN
         self._times = (cycle.edges[:-1, None] + widths[:, None] * shares).ravel()
-        self._seen: dict[tuple[float, ...], Float | None] = {}
+        self._seen: dict[tuple[tuple[str, float], ...], Float | None] = {}
 
     @property
     def name(self) -> str:
@@ -85,7 +85,7 @@ class CycleTerm:
 
     def _off(self, values: Mapping[str, float]) -> Float | None:
         """Whitened residuals without level and shift, in the space that they leave."""
-        key = tuple(values.values())
+        key = tuple(values.items())
         if key not in self._seen:
             if len(self._seen) > 64:
                 self._seen.clear()
