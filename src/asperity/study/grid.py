@@ -69,8 +69,8 @@ def _numbers(plan: SweepPlan) -> Iterator[tuple[str, str, Any]]:
         for case in table.cases or ():
             for name, value in case.items():
                 grid = isinstance(value, Mapping)
-                values = [value.get("from"), value.get("to")] if grid else value
-                for number in values if isinstance(values, list | tuple) else [values]:
+                ends = [value.get("from"), value.get("to")] if grid else value
+                for number in ends if isinstance(ends, list | tuple) else [ends]:
                     yield f"{where}.cases.{name}", name, number
         for name, spread in (table.over or {}).items():
             for value in spread.values():
