@@ -47,7 +47,8 @@ def test_the_folder_holds_the_fit(found, tmp_path):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert page.count("<svg") == 2
     assert "&lt;readings&gt;" in page
-    assert f"{estimate.value:.6g}" in page
+    (shown,) = re.findall(r"<td>lambda</td><td>([\d.]+)</td>.*<td>nm</td>", page)
+    assert 1e-9 * float(shown) == pytest.approx(estimate.value, abs=estimate.se / 10)
     # Nothing is fetched: no address outside the page in any attribute that loads.
     assert re.findall(r'(?:src|href)="(?!#)[^"]*"', page) == []
     assert "@import" not in page

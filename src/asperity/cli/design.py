@@ -57,7 +57,7 @@ def design(plan: Path, simulate: int, table: Path | None, as_json: bool) -> int:
     if table is not None:
         target = output_file(table, "--csv", example="points.csv", inputs={"plan": plan})
     checked = inference.read_plan(plan)
-    with bar("step") as update:
+    with bar("step", "design") as update:
         result = inference.design(checked, simulate=simulate, progress=update)
     if target is not None:
         with written_file(target) as fresh:

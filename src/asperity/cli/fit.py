@@ -244,7 +244,7 @@ def fit(
         require_folder(report, "--report")
     require_picture(plot, *(d["file"] for d in fields["data"]))
     question = Question(law=laws[0] if laws else None, **fields)
-    with bar("window" if question.windows else "step", raising=False) as update:
+    with bar("window" if question.windows else "step", "fit", raising=False) as update:
         answer = answer_fit(question, progress=update)
     over = answer if isinstance(answer, WindowedFit) else None
     result: Fit = answer.fits[0] if isinstance(answer, WindowedFit) else answer
@@ -300,7 +300,7 @@ def _sampled(fit: Fit, sampling: dict[str, int], out: Path | None) -> Posterior:
     from asperity.inference.posterior import sample_posterior
     from asperity.outputs import written_file
 
-    with bar("draw") as update:
+    with bar("draw", "posterior") as update:
         posterior = sample_posterior(fit, **sampling, progress=update)
     if out is not None:
         with written_file(out, "--out") as path:
@@ -361,9 +361,15 @@ def compare(
     fields["laws"] = laws or listed
     question = Question(**fields)
     with bar("%", raising=False) as update:
-        comparison = answer_comparison(
-            question, progress=lambda done, total: update(round(100 * done / total), 100)
-        )
+
+        def progress(done: int, total: int) -> None:
+            # A hundred for the fit of each law, then a hundred for its evidence.
+            law, laws = done // 100, total // 200
+            part = "fit" if law < laws else "evidence"
+            label = f"{part} of law {min(law % laws + 1, laws)} of {laws}"
+            update(round(100 * done / total), 100, label)
+
+        comparison = answer_comparison(question, progress=progress)
     if as_json:
         click.echo(to_json(comparison_record(comparison)))
     else:

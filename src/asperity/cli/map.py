@@ -114,7 +114,7 @@ def _solve(
     # A material's number gives way to an axis; one that was given for this map does not.
     numbers = {n: s for n, s in numbers.items() if n in given or n not in {a.name for a in axes}}
     assert out is not None
-    with bar("point") as update:
+    with bar("point", "map") as update:
         return write_map(
             out,
             law,

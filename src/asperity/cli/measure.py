@@ -363,7 +363,7 @@ def _campaign(
             {"--thresholds": thresholds, "--out": out},
             inputs={f"recording '{f}'": f for f in recordings},
         )
-    with bar("files") as update:
+    with bar("file", "measurements") as update:
         done = run_campaign(
             recordings,
             rows_of,

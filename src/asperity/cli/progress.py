@@ -1,34 +1,58 @@
-"""Progress of long work on stderr."""
+"""Progress of long work on stderr: a bar on a terminal, lines in a log."""
 
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 
+import click
+
 from asperity.cli.interrupt import interruptible
 
-#: Seconds between updates: a log file is not to be flooded.
-_ON_TERMINAL, _IN_LOG = 0.2, 15.0
+#: Seconds before a bar shows itself, between its updates, and between lines of a log.
+_SILENT, _ON_TERMINAL, _IN_LOG = 1.0, 0.2, 15.0
 
 
 @contextmanager
-def bar(unit: str, *, raising: bool = True) -> Iterator[Callable[..., None]]:
-    """A progress bar, to be called with the work done, all work, and what is being worked on.
+def bar(unit: str, doing: str = "", *, raising: bool = True) -> Iterator[Callable[..., None]]:
+    """Progress, to be called with the work done, all work, and what is being worked on.
 
-    It shows itself after a second: a short job stays silent. Inside, Ctrl-C raises, or ends the
+    A short job stays silent. Inside, Ctrl-C raises, or ends the
     process at once where there are no files to put in order (`raising` False).
-    """
-    from tqdm import tqdm
 
-    interval = _ON_TERMINAL if sys.stderr.isatty() else _IN_LOG
-    shown = tqdm(
-        unit=unit, file=sys.stderr, delay=1.0, mininterval=interval, leave=False, dynamic_ncols=True
-    )
-    with shown, interruptible() if raising else nullcontext(lambda: None) as check:
+    Parameters
+    ----------
+    unit : str
+        Of the work.
+    doing : str
+        What is done, where calls do not say it.
+    """
+    shown = _on_terminal(unit) if sys.stderr.isatty() else _in_log(unit)
+    with shown as show, interruptible() if raising else nullcontext(lambda: None) as check:
 
         def update(done: int, total: int, label: str = "") -> None:
             check()
+            show(done, total, label or doing)
+
+        yield update
+
+
+@contextmanager
+def _on_terminal(unit: str) -> Iterator[Callable[[int, int, str], None]]:
+    from tqdm import tqdm
+
+    with tqdm(
+        unit=unit,
+        file=sys.stderr,
+        delay=_SILENT,
+        mininterval=_ON_TERMINAL,
+        leave=False,
+        dynamic_ncols=True,
+    ) as shown:
+
+        def show(done: int, total: int, label: str) -> None:
             if shown.total is None:
                 # What an earlier run had done is no speed of this one.
                 shown.initial = shown.n = done
@@ -37,4 +61,21 @@ def bar(unit: str, *, raising: bool = True) -> Iterator[Callable[..., None]]:
                 shown.set_description_str(label, refresh=False)
             shown.update(done - shown.n)
 
-        yield update
+        yield show
+
+
+@contextmanager
+def _in_log(unit: str) -> Iterator[Callable[[int, int, str], None]]:
+    start = last = time.monotonic()
+
+    def show(done: int, total: int, label: str) -> None:
+        nonlocal last
+        now = time.monotonic()
+        if now - last < _IN_LOG:
+            return
+        last = now
+        units = unit if unit.endswith("s") else f"{unit}s"
+        amount = f"{done} %" if unit == "%" else f"{done} of {total} {units}"
+        click.echo(f"asperity: {label or 'done'}: {amount}, {now - start:.0f} s", err=True)
+
+    yield show

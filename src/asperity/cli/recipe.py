@@ -67,7 +67,7 @@ def recipe(
     tables = [inference.read_table(path) for path in readings]
     table = tables[0] if len(tables) == 1 else joined(tables)[0]
     fixed = settings_of(fixes, "--fix")
-    with bar("step") as update:
+    with bar("step", "recipe") as update:
         result = steps.paper_procedure(table, bifurcations, fixed=fixed, progress=update)
     click.echo(to_json(result.record()) if as_json else recipe_text(result))
     return 0

@@ -101,7 +101,7 @@ def run(
         return _print_mistakes(protocol, error.mistakes)
     setup = None if record is None else _setup_for(wanted, record)
     _check_room(wanted, out, text, record)
-    with bar("ms") as update:
+    with bar("ms", "motion") as update:
 
         def in_milliseconds(time: float, end: float) -> None:
             update(round(1e3 * time), round(1e3 * end), "")

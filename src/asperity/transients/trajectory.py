@@ -154,7 +154,7 @@ def sample_times(sampling: Any, duration: float) -> SampleTimes:
             )
         if rate * duration > _MOST_ROWS:
             raise InputError(
-                f"sampling must come to at most {_MOST_ROWS:g} rows, got {rate:g} Hz for "
+                f"sampling must give at most {_MOST_ROWS:g} rows, got {rate:g} Hz for "
                 f"{duration:g} s; lower the rate or shorten the programme"
             )
         return EvenTimes(rate)
@@ -309,17 +309,25 @@ class Trajectory(Drawn):
         """
         import xarray
 
-        def channel(values: Float, units: str, name: str) -> tuple:
-            return "time", values, {"units": units, "long_name": name}
+        def channel(values: Float, units: str, name: str, role: str = "") -> tuple:
+            # What an instrument would record, for readers of recordings.
+            recorded = {"recording_role": role} if role else {}
+            return "time", values, {"units": units, "long_name": name, **recorded}
 
         about = {"long_name": "state of the equation of motion", "units": "1"}
         data = {
-            "force": channel(self.force, "N", "spring force"),
+            "force": channel(self.force, "N", "spring force", "F"),
             "friction": channel(self.friction, "1", "spring force over normal load"),
-            "load": channel(self.load, "N", "normal load"),
+            "load": channel(self.load, "N", "normal load", "W"),
             "velocity": channel(self.velocity, "m/s", "velocity of the slider"),
             "slip_velocity": channel(self.slip_velocity, "m/s", "plastic velocity"),
             "displacement": channel(self.displacement, "m", "displacement of the slider"),
+            "load_point_displacement": channel(
+                self.displacement + self.force / float(self.motion.slider.K),
+                "m",
+                "displacement of the far end of the spring",
+                "displacement",
+            ),
             "states": (("time", "state"), self.states, about),
             "event_time": (
                 "event",
@@ -333,7 +341,7 @@ class Trajectory(Drawn):
             ),
         }
         coords = {
-            "time": ("time", self.time, {"units": "s", "long_name": "time"}),
+            "time": channel(self.time, "s", "time", "time"),
             "state": ("state", list(self.state_names), {"long_name": "name of the state"}),
         }
         stopped = {"stopped": self.stopped or "end of the programme"}

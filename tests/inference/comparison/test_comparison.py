@@ -4,6 +4,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -18,7 +19,9 @@ from asperity.inference import compare, fit, table_of
 from asperity.inference.comparison.compare import judge
 from asperity.inference.comparison.evidence import evidence_of, leave_one_run_out
 from asperity.inference.comparison.record import laws_table
+from asperity.inference.comparison.support import support
 from asperity.inference.tables.outliers import outlying_rows
+from asperity.recording.defects.autoregression import Autoregression
 from references.populations import draws, population
 
 V = np.repeat([1e-6, 1e-5], 8)
@@ -306,3 +309,41 @@ def test_laws_of_a_recording_are_judged_by_the_likelihood_that_decides():
     undetermined = replace(out.fit, undetermined=("B", "c"))
     (row,) = laws_table(judge({"ruina-slip": undetermined}))[1]
     assert row[-1] == "lowest AICc; B, c not determined"
+
+
+class _Motion(SimpleNamespace):
+    """A recording's part of an objective, with a motion that is what a fit says."""
+
+    def fitted_friction(self, values):
+        return values["friction"]
+
+
+def _fit_with(law, run, friction, **about):
+    white = Autoregression(np.zeros(0), 1e-6)
+    noise = {"whiteness_p": 0.5}
+    term = _Motion(
+        run=run, name=run.name, models=[white], noise=noise, law_fails_after_changes=False
+    )
+    vars(term).update(about)
+    objective = SimpleNamespace(terms_of=lambda kind: [term])
+    return SimpleNamespace(law=law, values={"friction": friction}, objective=objective)
+
+
+@pytest.mark.parametrize(("jumps", "doubted"), [((), False), ((41.0,), True), ((70.0,), False)])
+def test_a_verdict_names_the_stretch_that_it_rests_on_and_its_doubts_first(jumps, doubted):
+    time = np.linspace(0, 100, 2001)
+    noise = 1e-3 * np.random.default_rng(3).standard_normal(time.size)
+    run = SimpleNamespace(
+        name="run", time=time, friction=0.6 + noise, jumps=jumps, stretches=[(0, time.size)]
+    )
+    wrong = np.where((time > 40) & (time < 42), 0.61, 0.6)
+    best, other = _fit_with("good", run, np.full(time.size, 0.6)), _fit_with("poor", run, wrong)
+    doubt, stretch = support(best, other)
+    begin, end = map(float, re.search(r"lies in (\S+) to (\S+) s of run", stretch).groups())
+    assert 39 < begin < 41
+    assert 41 < end < 43
+    assert ("In doubt, since the recording jumps at 41 s" in doubt) is doubted
+    # An error everywhere rests on no stretch.
+    assert support(best, _fit_with("poor", run, np.full(time.size, 0.61)))[1] == ""
+    doubt, _ = support(_fit_with("good", run, wrong, law_fails_after_changes=True), other)
+    assert "even good misses what follows the velocity changes" in doubt

@@ -259,6 +259,6 @@ def test_a_map_beyond_memory_is_refused_before_anything(numbers, tmp_path, monke
         columns = int(10 ** draw.uniform(0.5, 8))
         x = Axis("epsilon", 0.0, 0.4, columns)
         y = Axis("K", 1e5, 3e5, int(min(10**8, max(2, 10 ** draw.uniform(7.6, 9) / columns))))
-        with pytest.raises(InputError, match=r"axes must come to what there is room for, got .* x"):
+        with pytest.raises(InputError, match=r"axes must fit into the free space, got .* x"):
             write_map(tmp_path / "map.nc", "rice-ruina", numbers, x=x, y=y)
     assert list(tmp_path.iterdir()) == []

@@ -25,6 +25,7 @@ from asperity.inference.comparison.scale import (
     Standing,
     standing,
 )
+from asperity.inference.comparison.support import support
 from asperity.inference.fitting.fit import Data, fit, listed_data
 from asperity.inference.fitting.inputs import free_by_default
 from asperity.inference.fitting.minima import FAR_OFF
@@ -267,12 +268,26 @@ def compare(
         out = np.isin(np.arange(table.rows), outliers)
         rest = judge(fits_to([table.without(out)], lambda _: None, fits))
         result = _without(result, rest, table.row_names[out].tolist())
+    doubt, stretches = _support(result)
     result = replace(
         result,
         not_compared=not_compared,
-        verdict=result.verdict + _freed(result) + _without_numbers(not_compared),
+        verdict=doubt
+        + result.verdict
+        + stretches
+        + _freed(result)
+        + _without_numbers(not_compared),
     )
     return _examined(result, lambda laws: report(len(own) + laws)) if evidence else result
+
+
+def _support(comparison: Comparison) -> tuple[str, str]:
+    """What the verdict on the best law that is not as good as the best rests on."""
+    for judged in comparison.laws.values():
+        best = comparison.laws[comparison.best].fit if comparison.best else judged.fit
+        if judged.fit.converged and judged.fit.aicc - best.aicc >= DISFAVOURED:
+            return support(best, judged.fit)
+    return "", ""
 
 
 def _without_numbers(not_compared: Mapping[str, str]) -> str:

@@ -20,6 +20,9 @@ from asperity.recording.readers.raw import (
 
 _SIGNATURE = b"\x89HDF\r\n\x1a\n"
 
+#: Attribute of the datasets of a group that are its recording; without one, all are.
+_ROLE = "recording_role"
+
 #: Place of a group: the place of its parent, and its name; None for the root.
 _Place = tuple[Any, str] | None
 
@@ -40,7 +43,7 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     ----------
     path : Path
         One that is cut cannot be opened by the library. One whose data lie in other files is
-        refused: whoever sent it may not be allowed to read these.
+        refused, because the sender of the file may not be allowed to read the other files.
     group : str or None
         Where to look, in a file of several recordings.
     """
@@ -160,6 +163,9 @@ def _contents(file: Any, path: Path, matlab: bool) -> _Contents:
                 attributes[key] = dict(item.attrs)
                 intervals.append(interval_of(attributes[key]))
         intervals.append(interval_of(dict(node.attrs)))
+        # A file of a computed motion marks what an instrument would have recorded of it.
+        recorded = [key for key, about in attributes.items() if _ROLE in about]
+        arrays = {key: arrays[key] for key in recorded} or arrays
         columns, step = group_columns(arrays, attributes)
         if columns:
             groups[_path(place)] = columns
