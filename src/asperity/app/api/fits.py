@@ -143,9 +143,9 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
     """Fit a law, or compare several; the share of the work that is done is reported.
 
     The result has ``fit`` or ``comparison``, and ``sections``, what these say in words and tables,
-    of a comparison with ``laws``, those of each law; of the fit or the best one the pictures ``bands``,
-    ``residuals`` and ``runs``; and, where they were asked for, ``posterior`` and ``report``, the
-    folder as a ZIP file in base64.
+    of a comparison with ``laws``, those of each law; of the fit or the best one the pictures
+    ``bands``, ``residuals`` and ``runs``; and, where they were asked for, ``posterior`` and
+    ``report``, the folder as a ZIP file in base64.
     """
     from asperity.inference.answers import answer_comparison, answer_fit
     from asperity.inference.comparison.record import comparison_record
