@@ -21,6 +21,7 @@ from asperity.loads import (
     Slide,
     StepLoad,
 )
+from asperity.recording.readers import read
 from asperity.transients import Trajectory, transient
 from references.populations import population
 
@@ -233,10 +234,25 @@ def test_the_dataset_says_everything(physical) -> None:
     data = found.to_dataset()
     assert all({"units", "long_name"} <= set(v.attrs) for v in data.data_vars.values())
     np.testing.assert_array_equal(data["friction"], found.force / found.load)
+    stretch = data["load_point_displacement"] - data["displacement"]
+    np.testing.assert_allclose(stretch * p.slider.K, found.force, rtol=1e-9)
     assert data.sizes == {"time": 76, "state": 2, "event": len(found.events)}
     assert data.attrs["stopped"] == "end of the programme"
     assert "lambda = 6.2e-07 m" in data.attrs["parameters"]
     assert data.attrs["relative_tolerance"] == 1e-9
+
+
+def test_of_its_file_is_read_what_an_instrument_records(physical, tmp_path) -> None:
+    p = physical.Experiment(lambda_=LAMBDA)
+    steady = Programme(Slide("2 s"), load="7 N", velocity="3 um/s")
+    transient(p.slider, steady, sampling="10 Hz").to_dataset().to_netcdf(
+        tmp_path / "run.nc", engine="h5netcdf"
+    )
+    trace = read(tmp_path / "run.nc")
+    assert set(trace.channels) == {"force", "load", "load_point_displacement"}
+    drive = trace.channel("displacement").values
+    # That of the drive, which the slider's motion is not.
+    np.testing.assert_allclose(drive - drive[0], 3e-6 * trace.time, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

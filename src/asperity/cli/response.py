@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -171,7 +171,7 @@ def _stick_slip(
     )  # fmt: skip
     rows = result.values()
     if as_json:
-        record = {name: value for name, value, _, _ in rows}
+        record: dict[str, Any] = {name: value for name, value, _, _ in rows}
         record |= {"result": str(result.result), "asperity_version": __version__, "law": law}
         click.echo(to_json({**record, "parameters": values}))
     else:

@@ -150,7 +150,7 @@ def windows_sections(over: WindowedFit) -> list[Section]:
     """Estimates over several windows."""
     spans = ", ".join(f"{a:.6g} to {b:.6g}" for a, b in over.windows)
     head = ("", "estimate", "std. error", "of noise", "of the window", "95 % interval", "", "")
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for name, p in over.parameters.items():
         if name in over.undetermined:
             rows.append((name, NOT_DETERMINED, "", "", "", "", p.unit, "by these data"))

@@ -317,7 +317,8 @@ class Drawn(Displayed):
             figure: Figure = getattr(import_module(module), name)(self)
         if names == "geophysics":
             in_symbols: Any = import_module("asperity.parameters.names").in_symbols
-            for text in figure.findobj(lambda artist: hasattr(artist, "set_text")):
+            labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
+            for text in labels:
                 text.set_text(in_symbols(text.get_text()))
         return figure
 

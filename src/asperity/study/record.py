@@ -38,7 +38,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     PlanError
         With all mistakes in the names and values of the plan.
     """
-    mistakes: list[str] = []
+    mistakes: list[str | InputError] = []
     axes: dict[str, Any] = {}
     laws = laws_named(plan, mistakes)
     known = known_names(laws, plan.solve)
@@ -114,7 +114,7 @@ def _law_files(plan: SweepPlan) -> dict[str, str]:
     return digests
 
 
-def laws_named(plan: SweepPlan, mistakes: list[str]) -> list[str]:
+def laws_named(plan: SweepPlan, mistakes: list[str | InputError]) -> list[str]:
     """Laws of the plan, without repetition, in their order."""
     names = []
     for law in dict.fromkeys(plan.laws):

@@ -33,7 +33,7 @@ def support(best: Fit, other: Fit) -> tuple[str, str]:
     for first, second in pairs:
         begin, end = _deciding(first, best, second, other)
         span = f"{begin:.4g} to {end:.4g} s of {first.name}"
-        inside = [f"{t:.4g} s" for t in first.run.jumps if begin <= t <= end]
+        inside = [f"{t:.4g} s" for t in first.run.jumps or () if begin <= t <= end]
         if inside:
             doubts.append(f"the recording jumps at {', '.join(inside)}, in the deciding {span}")
         if first.law_fails_after_changes:

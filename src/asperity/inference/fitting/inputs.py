@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import Argument, InputError
+from asperity.inference.cycles.cycle import AveragedCycle
 from asperity.inference.holds.table import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
 from asperity.inference.runs.reading import GAIN
@@ -46,7 +47,7 @@ _REFERENCE_VELOCITY = 1e-6
 
 def free_by_default(
     law: type[Law],
-    data: Sequence[LockInTable | HealingTable | RecordedRun],
+    data: Sequence[LockInTable | HealingTable | AveragedCycle | RecordedRun],
     fixed: Mapping[str, Any] | None,
     material: Material | None,
 ) -> list[str]:
@@ -55,7 +56,7 @@ def free_by_default(
     Parameters
     ----------
     law : type of Law
-    data : sequence of LockInTable, HealingTable or RecordedRun
+    data : sequence of LockInTable, HealingTable, AveragedCycle or RecordedRun
         The stiffness of a recording is free in any case.
     fixed : mapping, optional
     material : Material, optional
