@@ -152,7 +152,6 @@ def stick_slip_response(
         )
     V = obeying(velocity, "stick_slip_response.velocity", "velocity", "positive")
     if spring is not None:
-        stiffness = obeying(spring, "stick_slip_response.spring", "stiffness", "positive")
         stiffness: Any = spring
         slider = Slider(slider.law, spring=stiffness, load=slider.W0, mass=slider.M)
     eta = None

@@ -11,7 +11,6 @@ import numpy as np
 
 from asperity.errors import Argument, InputError
 from asperity.inference.cycles.cycle import AveragedCycle
-from asperity.inference.cycles.cycle import AveragedCycle
 from asperity.inference.holds.table import HealingTable
 from asperity.inference.runs.assembly import PARAMETER, over_load
 from asperity.inference.runs.reading import GAIN
