@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.laws import Law, get_law, registered
 from asperity.loads.modulated import lowest_load, modulated
 from asperity.orbit import PeriodicResponse, periodic_response
@@ -58,6 +58,7 @@ def sourced_numbers(
     material: Material | None,
     origin: str = "given",
     law: str | None = None,
+    place: str = "",
 ) -> dict[str, SourcedNumber]:
     """Numbers by name: the given ones, and those of the material for the rest.
 
@@ -70,6 +71,8 @@ def sourced_numbers(
         Name of the source of the given numbers.
     law : str, optional
         The law that they are for.
+    place : str
+        The table of a file that has the given numbers; empty for arguments, options and sliders.
 
     Raises
     ------
@@ -79,17 +82,19 @@ def sourced_numbers(
     known = known_parameters(law)
     numbers: dict[str, SourcedNumber] = {}
     for written, value in given.items():
-        name = known_name(written, known)
+        field = Argument(f"{place}.{written}") if place else Argument("numbers", key=written)
+        name = known_name(written, known, field)
         if name in numbers:
-            raise InputError(f"{name} must be given once, got it as '{written}' too; leave one out")
+            raise InputError(field, "be given once", f"{name} too", "leave one out")
         if isinstance(value, SourcedNumber):
             numbers[name] = value
             continue
-        result = known[name].check(value)
+        try:
+            result = known[name].check(value)
+        except InputError as error:
+            raise error.about(field) from None
         if np.ndim(result):
-            raise InputError(
-                f"{known[name].label} must be one number, got {shown(value)}; give a single value"
-            )
+            raise InputError(field, "be one number", shown(value), "give a single value")
         numbers[name] = SourcedNumber(float(result), origin)
     if material is None:
         return numbers

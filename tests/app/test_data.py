@@ -19,6 +19,7 @@ from asperity.app.uploads import Uploads
 from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.inference.answers import read_data
+from asperity.outputs.tables import Section
 from asperity.questions import fit as questions
 
 MU1, PHASE1 = 0.012, -0.4
@@ -372,9 +373,11 @@ def test_a_posterior_is_sampled_as_it_was_asked_for(monkeypatch):
         "asperity.fit_report.write_report",
         lambda folder, found, posterior: folder.mkdir() or posterior.to_netcdf(folder / "a.nc"),
     )
+    said = Section("posterior", ("A is larger than B",))
+    monkeypatch.setattr("asperity.inference.report.posterior_sections", lambda posterior: [said])
     asked = {
         "laws": ["rice-ruina"], "free": ["mu0"], "material": "bureau2000", "report": True,
-        "tables": [{"name": "readings.csv", "text": TABLE}],
+        "names": "geophysics", "tables": [{"name": "readings.csv", "text": TABLE}],
         "posterior": True, "chains": 2, "draws": 100, "seed": 7,
     }  # fmt: skip
     sent = []
@@ -382,6 +385,7 @@ def test_a_posterior_is_sampled_as_it_was_asked_for(monkeypatch):
     result = fits.fit(whole, lambda **message: sent.append(message))
     assert {"draws": 50, "of": 800} in sent
     assert result["posterior"]["seed"] == 7
+    assert result["sections"][-1]["sentences"] == ("a is larger than b",)
     middles, heights = (np.array(result["posterior"]["histograms"]["mu0"][n]) for n in "xy")
     width = middles[1] - middles[0]
     mu0 = result["fit"]["parameters"]["mu0"]
@@ -606,6 +610,8 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
     table.wait_for()
     rows = {row.split("\t")[0]: row.split("\t")[1] for row in table.inner_text().splitlines()[1:]}
     found = {name: number(rows[name]) for name in PLANTED}
+    assert "nm" in table.get_by_role("row", name="D0").inner_text()
+    found["D0"] *= 1e-9
     # 200 samples of a noise of 3e-4 leave standard errors of A, B and D0 of 0.8, 0.5 and 0.7 %.
     assert found == pytest.approx(PLANTED, rel=0.03)
     assert found["A"] - found["B"] == pytest.approx(PLANTED["A"] - PLANTED["B"], rel=0.02)

@@ -5,9 +5,8 @@ import json
 
 import numpy as np
 import pytest
+from benchmarks.stick_slip import saw
 from scipy.io import savemat
-
-from references.stick_slip import saw
 
 
 @pytest.fixture(scope="module")

@@ -94,7 +94,7 @@ def test_a_protocol_has_a_track() -> None:
     [
         ({"amplitude": 0.02}, "track.length must"),
         ({"amplitude": -0.02, "length": "20 um"}, "track_amplitude must not be negative"),
-        ({"amplitude": 0.02, "length": "20 N"}, "track_length must"),
+        ({"amplitude": 0.02, "length": "20 N"}, "track.length must"),
         ({"amplitude": 0.02, "length": "20 um", "exponent": 1.0}, "track.exponent must be above 1"),
     ],
 )

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
+from benchmarks.stick_slip import saw
 
 import asperity as asp
 from asperity.errors import InputError
@@ -18,7 +19,6 @@ from asperity.measurement.stick_slip.measure import (
 from asperity.recording import Channel, Trace
 from asperity.recording.defects.check import check
 from references.populations import population
-from references.stick_slip import saw
 
 
 def recorded(friction, rate=2000.0, name="mu"):

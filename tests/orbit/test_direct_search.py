@@ -70,7 +70,7 @@ def test_orbits_with_slip_events_are_those_on_which_motions_settle(monkeypatch):
     known = KnownOrbits(EPSILON.size)
     values = DIRECT(at(), known)
     assert (values.outcome == Outcome.CONVERGED).all()
-    assert known.there.all()
+    assert known.known.all()
     monkeypatch.setattr(direct, "settled_orbits", lambda *given, **_: (None, given[3][:0]))
     left = np.flatnonzero(DIRECT(at()).outcome != Outcome.CONVERGED)
     # Or else this tests nothing.
@@ -100,7 +100,7 @@ def test_orbits_of_an_earlier_call_lead_to_those_of_the_search():
     few = EPSILON[:3]
     known = KnownOrbits(few.size)
     DIRECT(at(epsilon=few), known)
-    assert known.there.all()
+    assert known.known.all()
     moved = at(epsilon=few, A=0.0115, D0=2.9e-6, V=4.2e-5)
     values, slopes = DIRECT.value_and_jacobian(moved, known)
     expected, expected_slopes = WHOLE.value_and_jacobian(moved)
@@ -121,7 +121,7 @@ def test_points_that_fail_keep_the_orbits_known_before():
     lost = DIRECT(at(epsilon=few, K=9.1e1, A=1e-4), known)
     failed = lost.outcome != Outcome.CONVERGED
     assert failed.any()
-    assert known.there.all()
+    assert known.known.all()
     assert np.array_equal(known.orbit.centre[:, failed], before[:, failed])
     again = DIRECT(at(epsilon=few), known)
     assert again.harmonics == pytest.approx(WHOLE(at(epsilon=few)).harmonics, rel=1e-9)

@@ -8,7 +8,6 @@ import pytest
 from asperity import Slider, periodic_response, perturbation_response, sensitivities
 from asperity.errors import InputError
 from asperity.laws import ElastoPlastic, law_parameters
-from references.populations import population
 
 pytestmark = pytest.mark.slow
 
@@ -25,7 +24,11 @@ LAWS = {"elasto-plastic": (ElastoPlastic, BASE | {"lambda_": 7e-7})}
 #: that only the search finds.
 DRIVES = {"elasto-plastic": [(1e-6, 120.0, 0.24), (1e-5, 120.0, 0.5), (1e-6, 0.4, 0.24)]}
 #: The derivatives of an orbit of the search by two parameters are in `test_response_function`.
-CASES = population([(law, row) for law in LAWS for row in range(len(DRIVES[law]))], short=2)
+CASES = [
+    pytest.param(law, row, marks=pytest.mark.long if row == 2 else ())
+    for law, drives in DRIVES.items()
+    for row in range(len(drives))
+]
 SCALARS = ("mean_friction", "mu1", "mu2", "phase1", "phase2")
 STEP = 4e-3
 

@@ -117,7 +117,7 @@ def test_all_mistakes_are_told_at_once(write) -> None:
         ("bureau2000", "bureau", "did you mean 'bureau2000'"),
         ("lambda =", "alpha =", "belongs to linker-dieterich"),
         ("lambda =", "lamda =", "did you mean 'lambda'"),
-        ('K = "0.5 N/um"', 'K = "-0.5 N/um"', "slider.K must be positive"),
+        ('K = "0.5 N/um"', 'K = "-0.5 N/um"', "parameters.K must be positive"),
         ('material = "bureau2000"', "", "got none for"),
         ("[solver]", "[solver]\ninertia = 3", "solver.inertia must be"),
         ('"step load to 9 N"', "9", "step 3 must be a text, or a table"),

@@ -114,18 +114,18 @@ def test_the_output_has_the_columns_of_the_issue_in_order(here, tmp_path: Path) 
 
 
 BAD = [
-    ({"A": -0.01}, "law.A must be positive, got -0.01"),
+    ({"A": -0.01}, "A must be positive, got -0.01"),
     ({"epsilon": 1}, "epsilon must be at least 0 and below 1"),
     ({"epsilon": -0.1}, "epsilon must be at least 0 and below 1"),
     ({"D0": "nan"}, "D0 must be a finite number in m, got 'nan'"),
     ({"B": "inf"}, "B must be a finite number, got 'inf'"),
     ({"V": "1 um/s"}, "V must be a finite number in m/s, got '1 um/s'"),
     ({"V": "1,5e-6"}, "V must be a finite number in m/s, got '1,5e-6'"),
-    ({"V": 0}, "velocity must be positive, got 0 m/s"),
+    ({"V": 0}, "V must be positive, got 0 m/s"),
     ({"frequency": -120}, "frequency must be positive, got -120 Hz"),
-    ({"K": 0}, "slider.K must be positive, got 0 N/m"),
-    ({"W0": -7}, "slider.W0 must be positive, got -7 N"),
-    ({"M": -1}, "slider.M must not be negative, got -1 kg"),
+    ({"K": 0}, "K must be positive, got 0 N/m"),
+    ({"W0": -7}, "W0 must be positive, got -7 N"),
+    ({"M": -1}, "M must not be negative, got -1 kg"),
     ({"M": "heavy"}, "M must be a finite number in kg, got 'heavy'"),
     ({"mu0": ""}, "rice-ruina must have mu0, got an empty cell"),
     ({"law": "rice-runia"}, "did you mean 'rice-ruina'?"),

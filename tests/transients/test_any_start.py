@@ -136,7 +136,8 @@ def test_compiled_steps_return_however_many_are_rejected(monkeypatch):
     import jax
     import jax.numpy as jnp
 
-    system = type("", (), {"segment": HOLD.segments[0], "first_length": lambda *_: jnp.ones(())})()
+    parts = {"segment": HOLD.segments[0], "motion": None, "first_length": lambda *_: jnp.ones(())}
+    system = type("", (), parts)()
 
     def attempts(error, factor):
         def attempt(t, Y, h, memory):

@@ -1,7 +1,7 @@
 """The normal direction: elastic contacts and the squeezed air layer that work in parallel.
 
 `effective_modulation` answers the question the friction laws ask: which fraction of the load
-modulation do the micro-contacts bear? Nothing here knows of friction.
+modulation do the micro-contacts bear? No module of this room depends on friction.
 """
 
 from asperity.air.inverse import InverseResult, gap, patch_radius

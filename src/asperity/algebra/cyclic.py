@@ -24,16 +24,16 @@ def _triangularise(rows: Array, columns: int) -> Array:
 
     `rows` has shape (rows, all columns, points).
     """
-    done, rest = [], rows
+    done, remaining = [], rows
     for k in range(columns):
-        pivot, rest = reflect(rest)
+        pivot, remaining = reflect(remaining)
         zeros = jnp.zeros((k, *pivot.shape))
-        done.append(jnp.concatenate([zeros, pivot[None], rest[0]]))
-        rest = rest[1:]
-    if not rest.shape[0]:
+        done.append(jnp.concatenate([zeros, pivot[None], remaining[0]]))
+        remaining = remaining[1:]
+    if not remaining.shape[0]:
         return jnp.stack(done)
-    padding = jnp.zeros((rest.shape[0], columns, *rest.shape[2:]))
-    return jnp.concatenate([jnp.stack(done), jnp.concatenate([padding, rest], axis=1)])
+    padding = jnp.zeros((remaining.shape[0], columns, *remaining.shape[2:]))
+    return jnp.concatenate([jnp.stack(done), jnp.concatenate([padding, remaining], axis=1)])
 
 
 def _back_substitute(triangle: Array, rhs: Array) -> Array:
@@ -143,8 +143,10 @@ def _eliminated(maps: Array, rhs: Array) -> tuple[Array, Array, Array]:
         upper = jnp.concatenate([last, first, zero, right], axis=1)
         lower = jnp.concatenate([-T, zero, identity, r], axis=1)
         rows = _triangularise(jnp.concatenate([upper, lower]), n)
-        rest = rows[n:]
-        return (rest[:, n : 2 * n], rest[:, 2 * n : 3 * n], rest[:, 3 * n :]), rows[:n]
+        remaining = rows[n:]
+        return (remaining[:, n : 2 * n], remaining[:, 2 * n : 3 * n], remaining[:, 3 * n :]), rows[
+            :n
+        ]
 
     start = (-maps[0], identity, rights[0])
     rows: Array

@@ -38,16 +38,16 @@ def inverse_points(matrix: Matrix) -> Matrix:
     lower = [row[:2] for row in matrix[2:]], [row[2:] for row in matrix[2:]]
     first = inverse_points(upper[0])
     across, down = _multiply(first, upper[1]), _multiply(lower[0], first)
-    rest = inverse_points(_subtract(lower[1], _multiply(lower[0], across)))
-    corner = _multiply(rest, down)
+    remaining = inverse_points(_subtract(lower[1], _multiply(lower[0], across)))
+    corner = _multiply(remaining, down)
     return [
         *(
             [*a, *(-b for b in c)]
             for a, c in zip(
-                _add(first, _multiply(across, corner)), _multiply(across, rest), strict=True
+                _add(first, _multiply(across, corner)), _multiply(across, remaining), strict=True
             )
         ),
-        *([*(-a for a in b), *c] for b, c in zip(corner, rest, strict=True)),
+        *([*(-a for a in b), *c] for b, c in zip(corner, remaining, strict=True)),
     ]
 
 
@@ -64,22 +64,22 @@ def inverse_by_elimination(matrix: Array) -> Array:
     rows = jnp.arange(n)[:, None]
 
     def eliminate(k: Array, carry: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:
-        rest, free, order = carry
-        column = jax.lax.dynamic_index_in_dim(rest, k, 1, keepdims=False)
+        remaining, free, order = carry
+        column = jax.lax.dynamic_index_in_dim(remaining, k, 1, keepdims=False)
         chosen = jnp.argmax(jnp.where(free, jnp.abs(column), -1.0), axis=0)
         here = rows == chosen
         pivot = 1 / jnp.where(here, column, 0.0).sum(0)
-        row = jnp.where(here[:, None], rest, 0.0).sum(0) * pivot
+        row = jnp.where(here[:, None], remaining, 0.0).sum(0) * pivot
         row = jnp.where(rows == k, pivot, row)
-        rest = jnp.where((rows == k)[None], 0.0, rest)
+        remaining = jnp.where((rows == k)[None], 0.0, remaining)
         below = jnp.where(here, 0.0, column)
-        rest = jnp.where(here[:, None], row[None], rest - below[:, None] * row[None])
-        return rest, free & ~here, order.at[k].set(chosen)
+        remaining = jnp.where(here[:, None], row[None], remaining - below[:, None] * row[None])
+        return remaining, free & ~here, order.at[k].set(chosen)
 
     start = matrix, jnp.ones((n, points), dtype=bool), jnp.zeros((n, points), dtype=int)
-    rest, _, order = jax.lax.fori_loop(0, n, eliminate, start)
-    rest = jnp.take_along_axis(rest, order[:, None], 0)
-    return jnp.take_along_axis(rest, jnp.argsort(order, axis=0)[None], 1)
+    remaining, _, order = jax.lax.fori_loop(0, n, eliminate, start)
+    remaining = jnp.take_along_axis(remaining, order[:, None], 0)
+    return jnp.take_along_axis(remaining, jnp.argsort(order, axis=0)[None], 1)
 
 
 def _multiply(a: Matrix, b: Matrix) -> Matrix:
@@ -131,17 +131,17 @@ def solve_columns(matrix: Array, rhs: Array) -> Array:
     if n == 2:
         (a, b), (c, d) = matrix
         return jnp.stack([d * rhs[0] - b * rhs[1], a * rhs[1] - c * rhs[0]]) / (a * d - b * c)
-    rest = jnp.concatenate([matrix, rhs], axis=1)
+    remaining = jnp.concatenate([matrix, rhs], axis=1)
     # Reflections mix rows: a row larger than the others by 1e16, as in fast motions, would lose
     # the digits of the others.
     size = jax.lax.stop_gradient(jnp.abs(matrix).max(1, keepdims=True))
-    rest = rest / jnp.where(size > 0, size, 1.0)
+    remaining = remaining / jnp.where(size > 0, size, 1.0)
     diagonal, rows = [], []
     for _ in range(n):
-        pivot, rest = reflect(rest)
+        pivot, remaining = reflect(remaining)
         diagonal.append(pivot)
-        rows.append(rest[0])
-        rest = rest[1:]
+        rows.append(remaining[0])
+        remaining = remaining[1:]
     solution: list[Array] = []  # last unknown first
     for k in reversed(range(n)):
         known = n - 1 - k

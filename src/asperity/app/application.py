@@ -112,6 +112,8 @@ def build(
         Route("/api/catalogue", whole_catalogue),
         Mount("/static", StaticFiles(directory=STATIC)),
     ]
+    if catalogue.DOCS.is_dir():
+        routes.append(Mount("/docs", StaticFiles(directory=catalogue.DOCS, html=True)))
 
     @contextlib.asynccontextmanager
     async def lifespan(app: Starlette) -> AsyncIterator[None]:

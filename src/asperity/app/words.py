@@ -61,7 +61,9 @@ def in_labels(argument: Argument) -> str:
     head, _, rest = name.partition(".")
     if head in ("data", "runs") and rest:
         name = rest.partition(".")[2] or rest
-    if name in ("columns", "Trace.channel") and key:
+    if name in ("numbers", "fixed", "start") and key:
+        label = key
+    elif name in ("columns", "Trace.channel") and key:
         label = _ROLES.get(key, f"Role {key}")
     elif name == "units" and key:
         label = f"Unit of {key}"

@@ -154,7 +154,7 @@ def continuation(
         differ by more than a factor of 2 are continued by equal factors.
     velocity : float or str
         Pulling velocity V (m/s). This, epsilon and frequency may be left out where they are the
-        parameter; what the slider or these say of the parameter gives way to `span`.
+        parameter; `span` replaces the value of the parameter in the slider or in these arguments.
     epsilon : float or str
         Relative amplitude of the load.
     frequency : float or str

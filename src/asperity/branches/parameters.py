@@ -200,7 +200,7 @@ def one_problem(
     if not slider.law.rate_dependent:
         raise InputError(
             f"law must depend on the velocity to have a branch with bifurcations, got "
-            f"{slider.law.name}; its force is mu W, whatever the parameters"
+            f"{slider.law.name}; its force is mu W for all parameters"
         )
     amplitude = moving.get("epsilon", epsilon)
     problem = checked_problem(

@@ -186,29 +186,32 @@ class BoundaryHalf(Curves):
         step = float(length[0])
         guess = self.here.at + step * self.direction
         across = _across(self.direction)
-        there = critical_point(self.plane, self.kind, self.here.branch_orbit, guess, across)
+        neighbour = critical_point(self.plane, self.kind, self.here.branch_orbit, guess, across)
         turn, miss, self._other_kind = 1.0, 0.0, False
-        if there is not None:
-            moved = there.at - self.here.at
+        if neighbour is not None:
+            moved = neighbour.at - self.here.at
             turn = float(moved @ self.direction / np.linalg.norm(moved))
-            miss = float(np.linalg.norm(there.at - guess) / step)
-            self._other_kind = not _critical_kind(self.kind, there.branch_orbit)
-        good = None if self._other_kind else there
+            miss = float(np.linalg.norm(neighbour.at - guess) / step)
+            self._other_kind = not _critical_kind(self.kind, neighbour.branch_orbit)
+        good = None if self._other_kind else neighbour
         yield rows, Attempt.of_one(good, step, turn=turn, miss=miss)
 
     def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
         """Keep the point; a boundary ends at the edge of the rectangle and where it closes."""
         self.report()
-        before, there = self.here, attempt.next
-        moved = there.at - before.at
+        before, neighbour = self.here, attempt.next
+        moved = neighbour.at - before.at
         self.direction = moved / np.linalg.norm(moved)
-        self.here = there
-        if np.any(there.at < 0) or np.any(there.at > 1):
-            edge = _on_edge(self.plane, self.kind, before, there)
+        self.here = neighbour
+        if np.any(neighbour.at < 0) or np.any(neighbour.at > 1):
+            edge = _on_edge(self.plane, self.kind, before, neighbour)
             self.points += [edge] if edge else []
             return ["edge"]
-        self.points.append(there)
-        if len(self.points) > 5 and np.linalg.norm(there.at - self.first.at) < attempt.length[0]:
+        self.points.append(neighbour)
+        if (
+            len(self.points) > 5
+            and np.linalg.norm(neighbour.at - self.first.at) < attempt.length[0]
+        ):
             self.points.append(self.first)
             return ["closed"]
         return [""]
@@ -488,8 +491,8 @@ def _crossings(
         return []
     points = []
 
-    def visit(here: BranchOrbit, length: float, there: BranchOrbit) -> None:
-        for bifurcation in bifurcations_between(follower, here, length, there):
+    def visit(here: BranchOrbit, length: float, neighbour: BranchOrbit) -> None:
+        for bifurcation in bifurcations_between(follower, here, length, neighbour):
             branch_orbit = bifurcation.branch_orbit
             if bifurcation.kind != "branch point" and 0 <= branch_orbit.t <= 1:
                 points.append(

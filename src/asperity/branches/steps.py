@@ -196,15 +196,15 @@ class ParameterBranch(Curves):
         self, rows: Indices, length: Float, failures: NDArray[np.int_]
     ) -> Iterator[tuple[Indices, Attempt]]:
         """One step of the arclength."""
-        there, step = self.follower.step(self.here.point, float(length[0]))
+        following, step = self.follower.step(self.here.point, float(length[0]))
         iterations, turn = float(step.iterations[0]), float(step.turn[0])
-        yield rows, Attempt.of_one(there, float(length[0]), iterations=iterations, turn=turn)
+        yield rows, Attempt.of_one(following, float(length[0]), iterations=iterations, turn=turn)
 
     def accept(self, rows: Indices, chosen: Indices, attempt: Attempt) -> list[str]:
         """Visit the new orbit; the branch ends outside the span."""
-        there = attempt.next
-        self.visit(self.here, float(attempt.length[0]), there)
-        self.here, self.left = there, self.left - 1
-        if not 0 <= there.t <= 1:
-            return ["end" if there.t >= 0.5 else "start"]
+        following = attempt.next
+        self.visit(self.here, float(attempt.length[0]), following)
+        self.here, self.left = following, self.left - 1
+        if not 0 <= following.t <= 1:
+            return ["end" if following.t >= 0.5 else "start"]
         return ["" if self.left else STEPS]

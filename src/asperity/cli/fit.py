@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
+    Count,
     json_option,
     law_options,
     names_option,
@@ -109,9 +110,7 @@ _THEN = (
         help="State at the beginning of a recording.",
     ),
     click.option("--gauge", metavar="HZ", help='Low-pass of the force gauge, like "50 Hz".'),
-    click.option(
-        "--gauge-order", type=click.IntRange(1, 8), default=1, show_default=True, help="Its order."
-    ),
+    click.option("--gauge-order", type=Count(), default=1, show_default=True, help="Its order."),
     click.option(
         "--fit-rate",
         metavar="HZ|full",

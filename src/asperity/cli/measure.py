@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
+    Count,
     json_option,
     names_option,
     plot_option,
@@ -132,7 +133,7 @@ in place of numbers; 2: bad input.
 )  # fmt: skip
 @click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
 @click.option(
-    "--harmonics", metavar="N", type=click.IntRange(1, 64), default=4, show_default=True,
+    "--harmonics", metavar="N", type=Count(), default=4, show_default=True,
     help="How many.",
 )  # fmt: skip
 @click.option(

@@ -19,6 +19,21 @@ Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
 
 
+class Count(click.ParamType):
+    """A whole number; its limits are those of the question or the function that takes it."""
+
+    name = "N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: Any) -> int:
+        """The number that a text is."""
+        try:
+            return int(value)
+        except ValueError:
+            option = "" if param is None else param.opts[0]
+            rule = "be a whole number"
+            raise InputError(option, rule, f"'{value}'", "correct the value") from None
+
+
 def material_option() -> Decorator:
     """``--material``."""
     return click.option(

@@ -29,6 +29,8 @@ Examples:
   asperity response --law elasto-plastic --material bureau2000 \\
       -V "1 um/s" -e 0.24 -f "120 Hz" --set epsilon2=0.02 --set tilt=0.03
   asperity response --table points.csv --out responses.csv --material bureau2000
+  asperity response --stick-slip --law rice-ruina --material bureau2000 \\
+      -V "1 um/s" --set "K=10 N/m" --set "M=0.1 kg" --inertia
 
 \b
 Convention: w(t) = W/W0 = 1 + eps cos wt,
@@ -56,6 +58,11 @@ _SHOWN = (
 
 @click.command(epilog=_EPILOG)
 @point_options
+@click.option(
+    "--stick-slip",
+    is_flag=True,
+    help="Without a modulation: period, drop and durations of stick-slip, if there is any.",
+)
 @plot_option()
 @names_option()
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
@@ -66,6 +73,7 @@ def response(
     law: str | None,
     material: str | None,
     given: dict[str, str],
+    stick_slip: bool,
     table: Path | None,
     out: Path | None,
     resume: bool,
@@ -78,6 +86,13 @@ def response(
     Mean friction, harmonics of the force and Floquet multipliers of the periodic orbit, be it
     stable or not; without inertia unless it is asked for.
     """
+    if stick_slip:
+        if table is not None or out is not None or plot is not None or resume:
+            raise InputError(
+                "--stick-slip must go with one point and alone, got --table, --out, --resume or "
+                "--plot; leave it out, or take asperity.experiment.stick_slip_response with arrays"
+            )
+        return _stick_slip(law, material, given, as_json, names)
     if table is not None:
         if out is None:
             raise InputError("--out must be given with --table, got nothing; name the output file")
@@ -126,12 +141,74 @@ def _point(
     return 0 if result.converged else 1
 
 
+def _stick_slip(
+    law: str | None, material: str | None, given: dict[str, str], as_json: bool, names: Names
+) -> int:
+    from asperity._version import __version__
+    from asperity.cli.report import to_json
+    from asperity.experiment import stick_slip_response
+    from asperity.laws import get_law
+    from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
+    from asperity.parameters import MODULATION, point_parameters
+    from asperity.slider.named import slider_from
+
+    law = law_named(law)
+    refuse_foreign(law, given)
+    for name in ("epsilon", "frequency"):
+        if name in given:
+            raise InputError(
+                f"--stick-slip must come without a modulation, got {name} = {given[name]}; leave "
+                "it out, or leave --stick-slip out"
+            )
+    sourced = sourced_numbers(given, material_named(material), "command line", law)
+    modulation = ("epsilon", "frequency", *MODULATION)
+    among = {n: p for n, p in point_parameters(get_law(law)).items() if n not in modulation}
+    numbers = numbers_for(law, sourced, among)
+    values = {name: number.value for name, number in numbers.items()}
+    result = stick_slip_response(
+        slider_from(get_law(law), values), velocity=values["V"],
+        inertia=bool(values.get("inertia", 0.0)), radiation_damping=values.get("eta"),
+    )  # fmt: skip
+    rows = result.values()
+    if as_json:
+        record = {name: value for name, value, _, _ in rows}
+        record |= {"result": str(result.result), "asperity_version": __version__, "law": law}
+        click.echo(to_json({**record, "parameters": values}))
+    else:
+        texts = [
+            (name, f"{value:.9g} {unit}".removesuffix(" 1"), meaning)
+            for name, value, unit, meaning in rows
+            if result.slips or name in ("steady", "stable")
+        ]
+        click.echo(_words(law, numbers, str(result.result), texts, names))
+    return 0 if result.slips or result.steady else 1
+
+
 def _text(
     law: str, result: PeriodicResponse, numbers: dict[str, SourcedNumber], names: Names
 ) -> str:
+    from asperity.parameters import OUTPUTS
+
+    outputs = []
+    for name in _SHOWN:
+        value = getattr(result, name)[()]
+        text = ("no", "yes")[int(value)] if name == "stable" else str(value)
+        if isinstance(value, float):
+            text = f"{value:.9g} {OUTPUTS[name].unit}".removesuffix(" 1")
+        outputs.append((name, text, OUTPUTS[name].meaning))
+    return _words(law, numbers, "response", outputs, names)
+
+
+def _words(
+    law: str,
+    numbers: dict[str, SourcedNumber],
+    heading: str,
+    outputs: list[tuple[str, str, str]],
+    names: Names,
+) -> str:
     from asperity.laws import get_law
     from asperity.outputs.tables import aligned
-    from asperity.parameters import OUTPUTS, display_name, point_parameters
+    from asperity.parameters import display_name, point_parameters
     from asperity.units import format_si
 
     chosen = get_law(law)
@@ -144,15 +221,8 @@ def _text(
         )
         for name, number in numbers.items()
     ]
-    outputs = []
-    for name in _SHOWN:
-        value = getattr(result, name)[()]
-        text = ("no", "yes")[int(value)] if name == "stable" else str(value)
-        if isinstance(value, float):
-            text = f"{value:.9g} {OUTPUTS[name].unit}".removesuffix(" 1")
-        outputs.append((name, text, OUTPUTS[name].meaning))
     title = f"{law}, of forces per square metre: N for Pa" if names == "geophysics" else law
-    return f"{title}\n{aligned(inputs, '  ')}\nresponse\n{aligned(outputs, '  ')}"
+    return f"{title}\n{aligned(inputs, '  ')}\n{heading}\n{aligned(outputs, '  ')}"
 
 
 def _table(

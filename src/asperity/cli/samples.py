@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from asperity.cli.options import json_option
+from asperity.cli.options import Count, json_option
 
 _EPILOG = """\b
 Examples:
@@ -23,7 +23,7 @@ Examples:
     type=click.Path(path_type=Path),
     help="File to write: .csv, .txt, .h5 or .tdms; NAME.csv by default.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the instrument's noise.")
+@click.option("--seed", type=Count(), default=0, show_default=True, help="Of the noise.")
 @json_option()
 def samples(name: str | None, out: Path | None, seed: int, as_json: bool) -> int:
     """List the sample recordings, or make one of them.

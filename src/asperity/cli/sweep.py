@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.interrupt import interruptible
-from asperity.cli.options import json_option
+from asperity.cli.options import Count, json_option
 from asperity.errors import InputError
 
 if TYPE_CHECKING:
@@ -149,10 +149,13 @@ def sweep(context: click.Context) -> None:
 @click.argument("plan", type=Path)
 @click.option("--out", type=Path, metavar="STORE", help="Folder of the store, like results.zarr.")
 @click.option(
-    "--workers", type=int, metavar="N", help="Processes of this machine; one a core by default."
+    "--workers", type=Count(), metavar="N", help="Processes of this machine; one a core by default."
 )
 @click.option(
-    "--cluster", type=int, metavar="N", help="A Dask cluster of N workers on this machine, instead."
+    "--cluster",
+    type=Count(),
+    metavar="N",
+    help="A Dask cluster of N workers on this machine, instead.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="A Dask scheduler that runs, instead.")
 @click.option("--extend", is_flag=True, help="The plan has more rows behind those of the store.")

@@ -20,6 +20,8 @@ _OPTIONS: Mapping[str, str] = {
     "stress_to_force.area": "--area",
     "recording.path": "the recording",
     "slice.start and slice.end": "--window",
+    "samples.seed": "--seed",
+    **{name: f"--{name}" for name in ("workers", "cluster")},
 }
 
 
@@ -32,6 +34,7 @@ def in_options(argument: Argument, own: Mapping[str, str] | None = None) -> str:
     own : mapping of str to str, optional
         Option of each field of a question, which other commands mean otherwise.
     """
+    from asperity.parameters import DRIVE, MACHINE
     from asperity.questions.options import COLUMN_OPTIONS, MEASURE_OPTIONS, SOURCE_OPTIONS
 
     name, key, value = argument
@@ -42,6 +45,9 @@ def in_options(argument: Argument, own: Mapping[str, str] | None = None) -> str:
         if key in COLUMN_OPTIONS:
             return f"{COLUMN_OPTIONS[key]} {_quoted(value)}".rstrip()
         return f'--column "{key}={value}"' if value else f"--column {key}=NAME"
+    if name == "numbers":
+        named = {**DRIVE, **MACHINE}.get(key)
+        return named.options[0] if named and named.options else f"--set {key}".rstrip()
     if name == "units" and key and value:
         return f'--unit "{key}={"UNIT" if value == "..." else value}"'
     known = {**_OPTIONS, **SOURCE_OPTIONS, **(own or {})}

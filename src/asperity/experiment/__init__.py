@@ -22,6 +22,7 @@ from asperity.experiment.recipes import (
     slide_hold_slide,
     velocity_steps,
 )
+from asperity.experiment.stick_slip import StickSlip, stick_slip_response
 from asperity.tribometer.tribometer import channel_gain
 
 __all__ = [
@@ -36,6 +37,7 @@ __all__ = [
     "Exciter",
     "Holds",
     "SlideHoldSlide",
+    "StickSlip",
     "VelocityStepResponse",
     "VelocitySteps",
     "amplitude_motion",
@@ -46,5 +48,6 @@ __all__ = [
     "loading_recording",
     "slide_hold_slide",
     "step_response",
+    "stick_slip_response",
     "velocity_steps",
 ]

@@ -14,15 +14,13 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from asperity._version import __version__
 from asperity.errors import InputError
+from asperity.experiment.labelled import Shaped, labelled
 from asperity.laws import Law
-from asperity.orbit.response import dimension_names
-from asperity.parameters import MACHINE, law_parameters, obeying
+from asperity.parameters import obeying
 from asperity.parameters.arguments import typed
 from asperity.parameters.parameter import Displayed, SummaryLine, number_line
 from asperity.slider import Slider
-from asperity.slider.named import slider_values
 from asperity.slider.problem import flatten
 from asperity.theory.memory import steady_growth
 from asperity.transients.batch import End
@@ -143,7 +141,7 @@ class Holds(Displayed):
     def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
         """Labelled arrays; axes are named by what varies along them alone, or by `dims`."""
         drive = {"hold_time": ("s", self.hold_time), "velocity": ("m/s", self.velocity)}
-        return _dataset(self, drive, dims)
+        return labelled(self, _MEANINGS, drive, dims)
 
 
 @dataclass(frozen=True, repr=False)
@@ -208,7 +206,7 @@ class VelocityStepResponse(Displayed):
     def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
         """Labelled arrays; axes are named by what varies along them alone, or by `dims`."""
         drive = {n: ("m/s", getattr(self, n)) for n in ("velocity_before", "velocity")}
-        return _dataset(self, drive, dims)
+        return labelled(self, _MEANINGS, drive, dims)
 
 
 @typed
@@ -272,7 +270,7 @@ def hold_response(
     response, after, rate = _in_shapes(run, flat, V, time, runaway)
     assert isinstance(response, HoldResponse)
     stable = _stable(flat, V)
-    shaped = _Shaped(shape)
+    shaped = Shaped(shape)
     crossing = response.end == End.CROSSING
     return Holds(
         hold_time=shaped(time),
@@ -339,7 +337,7 @@ def step_response(
     runaway = np.log(np.maximum(_RUNAWAY / V, _RUNAWAY_RATIO))
     response, after = _in_shapes(run, flat, V, first, runaway)
     stable = _stable(flat, V)
-    shaped = _Shaped(shape)
+    shaped = Shaped(shape)
     crossing = response.end == End.CROSSING
     over = np.where(response.end == End.STEADY, response.after, response.extremum)
     return VelocityStepResponse(
@@ -396,19 +394,8 @@ def _stable(slider: Slider, V: Float) -> NDArray[np.bool_]:
     return np.asarray(_in_shapes(run, slider, V, V, V) < 0)
 
 
-class _Shaped:
-    """Arrays in the shape of the arguments."""
-
-    def __init__(self, shape: tuple[int, ...]) -> None:
-        self._shape = shape
-
-    def __call__(self, array: Any) -> Any:
-        array = np.asarray(array)
-        return array.reshape((*self._shape, *array.shape[1:]))
-
-
 def _settling(
-    after: SettlingDistance | None, end: Any, stable: NDArray[np.bool_], shaped: _Shaped
+    after: SettlingDistance | None, end: Any, stable: NDArray[np.bool_], shaped: Shaped
 ) -> dict[str, Any]:
     none = np.full(len(stable), np.nan)
     ends = end if after is None else after.end
@@ -448,44 +435,3 @@ _MEANINGS: dict[str, tuple[str, str]] = {
     "settling_slip": ("m", f"slip to within {100 * SETTLED:g} % of steady sliding"),
     "stable": ("1", "whether steady sliding is stable"),
 }
-
-
-def _dataset(
-    record: Any, drive: dict[str, tuple[str, Float]], dims: tuple[str, ...] | None
-) -> xarray.Dataset:
-    import xarray
-
-    shape = record.result.shape
-    values = {name: (np.asarray(v), {"units": unit}) for name, (unit, v) in drive.items()}
-    law: type[Law] = type(record.slider.law)
-    known = {**law_parameters(law), **MACHINE}
-    for name, value in slider_values(record.slider).items():
-        array = np.asarray(value, float)
-        padded = array.reshape((1,) * (len(shape) - array.ndim) + array.shape)
-        values[name] = padded, known[name].attributes
-    varying = {name: _varying(value) for name, (value, _) in values.items()}
-    names = dimension_names(shape, varying, dims)
-    data = {
-        name: (names, getattr(record, name), {"units": unit, "long_name": meaning})
-        for name, (unit, meaning) in _MEANINGS.items()
-        if hasattr(record, name)
-    }
-    data["result"] = (names, record.result.astype(str), {"long_name": "what follows"})
-    coords = {
-        name: (
-            [d for d, n in zip(names, varying[name], strict=True) if n > 1],
-            value[tuple(slice(None) if n > 1 else 0 for n in varying[name])],
-            attributes,
-        )
-        for name, (value, attributes) in values.items()
-    }
-    attrs = {"asperity_version": __version__, "law": law.name}
-    return xarray.Dataset(data, coords=coords, attrs=attrs)
-
-
-def _varying(value: Float) -> tuple[int, ...]:
-    """The shape of an array, with length 1 along the axes on which it does not vary."""
-    return tuple(
-        1 if np.all(value == np.take(value, [0], axis=axis)) else size
-        for axis, size in enumerate(value.shape)
-    )

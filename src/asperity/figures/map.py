@@ -291,9 +291,9 @@ def region_names(dataset: xarray.Dataset) -> list[tuple[str, float, float]]:
 
 
 def _name_regions(axis: Axes, dataset: xarray.Dataset) -> None:
-    for word, *at in region_names(dataset):
+    for word, x, y in region_names(dataset):
         axis.text(
-            *at, word, transform=axis.transAxes, ha="center", va="center", zorder=5,
+            x, y, word, transform=axis.transAxes, ha="center", va="center", zorder=5,
             path_effects=[patheffects.withStroke(linewidth=2.5, foreground="white", alpha=0.8)],
         )  # fmt: skip
 

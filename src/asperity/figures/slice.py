@@ -52,18 +52,18 @@ def plot_slice(
         if side is not None and side not in dims:
             raise InputError(f"{name} must be an axis of the store, got '{side}'; "
                              f"{closest(side, dims)}")  # fmt: skip
-    given = dict(at or {})
-    for name in given:
+    chosen = dict(at or {})
+    for name in chosen:
         if name not in dims or name in (x, y):
             raise InputError(f"at must name other axes, got '{name}'; {closest(name, dims)}")
     for dim in dims:
         if dim in (x, y):
             continue
         labelled = dim in part.indexes and np.issubdtype(part[dim].dtype, np.number)
-        if labelled and dim in given:
-            part = part.sel({dim: float(given[dim])}, method="nearest")
+        if labelled and dim in chosen:
+            part = part.sel({dim: float(chosen[dim])}, method="nearest")
         else:
-            part = part.isel({dim: int(given.get(dim, 0))})
+            part = part.isel({dim: int(chosen.get(dim, 0))})
     figure = new_figure(4.4, 3.4)
     axis = figure.subplots()
     label = f"{part.attrs.get('long_name', show)} ({part.attrs.get('units', '1')})"

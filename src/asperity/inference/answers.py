@@ -12,6 +12,7 @@ from typing import Any
 from asperity import materials
 from asperity.errors import Argument, InputError
 from asperity.inference.comparison.compare import Comparison, compare
+from asperity.inference.cycles.cycle import AveragedCycle, averaged_cycle
 from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.inputs import priors_of
 from asperity.inference.fitting.result import Fit
@@ -22,7 +23,9 @@ from asperity.inference.runs.run import RecordedRun, recorded_run
 from asperity.inference.runs.unloading import measured_stiffness
 from asperity.inference.tables.table import OBSERVABLES, LockInTable, read_table
 from asperity.laws import Law, get_law, known_law, registered
+from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
 from asperity.outputs.targets import require_rereadable
+from asperity.parameters import DRIVE, MACHINE
 from asperity.parameters.arguments import FilePath, typed
 from asperity.questions import fit as questions
 from asperity.recording import Trace
@@ -37,7 +40,7 @@ _TRENDS = {"none": (), "linear": ("trend",), "quadratic": ("trend", "bend")}
 
 
 #: Sets of data of any kind.
-AnyData = LockInTable | HealingTable | RecordedRun
+AnyData = LockInTable | HealingTable | AveragedCycle | RecordedRun
 #: These, and what is read as one of them.
 Data = AnyData | Trace | FilePath
 
@@ -119,8 +122,33 @@ def read_data(
         elif table:
             result.append(read_table(data.file, at, name=data.name))
         else:
-            result.append(recorded_run(read(data), window=data.window, **_reading(data)))
+            trace = read(data)
+            cycle = _stick_slip(data, trace, question.fixed)
+            result.append(
+                recorded_run(trace, window=data.window, **_reading(data))
+                if cycle is None
+                else cycle
+            )
     return result
+
+
+def _stick_slip(
+    data: questions.Data, trace: Trace, fixed: Mapping[str, Any]
+) -> AveragedCycle | None:
+    """The averaged cycle of a recording of stick-slip; None of any other."""
+    if data.steps is not None or data.velocities is not None:
+        return None
+    given = {n: MACHINE[n].check(fixed[n]) for n in ("K", "M", "W0") if n in fixed}
+    V = float(DRIVE["V"].check(fixed["V"])) if "V" in fixed else None
+    machine = Machine(given.get("K"), V, given.get("M"), given.get("W0"))
+    try:
+        measurement = measure_stick_slip(trace, window=data.window, machine=machine)
+    except InputError:
+        # What a run needs is asked for by the reader of runs.
+        return None
+    if not measurement.clear:
+        return None
+    return averaged_cycle(measurement, Path(data.name or data.file).stem)
 
 
 def _reading(data: questions.Data) -> dict[str, Any]:

@@ -435,12 +435,12 @@ def headlines(words: Sequence[HeadlineWords], claims: Sequence[Claim]) -> list[H
     computed = {name: claim.computed for name, claim in ledger.items()}
     return [
         Headline(
-            claim=one.statement,
-            found=fill(one.found, computed, "headline.found"),
-            standing=_standing([ledger[name] for name in one.claims]),
-            claims=one.claims,
+            claim=conclusion.statement,
+            found=fill(conclusion.found, computed, "headline.found"),
+            standing=_standing([ledger[name] for name in conclusion.claims]),
+            claims=conclusion.claims,
         )
-        for one in words
+        for conclusion in words
     ]
 
 

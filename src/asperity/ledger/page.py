@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from importlib.resources import files
@@ -85,7 +85,10 @@ def build_page(
     parts = {
         "In brief": ("brief", _brief(paper.contents.summary, headlines, claims)),
         **{
-            group.title: (group.key, group.before + _figures(group.plates) + group.after)
+            group.title: (
+                group.key,
+                group.before + "\n".join(map(_figure, group.plates)) + group.after,
+            )
             for group in groups
         },
         **({"Measured points": ("points", _agreement(agreement))} if agreement else {}),
@@ -147,10 +150,6 @@ def _agreement(agreement: Sequence[CurveComparison]) -> str:
 def _chip(kind: str, sign: str, word: str) -> str:
     """A verdict as a coloured word with a sign, because some readers do not see the colour."""
     return f'<span class="chip {kind}"><span aria-hidden="true">{sign}</span> {word}</span>'
-
-
-def _figures(plates: Iterable[Plate]) -> str:
-    return "\n".join(map(_figure, plates))
 
 
 def _figure(plate: Plate) -> str:

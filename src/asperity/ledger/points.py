@@ -7,8 +7,8 @@ there are points, since nothing is fitted to them here.
 =============  =====================================================================================
 verdict        rule
 =============  =====================================================================================
-agrees         chi^2 is not larger than the 95 % quantile, and a curve that is 20 % off would have
-               been found out: with it chi^2 exceeds that quantile in 95 % of all cases or more
+agrees         chi^2 is not larger than the 95 % quantile, and the test has power: for a curve that
+               is 20 % off chi^2 exceeds that quantile in 95 % of all cases or more
 disagrees      chi^2 is larger than the 95 % quantile
 undecided      chi^2 is not larger, but the errors are so wide that a curve 20 % off would pass too
 =============  =====================================================================================
@@ -33,9 +33,9 @@ from asperity.units import to_si
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: Probability that a test accepts a true curve.
+#: Significance level: the probability that a test rejects a true curve.
 LEVEL = 0.05
-#: A test must reject a curve that is wrong by this share with the power LEVEL.
+#: A test must reject a curve that is wrong by this share with the probability 1 - LEVEL.
 WRONG_BY = 0.2
 
 #: The same in a sentence, for what is written.

@@ -113,7 +113,8 @@ def _fault(modulation: Modulation, samples: int, name: str) -> str:
             f"{low:.4g}; lower its strength"
         )
     for field, part in (("w", w), ("pull", pull)):
-        mean = _furthest(part.mean(0), 1.0)
+        means = part.mean(0)
+        mean = float(means[np.argmax(np.abs(means - 1.0))])
         if abs(mean - 1) > _MEAN:
             return (
                 f"{name}.at must give a {field} of mean 1 over the period, got {mean:.6g}; divide "
@@ -148,10 +149,6 @@ def _fault(modulation: Modulation, samples: int, name: str) -> str:
             "member out"
         )
     return ""
-
-
-def _furthest(values: Array, wanted: float) -> float:
-    return float(values[np.argmax(np.abs(values - wanted))])
 
 
 def _missed_by_slope(values: Array, slopes: Array) -> float:

@@ -6,12 +6,12 @@ Over a window of a few time constants this settling is a part of the model::
     c_k(t) = drift or harmonic + amplitude e^(-(t - start)/tau),    k = 0, 1, ..., n
 
 For each tau the amplitude is linear. Within a block e^(-t/tau) is a straight line to second order
-of the block's length over tau, so the columns are combinations of those that the sums hold, and no
-second pass over the samples is needed.
+of the block's length over tau, so the columns are combinations of the summed columns, and no second
+pass over the samples is needed.
 
-Whether there is a settling, and of which tau, is weighed by likelihood: Student's, since the noise
-is estimated from few lines. The correction of the reading is the mean over the weights, and its
-covariance holds that of the amplitude and the spread over tau.
+The likelihood (Student's t, because the noise is estimated from few lines) weighs the models
+without a settling and with each tau. The correction of the reading is the weighted mean, and its
+covariance includes that of the amplitude and the variance over tau.
 """
 
 from __future__ import annotations
@@ -26,20 +26,21 @@ from asperity.lock_in.normal_equations import BlockSums, inverted
 
 Array = NDArray[np.float64]
 
-#: Odds of a settling before the data are seen, times the Occam factor of its amplitude: of the mean
-#: and of a harmonic, which has two amplitudes. With a mean's, 3 to 10 of 1,000 steady recordings
-#: prefer a settling, in white and in AR(1) noise, and 99 of 100 keep their uncertainty to 10 %.
+#: Prior odds of a settling times the Occam factor of its amplitude, for the mean and for a
+#: harmonic, which has two amplitudes. With these odds of the mean, 3 to 10 of 1,000 steady
+#: recordings prefer a settling, in white and AR(1) noise, and 99 of 100 keep their uncertainty
+#: within 10 %.
 _ODDS = (0.005, 0.0005)
-#: Time constants beyond this share of the window have no end in it: with a linear drift next to it
-#: the final level is an extrapolation.
+#: A settling with a time constant above this share of the window does not end in the window: with a
+#: linear drift in the model, the final level is an extrapolation.
 OPEN = 1 / 3
-#: Longest time constant, in windows; time constants tried at once; and the shortest of a harmonic,
-#: in periods: next to it other harmonics are no longer apart.
+#: Longest time constant, in windows; number of time constants of a grid; and shortest time constant
+#: of a harmonic, in periods, below which it overlaps with other harmonics.
 _LONGEST, _TRIED, _SHORTEST = 2.0, 41, 4.0
 #: Without a gain above this many times the noise nothing is corrected.
 _LEAST_GAIN = 4.0
-#: Log-likelihood below the best from which time constants count for nothing, and how many of those
-#: that count make the sum over them an integral.
+#: Log-likelihood below the maximum at which a time constant is negligible, and number of time
+#: constants that are not, with which the sum approximates the integral.
 _NEGLIGIBLE, _ENOUGH = 12.0, 9
 #: The iteration ends when the noise falls by less than to this share of its last value.
 _STILL = 0.8

@@ -1,7 +1,7 @@
 """Running a compiled function over many operating points in chunks of a fixed shape.
 
-One shape means one compilation, and bounded memory whatever the number of points. Chunks run one
-after the other: programs of XLA's CPU backend that are called from several threads may deadlock.
+One shape needs one compilation, and the memory does not grow with the number of points. Chunks run
+in sequence: programs of XLA's CPU backend that are called from several threads may deadlock.
 Several cores are used by several processes, see `asperity.orbit.search`.
 """
 

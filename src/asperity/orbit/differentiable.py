@@ -298,8 +298,8 @@ def response_function(
         follows branches, which may take a minute for one point. Within `jax.jit`, and where
         multipliers are wanted, it is as True.
     least_points : int
-        Calls with fewer points are filled up to so many, for callers whose number of points varies:
-        they share one compiled program.
+        Calls with fewer points are padded to this number, so that calls with different numbers of
+        points share one compiled program.
 
     Returns
     -------

@@ -200,6 +200,6 @@ def _eigensystem_rule(primals: tuple, tangents: tuple) -> tuple:
     values, vectors = eigensystem(*primals)
     turned = jnp.linalg.solve(vectors, tangents[0] @ vectors)
     n = values.shape[-1]
-    apart = values[:, None, :] - values[:, :, None] + jnp.eye(n)
-    mixed = jnp.where(jnp.eye(n, dtype=bool), 0.0, turned / apart)
+    differences = values[:, None, :] - values[:, :, None] + jnp.eye(n)
+    mixed = jnp.where(jnp.eye(n, dtype=bool), 0.0, turned / differences)
     return (values, vectors), (jnp.diagonal(turned, axis1=-2, axis2=-1), vectors @ mixed)

@@ -27,19 +27,20 @@ from asperity.slider.problem import Problem
 #: times the intervals the error is smaller by 3^4 for a stiff orbit, by 3^8 otherwise.
 AGREEMENT = 2e-7
 
-#: Each interval is cut into 3, 9, 27... parts for finer transfer maps, up to these numbers in all:
-#: of all intervals at once, and of one after the other.
+#: Each interval is divided into 3, 9, 27... parts for finer transfer maps, up to these total
+#: numbers: with all maps in memory, and with one interval at a time.
 _MOST_AT_ONCE, _MOST_INTERVALS = 35_000, 40_000_000
 #: Largest number of intervals of all points for work on whole chunks of points (some 200 MB).
 _MOST_SIDE_BY_SIDE = 100_000
 
-#: Multipliers below this modulus are compared absolutely: no experiment sees them. Two have their
-#: product from Liouville's formula; of more the small ones drown in the round-off of the large.
+#: Multipliers below this modulus are compared absolutely, because no experiment can measure them:
+#: for two multipliers, whose product Liouville's formula gives, and for more, where round-off of
+#: the large ones hides the small ones.
 _VANISHING = (1e-12, 1e-6)
 _LOST_IN_ROUND_OFF = 1e-7
 
 #: Mean logarithm of the multipliers, exact by Liouville's formula, above which the largest
-#: certainly overflows a double, and above which no mesh of ours resolves the others.
+#: multiplier overflows a double, and above which no mesh resolves the other ones.
 _OVERFLOW, _HOPELESS = 750.0, 5000.0
 
 
@@ -171,6 +172,6 @@ def multiplier_gap(before: NDArray[np.complex128], now: NDArray[np.complex128]) 
         floor = max(_VANISHING[several], several * _LOST_IN_ROUND_OFF * largest)
         gaps = np.abs(old - new) / np.maximum(np.abs(new), floor)
         turned = np.abs(np.exp(1j * (before.imag - now.imag)) - 1)
-        apart = np.abs(before.real - now.real) / np.abs(now.real)
-        gaps = np.where(huge, np.maximum(apart, turned), gaps)
+        changes = np.abs(before.real - now.real) / np.abs(now.real)
+        gaps = np.where(huge, np.maximum(changes, turned), gaps)
     return float(np.max(gaps, initial=0.0))

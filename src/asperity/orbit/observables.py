@@ -63,12 +63,12 @@ class Observables(NamedTuple):
 class PeriodicOrbit(Protocol):
     """Interface of an orbit, independent of its representation.
 
-    Two representations have it. `FourierOrbit` keeps the mean of each state apart from the rest on
-    a grid, so that a rest 1e-9 of the mean keeps its digits, and is small enough for hundreds of
-    points to be iterated in a core's cache. `Orbit` has polynomials on a separate mesh for every
-    point, which puts the intervals where an orbit is steep, and from whose equations the monodromy
-    matrix follows. Neither could stand in for the other without a loss of digits or of range, and
-    nothing beyond the method that made it needs to know which one it has.
+    There are two representations. `FourierOrbit` keeps the mean of each state and its zero-mean
+    part on a grid separately, so that a zero-mean part of 1e-9 of the mean keeps its digits;
+    hundreds of points fit into the cache of a core. `Orbit` has polynomials on a separate mesh for
+    every point, with fine intervals where the orbit is steep; the monodromy matrix follows from its
+    equations. Replacing one by the other would lose digits or range. Code outside of the methods
+    works with either.
     """
 
     @property

@@ -78,17 +78,14 @@ def over_a_period(response: PeriodicResponse) -> Period:
         friction = friction - M * V * omega / W0 * _derivative(velocity)
     load = np.asarray(at.w) * np.ones(len(force))
     age = None
-    if isinstance(response.load, Harmonic) and _has_age(slider.law):
+    has_age = slider.law.state_names == ("log_age",) or isinstance(slider.law, LinkerDieterich)
+    if isinstance(response.load, Harmonic) and has_age:
         state = _state(slider.law, jnp.asarray(V * slip), friction / load, load)
         log_age = state
         if isinstance(slider.law, LinkerDieterich):
             log_age = slider.law.log_age((state,), jnp.asarray(load))
         age = np.asarray(jnp.exp(log_age - slider.law.steady_state(V)[0])).reshape(-1)
     return Period(response.theta / (2 * np.pi), load, force, velocity, slip, age)
-
-
-def _has_age(law: Law) -> bool:
-    return law.state_names == ("log_age",) or isinstance(law, LinkerDieterich)
 
 
 @jax.jit

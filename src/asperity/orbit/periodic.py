@@ -86,7 +86,7 @@ def periodic_response(
     Returns
     -------
     PeriodicResponse
-        A point that fails says why in `result`; its numbers are NaN and `converged` is False.
+        `result` has the reason of a failed point; its numbers are NaN and `converged` is False.
 
     Raises
     ------

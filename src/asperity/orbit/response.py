@@ -338,7 +338,7 @@ class PeriodicResponse(Drawn):
 
 
 def dimension_names(
-    shape: tuple[int, ...], shapes: Mapping[str, tuple[int, ...]], given: Any = None
+    shape: tuple[int, ...], shapes: Mapping[str, tuple[int, ...]], dims: Any = None
 ) -> tuple[str, ...]:
     """Names of the axes of a grid.
 
@@ -348,21 +348,21 @@ def dimension_names(
         Of the grid.
     shapes : mapping of str to tuple of int
         Of each parameter, broadcastable to `shape`.
-    given : tuple of str, optional
-        Names to take instead.
+    dims : tuple of str, optional
+        Names of the axes in place of automatic ones.
 
     Raises
     ------
     InputError
         If there are not as many names as axes, or a name occurs twice.
     """
-    if given is not None:
-        chosen = [given] if isinstance(given, str) else given
+    if dims is not None:
+        chosen = [dims] if isinstance(dims, str) else dims
         texts = isinstance(chosen, list | tuple) and all(isinstance(n, str) for n in chosen)
         if texts and len(chosen) == len(set(chosen)) == len(shape):
             return tuple(chosen)
         raise InputError(
-            f"dims must be {len(shape)} different names, one for each axis, got {shown(given)}; "
+            f"dims must be {len(shape)} different names, one for each axis, got {shown(dims)}; "
             "leave it out to have the axes named by what varies"
         )
     along: dict[str, list[int]] = {}

@@ -100,7 +100,7 @@ class Solution(NamedTuple):
         self.outcome[rows] = Outcome.CONVERGED
 
     def discard(self, rows: Indices) -> None:
-        """Set the numbers of failed points to NaN, so that none is mistaken for an answer."""
+        """Set the numbers of failed points to NaN, which cannot be mistaken for answers."""
         for values in self[:5]:
             values[..., rows] = np.nan
 

@@ -73,7 +73,7 @@ def require_disk(size: float, folder: Path, name: str, what: str, way_out: str) 
 def _require(size: float, free: float, name: str, what: str, way_out: str, where: str) -> None:
     if size > _SHARE * free:
         raise InputError(
-            f"{name} must come to what there is room for, got {what}, {size_text(size)}, with "
+            f"{name} must fit into the free space, got {what}, {size_text(size)}, with "
             f"{size_text(free)} {where} free; {way_out}"
         )
 

@@ -129,7 +129,7 @@ class UnfinishedOutput:
         Parameters
         ----------
         progress : mapping of str to object
-            JSON values; doubles are read back as they are.
+            JSON values, from which doubles are restored exactly.
         """
         fresh = fresh_name(self.record)
         progress = dict(progress)
@@ -165,7 +165,7 @@ class UnfinishedText(UnfinishedOutput):
     """Finished blocks of lines of text.
 
     The progress holds ``length``, the bytes of the finished blocks, ``crc32``, their checksum,
-    ``rows`` and whatever else is counted.
+    ``rows`` and further counts.
     """
 
     def start(self, resume: bool) -> dict[str, Any]:
@@ -238,7 +238,7 @@ class UnfinishedText(UnfinishedOutput):
         what : str
         total : int
         counted : str
-            The count that says how many are finished, by its name in `append`.
+            Name in `append` of the count of finished items.
         """
         try:
             yield

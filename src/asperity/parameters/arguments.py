@@ -9,7 +9,7 @@ from __future__ import annotations
 import collections.abc
 import inspect
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache, wraps
 from pathlib import Path
 from types import GenericAlias, NoneType, UnionType
@@ -120,14 +120,16 @@ def _taken(value: Any, kind: Any, name: str) -> Any:
         if isinstance(value, type(parts[0])):
             return one_of(value, parts, name)
     elif origin in (bool, int, float):
+        if origin is float and _is_one_number(value):
+            return value
         plain = value.item() if isinstance(value, np.generic) else value
         number = int | float if origin is float else origin
         if isinstance(plain, number) and isinstance(plain, bool) == (origin is bool):
             return plain
     elif origin in (tuple, Sequence):
         alike = origin is Sequence or parts[-1] is ...
-        several = isinstance(value, np.ndarray) and value.ndim > 0
-        several = several or isinstance(value, tuple | list | range)
+        listed = isinstance(value, Collection) and not isinstance(value, str | bytes | Mapping)
+        several = listed and getattr(value, "shape", None) != ()
         if several and (alike or len(value) == len(parts)):
             kinds = parts[:1] * len(value) if alike else parts
             each = enumerate(zip(value, kinds, strict=True))
@@ -138,6 +140,12 @@ def _taken(value: Any, kind: Any, name: str) -> Any:
     elif isinstance(value, NoneType if origin is None else origin):
         return value
     raise _OtherTypeError
+
+
+def _is_one_number(value: Any) -> bool:
+    """Whether it is an array of one number, which may stand for the number."""
+    shape, kind = getattr(value, "shape", None), getattr(getattr(value, "dtype", None), "kind", "")
+    return shape in ((), (1,)) and kind in "iuf"
 
 
 #: Types in the words of a message.

@@ -15,7 +15,7 @@ from functools import cache
 from types import MappingProxyType
 from typing import Any
 
-from asperity.errors import InputError, closest
+from asperity.errors import Argument, InputError, closest
 from asperity.parameters.arguments import shown
 from asperity.parameters.parameter import Output, Parameter
 
@@ -350,7 +350,9 @@ def canonical_name(name: str, known: Mapping[str, Parameter]) -> str | None:
     return next((p.name for p in known.values() if name in p.aliases), None)
 
 
-def known_name(name: str, known: Mapping[str, Parameter], label: str = "parameter") -> str:
+def known_name(
+    name: str, known: Mapping[str, Parameter], label: str | Argument = "parameter"
+) -> str:
     """As `canonical_name`.
 
     Raises

@@ -68,9 +68,9 @@ def numbers_of(
     known = {**law_parameters(law), **MACHINE}
     refuse_foreign(law_name, stated)
     for name in stated:
-        known_name(name, known, "parameters")
+        known_name(name, known, f"parameters.{name}")
     source = materials.load_from(folder, material) if material else None
-    numbers = sourced_numbers(stated, source, "protocol", law_name)
+    numbers = sourced_numbers(stated, source, "protocol", law_name, "parameters")
     return numbers_for(law_name, numbers, known, ("M",) if inertia else ())
 
 

@@ -145,17 +145,9 @@ class StepForm:
         return re.compile(named, re.IGNORECASE)
 
 
-def _step_load(parts: Mapping[str, Any], folder: Path) -> ProgrammeStep:
-    return StepLoad(parts["load"])
-
-
 def _list(text: str) -> tuple[str, ...]:
     """Quantities with commas between them, each with its unit."""
     return tuple(part.strip() for part in text.split(","))
-
-
-def _modulate(parts: Mapping[str, Any], folder: Path) -> ProgrammeStep:
-    return Modulate(**parts)
 
 
 #: All forms of steps.
@@ -169,9 +161,11 @@ FORMS = (
     StepForm(
         "modulate {epsilon} at {frequency} for {duration}[rising in {rise}][falling in {fall}]",
         "modulate 24 % at 120 Hz for 20 s",
-        _modulate,
+        lambda parts, folder: Modulate(**parts),
     ),
-    StepForm("step load to {load}", "step load to 9 N", _step_load),
+    StepForm(
+        "step load to {load}", "step load to 9 N", lambda parts, folder: StepLoad(parts["load"])
+    ),
     StepForm(
         "ramp load to {load} in {duration}",
         "ramp load to 9 N in 5 s",

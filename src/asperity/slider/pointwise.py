@@ -1,6 +1,6 @@
 """The compiled programs of a law: its equation of motion at single phases, with derivatives.
 
-Everything that solves orbits on meshes works on these arrays and knows no law. A program works on
+Solvers of orbits on meshes work on these arrays, independent of the law. A program works on
 `ROWS` phases of all operating points, so that one serves all meshes.
 """
 

@@ -300,7 +300,7 @@ def law_name(law: Any, folder: Path) -> str:
 
 def checked_value(parameter: Parameter, value: Any) -> float:
     """One number of a plan in SI."""
-    number = parameter.check(value)
+    number = parameter.check(value, parameter.name)
     if np.ndim(number):
         raise InputError(f"{parameter.name} must be one number, got {shown(value)}")
     return float(number)
@@ -350,7 +350,9 @@ def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter])
     if column in TEXTS:
         raise InputError(f"over must name numbers, got '{column}'; add an axis of its values")
     if set(table) == {"mean", "std"}:
-        mean, std = checked_value(known[column], table["mean"]), _width(known[column], table["std"])
+        parameter = known[column]
+        mean = checked_value(parameter, table["mean"])
+        std = float(obeying(table["std"], f"{parameter.name}.std", parameter.kind, "positive"))
         return {"low": mean, "high": std, "kind": "normal"}
     if not {"from", "to"} <= set(table) <= {"from", "to", "spacing"}:
         raise InputError(
@@ -364,11 +366,6 @@ def _spread(name: str, table: Mapping[str, Any], known: Mapping[str, Parameter])
     spacing = table.get("spacing", "linear")
     _check_spacing(f"over.{name}", spacing, low, high, ("linear", "log"))
     return {"low": low, "high": high, "kind": spacing}
-
-
-def _width(parameter: Parameter, value: Any) -> float:
-    """A standard deviation in SI."""
-    return float(obeying(value, f"{parameter.name}.std", parameter.kind, "positive"))
 
 
 def _cases(

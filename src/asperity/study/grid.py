@@ -69,9 +69,9 @@ def _numbers(plan: SweepPlan) -> Iterator[tuple[str, str, Any]]:
         for case in table.cases or ():
             for name, value in case.items():
                 grid = isinstance(value, Mapping)
-                values = [value.get("from"), value.get("to")] if grid else value
-                for number in values if isinstance(values, list | tuple) else [values]:
-                    yield f"{where}.cases.{name}", name, number
+                entries = [value.get("from"), value.get("to")] if grid else value
+                for entry in entries if isinstance(entries, list | tuple) else [entries]:
+                    yield f"{where}.cases.{name}", name, entry
         for name, spread in (table.over or {}).items():
             for value in spread.values():
                 yield f"{where}.over.{name}", name, value
@@ -124,7 +124,7 @@ class SweepGrid:
         if grid.points > _MOST_POINTS:
             raise PlanError(
                 [
-                    f"axes must come to at most {_MOST_POINTS:.3g} points, got "
+                    f"axes must give at most {_MOST_POINTS:.3g} points, got "
                     f"{' x '.join(map(shown, grid.shape))}; shorten them"
                 ]
             )

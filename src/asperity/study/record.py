@@ -38,7 +38,7 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
     PlanError
         With all mistakes in the names and values of the plan.
     """
-    mistakes: list[str] = []
+    mistakes: list[str | InputError] = []
     axes: dict[str, Any] = {}
     laws = laws_named(plan, mistakes)
     known = known_names(laws, plan.solve)
@@ -51,7 +51,9 @@ def plan_record(plan: SweepPlan) -> dict[str, Any]:
                 )
             axes[written] = axis
         except InputError as error:
-            mistakes.append(f"axes.{name}: {error}")
+            at = error.field.name
+            place = f"axes.{name}" if at == name else f"axes.{name}.{at}"
+            mistakes.append(error.about(place) if error.rule else f"axes.{name}: {error}")
     if not plan.axes:
         mistakes.append("axes must have at least one axis, got none; add a table like [axes.K]")
     numbers: dict[str, float] = {}
@@ -112,7 +114,7 @@ def _law_files(plan: SweepPlan) -> dict[str, str]:
     return digests
 
 
-def laws_named(plan: SweepPlan, mistakes: list[str]) -> list[str]:
+def laws_named(plan: SweepPlan, mistakes: list[str | InputError]) -> list[str]:
     """Laws of the plan, without repetition, in their order."""
     names = []
     for law in dict.fromkeys(plan.laws):
@@ -143,7 +145,7 @@ def _numbers(
     written = {n: v for n, v in plan.parameters.items() if canonical_name(n, known) not in ratios}
     varied = {column for axis in axes.values() for column in columns_of(axis)}
     targets = {RATIOS[n].target: n for n in {*ratios, *varied} & set(RATIOS)}
-    offered = sourced_numbers(written, material, "plan", laws[0] if laws else None)
+    offered = sourced_numbers(written, material, "plan", laws[0] if laws else None, "parameters")
     explicit = {canonical_name(name, known) for name in written}
     for name in sorted({*explicit, *ratios} & varied, key=str):
         raise InputError(

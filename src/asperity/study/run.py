@@ -130,7 +130,9 @@ def run_sweep(
         if swept:
             log(f"{swept} half-written files of killed processes were removed")
         try:
-            require_disk(_bytes_left(store), path.parent, "out", f"{store.grid.points:,} points",
+            # Bytes of the chunks that are not done, uncompressed.
+            missing = (1 - store.share_done()) * store.grid.bytes
+            require_disk(missing, path.parent, "out", f"{store.grid.points:,} points",
                          "choose another disk or fewer outputs")  # fmt: skip
             pool_workers = stack.enter_context(pool)
         except InputError:
@@ -249,11 +251,6 @@ def _require_coordinates(grid: SweepGrid, folder: Path) -> None:
     )  # fmt: skip
 
 
-def _bytes_left(store: SweepStore) -> float:
-    """Bytes that the chunks which are not done will take, uncompressed, at most."""
-    return (1 - store.share_done()) * store.grid.bytes
-
-
 def _run(
     store: SweepStore,
     lock: StoreLock,
@@ -286,7 +283,7 @@ def _run(
         raise InputError(
             f"workers must run until the sweep ends, got no answer any more ({workers.about}) "
             f"after {counts.points:,} of {counts.total:,} points; start a cluster and repeat the "
-            "command, which goes on from there"
+            "command, which continues from there"
         ) from None
     finally:
         with contextlib.suppress(OSError):
@@ -315,7 +312,7 @@ def _writing(path: Path, counts: SweepProgress | None = None) -> Iterator[None]:
         done = f" after {counts.points:,} of {counts.total:,} points" if counts else ""
         raise InputError(
             f"out must be a folder that can be written, got '{path.name}' ({why}, {room} free)"
-            f"{done}; make room and repeat the command, which goes on from there"
+            f"{done}; make room and repeat the command, which continues from there"
         ) from None
 
 

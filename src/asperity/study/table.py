@@ -535,6 +535,6 @@ def _check(
         pass
     for i in np.flatnonzero(present):
         try:
-            parameter.check(float(numbers[i]))
+            parameter.check(float(numbers[i]), parameter.name)
         except InputError as error:
             reasons[i] = reasons[i] or str(error)

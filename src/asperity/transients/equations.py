@@ -212,6 +212,6 @@ def states_after_jump(motion: Motion, before: Excitation, after: Excitation, Y: 
         return jnp.stack(jnp.broadcast_arrays(*rates))
 
     _, per_way = jax.jvp(state_rates, (motion.V,), (jnp.ones_like(motion.V),))
-    way = jump * motion.slider.W0 / motion.slider.K
-    jumps = jnp.concatenate([jnp.zeros(len(motion.mechanical)), per_way * way, jump[None]])
+    displacement = jump * motion.slider.W0 / motion.slider.K
+    jumps = jnp.concatenate([jnp.zeros(len(motion.mechanical)), per_way * displacement, jump[None]])
     return Y + jumps

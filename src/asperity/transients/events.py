@@ -82,7 +82,8 @@ class Event:
     time : float
         Seconds.
     kind : str
-        "slip start", "slip end", "steady", "reversal", or the kind of a `Termination`.
+        "slip start", "slip end", "steady", "reversal", or the kind of a `Termination`; where a
+        level of the force is given, "fall" through it, and "peak" and "trough" of the force.
     """
 
     time: float
@@ -102,11 +103,14 @@ class EventThresholds:
     steady : float
         Relative deviation below which sliding counts as steady, or change of a state over a period
         below which the response to a modulation counts as steady.
+    level : float or None
+        F/W0 through which falls of the force are events, with its extrema under a steady drive.
     """
 
     slip: float
     runaway: float
     steady: float
+    level: float | None = None
 
 
 #: Signed distance from a threshold; an event is a change of its sign.
@@ -137,6 +141,10 @@ class EventDetector:
         self._runaway: Distance = lambda r: log_speed(r.slip, thresholds.runaway)
         self._unsteadiness: Distance = lambda r: np.log(r.unsteadiness / thresholds.steady)
         self._friction: Distance = lambda r: r.friction
+        self._level = thresholds.level
+        self._above: Distance = lambda r: r.force - thresholds.level
+        # The drive moves at V where a level is given.
+        self._ahead: Distance = lambda r: r.velocity - 1
         self._steady = thresholds.steady
         self._before: dict[str, float] = {}
 
@@ -170,6 +178,11 @@ class EventDetector:
             Event(t, "slip start" if up else "slip end")
             for t, up in self._crossings("slip", self._slip, times, samples, dense_output)
         ]
+        if self._level is not None:
+            falls = self._crossings("level", self._above, times, samples, dense_output)
+            extrema = self._crossings("extremum", self._ahead, times, samples, dense_output)
+            result += [Event(t, "fall") for t, up in falls if not up]
+            result += [Event(t, "peak" if up else "trough") for t, up in extrema]
         terminations = []
         if self._may_run_away:
             crossed = self._crossings("runaway", self._runaway, times, samples, dense_output)

@@ -111,9 +111,9 @@ def attempt_step(
     error = h * fifth / jnp.sqrt((fifth + 0.01 * third + 1e-300) * size)
     # The last two stages lie at the end of the step: two slopes, and two states.
     steep = jnp.square(h * (stages[12] - stages[11]) / scale).sum()
-    apart = jnp.square((new - before) / scale).sum()
-    at_limit = steep > _STIFF**2 * apart
-    error = jnp.where(steep > _UNSTABLE**2 * apart, jnp.inf, error)
+    distance = jnp.square((new - before) / scale).sum()
+    at_limit = steep > _STIFF**2 * distance
+    error = jnp.where(steep > _UNSTABLE**2 * distance, jnp.inf, error)
     return TrialStep(new, error, _SAFETY * error ** (-1 / 8), slope, at_limit, (Y, stages))
 
 

@@ -108,7 +108,7 @@ def _after_hold(
     end = jnp.where(lost, End.TOO_MANY_STEPS, reloaded.end)
     maximum = _force(motion, reloaded.Y)
     maximum = jnp.where(end == End.STEADY, jnp.maximum(maximum, level), maximum)
-    way = slider.W0 / slider.K
+    length_scale = slider.W0 / slider.K
     at_end, at_maximum = (
         jnp.exp(ConstantDrive(motion, None).log_slip(end_of.Y.T)) for end_of in (holding, reloaded)
     )
@@ -116,13 +116,13 @@ def _after_hold(
         level,
         _force(motion, holding.Y),
         jnp.where(lost, jnp.nan, maximum),
-        holding.Y[:, -1] * way,
+        holding.Y[:, -1] * length_scale,
         at_end,
         at_maximum,
         holding.Y[:, :-1],
         reloaded.Y[:, :-1],
         jnp.where(lost, jnp.nan, reloaded.t * V),
-        jnp.where(lost, jnp.nan, (reloaded.Y[:, -1] - holding.Y[:, -1]) * way),
+        jnp.where(lost, jnp.nan, (reloaded.Y[:, -1] - holding.Y[:, -1]) * length_scale),
         end,
     )
     # The displacement counts from the beginning of reloading.
@@ -176,13 +176,13 @@ def _before_step(slider: Slider, V_before: Array, V: Array) -> tuple[Array, Driv
 def _after_step(slider: Slider, V: Array, start: Array, reached: Reached) -> StepResponse:
     motion = QuasiStatic(slider, V, 1.0)
     lost = reached.end == End.TOO_MANY_STEPS
-    way = slider.W0 / slider.K
+    length_scale = slider.W0 / slider.K
     return StepResponse(
         _force(motion, start),
         jnp.where(lost, jnp.nan, _force(motion, reached.Y)),
         _force(motion, _from_here(motion.steady())),
         jnp.where(lost, jnp.nan, reached.t * V),
-        jnp.where(lost, jnp.nan, reached.Y[:, -1] * way),
+        jnp.where(lost, jnp.nan, reached.Y[:, -1] * length_scale),
         reached.Y[:, :-1],
         reached.end,
     )
@@ -220,11 +220,11 @@ def _to_steady(slider: Slider, V: Array, extremum: Reached, runaway: Array) -> D
 def _settling(slider: Slider, V: Array, extremum: Reached, on: Reached) -> SettlingDistance:
     crossing = extremum.end == End.CROSSING
     over = crossing & (on.end == End.STEADY)
-    way = slider.W0 / slider.K
+    length_scale = slider.W0 / slider.K
     return SettlingDistance(
         jnp.where(crossing, on.end, extremum.end),
         jnp.where(over, (extremum.t + on.last) * V, jnp.nan),
-        jnp.where(over, on.last_Y[:, -1] * way, jnp.nan),
+        jnp.where(over, on.last_Y[:, -1] * length_scale, jnp.nan),
     )
 
 

@@ -1,19 +1,17 @@
 """Integration through the segments of a programme, one compiled chunk of steps at a time.
 
-Where the steps of the explicit method are limited by stability, the implicit one goes on.
+The implicit method replaces the explicit one where stability limits the explicit steps.
 
 A slider on elastic asperities rings at sqrt(W0 / (lambda M)). In a hold the slip that damps the
-ringing becomes slower and slower, so that a trace of it is left for ever, and steps that resolve it
-never become longer. Where such steps are too many, the velocity of the slider is integrated with
-the error that corresponds to the tolerated error of the force on the asperities,
+ringing becomes slower and slower, so that the ringing never ends, and steps that resolve it never
+become longer. If the number of such steps is too large, the velocity of the slider is integrated
+with the error that corresponds to the tolerated error of the force on the asperities,
 
     |dv| = sqrt(lambda W0 / M) |d(F_i/W)|,
 
 the velocity with which the slider rings while F_i/W swings by its tolerated error. The implicit
-method then takes steps longer than a period and damps the ringing that is left. All other states
-keep their tolerances.
-
-Stiffness-based choice of the method.
+method then takes steps longer than a period and damps the remaining ringing. All other states keep
+their tolerances.
 """
 
 from __future__ import annotations

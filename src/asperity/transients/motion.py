@@ -234,7 +234,7 @@ def transient(
     Returns
     -------
     Trajectory
-        Up to the end of the programme, or to where `stopped` says why it ends before: contact
+        Up to the end of the programme, or to an earlier end with its reason in `stopped`: contact
         lost, runaway without inertia, reversal of slip for a law that does not have it, too many
         steps.
 

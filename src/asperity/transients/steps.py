@@ -1,14 +1,13 @@
-"""Steps of controlled length, one after the other, whatever the method that makes them.
+"""Step-size control, common to the explicit and the implicit method.
 
 Loops over small arrays are compiled as one kernel of the processor. XLA runs every operation of the
-body of a loop as a separate kernel. For arrays of a few numbers, calling the kernels
-takes several times as long as what they compute. A call that carries the attributes below is
-compiled to a single kernel, control flow included; compilers that do not know them run it as they
-run any call.
+body of a loop as a separate kernel. For arrays of a few numbers, calling the kernels takes several
+times as long as their computation. A call with the attributes below is compiled to a single kernel
+with its control flow; compilers without these attributes ignore them.
 
-XLA cannot compile all programs so, and may abort the process (jaxlib 0.10.2). Only programs made
-of element-wise operations on scalar parameters are compiled this way: every law with a closed
-form for its velocity, under any load that is not a table.
+XLA cannot compile every program to one kernel, and may abort the process (jaxlib 0.10.2). Only
+programs of element-wise operations on scalar parameters are compiled this way: every law with a
+closed form for its velocity, under any load except a table.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ import numpy as np
 from jax import Array
 from jax.experimental.xla_metadata import set_xla_metadata
 
+from asperity.slider import ReversingInertial, StiffInertial
 from asperity.transients.dense_output import GOING_ON, STEPS, UNDERFLOW, StepChunk
 from asperity.transients.equations import SegmentEquations
 
@@ -105,6 +105,9 @@ def _primitives(jaxpr: Any) -> Iterator[str]:
 
 #: Factor by which a rejected step is shortened at least.
 _SAFETY = 0.9
+
+#: Shortest step (s) where the clock does not matter.
+_SHORTEST = 1e-200
 
 #: Trial steps in a call of a compiled program; between calls Python can handle Ctrl-C.
 _TRIALS = 4 * STEPS
@@ -199,6 +202,10 @@ def run_steps(
         Passed to the first step.
     limits : LengthLimits
     """
+    # Where a slip ends, the logarithm of the velocity changes within times far below the resolution
+    # of the clock, over which load and drive stay as they are.
+    by_rest = isinstance(system.motion, StiffInertial | ReversingInertial)
+    shortest = _SHORTEST if by_rest else 0.0
 
     def unfinished(run: AcceptedSteps) -> Array:
         tried = run.taken + run.rejected
@@ -217,7 +224,7 @@ def run_steps(
         factor = jnp.where(jnp.isfinite(trial.error), factor, limits.shrink)
         h_next = h * jnp.where(good, factor, jnp.minimum(factor, _SAFETY))
         # A length of NaN ends the loop, too.
-        lost = ~good & ~(t + h_next > t)
+        lost = ~good & ~(h_next > shortest if shortest else t + h_next > t)
 
         def accepted(new: Array, old: Array) -> Array:
             return jnp.where(good, new, old)

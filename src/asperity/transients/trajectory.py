@@ -154,7 +154,7 @@ def sample_times(sampling: Any, duration: float) -> SampleTimes:
             )
         if rate * duration > _MOST_ROWS:
             raise InputError(
-                f"sampling must come to at most {_MOST_ROWS:g} rows, got {rate:g} Hz for "
+                f"sampling must give at most {_MOST_ROWS:g} rows, got {rate:g} Hz for "
                 f"{duration:g} s; lower the rate or shorten the programme"
             )
         return EvenTimes(rate)

@@ -195,8 +195,8 @@ def _rows(
         keep = wanted & np.isfinite(readings.values.get(name, np.nan))
         if not keep.any():
             return None
-        columns = ({name: a[name]} for a in (readings.values, readings.errors))
-        return LockInTable(readings.name, readings.points, *columns).without(~keep)
+        values, errors = ({name: a[name]} for a in (readings.values, readings.errors))
+        return LockInTable(readings.name, readings.points, values, errors).without(~keep)
 
     steady = part("mean_friction", ~modulated)
     if steady is None:

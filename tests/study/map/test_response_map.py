@@ -221,7 +221,7 @@ def test_an_interruption_before_the_first_block_leaves_nothing(numbers, tmp_path
         ("rice-ruina", {"K": 2e5}, (EPS, K), ["K must be given once, got an axis and a fixed"]),
         ("rice-ruina", {}, (Axis("alpha", 0.0, 0.1, 3), K), ["'alpha'", "linker-dieterich"]),
         ("rice-runia", {}, (EPS, K), ["did you mean 'rice-ruina'?"]),
-        ("rice-ruina", {"V": "1 um"}, (EPS, K), ["velocity must be a velocity (m/s), got '1 um'"]),
+        ("rice-ruina", {"V": "1 um"}, (EPS, K), ["numbers['V'] must be a velocity (m/s)"]),
         ("rice-ruina", {"inertia": 1}, (EPS, K), ["M must be positive where inertia"]),
         ("linker-dieterich", {}, (EPS, K), ["must have all its numbers, got none for alpha"]),
         ("rice-ruina", {}, (Axis("V", 1e-6, 1e-5, 3), K), ["got none for epsilon"]),
@@ -259,6 +259,6 @@ def test_a_map_beyond_memory_is_refused_before_anything(numbers, tmp_path, monke
         columns = int(10 ** draw.uniform(0.5, 8))
         x = Axis("epsilon", 0.0, 0.4, columns)
         y = Axis("K", 1e5, 3e5, int(min(10**8, max(2, 10 ** draw.uniform(7.6, 9) / columns))))
-        with pytest.raises(InputError, match=r"axes must come to what there is room for, got .* x"):
+        with pytest.raises(InputError, match=r"axes must fit into the free space, got .* x"):
             write_map(tmp_path / "map.nc", "rice-ruina", numbers, x=x, y=y)
     assert list(tmp_path.iterdir()) == []

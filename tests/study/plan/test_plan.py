@@ -101,13 +101,13 @@ def test_plans_beyond_memory_are_refused_before_anything(
     few = {"epsilon": {"values": (0.1, 0.2)}}
     huge = int(10 ** draw.uniform(9, 18))
     plans = {
-        "axes must come to at most": {"axes": spans(*rows)},
+        "axes must give at most": {"axes": spans(*rows)},
         "axis must have from 1 to 1,000,000 rows": {"axes": {"case": {"cases": [lists]}}},
-        "axes must come to": {"axes": {"sample": drawn}},
-        "threshold.scan must come to what": {
+        "axes must (fit into|give at most)": {"axes": {"sample": drawn}},
+        "threshold.scan must fit into": {
             "axes": few, "solve": "threshold", "threshold": {"scan": huge}
         },
-        "chunk must come to what": {
+        "chunk must fit into": {
             "axes": {"epsilon": few["epsilon"], **spans(10**5, 1, 10**5)}, "chunk": huge
         },
     }  # fmt: skip

@@ -180,7 +180,7 @@ def test_a_full_disk_is_a_sentence_and_costs_nothing(
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(durable, "sync_file", full)
-        with pytest.raises(InputError, match=r"the disk is full.*goes on from there"):
+        with pytest.raises(InputError, match=r"the disk is full.*continues from there"):
             run(out)
     assert store_status(out).done < POINTS
     run(out)
@@ -192,14 +192,14 @@ def test_a_refused_start_leaves_no_store(tmp_path: Path, closed_form: ClosedForm
     out = tmp_path / "s.zarr"
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run_module, "_bytes_left", lambda store: 1e30)
-        with pytest.raises(InputError, match="what there is room for"):
+        with pytest.raises(InputError, match="fit into the free space"):
             run(out)
         assert not out.exists()
     assert run(out).points == POINTS
     before = files_of(out)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(run_module, "_bytes_left", lambda store: 1e30)
-        with pytest.raises(InputError, match="what there is room for"):
+        with pytest.raises(InputError, match="fit into the free space"):
             run(out)
     assert files_of(out) == before
 

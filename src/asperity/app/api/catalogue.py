@@ -6,6 +6,7 @@ Names, units, rules and defaults are those of `asperity.parameters`, values thos
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from latex2mathml.converter import convert
@@ -29,6 +30,9 @@ from asperity.parameters import (
 from asperity.parameters.parameter import plain_text
 from asperity.units import KINDS, to_si
 
+#: The documentation of a clone, once ``make docs`` has built it.
+DOCS = Path(__file__).parents[4] / "docs" / "_build" / "html"
+
 #: Numbers of the air layer and of the contacts beside it: the names under which materials have
 #: them, symbol and meaning. `asperity.air` says what each is.
 AIR = {
@@ -50,6 +54,7 @@ def as_json() -> str:
     return to_json(
         {
             "version": __version__,
+            "docs": DOCS.is_dir(),
             "kinds": {
                 name: {"si": kind.si, "ladder": kind.ladder, "example": kind.example}
                 for name, kind in KINDS.items()

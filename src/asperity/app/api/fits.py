@@ -144,8 +144,8 @@ def fit(argument: Mapping[str, Any], report: Callable[..., None]) -> dict[str, A
 
     The result has ``fit`` or ``comparison``, and ``sections``, what these say in words and tables,
     of a comparison with ``laws``, those of each law; of the fit or the best one the pictures
-    ``bands``, ``residuals`` and ``runs``; and, where they were asked for, ``posterior`` and
-    ``report``, the folder as a ZIP file in base64.
+    ``bands``, ``residuals`` and ``runs``; and, if requested, ``posterior`` and ``report``, the
+    folder as a ZIP file in base64.
     """
     from asperity.inference.answers import answer_comparison, answer_fit
     from asperity.inference.comparison.record import comparison_record

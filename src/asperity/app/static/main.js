@@ -102,6 +102,10 @@ async function start() {
   page.catalogue = await get("catalogue");
   useKinds(page.catalogue.kinds);
   useNames(page.catalogue);
+  if (page.catalogue.docs) {
+    const to = (file, text) => el("a", { href: `/docs/${file}.html` }, text);
+    fill(document.getElementById("docs"), "Documentation: ", to("index", "all pages"), ", ", to("app", "this page"), ", ", to("nomenclature", "names and units"), ".");
+  }
   fill(bar, TABS.map((t) => el("li", {}, el("a", {
     href: `#${t.name}`, "data-tab": t.name,
     click: (event) => {

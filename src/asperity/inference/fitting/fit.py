@@ -14,6 +14,8 @@ from typing import Any
 import numpy as np
 
 from asperity.errors import InputError
+from asperity.inference.cycles.cycle import AveragedCycle
+from asperity.inference.cycles.term import CycleTerm
 from asperity.inference.fitting.description import described_fit, failed_fit
 from asperity.inference.fitting.inputs import (
     fixed_values,
@@ -60,14 +62,14 @@ from asperity.inference.tables.term import Forward, LockInTerm
 from asperity.inference.unknowns import Prior, material_priors, unknowns_of
 from asperity.laws import Law, get_law
 from asperity.materials import Material
-from asperity.parameters import law_parameters
+from asperity.parameters import MACHINE, law_parameters
 from asperity.parameters.arguments import typed
 from asperity.recording import Trace
 
 #: The level of sliding (dimensionless; m/s), for data that are counted from it.
 _OF_THE_LEVEL = {"mu0": 0.6, "V0": 1e-6}
 
-Data = LockInTable | HealingTable | RecordedRun | Trace
+Data = LockInTable | HealingTable | AveragedCycle | RecordedRun | Trace
 
 
 @typed
@@ -95,8 +97,8 @@ def fit(
 
     Parameters
     ----------
-    data : LockInTable, HealingTable, RecordedRun or Trace, or several
-        All in one likelihood; tables of holds go with their like alone.
+    data : LockInTable, HealingTable, AveragedCycle, RecordedRun or Trace, or several
+        All in one likelihood; tables of holds, and averaged cycles, go with their like alone.
     law : str or type of Law
         Rate-dependent.
     free : sequence of str, optional
@@ -160,6 +162,17 @@ def fit(
     table = joined(tables)[0] if tables else None
     names = free_by_default(chosen, several, fixed, material) if free is None else list(free)
 
+    cycles = [d for d in several if isinstance(d, AveragedCycle)]
+    if cycles:
+        if len(cycles) < len(several):
+            raise InputError(
+                "data must be cycles of stick-slip alone or other data, got both; fit them one "
+                "after the other, with the first as the prior of the second"
+            )
+        objective = _cycle_objective(
+            chosen, cycles, free, fixed=fixed or {}, material=material, prior=prior, start=start
+        )
+        return _fit_alone(objective, seed, starts, progress, profile=profile, simpler=simpler)
     if holds:
         if len(holds) < len(several):
             raise InputError(
@@ -176,7 +189,7 @@ def fit(
             start=start,
             bare=bare,
         )
-        return _fit_to_holds(objective, seed, starts, progress, profile=profile, simpler=simpler)
+        return _fit_alone(objective, seed, starts, progress, profile=profile, simpler=simpler)
 
     def compared(recordings: Sequence[RecordedRun]) -> Objective:
         return _objective(
@@ -273,7 +286,59 @@ def _hold_objective(
     return Objective((term,), law, unknowns, constants, tolerance=1e-9)
 
 
-def _fit_to_holds(
+def _cycle_objective(
+    law: type[Law],
+    cycles: Sequence[AveragedCycle],
+    free: Sequence[str] | None,
+    *,
+    fixed: Mapping[str, Any],
+    material: Material | None,
+    prior: Material | Mapping[str, Prior] | None,
+    start: Mapping[str, Any] | None,
+) -> Objective:
+    """The function to minimise for averaged cycles, everything wrong refused."""
+    first, numbers = cycles[0], law_parameters(law)
+    # The level of friction is fitted in each cycle.
+    given = {n: v for n, v in fixed.items() if n not in ("V", "W0")}
+    level = float(np.mean(first.values[:-1]))
+    given = {n: v for n, v in {"mu0": level, "V0": first.V}.items() if n in numbers} | given
+    names = [n for n in (*numbers, "K", "M") if n not in given] if free is None else list(free)
+    if "mu0" in names:
+        raise InputError(
+            "free must be what the shape of a cycle shows, got 'mu0'; leave it out: a constant "
+            "friction is fitted in each cycle"
+        )
+    unseen = [c.name for c in cycles if not c.resolved]
+    if unseen and "M" in names:
+        raise InputError(
+            f"M must be fixed where a slip is shorter than four samples, got it free for "
+            f"{unseen[0]}; fix M, or sample faster"
+        )
+    constants = fixed_values(law, None, names, given, material)
+    if "K" in given and "K" not in names:
+        constants["K"] = float(MACHINE["K"].check(given["K"]))
+    missing = [n for n in ("K", "M") if n not in names and not constants.get(n)]
+    if missing:
+        raise InputError(
+            f"{missing[0]} must be free or fixed for a fit of cycles, got neither; name it in "
+            "--free, or give it with --fix"
+        )
+    priors = material_priors(prior, names) if isinstance(prior, Material) else dict(prior or {})
+    require_free(law, names, priors, bare=False)
+    # A stick loads by K V/W0, and a slip lasts for half a period of sqrt(K/M).
+    K = first.loading_slope * first.W0 / first.V
+    M = float(constants.get("K", K)) * (first.slip_duration / np.pi) ** 2
+    begun = {"K": K, "M": M} | start_values(law, names, start, material)
+    usual = {"K": (K / 1.5, K * 1.5), "M": (M / 4, M * 2), "B": (first.drop / 40, first.drop / 2)}
+    unknowns = unknowns_of(
+        law, names, largest_epsilon=0.0, start={n: v for n, v in begun.items() if n in names},
+        priors=priors, usual=usual,
+    )  # fmt: skip
+    terms = tuple(CycleTerm(cycle, law, constants) for cycle in cycles)
+    return Objective(terms, law, unknowns, constants, tolerance=1e-6)
+
+
+def _fit_alone(
     objective: Objective,
     seed: int,
     starts: int,
@@ -282,18 +347,19 @@ def _fit_to_holds(
     profile: bool,
     simpler: Sequence[Fit],
 ) -> Fit:
-    """The fit, under the error that the residuals of the best minimum show if none is given."""
+    """The fit of one kind of data; the error of holds is that of the residuals if none is given."""
     steps = _Steps(progress, len(objective.unknowns))
     special = [f.values for f in simpler if f.converged and extends(objective.law, f.objective.law)]
     minima = minima_of(objective, seed, steps.minimised, drawn=starts, simpler=special)
     if not minima or not math.isfinite(minima[0].chi2):
         return failed_fit(objective)
-    for term in objective.terms_of(HoldTerm):
-        term.estimate_error(objective.named(minima[0].u), len(objective.unknowns))
-    objective.forget()
-    best = objective.minimise(minima[0].u)
-    others = [Minimum(m.u, objective.chi2(m.u)) for m in minima[1:]]
-    return described_fit(objective, [best, *others], profile=profile, described=steps.described)
+    if objective.terms_of(HoldTerm):
+        for term in objective.terms_of(HoldTerm):
+            term.estimate_error(objective.named(minima[0].u), len(objective.unknowns))
+        objective.forget()
+        best = objective.minimise(minima[0].u)
+        minima = [best, *(Minimum(m.u, objective.chi2(m.u)) for m in minima[1:])]
+    return described_fit(objective, minima, profile=profile, described=steps.described)
 
 
 class _Steps:
@@ -330,11 +396,11 @@ def _begun(result: Fit, recordings: Sequence[RecordedRun], given: Any) -> dict[s
 
 def listed_data(
     data: Data | Iterable[Data], options: RunOptions
-) -> list[LockInTable | HealingTable | RecordedRun]:
+) -> list[LockInTable | HealingTable | AveragedCycle | RecordedRun]:
     """One set of data or several as a list, recordings made ready."""
-    single = LockInTable | HealingTable | RecordedRun | Trace
-    several = [data] if isinstance(data, single) else list(data)
-    ready = [d if isinstance(d, LockInTable | HealingTable) else run_of(d) for d in several]
+    of_its_own = LockInTable | HealingTable | AveragedCycle
+    several = [data] if isinstance(data, of_its_own | RecordedRun | Trace) else list(data)
+    ready = [d if isinstance(d, of_its_own) else run_of(d) for d in several]
     require_own_samples([d for d in ready if isinstance(d, RecordedRun)])
     rate = options.fit_rate
     return [cleaned(d, rate) if isinstance(d, RecordedRun) else d for d in ready]

@@ -107,7 +107,7 @@ def start_values(
                 "start", "be of free parameters", f"'{name}'", "free it or leave it out"
             )
         # A stiffness is read with the run that it belongs to.
-        known[name] = value if name.startswith("K") else float(_checked(law, name, value))
+        known[name] = value if name.startswith("K") else float(_checked(law, "start", name, value))
     return known
 
 
@@ -195,7 +195,7 @@ def fixed_values(
             continue
         if name in given:
             over = over_load(given[name]) if name == "K" else None
-            result[name] = _checked(law, name, given[name]) if over is None else over
+            result[name] = _checked(law, "fixed", name, given[name]) if over is None else over
         elif name in points and np.isfinite(points[name]).all():
             result[name] = points[name]
         elif material is not None and name in material and material[name].value is not None:
@@ -223,7 +223,9 @@ def fixed_values(
             )
         result["K"] = result["K"] * result["W0"]
     if "eps_ratio" not in free:
-        result["eps_ratio"] = ratio = float(_checked(law, "eps_ratio", given.get("eps_ratio", 1.0)))
+        result["eps_ratio"] = ratio = float(
+            _checked(law, "fixed", "eps_ratio", given.get("eps_ratio", 1.0))
+        )
         largest = ratio * float(np.max(points.get("epsilon", 0.0)))
         if largest >= 1:
             raise InputError(
@@ -232,10 +234,13 @@ def fixed_values(
     return result
 
 
-def _checked(law: type[Law], name: str, value: Any) -> Any:
+def _checked(law: type[Law], field: str, name: str, value: Any) -> Any:
     """A value in SI; a text has its unit."""
     known = {**point_parameters(law), EPS_RATIO.name: EPS_RATIO}
-    return known[name].check(value)
+    try:
+        return known[name].check(value)
+    except InputError as error:
+        raise error.about(Argument(field, key=name)) from None
 
 
 def require_free(

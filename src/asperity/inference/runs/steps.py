@@ -203,8 +203,10 @@ def integrated(
         )
         return first + _SIDE_BY_SIDE, change, slopes
 
-    begin = jax.vmap(lambda direction: jax.jvp(first_states, (x,), (direction,))[1])
-    start = jnp.asarray(0), begin(free.directions), nothing
+    def begin(direction: Array) -> Array:
+        return jax.jvp(first_states, (x,), (direction,))[1]
+
+    start = jnp.asarray(0), jax.vmap(begin)(free.directions), nothing
     *_, slopes = jax.lax.while_loop(lambda carry: carry[0] < steps, body, start)
     return curve, slopes, steps, done
 

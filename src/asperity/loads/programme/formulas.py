@@ -209,12 +209,12 @@ class PeriodicSegment(ProgrammeSegment):
 
     def position(self, t: ArrayLike) -> Array:
         """Integral of V, term by term."""
-        way = self.pull1 * jnp.asarray(t)
+        displacement = self.pull1 * jnp.asarray(t)
         for k, (a, b) in enumerate(getattr(self.modulation, "pull", ()), start=1):
             angle = k * self._omega * t
             swing = a * jnp.sin(angle) + b * (1 - jnp.cos(angle))
-            way = way + self.pull1 * swing / (k * self._omega)
-        return way
+            displacement = displacement + self.pull1 * swing / (k * self._omega)
+        return displacement
 
     def _over_a_period(self) -> np.ndarray:
         return np.linspace(0, 1 / float(self.frequency), 513)

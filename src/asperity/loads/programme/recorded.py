@@ -133,7 +133,7 @@ class RecordedSegment(ProgrammeSegment):
 
 
 def interpolated(
-    time: np.ndarray, given: Any, level: float, kind: str, interpolant: str, name: str
+    time: np.ndarray, recorded: Any, level: float, kind: str, interpolant: str, name: str
 ) -> tuple[PiecewiseCubic, np.ndarray]:
     """Cubics through the samples over the time since the first, with values that bound them.
 
@@ -141,7 +141,7 @@ def interpolated(
     ----------
     time : array, shape (n,)
         Seconds.
-    given : array, shape (n,), or None
+    recorded : array, shape (n,), or None
         Samples; None for the constant `level`.
     level : float
         SI.
@@ -157,10 +157,10 @@ def interpolated(
     """
     _check_time(time, name)
     span = np.array([0.0, time[-1] - time[0]])
-    if given is None:
+    if recorded is None:
         return PiecewiseCubic.of(span, np.array([[0.0], [0.0], [0.0], [level]])), np.array([level])
     field = f"{name}.{_FIELDS[kind]}"
-    values = np.asarray(to_si(given, kind, field), float)
+    values = np.asarray(to_si(recorded, kind, field), float)
     if values.shape != time.shape:
         raise InputError(
             f"{field} must be as long as time, got {values.shape} for {time.shape}; "

@@ -29,8 +29,9 @@ _TOGETHER = 256
 #: Readings of the falls, each without those that the one before has not confirmed.
 _READINGS = 4
 #: Standard uncertainty of an onset or end of half a cosine of d samples and drop D in white noise
-#: s: this times sqrt(d) s/D samples (inverse of Fisher's information of both).
-_TIMING = 2.65
+#: s: this times sqrt(d) s/D samples (inverse of Fisher's information of both). Of correlated noise
+#: s sqrt(2/d) is the scatter of means over half of the slip. And what sampling adds (samples).
+_TIMING, _SAMPLING = 2.65, 0.45
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,17 +189,15 @@ def _onset_and_end(
         # The slip as sums over bins, from the earliest onset to the latest end.
         edges = np.linspace(span_on[0], span_end[1] + 1.0, _BINS + 1, axis=1)
         edges = np.clip(np.rint(edges).astype(np.intp), first[:, None], stop[:, None])
-        centre = (edges[:, 1:] + edges[:, :-1] - 1) / 2
-        count = np.maximum(edges[:, 1:] - edges[:, :-1], 1)
-        mean = (sums.y[edges[:, 1:]] - sums.y[edges[:, :-1]]) / count
         pair = np.s_[:, :, None, None], np.s_[:, None, :, None]
-        begin, stops = until[pair[0]], since[pair[1]]
-        weight = np.minimum(edges[:, None, None, 1:], stops)
-        weight = np.maximum(weight - np.maximum(edges[:, None, None, :-1], begin), 0)
+        # Of the bin in which the slip begins or ends only the part that is slip.
+        begin = np.maximum(edges[:, None, None, :-1], until[pair[0]])
+        stops = np.maximum(np.minimum(edges[:, None, None, 1:], since[pair[1]]), begin)
+        weight = stops - begin
         length_here = np.maximum(off[pair[1]] - on[pair[0]], 0.25)
-        u = np.clip((centre[:, None, None, :] - on[pair[0]]) / length_here, 0.0, 1.0)
+        u = np.clip(((begin + stops - 1) / 2 - on[pair[0]]) / length_here, 0.0, 1.0)
         model = low[pair[1]] + _half_cosine(u) * (high[pair[0]] - low[pair[1]])
-        misfit = (weight * model * (model - 2 * mean[:, None, None, :])).sum(-1)
+        misfit = (model * (weight * model - 2 * (sums.y[stops] - sums.y[begin]))).sum(-1)
         squares = sums.yy[since][:, None, :] - sums.yy[until][:, :, None]
         misfit += np.where(since[:, None, :] > until[:, :, None], squares, 0.0)
         misfit += left[2][:, :, None] + right[2][:, None, :]
@@ -245,9 +244,10 @@ def _measured(
     # The end of a line is twice as uncertain as its mean.
     doubt = 2 * np.hypot(_of_mean(scatter, until - first), _of_mean(scatter, stop - since))
     duration = end - onset
+    long = np.maximum(duration, 2.0)
     timing = np.hypot(
-        _TIMING * np.sqrt(np.maximum(duration, 1.0)) * scatter[0] / np.maximum(drop, scatter[0]),
-        1 / np.sqrt(12.0),
+        _TIMING / np.sqrt(2.0) * long * _of_mean(scatter, long / 2) / np.maximum(drop, scatter[0]),
+        _SAMPLING,
     )
     rates = np.hypot(left[1], right[1])
     doubt = np.hypot(doubt, rates * timing)
@@ -305,7 +305,7 @@ def _lines(force: Array, first: Index, stop: Index) -> tuple[Array, Array, Array
     return centre, mean + force[first], slope
 
 
-def _of_mean(scatter: Array, samples: Index) -> Array:
+def _of_mean(scatter: Array, samples: Index | Array) -> Array:
     """Scatter of the mean over so many samples, between and beyond the widths that are known."""
     known = np.arange(scatter.size)
     octave = np.log2(np.maximum(samples, 1))

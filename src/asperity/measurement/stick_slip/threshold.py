@@ -196,7 +196,8 @@ def _threshold(group: list[_Row]) -> Threshold:
     elif max(low, high) > _WIDEST * min(low, high):
         reason = f"at {V:.4g} m/s K/W0 is only known to lie between {low:.4g} and {high:.4g} 1/m"
     if reason:
-        return Threshold(V, *[np.nan] * 4, low, high, reason)
+        none = float("nan")
+        return Threshold(V, none, none, none, none, low, high, reason)
     centre, doubt = (low + high) / 2, abs(high - low) / np.sqrt(12.0)
     frequency, error = _frequency(group, centre)
     if not np.isfinite(frequency):

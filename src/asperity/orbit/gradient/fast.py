@@ -186,7 +186,7 @@ def _fourier_orbits(problem: Problem, program: Program, valid: Array, good: Arra
     )
     cycle = load_cycle(load, _NODES, _GRADING)
     good &= orbit_error(system, cycle, orbit, program.harmonics) < _ERROR
-    unknowns = FourierUnknowns(orbit.mean, orbit.rest)
+    unknowns = FourierUnknowns(orbit.mean, orbit.zero_mean)
     floquet, more_steps = None, jnp.zeros_like(orbit.steps)
     if program.multipliers:
         J = _stretched(FourierEquations(_NODES, _GRADING), problem, unknowns)
@@ -196,8 +196,10 @@ def _fourier_orbits(problem: Problem, program: Program, valid: Array, good: Arra
     # Other points get states with finite equations, so that no NaN reaches a good point.
     steady = system.steady()
     mean = tuple(jnp.where(good, a, s) for a, s in zip(orbit.mean, steady, strict=True))
-    rest = tuple(jnp.where(good, a, 0.0) for a in orbit.rest)
-    return FastOrbits(FourierUnknowns(mean, rest), floquet, (orbit.steps, more_steps), valid, good)
+    zero_mean = tuple(jnp.where(good, a, 0.0) for a in orbit.zero_mean)
+    return FastOrbits(
+        FourierUnknowns(mean, zero_mean), floquet, (orbit.steps, more_steps), valid, good
+    )
 
 
 def _fourier_values(
@@ -209,7 +211,7 @@ def _fourier_values(
         problem.system,
         equations.cycle(problem),
         unknowns.mean,
-        unknowns.rest,
+        unknowns.zero_mean,
         program.harmonics,
     )
     logs = jnp.zeros((0, *mean.shape), dtype=complex)

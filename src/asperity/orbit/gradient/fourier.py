@@ -39,7 +39,7 @@ class FourierUnknowns(NamedTuple):
     """A Fourier orbit: mean states (points,) and zero-mean parts (nodes, points)."""
 
     mean: States
-    rest: States
+    zero_mean: States
 
 
 class _InvertedJacobian(NamedTuple):
@@ -92,8 +92,8 @@ class FourierEquations:
         def push(*change: Array) -> States:
             return _times(at.jacobian, change)
 
-        mean, rest, _ = advance(cycle, at.inverse, unknowns.mean, rates, push)
-        return _less(unknowns, FourierUnknowns(mean, rest))
+        mean, zero_mean, _ = advance(cycle, at.inverse, unknowns.mean, rates, push)
+        return _less(unknowns, FourierUnknowns(mean, zero_mean))
 
     def solve(
         self, product: Callable[[Any], Any], right: FourierUnknowns, at: _InvertedJacobian
@@ -102,12 +102,12 @@ class FourierEquations:
         J, share, integral = self._transposed(at)
 
         def contract(y: FourierUnknowns) -> FourierUnknowns:
-            states = tuple(m[:, None] + z for m, z in zip(y.mean, y.rest, strict=True))
+            states = tuple(m[:, None] + z for m, z in zip(y.mean, y.zero_mean, strict=True))
             rates = _times(J, states)
             change = tuple(-c for c in _times(at.inverse, tuple(r @ share for r in rates)))
             follow = _times(J, tuple(c[:, None] for c in change))
-            rest = tuple((r + f) @ integral for r, f in zip(rates, follow, strict=True))
-            return FourierUnknowns(together(y.mean, change), rest)
+            zero_mean = tuple((r + f) @ integral for r, f in zip(rates, follow, strict=True))
+            return FourierUnknowns(together(y.mean, change), zero_mean)
 
         return _turned(
             contracted(contract, _turned(right), at.steps + _MORE_STEPS, points_last=False)
@@ -121,10 +121,10 @@ class FourierEquations:
         n = range(len(J))
 
         def contract(y: FourierUnknowns) -> FourierUnknowns:
-            rest = tuple(z @ integral.T for z in y.rest)
-            change = [y.mean[j] + sum((J[i][j] * rest[i]).sum(1) for i in n) for j in n]
+            zero_mean = tuple(z @ integral.T for z in y.zero_mean)
+            change = [y.mean[j] + sum((J[i][j] * zero_mean[i]).sum(1) for i in n) for j in n]
             mean = [-sum(at.inverse[i][j] * change[i] for i in n) for j in n]
-            rates = [r + m[:, None] * share for r, m in zip(rest, mean, strict=True)]
+            rates = [r + m[:, None] * share for r, m in zip(zero_mean, mean, strict=True)]
             states = tuple(sum(J[i][j] * rates[i] for i in n) for j in n)
             means_too = tuple(m + s.sum(1) for m, s in zip(y.mean, states, strict=True))
             return FourierUnknowns(means_too, states)

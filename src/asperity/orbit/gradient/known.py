@@ -1,8 +1,7 @@
 """Known orbits on collocation meshes, initial guesses at nearby parameters.
 
-A fit calls again and again with the same points and parameters that change little. From the orbits
-of the call before, Newton's method needs a few steps, where a search from nothing takes ten times
-as long.
+A fit calls many times with the same points and slightly changed parameters. From the orbits of the
+call before, Newton's method needs a few steps; a search without them takes ten times as long.
 """
 
 from __future__ import annotations
@@ -96,11 +95,11 @@ Float = NDArray[np.float64]
 
 #: Number of intervals of the meshes of stored orbits.
 KEPT = 216
-#: Intervals of the mesh that is compared with the first one on which orbits are differentiated.
+#: Intervals of the mesh that is compared with the first mesh for derivatives.
 COARSER = FIRST_MESH
-#: Largest relative change of mean and harmonics from a mesh to the next at which the finer serves:
-#: its own error is smaller by 3^8, for a stiff orbit by 3^4. The same of the last mesh, as good as
-#: the whole search.
+#: Largest relative change of mean and harmonics between two meshes for which the finer one is
+#: accurate (its error is smaller by 3^8, for a stiff orbit by 3^4); and this limit for the last
+#: mesh, equal to the accuracy of the whole search.
 _AGREEMENT, _LAST_AGREEMENT = 1e-8, AGREEMENT
 
 
@@ -114,23 +113,23 @@ class KnownOrbits:
         Number of points; calls must have as many, in the same order.
     orbit : Orbit or None
         Points along the last axis; None where no orbit is known.
-    there : bool array, shape (points,)
+    known : bool array, shape (points,)
         Of which points an orbit is known.
     """
 
     points: int
     orbit: Orbit | None = None
-    there: NDArray[np.bool_] = field(init=False)
+    known: NDArray[np.bool_] = field(init=False)
 
     def __post_init__(self) -> None:
-        self.there = np.zeros(self.points, bool)
+        self.known = np.zeros(self.points, bool)
 
     def keep(self, problem: Problem, index: Indices, orbit: Orbit) -> None:
         """Keep the orbits of the points `index` of a problem, on a mesh of any size."""
         size = problem.system.size
         if self.orbit is None:
             self.orbit = Orbit.empty(orbit.scheme, size, KEPT, self.points)
-        self.there[index] = True
+        self.known[index] = True
         if len(orbit.mesh) == KEPT + 1:
             put(self.orbit, index, orbit)
             return
@@ -143,7 +142,7 @@ class KnownOrbits:
         """The known orbits of the points `index`, which may repeat a point."""
         orbit = None if self.orbit is None else take(self.orbit, index)
         others = KnownOrbits(len(index), orbit)
-        others.there[:] = self.there[index]
+        others.known[:] = self.known[index]
         return others
 
 

@@ -139,8 +139,8 @@ def _orbit_changes(orbit: Orbit, values: Any, sides: Float) -> Float:
     coefficients = np.asarray(orbit.scheme.a), np.asarray(orbit.scheme.b)
     parts = []
     for start in range(0, sides.shape[2], _SIDES):
-        some = _filled(constant[:, :, start : start + _SIDES])
-        parts.append(np.asarray(_solved(response, some, orbit.widths, coefficients)))
+        padded = _filled(constant[:, :, start : start + _SIDES])
+        parts.append(np.asarray(_solved(response, padded, orbit.widths, coefficients)))
     return np.concatenate(parts)[: sides.shape[2]]
 
 

@@ -134,7 +134,7 @@ class DirectSearch:
         """Search for the orbits of the points `wanted`."""
         known = self.known
         if known is not None and known.orbit is not None:
-            self._follow(known.orbit, wanted[known.there[wanted]])
+            self._follow(known.orbit, wanted[known.known[wanted]])
         left = self._left(wanted)
         if len(left):
             self._from_averaged_limit(left)
@@ -209,7 +209,7 @@ def search_orbits(
     parameters : dict of str to array, shape (points,)
     wanted : bool array, shape (points,)
     direct : bool
-        Whether only to solve each point by itself, without following branches to it. Multipliers
+        Whether only to solve each point independently, without following branches. Multipliers
         are then those of the mesh, unchecked.
     known : KnownOrbits, optional
         Of the first points, for a direct search, which begins there and keeps what it finds.

@@ -1,11 +1,11 @@
 """The collocation equations of orbits on meshes, linearised and condensed.
 
 The law's part comes from `asperity.slider.pointwise`, one compiled program for each law; the
-condensation is one for each number of states, whatever the mesh.
+condensation is one program for each number of states, for all meshes.
 
 The response of the slopes at the collocation points to a change at the left node of an interval
-is a small dense system. Solved interval by interval it leaves equations for the nodes alone. No
-interval knows its neighbours here, so that intervals of any mesh and any operating point lie along
+is a small dense system. Its solution in each interval leaves equations for the nodes only.
+Intervals are independent here, so that the intervals of all meshes and operating points lie along
 one axis.
 """
 
@@ -97,10 +97,10 @@ def _eliminate_stages(rows: Array) -> Array:
     for _ in range(stages):
         pivot, rest = rows[0, :, :n], rows[0, :, n:]
         inverse = inverse_points([list(row) for row in pivot])
-        pivot = product(jnp.stack([jnp.stack(row) for row in inverse]), rest)
+        solution = product(jnp.stack([jnp.stack(row) for row in inverse]), rest)
         below, rows = rows[1:, :, :n], rows[1:, :, n:]
-        rows = rows - (below[:, :, :, None] * pivot[None, None]).sum(2)
-        solved.append(pivot)
+        rows = rows - (below[:, :, :, None] * solution[None, None]).sum(2)
+        solved.append(solution)
     for j in reversed(range(stages - 1)):
         for later in range(stages - 1, j, -1):
             at = (later - j - 1) * n

@@ -1,16 +1,16 @@
 """Orbits of stiff equations, and under weak modulation: Fourier series, solved directly.
 
 Under slow modulation the orbit is nearly a sequence of steady states. Its harmonics fall
-exponentially, however fast perturbations of it grow or decay, so that a few dozen nodes, on which
-both are far from resolved, give it to round-off. Collocation on a mesh that begins to resolve them
-does worse: where sliding is unstable for part of the period, and a perturbation grows by e^40
-there, the solution on the mesh is as sensitive.
+exponentially, independent of the growth and decay of perturbations. A few dozen nodes, which do not
+resolve perturbations, therefore give the orbit to round-off. A mesh that begins to resolve the
+perturbations is less accurate: where sliding is unstable for part of the period, and a perturbation
+grows by e^40, the solution on the mesh is as sensitive.
 
 Under weak modulation, of any period, the response is nearly linear and its harmonics fall as powers
 of the amplitude: near a resonance, where the fast method does not contract, a series takes a
 fraction of the time of a mesh.
 
-A series is accepted where one with more nodes, solved anew, agrees with it.
+A series is accepted if the solution of a series with more nodes agrees with it.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ INTERVALS = 216
 _SLOW = 1.0
 #: Range of the slip exponent's half swing in which modulation counts as weak.
 _WEAK = (1e-3, 0.5)
-#: Smallest first and second harmonic of F/W0 under weak modulation. The states are kept whole, with
-#: a round-off of some 3e-16, of which smaller harmonics feel more than 1e-10; a mesh keeps them as
-#: deviations from their mean.
+#: Smallest first and second harmonic of F/W0 under weak modulation. A series stores complete
+#: states, with a round-off of some 3e-16, more than 1e-10 of smaller harmonics; a mesh stores
+#: deviations from the mean.
 _LEAST_HARMONIC = 3e-6
 #: Newton's steps from sequences of steady states, and from the series on fewer nodes.
 _FIRST_STEPS, _NEXT_STEPS = 14, 4
@@ -190,9 +190,11 @@ def _solved(jacobian: Float, derivative: Float, gap: Float) -> Float:
 @cache
 def _derivative(nodes: int) -> Float:
     """Derivative at the nodes of the trigonometric polynomial through them."""
-    apart = np.arange(nodes)[:, None] - np.arange(nodes)
-    sine = np.sin(np.pi * apart / nodes)
-    return np.where(apart == 0, 0.0, 0.5 * (-1.0) ** apart / np.where(apart == 0, 1.0, sine))
+    difference = np.arange(nodes)[:, None] - np.arange(nodes)
+    sine = np.sin(np.pi * difference / nodes)
+    return np.where(
+        difference == 0, 0.0, 0.5 * (-1.0) ** difference / np.where(difference == 0, 1.0, sine)
+    )
 
 
 def _last_harmonics(Y: Float) -> Float:

@@ -99,12 +99,12 @@ class Autoregression:
         """Autocovariances of the lags 0 to n - 1; n is at most the order (Levinson's recursion)."""
         result = np.zeros(n)
         result[:1] = self.variance
-        rest = self.variance
+        innovation_power = self.variance
         for k, (a, partial) in enumerate(zip(self.coefficients, self.reflection, strict=False)):
             if k + 1 >= n:
                 break
-            result[k + 1] = partial * rest + a @ result[k:0:-1]
-            rest *= 1 - partial**2
+            result[k + 1] = partial * innovation_power + a @ result[k:0:-1]
+            innovation_power *= 1 - partial**2
         return result
 
     def whiten(self, columns: Float) -> Float:
@@ -151,8 +151,8 @@ class Autoregression:
         logs = np.log1p(-(self.reflection**2))
         ahead = np.cumsum(np.concatenate([[0.0], logs]))
         first = ahead[: min(n, self.order)]
-        rest = max(n - self.order, 0) * ahead[-1]
-        return 0.5 * (n * math.log(self.variance) + float(first.sum()) + float(rest))
+        later = max(n - self.order, 0) * ahead[-1]
+        return 0.5 * (n * math.log(self.variance) + float(first.sum()) + float(later))
 
     def spectrum(self, frequency: Float) -> Float:
         """Power per frequency in cycles a sample, two-sided; it integrates to the variance."""
@@ -201,11 +201,11 @@ def fitted(
     variance = sum(float(np.sum(r * r)) for r in rows) / n
     reflection = _reflections(rows, highest)
     criteria = [n * math.log(max(variance, 1e-300)) + 2]
-    rest = variance
+    innovation_power = variance
     for k, partial in enumerate(reflection, start=2):
-        rest *= 1 - partial * partial
+        innovation_power *= 1 - partial * partial
         penalty = 2 * k + 2 * k * (k + 1) / max(n - k - 1, 1)
-        criteria.append(n * math.log(max(rest, 1e-300)) + penalty)
+        criteria.append(n * math.log(max(innovation_power, 1e-300)) + penalty)
     best = len(reflection)
     if order is None:
         best = min(best, max(int(np.argmin(criteria)), _lowest_order(n)))
@@ -225,11 +225,11 @@ def _lowest_order(n: int) -> int:
 def _reflections(stretches: Sequence[Float], highest: int) -> list[float]:
     """Partial correlations of stretches of rows by Burg's method, up to the highest order."""
     products = [LaggedProducts(rows, highest) for rows in stretches]
-    power = rest = sum(p.power for p in products)
+    power = innovation_power = sum(p.power for p in products)
     predictor = np.ones(1)
     result: list[float] = []
     while len(result) < highest:
-        if rest <= _SMOOTH * power:
+        if innovation_power <= _SMOOTH * power:
             return _reflections_of_smooth(stretches, highest)
         for p in products:
             p.next_order()
@@ -239,7 +239,7 @@ def _reflections(stretches: Sequence[Float], highest: int) -> list[float]:
         partial = 2 * float(forward @ along) / float(forward @ table @ forward + backward @ along)
         result.append(_inside(partial))
         predictor = forward - result[-1] * backward
-        rest *= 1 - result[-1] ** 2
+        innovation_power *= 1 - result[-1] ** 2
     return result
 
 

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
 #: Number of levels next to the extreme that show the usual number of samples at a level.
 _LEVELS = 3
-#: The extreme of a smooth signal that is quantised holds at most 2.4 times the samples of the next
-#: level where it is a parabola, and 5.3 times where it is as flat as a fourth power.
+#: Saturation needs this ratio of samples at the extreme to samples at the next level. A quantised
+#: smooth extreme has a ratio up to 2.4 (parabola) or 5.3 (fourth power).
 _CROWDED = 8
 _FEWEST = 5
 #: So many equal samples in a row are no chance where the values next to them occur once.
@@ -22,11 +22,13 @@ _IN_A_ROW = 3
 #: Rounding is coarse where this share of neighbours is equal and the other differences are whole
 #: multiples of one step, to this share of it.
 _MOSTLY_EQUAL, _WHOLE = 0.5, 0.02
-#: A held channel repeats a tenth of its samples at least and jumps by several steps between.
+#: A sample-and-hold channel repeats at least a tenth of its samples, and has several quantisation
+#: steps between them.
 _REPEATED, _STEPS = 0.1, 4.0
-#: Share of the runs of equal samples that have the usual length, and what irregular holding needs.
+#: Regular holding: share of runs of the usual length. Irregular holding: share of repeated samples,
+#: and size of the steps between them.
 _REGULAR, _OFTEN, _FAR = 0.9, 0.3, 10.0
-#: Zeros count where the channel is usually this many scatters away from zero.
+#: Zeros are defects if the channel is usually further than this many standard deviations from zero.
 _AWAY = 5.0
 
 

@@ -1,7 +1,7 @@
 """Time stamps that were rounded: an even grid, cut by gaps, plus a rounding error.
 
 A clock that is stored in single precision, or written with few digits, has steps that alternate
-though the samples are evenly spaced. Taken as they are, such stamps lower an amplitude by the share
+though the samples are evenly spaced. Without correction such stamps lower an amplitude by the share
 (2 pi f q)^2/24 for a quantum q; where q exceeds the sampling step, several samples share a stamp.
 """
 
@@ -21,14 +21,15 @@ if TYPE_CHECKING:
 _FEWEST = 16
 #: Samples from which the quantum is estimated; in single precision the quantum grows with time.
 _WINDOW = 64
-#: The quantum in the last part of a recording over that in most of it, at most.
+#: Largest ratio of the quantum in the last part of a recording to that in most of it.
 _DOUBLED = 2.1
-#: Steps that differ from the commonest, at least. Fewer may be lost samples: of 3,500 recordings
-#: that lost 8 to 39 at random 3 passed for rounded with 16 here, and none with 24.
+#: Smallest number of steps that differ from the most common one. Fewer such steps may be lost
+#: samples: of 3,500 recordings that lost 8 to 39 samples at random, 3 were taken for rounded with
+#: 16 here, and none with 24.
 _EVENTS = 24
-#: Stamps scatter about their grid over one quantum, about the line of least squares over 1.09
-#: quanta at most in 11,400 grids of 24 to 20,000 samples; stamps with a jitter of 0.03 to 0.5
-#: steps, rounded to that or finer, over 1.96 and more in 3,280.
+#: Largest range of the deviations from the least-squares line, in quanta. Rounded grids have at
+#: most 1.09 (11,400 grids of 24 to 20,000 samples); stamps with a jitter of 0.03 to 0.5 steps,
+#: rounded to that or finer, have at least 1.96 (3,280 cases).
 _WITHIN = 1.25
 #: A gap is longer than a step by a quantum and by this share of a step.
 _GAP = 0.4

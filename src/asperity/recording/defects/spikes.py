@@ -19,10 +19,10 @@ if TYPE_CHECKING:
     Array = NDArray[np.float64]
 
 #: A spike stands out of both samples at these distances. Next neighbours detect it next to a
-#: fast modulation; those farther off see spikes that last longer than a sample.
-_APART = (1, 3)
-#: How far it stands out, in usual differences of samples so far apart. White noise of 1e8 samples
-#: reaches seven, a sine 1.6.
+#: fast modulation; more distant samples detect spikes longer than a sample.
+_DISTANCES = (1, 3)
+#: Smallest size of a spike, in usual differences of samples at that distance. White noise of 1e8
+#: samples reaches 7, a sine 1.6.
 _OUT = 10.0
 #: Samples of a chunk with a common usual difference; they fit into the second-level cache.
 _CHUNK = 1 << 14
@@ -30,25 +30,26 @@ _CHUNK = 1 << 14
 _SIDE = 16
 #: Stride of the differences from which the usual difference of a chunk is computed.
 _EVERY = 8
-#: Samples on either side of a change of the drive at which a peak is no spike by itself; samples
-#: beside it whose differences are its own; and how many times as far off as all others a spike is.
+#: Samples on either side of a change of the drive where the stricter rule applies; samples next to
+#: a spike whose differences belong to it; and smallest ratio of a spike to all other differences
+#: there.
 _AT_CHANGE, _ITS_OWN, _CLEARLY = 16, 3, 2.0
 
 
 def spikes(values: Array) -> NDArray[np.intp]:
     """Samples that are spikes, in rising order."""
     parts = [np.empty(0, dtype=np.intp)]
-    most = max(_APART)
+    most = max(_DISTANCES)
     # Another check reports missing and overflowing values.
     with np.errstate(over="ignore", invalid="ignore"):
         for start in range(0, max(values.size - 2 * most, 0), _CHUNK):
             piece = values[start : start + _CHUNK + 2 * most]
-            parts += [_standing_out(piece, apart) + start for apart in _APART]
+            parts += [_standing_out(piece, distance) + start for distance in _DISTANCES]
     return np.unique(np.concatenate(parts))
 
 
-def _standing_out(piece: Array, apart: int) -> NDArray[np.intp]:
-    steps = piece[apart:] - piece[:-apart]
+def _standing_out(piece: Array, distance: int) -> NDArray[np.intp]:
+    steps = piece[distance:] - piece[:-distance]
     limit = _OUT * _usual(steps)
     if not limit > 0:
         return np.empty(0, dtype=np.intp)
@@ -56,16 +57,19 @@ def _standing_out(piece: Array, apart: int) -> NDArray[np.intp]:
     if not (up.any() and down.any()):
         return np.empty(0, dtype=np.intp)
     # A spike goes out and back; a step stays at a new level.
-    at = np.flatnonzero((up[:-apart] & down[apart:]) | (down[:-apart] & up[apart:])) + apart
-    return at[np.isfinite(piece[at]) & _locally(np.abs(steps), at, apart)]
+    at = (
+        np.flatnonzero((up[:-distance] & down[distance:]) | (down[:-distance] & up[distance:]))
+        + distance
+    )
+    return at[np.isfinite(piece[at]) & _locally(np.abs(steps), at, distance)]
 
 
-def _locally(sizes: Array, at: NDArray[np.intp], apart: int) -> NDArray[np.bool_]:
+def _locally(sizes: Array, at: NDArray[np.intp], distance: int) -> NDArray[np.bool_]:
     """Whether spikes stand out of the usual differences on each side, as a modulation may begin."""
-    jump = np.minimum(sizes[at - apart], sizes[at])
+    jump = np.minimum(sizes[at - distance], sizes[at])
     out = np.ones(at.size, dtype=bool)
     # The steps of the spike itself end where it is one step away.
-    for side in (np.arange(-_SIDE, 0) - 2 * apart + 1, np.arange(_SIDE) + apart):
+    for side in (np.arange(-_SIDE, 0) - 2 * distance + 1, np.arange(_SIDE) + distance):
         for part in np.array_split(np.arange(at.size), at.size // _CHUNK + 1):
             near = at[part, None] + side
             inside = (near >= 0) & (near < sizes.size)
@@ -86,10 +90,8 @@ def _usual(steps: Array) -> float:
     # A coarse recorder repeats most values; its single steps then count as usual.
     every = np.abs(steps[np.isfinite(steps)])
     moving = every[every > 0]
-    return float(np.median(moving)) if moving.size > 0.02 * every.size else _smallest(moving)
-
-
-def _smallest(moving: Array) -> float:
+    if moving.size > 0.02 * every.size:
+        return float(np.median(moving))
     return float(moving.min()) if moving.size else 0.0
 
 

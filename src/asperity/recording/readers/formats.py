@@ -131,7 +131,7 @@ def raw_recording(
     Raises
     ------
     InputError
-        If the file cannot be read; with what the library of the format says of it.
+        If the file cannot be read; with the message of the format's library.
     """
     name = format_of(path) if format is None else format
     reader = reader_named(name)

@@ -43,7 +43,7 @@ def read(path: Path, *, group: str | None = None) -> RawRecording:
     ----------
     path : Path
         One that is cut cannot be opened by the library. One whose data lie in other files is
-        refused: whoever sent it may not be allowed to read these.
+        refused, because the sender of the file may not be allowed to read the other files.
     group : str or None
         Where to look, in a file of several recordings.
     """

@@ -151,11 +151,6 @@ def _is_value(cell: str, decimal: str) -> bool:
     return is_number(cell, decimal) or cell in MISSING or bool(_STAMP.fullmatch(cell))
 
 
-def _has_words(text: str) -> bool:
-    """Whether a line holds letters that belong to no number, date or missing value."""
-    return bool(_WORD.search(text))
-
-
 def digits(cell: str, decimal: str) -> tuple[int, int]:
     """Digits behind the decimal mark and in the exponent; (0, 0) if the cell is no number."""
     if not is_number(cell, decimal):
@@ -409,12 +404,12 @@ def layout_of(
     """
     written = [line for line in lines if not line.blank and not line.comment]
     # The sample excludes headings and the last line, which may be cut.
-    numeric = (line for line in reversed(written) if not _has_words(line.text))
+    numeric = (line for line in reversed(written) if not _WORD.search(line.text))
     last = list(islice(numeric, _SAMPLE)) or written[-_SAMPLE:]
     sample = [line.text for line in last if line.ended] or [line.text for line in last]
     ways = _ways(delimiter, decimal)
-    scored = [(_score(sample, *way), way) for way in ways]
-    (score, width), way = max(scored, key=lambda s: s[0])
+    scored = [(_score(sample, *separators), separators) for separators in ways]
+    (score, width), separators = max(scored, key=lambda s: s[0])
     if not sample or score < 0.5:
         raise InputError(
             "recording.path",
@@ -422,29 +417,29 @@ def layout_of(
             f"'{path.name}' without one that is understood",
             "say delimiter= and decimal=, or give a recording",
         )
-    rows = [cells_of(text, way[0]) for text in sample]
+    rows = [cells_of(text, separators[0]) for text in sample]
     rows = [row for row in rows if len(row) == width]
-    closed = width > 1 and way[0] is not None and not any(row[-1] for row in rows)
-    first = next(i for i, line in enumerate(lines) if _is_row(line, *way, width, rows))
+    closed = width > 1 and separators[0] is not None and not any(row[-1] for row in rows)
+    first = next(i for i, line in enumerate(lines) if _is_row(line, *separators, width, rows))
     above = lines[:first]
     counted = _count_rows([row[0] for row in rows])
-    heads = _headings(above, way[0], width - closed, counted)
+    heads = _headings(above, separators[0], width - closed, counted)
     if closed and not any(heads.names):
         # A named column may be empty; one that the delimiter at the end makes has no name.
-        wide = _headings(above, way[0], width, counted)
+        wide = _headings(above, separators[0], width, counted)
         closed, heads = (False, wide) if any(wide.names) and wide.names[-1] else (closed, heads)
     if not any(heads.names):
-        heads = _names_of_another_width(above, way[0], width - closed)
+        heads = _names_of_another_width(above, separators[0], width - closed)
     sign = next((line.comment for line in lines if line.comment), "")
-    grouped = any(_is_grouped(cell, way[1]) for row in rows for cell in row)
+    grouped = any(_is_grouped(cell, separators[1]) for row in rows for cell in row)
     longer = 0
     for line in reversed(above):
-        cells = cells_of(line.text, way[0])
-        if len(cells) <= width or not all(is_number(cell, way[1]) for cell in cells):
+        cells = cells_of(line.text, separators[0])
+        if len(cells) <= width or not all(is_number(cell, separators[1]) for cell in cells):
             break
         longer += 1
     return Layout(
-        *way, width - closed, closed, heads, lines[first].start, sign, rows, grouped, longer
+        *separators, width - closed, closed, heads, lines[first].start, sign, rows, grouped, longer
     )
 
 

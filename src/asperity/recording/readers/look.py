@@ -6,8 +6,8 @@ sweep (int32), ``dtime`` (float32); then 16 (older) or 32 headers of 84 bytes, o
 not used are called ``no_val``. Columns follow, one behind the other.
 
 Older files hold big-endian float32, as the header is; newer ones float64 in the byte order of the
-machine that wrote them, mostly little-endian. The header says nothing of it, so the size of the
-file decides between 4 and 8 bytes, and the numbers themselves the byte order.
+machine that wrote them, mostly little-endian. The header does not state the format, so the size of
+the file decides between 4 and 8 bytes, and the numbers themselves the byte order.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def read(path: Path, *, delimiter: str | None = None, decimal: str | None = None
     path : Path
         The file; UTF-8, UTF-16, or a Western code page; packed by gzip or not.
     delimiter, decimal : str or None
-        Where the user knows better than the file shows.
+        The user's choice, in place of the recognised one.
     """
     if beginning(path).startswith(_GZIP):
         return _of_any_encoding(io.BytesIO(_unpacked(path)), path, delimiter, decimal)

@@ -203,7 +203,7 @@ def in_si(values: NDArray[Any], unit: Unit | None) -> NDArray[np.float64]:
 def split_labels(labels: Sequence[str]) -> list[tuple[str, str]]:
     """Name and unit text of each heading of a file; the unit may be empty.
 
-    Brackets at the end hold the unit whatever it says. A slash, a comma, ``in`` and an underscore
+    Brackets at the end always hold the unit. A slash, a comma, ``in`` and an underscore
     count only before a usual unit, so that ``dW/dt``, ``mu_s`` and ``D_c`` stay whole; and ``F_N``
     next to another ``F_...`` is the normal force, not a force in newton.
     """

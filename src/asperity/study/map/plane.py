@@ -59,7 +59,7 @@ class Axis:
         object.__setattr__(self, "name", parameter.name)
         for end in ("low", "high"):
             value = getattr(self, end)
-            si = number(value, parameter.label, parameter.kind, parameter.rule)
+            si = number(value, f"axis of {self.name}", parameter.kind, parameter.rule)
             object.__setattr__(self, end, si)
         if not self._ends[0] < self._ends[1]:
             raise InputError(

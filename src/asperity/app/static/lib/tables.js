@@ -20,12 +20,12 @@ export function table(head, rows, label, tall = false) {
     el("tbody", {}, rows.map(([first, ...others]) => el("tr", {}, el("th", { scope: "row" }, first), others.map((t) => el("td", {}, t)))))), tall);
 }
 
-/** The sections of a report, as the server describes it once for all who render it. */
-export function sections(report) {
+/** The sections of a report, as the server describes it once for all who render it; `of` names its tables. */
+export function sections(report, of = "") {
   return report.flatMap(({ title, sentences, head, rows, warnings }) => [
     title && el("h4", {}, title),
     ...sentences.map((sentence) => el("p", {}, `${sentence}.`.replace(/\.\.$/, "."))),
-    rows.length && table(head, rows, title || (head.includes("estimate") ? "Parameters" : head[0] === "law" ? "Comparison" : "Numbers")),
+    rows.length && table(head, rows, `${title || (head.includes("estimate") ? "Parameters" : head[0] === "law" ? "Comparison" : "Numbers")}${of}`),
     ...warnings.map((warning) => el("p", { class: "message" }, warning)),
   ]).filter(Boolean);
 }

@@ -234,10 +234,10 @@ def arclength_step(
         plane = Plane(weighted_row(point.orbit, point.tangent.nodes, point.units), point.tangent.t)
         result = correct(line, guess, t, plane, max_steps=max_steps)
         orbit, t = result.orbit, result.t
-        there = remeshed(line.at(t), orbit, len(orbit.mesh) - 1)
-        before = interpolated(point.tangent.nodes, orbit.mesh, there.mesh)
-        turn = turned(line, there, t, before, point.tangent.t)
-        good = usable(there, turn.cosine) & (result.error < ACCEPTED)
+        equidistributed = remeshed(line.at(t), orbit, len(orbit.mesh) - 1)
+        before = interpolated(point.tangent.nodes, orbit.mesh, equidistributed.mesh)
+        turn = turned(line, equidistributed, t, before, point.tangent.t)
+        good = usable(equidistributed, turn.cosine) & (result.error < ACCEPTED)
     error = np.where(good, result.error, np.inf)
     return ArclengthStep(orbit, turn.point, error, result.steps, turn.cosine)
 

@@ -375,8 +375,8 @@ def orbits_along_branches(
 ) -> tuple[InitialGuess, NDArray[np.bool_]]:
     """Orbits of all points of `problem` (NumPy arrays) at the end of their branch.
 
-    Where a branch does not reach the requested amplitude, `outcome` says why. Returned with the
-    guess is whether a finer mesh would give the same, shape (points,).
+    Where a branch does not reach the requested amplitude, `outcome` has the reason. Returned with
+    the guess is whether a finer mesh would give the same, shape (points,).
     """
     branch = follow_from_steady_sliding(problem, np.arange(points), mesh)
     guess = InitialGuess.none(problem, points, mesh.intervals)._replace(orbit=branch.orbit)

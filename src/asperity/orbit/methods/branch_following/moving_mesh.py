@@ -2,9 +2,9 @@
 
 Under slow modulation the orbit follows an unstable state of sliding for part of the period and
 leaves it in a jump (a canard). Along the branch the jump moves through the period, while the
-parameter hardly changes. At a fixed phase that is a violent change, at a fixed interval
-of a mesh that moves with the orbit it is none: so the change from the last point to this one is
-extrapolated interval by interval, phases included.
+parameter hardly changes. At a fixed phase the states then change strongly; at a fixed interval of a
+mesh that moves with the orbit they hardly change. The prediction therefore extrapolates the states
+and the phases of each interval from the last two points.
 """
 
 from __future__ import annotations
@@ -127,15 +127,15 @@ def moving_step(
         plane = Plane(weighted_row(guess, tangent.nodes, units), tangent.t)
         result = correct(line, guess, t_guess, plane, max_steps=max_steps, tolerance=ACCEPTED)
         orbit, t = result.orbit, result.t
-        there = relaid(orbit, units)
-        turn = turned(line, there, t, tangent.nodes, tangent.t)
+        new = relaid(orbit, units)
+        turn = turned(line, new, t, tangent.nodes, tangent.t)
         step = _distance(units, guess, t_guess, point.orbit, point.t)
         t_slope = turn.point.tangent.t
         forward = ratio * (t - point.t) * (tangent.t + t_slope)
         backward = (tangent.t * t_slope > 0) & (forward < 0)
         miss = _distance(units, orbit, t, guess, t_guess) / step
-        length = _distance(units, there, t, point.orbit, point.t)
-        fine = usable(there, turn.cosine) & ~backward
+        length = _distance(units, new, t, point.orbit, point.t)
+        fine = usable(new, turn.cosine) & ~backward
         error = np.where(fine & (result.error <= ACCEPTED), result.error, np.inf)
         fastest = turn.values.log_slip.max((0, 1))
     following = PointPair(point.orbit, point.t, turn.point)

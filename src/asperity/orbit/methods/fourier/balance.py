@@ -59,7 +59,7 @@ class BalanceUnknowns(NamedTuple):
     """An orbit: slow states as means (points,) and zero-mean parts, and F_i/W, (nodes, points)."""
 
     mean: States
-    rest: States
+    zero_mean: States
     friction: Array
 
 
@@ -123,16 +123,16 @@ class BalanceEquations:
     def linearised(self, problem: Problem, unknowns: BalanceUnknowns) -> Prepared:
         """Inverse of the balance, and the response to changes of the means."""
         cycle = self.cycle(problem)
-        slow, g = together(unknowns.mean, unknowns.rest), unknowns.friction
+        slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction
         D = self.derivative
         c = _coefficients(problem)
-        one = jnp.ones_like(g)
+        ones = jnp.ones_like(g)
         _, push = jax.linearize(lambda *Y: _slip(problem, cycle.at, Y[0], Y[1:]), g, *slow[1:])
         n, none = range(len(slow)), jnp.zeros_like(g)
 
         def by(j: int) -> Array:
             """Change of slip with the j-th of friction and states of the law."""
-            return push(*(one if i == j else none for i in n))
+            return push(*(ones if i == j else none for i in n))
 
         def drag(slip: Array) -> Array:
             return c.damping * slip + c.inertness * (D @ slip)
@@ -143,10 +143,10 @@ class BalanceEquations:
         diagonal = (cycle.at.w + c.ratio) + c.damping * by(0)
         matrix = matrix + np.eye(self.nodes)[..., None] * diagonal[:, None]
         inverse = inverse_by_elimination(matrix)
-        pulls = [one, *(-drag(by(j)) for j in n[1:])]
+        pulls = [ones, *(-drag(by(j)) for j in n[1:])]
         friction = tuple(_times(inverse, pull) for pull in pulls)
         _, push_rates = jax.linearize(lambda *Y: self._rates(problem, cycle, Y[1:], Y[0]), g, *slow)
-        columns = [push_rates(friction[j], *(one if i == j else none for i in n)) for j in n]
+        columns = [push_rates(friction[j], *(ones if i == j else none for i in n)) for j in n]
         rates = [[columns[j][i] for j in n] for i in n]
         mean = [[cycle.share @ entry for entry in row] for row in rates]
         return Prepared(inverse, friction, rates, inverse_points(mean))
@@ -161,7 +161,7 @@ class BalanceEquations:
         bound: Callable[[Array], Array],
     ) -> tuple[BalanceUnknowns, States]:
         """The next unknowns for a change of the friction, and the change of the means."""
-        slow, g = together(unknowns.mean, unknowns.rest), unknowns.friction + moved
+        slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction + moved
         rates = self._rates(problem, cycle, slow, g)
         half = self.nodes // 2
         # Sum mirror images first: odd functions of theta then cancel exactly.
@@ -170,18 +170,18 @@ class BalanceEquations:
             bound(-sum(a * r for a, r in zip(row, gaps, strict=True))) for row in at.mean_inverse
         )
         integral = cycle.integral * cycle.stretch
-        rest = tuple(
+        zero_mean = tuple(
             integral @ (r + sum(a * x for a, x in zip(row, change, strict=True)))
             for r, row in zip(rates, at.rates, strict=True)
         )
         g = g + sum(a * x for a, x in zip(at.friction, change, strict=True))
-        return BalanceUnknowns(together(unknowns.mean, change), rest, g), change
+        return BalanceUnknowns(together(unknowns.mean, change), zero_mean, g), change
 
     def bounded_step(
         self, problem: Problem, cycle: LoadCycle, unknowns: BalanceUnknowns, at: Prepared
     ) -> tuple[BalanceUnknowns, Array]:
         """A step that changes no exponent by much, and the largest change, shape (points,)."""
-        slow, g = together(unknowns.mean, unknowns.rest), unknowns.friction
+        slow, g = together(unknowns.mean, unknowns.zero_mean), unknowns.friction
         moved = _times(at.inverse, -self._balance(problem, cycle, slow, g))
         _, exponent = jax.jvp(lambda g: _log_slip(problem, cycle.at, g, slow[1:]), (g,), (moved,))
         leap = jnp.abs(exponent).max(0)
@@ -195,8 +195,11 @@ class BalanceEquations:
             lambda x: jnp.clip(x, -_LARGEST_CHANGE, _LARGEST_CHANGE),
         )
         # Of z relative to its size, whose rate has the round-off of kappa; others are exponents.
-        sizes = [jnp.abs(new.rest[0]).max(0) + 1e-3 * problem.system.kappa, *[1.0] * len(change)]
-        parts = zip(new.rest, unknowns.rest, sizes, strict=False)
+        sizes = [
+            jnp.abs(new.zero_mean[0]).max(0) + 1e-3 * problem.system.kappa,
+            *[1.0] * len(change),
+        ]
+        parts = zip(new.zero_mean, unknowns.zero_mean, sizes, strict=False)
         moves = [jnp.abs(a - b).max(0) / size for a, b, size in parts]
         return new, jnp.stack([leap, *moves, *map(jnp.abs, change)]).max(0)
 
@@ -205,7 +208,7 @@ class BalanceEquations:
     ) -> BalanceUnknowns:
         """The unknowns minus the result of one iteration step from them."""
         problem, (prepared, _) = parameters[0], at
-        cycle, slow = self.cycle(problem), together(unknowns.mean, unknowns.rest)
+        cycle, slow = self.cycle(problem), together(unknowns.mean, unknowns.zero_mean)
         gap = self._balance(problem, cycle, slow, unknowns.friction)
         moved = _times(prepared.inverse, -gap)
         stepped, _ = self._advance(problem, cycle, unknowns, prepared, moved, lambda x: x)
@@ -244,8 +247,10 @@ class BalanceEquations:
         cycle, c = self.cycle(problem), _coefficients(problem)
         g, kappa = unknowns.friction, problem.system.kappa
         centre = cycle.share @ g
-        constant, rest = unknowns.mean[0] - c.ratio * centre, g - centre
-        mean, phasors = spectrum(cycle, constant, unknowns.rest[0] - c.ratio * rest, harmonics)
+        constant, zero_mean = unknowns.mean[0] - c.ratio * centre, g - centre
+        mean, phasors = spectrum(
+            cycle, constant, unknowns.zero_mean[0] - c.ratio * zero_mean, harmonics
+        )
         # Where inertia holds the slider back, z and l g nearly cancel, and the harmonics of
         # f''/(m kappa) + (d/kappa) f' + f = w g - S + d p + p'/m keep more digits.
         waves = 1j * np.arange(1, harmonics + 1)[:, None]
@@ -365,12 +370,12 @@ def balanced_orbit(
         unknowns = _resampled(unknowns, nodes)
     equations = BalanceEquations(nodes, grading)
     unknowns, prepared, error, more = _iterate(equations, problem, unknowns, tolerance, max_steps)
-    slow = together(unknowns.mean, unknowns.rest)
+    slow = together(unknowns.mean, unknowns.zero_mean)
     exponent = _log_slip(problem, equations.cycle(problem).at, unknowns.friction, slow[1:])
     # Where the interface sticks it has kinks, which no Fourier series resolves.
     error = jnp.where(jnp.isfinite(exponent).all(0), error, jnp.inf)
     g = unknowns.friction
-    for waves in (unknowns.rest[0], g, equations.cycle(problem).at.w * g):
+    for waves in (unknowns.zero_mean[0], g, equations.cycle(problem).at.w * g):
         error = jnp.maximum(error, truncation(waves, harmonics))
     return BalancedOrbit(unknowns, prepared, error, steps + more)
 
@@ -418,8 +423,8 @@ def _resampled(unknowns: BalanceUnknowns, nodes: int) -> BalanceUnknowns:
     before, after = grid(unknowns.friction.shape[0])[0], grid(nodes)[0]
     k = np.arange(1, len(before) // 2)[:, None, None]
     kernel = (1 + 2 * np.cos(k * (after[:, None] - before)).sum(0)) / len(before)
-    rest = tuple(kernel @ part for part in unknowns.rest)
-    return BalanceUnknowns(unknowns.mean, rest, kernel @ unknowns.friction)
+    zero_mean = tuple(kernel @ part for part in unknowns.zero_mean)
+    return BalanceUnknowns(unknowns.mean, zero_mean, kernel @ unknowns.friction)
 
 
 def _start(equations: BalanceEquations, problem: Problem) -> BalanceUnknowns:

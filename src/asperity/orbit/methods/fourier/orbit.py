@@ -8,9 +8,9 @@ The states are split into means and zero-mean parts. One step of the iteration
 
 It is a linear iteration that contracts by about the change of the slip exponent in a period, a few
 hundredths in the regime of Bureau et al.; where it does not contract, the orbit is left to
-`asperity.orbit.methods.collocation`. The means need to contract no faster than the rest, so their
-Newton matrix stays that of the averaged limit. The zero-mean part is a separate unknown, so the
-harmonics keep their relative accuracy however small they are.
+`asperity.orbit.methods.collocation`. The means need to contract no faster than the zero-mean parts,
+so their Newton matrix stays that of the averaged limit. The zero-mean part is a separate unknown,
+so the harmonics keep their relative accuracy however small they are.
 
 Grid: theta = tau + g sin(tau) puts the nodes where the load is lightest and the slip pulse narrow.
 
@@ -58,7 +58,7 @@ class FourierOrbit(NamedTuple):
     Attributes
     ----------
     mean : tuple of arrays, shape (points,)
-    rest : tuple of arrays, shape (nodes, points)
+    zero_mean : tuple of arrays, shape (nodes, points)
         Of zero mean in tau.
     error : array, shape (points,)
     steps : int
@@ -67,7 +67,7 @@ class FourierOrbit(NamedTuple):
     """
 
     mean: States
-    rest: States
+    zero_mean: States
     error: Array
     steps: Array
     grading: float
@@ -83,12 +83,12 @@ class FourierOrbit(NamedTuple):
 
     def _interpolated(self, tau: np.ndarray) -> Array:
         """States at a column of `tau`, by trigonometric interpolation."""
-        nodes = len(self.rest[0])
-        apart = tau - grid(nodes)[0]
-        kernel = (2 / nodes) * sum(np.cos(k * apart) for k in range(1, nodes // 2))
+        nodes = len(self.zero_mean[0])
+        difference = tau - grid(nodes)[0]
+        kernel = (2 / nodes) * sum(np.cos(k * difference) for k in range(1, nodes // 2))
         # NumPy or JAX, as the arrays are.
-        xp = self.rest[0].__array_namespace__()
-        return xp.stack([m + kernel @ y for m, y in zip(self.mean, self.rest, strict=True)])
+        xp = self.zero_mean[0].__array_namespace__()
+        return xp.stack([m + kernel @ y for m, y in zip(self.mean, self.zero_mean, strict=True)])
 
 
 class LoadCycle(NamedTuple):
@@ -133,9 +133,9 @@ def rates_on(system: QuasiStatic, cycle: LoadCycle) -> Callable[..., States]:
     return rates
 
 
-def together(mean: States, rest: States) -> States:
+def together(mean: States, zero_mean: States) -> States:
     """The states on the grid."""
-    return tuple(m + y for m, y in zip(mean, rest, strict=True))
+    return tuple(m + y for m, y in zip(mean, zero_mean, strict=True))
 
 
 def jacobian(push: Callable[..., States], states: States) -> Matrix:
@@ -166,8 +166,8 @@ def advance(
     change = tuple(-sum(a * r for a, r in zip(row, residual, strict=True)) for row in inverse)
     follow = push(*(c + jnp.zeros_like(r) for c, r in zip(change, rates, strict=True)))
     integral = cycle.integral * cycle.stretch
-    rest = tuple(integral @ (r + f) for r, f in zip(rates, follow, strict=True))
-    return together(mean, change), rest, change
+    zero_mean = tuple(integral @ (r + f) for r, f in zip(rates, follow, strict=True))
+    return together(mean, change), zero_mean, change
 
 
 def _largest_change(change: States, new: States, old: States, kappa: Array) -> Array:
@@ -229,10 +229,10 @@ def fourier_orbit(
         return (steps < max_steps) & jnp.any((error > tolerance) & ~jnp.isnan(change))
 
     def body(carry: tuple) -> tuple:
-        mean, rest, last, reached, steps = carry
-        rates, push = jax.linearize(rates_of, *together(mean, rest))
+        mean, zero_mean, last, reached, steps = carry
+        rates, push = jax.linearize(rates_of, *together(mean, zero_mean))
         mean, new, moved = advance(cycle, inverse, mean, rates, push)
-        change = _largest_change(moved, new, rest, system.kappa)
+        change = _largest_change(moved, new, zero_mean, system.kappa)
         # The error of a contraction by r is r / (1 - r) times the last change.
         contraction = jnp.where(jnp.isinf(last), 0.5, change / last)
         error = jnp.where(contraction < 1, change * contraction / (1 - contraction), jnp.inf)
@@ -241,10 +241,12 @@ def fourier_orbit(
         error = jnp.where(reached <= tolerance, reached, error)
         return mean, new, change, error, steps + 1
 
-    mean, rest, change, error, steps = jax.lax.while_loop(
+    mean, zero_mean, change, error, steps = jax.lax.while_loop(
         unfinished, body, (averaged.centre, zero, far, far, 0)
     )
-    return FourierOrbit(mean, rest, jnp.where(jnp.isnan(change), jnp.inf, error), steps, grading)
+    return FourierOrbit(
+        mean, zero_mean, jnp.where(jnp.isnan(change), jnp.inf, error), steps, grading
+    )
 
 
 #: Estimated error of L.
@@ -273,9 +275,9 @@ def fourier_observables(
     max_steps : int
         Bound on the steps of the Floquet iteration.
     """
-    cycle = load_cycle(load, len(orbit.rest[0]), orbit.grading)
-    mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.rest, harmonics)
-    states = together(orbit.mean, orbit.rest)
+    cycle = load_cycle(load, len(orbit.zero_mean[0]), orbit.grading)
+    mean, phasors = force_spectrum(system, cycle, orbit.mean, orbit.zero_mean, harmonics)
+    states = together(orbit.mean, orbit.zero_mean)
     _, push = jax.linearize(rates_on(system, cycle), *states)
     J = jacobian(push, states)
     trace = sum(cycle.share @ row[i] for i, row in enumerate(J))
@@ -299,18 +301,18 @@ def orbit_error(
     system: QuasiStatic, cycle: LoadCycle, orbit: FourierOrbit, harmonics: int
 ) -> Array:
     """Estimated error of mean and harmonics: of the iteration or of the truncation, (points,)."""
-    error = jnp.maximum(orbit.error, truncation(orbit.rest[0], harmonics))
+    error = jnp.maximum(orbit.error, truncation(orbit.zero_mean[0], harmonics))
     # An interface that sticks for part of the period has kinks, which no Fourier series resolves.
-    states = jnp.stack(together(orbit.mean, orbit.rest))
+    states = jnp.stack(together(orbit.mean, orbit.zero_mean))
     sticks = jnp.isneginf(system.log_slip(states, cycle.at)).any(0)
     return jnp.where(sticks, jnp.inf, error)
 
 
 def force_spectrum(
-    system: QuasiStatic, cycle: LoadCycle, mean: States, rest: States, harmonics: int
+    system: QuasiStatic, cycle: LoadCycle, mean: States, zero_mean: States, harmonics: int
 ) -> tuple[Array, Array]:
     """Mean of F/W0 and its complex harmonics, shape (harmonics, points)."""
-    constant, force = system.force_split(jnp.stack(mean), jnp.stack(rest), cycle.at)
+    constant, force = system.force_split(jnp.stack(mean), jnp.stack(zero_mean), cycle.at)
     return spectrum(cycle, constant, force, harmonics)
 
 

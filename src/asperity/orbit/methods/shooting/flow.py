@@ -5,9 +5,8 @@ The states and their derivatives to the first states are integrated over the per
 method of order 8 of Dormand and Prince, all operating points in lock step; Newton's method on the
 first states closes the orbit, and the derivatives at its end are the monodromy matrix.
 
-A pass takes the time of some hundred evaluations of the rates, and knows no step control: whether
-the steps were short enough is checked by repeating it with twice as many, see
-`asperity.orbit.methods.shooting.newton`.
+A pass takes the time of some hundred evaluations of the rates, without step-size control. A second
+pass with twice as many steps checks the accuracy, see `asperity.orbit.methods.shooting.method`.
 
 Source: E. Hairer, S. P. Norsett, G. Wanner, Solving Ordinary Differential Equations I, 2nd ed.
 (Springer, 1993), section II.5.
@@ -261,8 +260,8 @@ def shot_waveform(
     """
     path = np.asarray(_path(problem, start, steps, count=count))
     theta = even_phases(phases)
-    apart = eccentric_phase(theta, grading) - 2 * np.pi * np.arange(count) / count
+    difference = eccentric_phase(theta, grading) - 2 * np.pi * np.arange(count) / count
     k = np.arange(1, (count + 1) // 2)[:, None, None]
-    interpolate = (1 + 2 * np.cos(k * apart).sum(0)) / count
+    interpolate = (1 + 2 * np.cos(k * difference).sum(0)) / count
     Y = start[:, None] + np.einsum("pk,knb->npb", interpolate, path)
     return waveform_of(problem, Y, theta)

@@ -170,8 +170,8 @@ class Shooting(Method):
         size, rows = problem.system.size, np.arange(problem.system.V.shape[-1])
         solution = Solution.unsolved(problem, len(rows), options)
         guess, relaxation = np.empty((size, len(rows))), np.empty(len(rows))
-        for some, values in run_chunks(averaged_start, (problem,), rows, _chunk(rows)):
-            guess[:, some], relaxation[some] = values
+        for members, values in run_chunks(averaged_start, (problem,), rows, _chunk(rows)):
+            guess[:, members], relaxation[members] = values
         # Points of like difficulty belong together.
         rows = np.argsort(relaxation, kind="stable")
         for divisions in _DIVISIONS:
@@ -208,11 +208,11 @@ class _Refinement:
         rows = self._near_orbits(rows)
         for count in self.divisions.finer:
             rows, left = self._closed(rows, count), []
-            for some, reached in self._passes(rows, count):
-                resolved = self._compare(some, reached, count)
+            for members, reached in self._passes(rows, count):
+                resolved = self._compare(members, reached, count)
                 good = ~resolved & np.isfinite(reached.step).all(0)
-                self.first[:, some[good]] += reached.step[:, good]
-                left.append(some[good])
+                self.first[:, members[good]] += reached.step[:, good]
+                left.append(members[good])
             rows = _joined(left)
 
     def _steps(self, count: int) -> Steps:
@@ -221,22 +221,22 @@ class _Refinement:
     def _passes(self, rows: Indices, count: int) -> Iterator[tuple[Indices, PeriodIntegration]]:
         """Integrate `rows` on `count` steps; the inverse is kept for chord steps."""
         solve = partial(newton_pass, steps=self._steps(count))
-        for some, reached in run_chunks(solve, (self.problem, self.first), rows, _chunk(rows)):
-            self.inverse[..., some] = reached.inverse
-            yield some, reached
+        for members, reached in run_chunks(solve, (self.problem, self.first), rows, _chunk(rows)):
+            self.inverse[..., members] = reached.inverse
+            yield members, reached
 
     def _near_orbits(self, rows: Indices) -> Indices:
         """Newton's method on the coarse division; returns the rows that it brings near an orbit."""
         near = []
         for _ in range(_NEWTON_STEPS):
             far = []
-            for some, reached in self._passes(rows, self.divisions.coarse):
+            for members, reached in self._passes(rows, self.divisions.coarse):
                 leap = reached.leap
                 good = np.isfinite(leap) & np.isfinite(reached.step).all(0)
                 damping = np.minimum(1.0, _LARGEST_CHANGE / np.maximum(leap[good], 1e-300))
-                self.first[:, some[good]] += damping * reached.step[:, good]
-                near.append(some[good & (leap < _NEAR)])
-                far.append(some[good & (leap >= _NEAR)])
+                self.first[:, members[good]] += damping * reached.step[:, good]
+                near.append(members[good & (leap < _NEAR)])
+                far.append(members[good & (leap >= _NEAR)])
             rows = _joined(far)
         return _joined(near)
 
@@ -246,32 +246,34 @@ class _Refinement:
         for _ in range(_CHORDS):
             far = []
             inputs = (self.problem, self.first, self.inverse)
-            for some, (start, change) in run_chunks(solve, inputs, rows, _chunk(rows)):
+            for members, (start, change) in run_chunks(solve, inputs, rows, _chunk(rows)):
                 good = np.isfinite(change)
-                self.first[:, some[good]] = start[:, good]
-                closed.append(some[change < _NEARLY_CLOSED])
-                far.append(some[good & (change >= _NEARLY_CLOSED)])
+                self.first[:, members[good]] = start[:, good]
+                closed.append(members[change < _NEARLY_CLOSED])
+                far.append(members[good & (change >= _NEARLY_CLOSED)])
             rows = _joined(far)
         return _joined(closed)
 
-    def _compare(self, some: Indices, reached: PeriodIntegration, count: int) -> NDArray[np.bool_]:
+    def _compare(
+        self, members: Indices, reached: PeriodIntegration, count: int
+    ) -> NDArray[np.bool_]:
         """Compare with the division before; writes the points that agree and returns which do."""
-        gap = _gap(self.mean_friction[some], self.harmonics[:, some], reached)
+        gap = _gap(self.mean_friction[members], self.harmonics[:, members], reached)
         resolved = (reached.change <= _ACCEPTED) & (gap <= _AGREEMENT)
         resolved &= _liouville_gap(reached) <= _LIOUVILLE
         agreed = np.flatnonzero(resolved)
         kept = take(reached, agreed)
         logs = log_multipliers(kept.monodromy, np.zeros(len(agreed)), kept.log_determinant)
-        before = self.polynomial[:, some[agreed]]
+        before = self.polynomial[:, members[agreed]]
         multiplier_gap = _multiplier_gap(before, kept.polynomial, from_logs(logs))
         resolved[agreed] = multiplier_gap <= _AGREEMENT
         closed = reached.change <= _CLOSED
-        self.mean_friction[some] = np.where(closed, reached.mean_friction, np.nan)
-        self.harmonics[:, some] = reached.harmonics
-        self.polynomial[:, some] = reached.polynomial
+        self.mean_friction[members] = np.where(closed, reached.mean_friction, np.nan)
+        self.harmonics[:, members] = reached.harmonics
+        self.polynomial[:, members] = reached.polynomial
         if resolved.any():
             logs = logs[:, resolved[agreed]]
-            self._store(some[resolved], take(reached, resolved), logs, count)
+            self._store(members[resolved], take(reached, resolved), logs, count)
         return resolved
 
     def _store(
@@ -303,8 +305,10 @@ class _Refinement:
                 grading=self.divisions.grading,
                 phases=phases,
             )
-            for some, samples in run_chunks(solve, (self.problem, self.first), rows, _chunk(rows)):
-                self.solution.waveform[..., some] = samples
+            for members, samples in run_chunks(
+                solve, (self.problem, self.first), rows, _chunk(rows)
+            ):
+                self.solution.waveform[..., members] = samples
 
 
 def _chunk(rows: Indices) -> int:
@@ -346,10 +350,10 @@ def _multiplier_gap(before: Float, now: Float, multipliers: NDArray[np.complex12
         change = np.zeros_like(multipliers)
         for coefficient in now - before:
             change = change * multipliers + coefficient
-        apart = multipliers[:, None] - multipliers[None]
-        apart[np.diag_indices(len(multipliers))] = 1.0
+        differences = multipliers[:, None] - multipliers[None]
+        differences[np.diag_indices(len(multipliers))] = 1.0
         size = np.abs(multipliers)
         floor = np.maximum(_VANISHING, _DROWNED * size.max(0))
-        gap = np.abs(change / apart.prod(1)) / np.maximum(size, floor)
+        gap = np.abs(change / differences.prod(1)) / np.maximum(size, floor)
         gap = gap.max(0)
     return np.where(np.isfinite(gap), gap, np.inf)

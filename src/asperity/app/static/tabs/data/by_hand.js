@@ -28,13 +28,14 @@ export class ByHand {
     this.element = el("details", { class: "by-hand", hidden: true },
       el("summary", {}, "Move the numbers by hand over the recording"), this.sliders, this.message, this.figure.element,
       el("div", { class: "actions" }, el("button", { type: "button", click: () => this.fitFrom(this.start()) }, "Fit from here")));
-    this.element.addEventListener("toggle", () => { if (this.element.open) this.#ask(); });
+    this.element.addEventListener("toggle", () => { if (this.element.open && this.recording) this.#ask(); });
   }
 
   /** The one recording with known velocities, or null; and the law. */
   use(recording, law) {
     const known = recording?.segments.length && recording.segments.every((s) => s.hold || s.velocity > 0) && !recording.segments[0].hold;
     this.element.hidden = !known;
+    if (!known) this.recording = null;
     if (!known || (this.recording === recording && this.law === law)) return;
     Object.assign(this, { recording, law, values: null });
     this.#build();

@@ -258,7 +258,7 @@ export class FitPanel {
     // What the fit says first stands beside the button, then its picture, then its numbers.
     const [first, ...others] = described;
     this.status.textContent = first.sentences.length ? `${first.sentences.join(". ")}.` : first.title;
-    const ofLaws = Object.entries(laws || {}).map(([n, own]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(own)));
+    const ofLaws = Object.entries(laws || {}).map(([n, own]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(own, ` of ${n}`)));
     fill(this.results, ...this.#runs(runs), ...this.#bands(bands), buttons,
       ...sections([{ ...first, sentences: [] }, ...others]), ...ofLaws, ...this.#posterior(posterior), this.#residuals(residuals));
     for (const draw of this.figures) draw();

@@ -217,9 +217,9 @@ export class RecordingCard {
         el("td", {}, channel.curve ? sparkline(channel.curve) : ""));
     });
     const rate = recording.rate ? `${digits(recording.rate, 6)} Hz` : "uneven sampling";
-    return scrolling("Channels as understood", [
+    return scrolling(`Channels of ${this.state.name} as understood`, [
       el("p", { class: "note" }, `${recording.samples.toLocaleString("en")} samples, ${digits(recording.start, 6)} s to ${digits(recording.end, 6)} s, ${rate}; ${recording.provenance.format || ""}`),
-      el("table", {}, el("thead", {}, el("tr", {}, ["Channel", "Role", "Unit", "Understood", "Values", ""].map((t) => el("th", { scope: "col" }, t)))),
+      el("table", {}, el("thead", {}, el("tr", {}, ["Channel", "Role", "Unit", "Understood", "Values", "Curve"].map((t) => el("th", { scope: "col" }, t)))),
         el("tbody", {}, rows))]);
   }
 
@@ -361,7 +361,7 @@ export class RecordingCard {
       if (n.startsWith("velocity")) return quantity(value, "velocity", 3);
       return withDoubt(value, row[`${n}_uncertainty`] ?? (n === "rate_dependence" ? row.rate_uncertainty : null));
     };
-    return scrolling("What was measured", el("table", {},
+    return scrolling(`What was measured of ${this.state.name}`, el("table", {},
       el("thead", {}, el("tr", {}, [modulated ? "In fits" : "", "From (s)", ...columns.map(([, t]) => t), "Verdict"].map((t) => (t ? el("th", { scope: "col" }, t) : el("td", {}))))),
       el("tbody", {}, rows.map((row, i) => {
         const box = el("input", {

@@ -80,11 +80,11 @@ export function stickSlip({ record, curves }, whole, name) {
       }],
     }, `Drops from ${digits(Math.min(...timed.map((e) => e.drop)), 2)} to ${digits(Math.max(...timed.map((e) => e.drop)), 2)}. Dashed: the smallest drop that is seen.`]);
   }
-  return { readings, list, charts, tables: [regimeTable(record), catalogue(record, events, name)] };
+  return { readings, list, charts, tables: [regimeTable(record, name), catalogue(record, events, name)] };
 }
 
-function regimeTable({ regimes }) {
-  return table(["From (s)", "To (s)", "Regime", "Evidence"], regimes.map((r) => [digits(r.start, 6), digits(r.end, 6), r.kind, r.evidence]), "Regimes");
+function regimeTable({ regimes }, name) {
+  return table(["From (s)", "To (s)", "Regime", "Evidence"], regimes.map((r) => [digits(r.start, 6), digits(r.end, 6), r.kind, r.evidence]), `Regimes of ${name}`);
 }
 
 function catalogue(record, events, name) {
@@ -97,6 +97,6 @@ function catalogue(record, events, name) {
   };
   return el("div", { class: "catalogue" },
     el("div", { class: "actions" }, el("h4", {}, "Catalogue of events"), el("button", { type: "button", click: save }, "Catalogue as CSV")),
-    table(["", ...shown.map(([, label]) => label)], events.map((e, i) => [String(i + 1), ...shown.map(([n, , factor]) => cell(e, n, factor))]), "Catalogue of events", true),
+    table(["", ...shown.map(([, label]) => label)], events.map((e, i) => [String(i + 1), ...shown.map(([n, , factor]) => cell(e, n, factor))]), `Catalogue of events of ${name}`, true),
     record.catalogue.length > MOST && el("p", { class: "note" }, `The first ${MOST} of ${record.catalogue.length} events; the CSV has all.`));
 }

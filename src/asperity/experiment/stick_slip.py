@@ -1,0 +1,191 @@
+"""Stick-slip of a simulated slider: period, drop, durations and velocities, for many points."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from asperity.algebra.small_systems import jacobian_columns
+from asperity.errors import InputError
+from asperity.experiment.labelled import Shaped, labelled
+from asperity.loads import Excitation
+from asperity.parameters import MACHINE, obeying
+from asperity.parameters.arguments import number, typed
+from asperity.parameters.parameter import Displayed, SummaryLine, number_line
+from asperity.slider import Motion, Slider, equation_of_motion
+from asperity.slider.problem import flatten
+from asperity.transients.limit_cycle import CycleEnd, limit_cycle
+
+if TYPE_CHECKING:
+    import xarray
+
+Float = NDArray[np.float64]
+
+#: Unit and meaning of what the record holds.
+_MEANINGS: dict[str, tuple[str, str]] = {
+    "period": ("s", "period of stick-slip"),
+    "drop": ("1", "largest less smallest F/W0"),
+    "peak": ("1", "largest F/W0"),
+    "lowest": ("1", "smallest F/W0"),
+    "stick_duration": ("s", "time of a period in which the force rises"),
+    "slip_duration": ("s", "time of a period in which the force falls"),
+    "peak_velocity": ("m/s", "largest velocity of the slider"),
+    "slips": ("1", "slips in a period; 0 without stick-slip"),
+    "steady": ("1", "whether the motion comes to steady sliding"),
+    "stable": ("1", "whether steady sliding is stable"),
+}
+
+
+@dataclass(frozen=True, repr=False)
+class StickSlip(Displayed):
+    """Limit cycles under a drive of constant velocity; arrays of one shape.
+
+    Numbers are NaN where no cycle repeats itself; `result` says why.
+
+    Attributes
+    ----------
+    velocity : array
+        Of the drive (m/s).
+    period, stick_duration, slip_duration : array
+        Seconds. In a slip the force falls from its peak to its lowest value: the slider is faster
+        than the drive. Sums over the slips of a period.
+    drop, peak, lowest : array
+        F/W0; the drop is the peak less the lowest.
+    peak_velocity : array
+        Of the slider (m/s).
+    slips : int array
+        In a period; 0 where no cycle repeats itself.
+    steady : bool array
+        Whether the motion comes to steady sliding.
+    stable : bool array
+        Whether steady sliding is stable against small disturbances. Where it is, and there is
+        stick-slip all the same, the beginning of the motion decides.
+    result : str array
+        What the motion comes to.
+    slider : Slider
+    """
+
+    velocity: Float
+    period: Float
+    drop: Float
+    peak: Float
+    lowest: Float
+    stick_duration: Float
+    slip_duration: Float
+    peak_velocity: Float
+    slips: NDArray[np.int_]
+    steady: NDArray[np.bool_]
+    stable: NDArray[np.bool_]
+    result: NDArray[np.object_]
+    slider: Slider
+
+    def values(self) -> list[tuple[str, float, str, str]]:
+        """Name, value, unit and meaning of every number of a single point."""
+        return [(n, float(getattr(self, n).item()), *about) for n, about in _MEANINGS.items()]
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Period, drop and peak velocity, and how many points have a cycle."""
+        names = ("period", "drop", "slip_duration", "peak_velocity")
+        lines = [number_line(name, getattr(self, name), _MEANINGS[name][1]) for name in names]
+        count = int(np.sum(self.slips > 0))
+        points = f"{self.slips.size} points, {count} with stick-slip"
+        return f"StickSlip, {self.slider.law.name}, {points}", lines
+
+    def to_dataset(self, dims: tuple[str, ...] | None = None) -> xarray.Dataset:
+        """Labelled arrays; axes are named by what varies along them alone, or by `dims`."""
+        return labelled(self, _MEANINGS, {"velocity": ("m/s", self.velocity)}, dims)
+
+
+@typed
+def stick_slip_response(
+    slider: Slider,
+    *,
+    velocity: ArrayLike | str,
+    spring: ArrayLike | str | None = None,
+    inertia: bool = True,
+    radiation_damping: float | str | None = None,
+    rtol: float = 1e-9,
+) -> StickSlip:
+    """What a slider pulled at a constant velocity comes to: stick-slip, or steady sliding.
+
+    Parameters
+    ----------
+    slider : Slider
+        Its parameters may be arrays, which broadcast with the velocity.
+    velocity : array or str
+        Of the drive (m/s), positive.
+    spring : array or str, optional
+        Stiffness (N/m) in the place of that of the slider.
+    inertia : bool
+        Whether the mass of the slider counts. Without it a slip of most laws runs away, and there
+        is no cycle; `result` says so.
+    radiation_damping : float or str, optional
+        eta (N s/m), positive.
+    rtol : float
+        Tolerated error of a step, as in `asperity.transient`.
+
+    Returns
+    -------
+    StickSlip
+
+    Raises
+    ------
+    InputError
+        If a value breaks its rule, or the law does not depend on velocity.
+
+    Notes
+    -----
+    The motion begins after sliding at a thousandth of the velocity, so that of a cycle and stable
+    steady sliding the cycle is reached. It is followed until its states repeat themselves to 1e-8,
+    after up to eight slips; `drop`, `peak` and `period` are accurate to about 1e-8 relatively. One
+    point after the other takes some hundredths of a second each.
+    """
+    if not slider.law.rate_dependent:
+        raise InputError(
+            f"law must depend on the velocity, got {slider.law.name}; asperity.theory has the "
+            "cycle of constant static and dynamic friction"
+        )
+    V = obeying(velocity, "stick_slip_response.velocity", "velocity", "positive")
+    if spring is not None:
+        slider = Slider(slider.law, spring=spring, load=slider.W0, mass=slider.M)
+    eta = None
+    if radiation_damping is not None:
+        eta = number(radiation_damping, MACHINE["eta"].label, "damping", "positive")
+    (flat, V), shape = flatten((slider, V), "stick_slip_response")
+    motion = equation_of_motion(flat, V, np.ones(len(V)), inertia=inertia, eta=eta)
+    cycles = [
+        limit_cycle(
+            jax.tree.map(lambda a, i=i: a[i], flat), float(v), inertia=inertia,
+            radiation_damping=eta, rtol=rtol,
+        )
+        for i, v in enumerate(V)
+    ]  # fmt: skip
+    shaped = Shaped(shape)
+
+    def of(name: str, kind: Any = float) -> Any:
+        return shaped(np.array([getattr(cycle, name) for cycle in cycles], kind))
+
+    numbers = ("period", "drop", "peak", "lowest", "stick_duration", "slip_duration")
+    return StickSlip(
+        velocity=shaped(V),
+        **{name: of(name) for name in (*numbers, "peak_velocity")},
+        slips=of("slips", int),
+        steady=shaped(np.array([cycle.end is CycleEnd.STEADY for cycle in cycles], bool)),
+        stable=shaped(_stable(motion)),
+        result=of("result", object),
+        slider=slider,
+    )
+
+
+def _stable(motion: Motion) -> NDArray[np.bool_]:
+    """Whether a small disturbance of steady sliding dies out, at each point."""
+    steady = motion.steady()
+    at = Excitation(jnp.ones(steady.shape[1]))
+    _, columns = jacobian_columns(lambda Y: motion.rates(Y, at), steady)
+    jacobian = np.moveaxis(np.stack(columns, axis=1), -1, 0)
+    return np.asarray(np.linalg.eigvals(jacobian).real.max(-1) < 0)

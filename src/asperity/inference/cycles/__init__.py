@@ -1,0 +1,1 @@
+"""Stick-slip as data of a fit: the averaged cycle."""

@@ -1,0 +1,215 @@
+"""The averaged cycle of regular stick-slip, with the covariance that its cycles show.
+
+Cycles are laid over each other at the middle of the slip. The covariance of their mean is that of
+the cycles (Newey and West, Econometrica 55, 703, 1987, so that variations along the track that last
+for several cycles count): the directions in which they differ by more than noise are kept, and the
+others have their mean variance, in units of the noise (Tipping and Bishop, J. R. Stat. Soc. B 61,
+611, 1999).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+
+if TYPE_CHECKING:
+    from asperity.measurement.stick_slip.measure import StickSlipMeasurement
+
+Float = NDArray[np.float64]
+
+REGULAR = "regular stick-slip"
+#: Cycles that are needed.
+_FEWEST = 12
+#: Bins of the stick, of either half of the slip, and after it; what they cover of the shortest
+#: stick, and lengths of the slip after its middle.
+_STICK, _SLIP, _AFTER = 12, 6, 3
+_COVERED, _FOLLOWED = 0.9, 2.0
+#: Samples of a slip below which its shape is not seen.
+_RESOLVED = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class AveragedCycle:
+    """Mean of the cycles of a recording; forces are F/W0.
+
+    Attributes
+    ----------
+    name : str
+        What messages call the recording.
+    edges : array, shape (bins + 1,)
+        Times (s) of the bins from the middle of the slip.
+    values : array, shape (bins + 1,)
+        Mean force in each bin, then the mean recurrence (s).
+    whitening : array, shape (bins + 1, bins + 1)
+        Matrix that gives residuals unit covariance.
+    log_scale : float
+        Half the log determinant of the covariance of `values`.
+    cycles : int
+    step : float
+        Between samples (s).
+    V, W0 : float
+        Velocity of the drive (m/s) and load (N).
+    loading_slope : float
+        Of F/W0 (1/s).
+    slip_duration, stick_duration, drop : float
+        Means of the events (s, s, F/W0).
+    spread, noise_spread : float
+        Standard deviation of the drops over their mean, and what the noise of the gauge explains
+        of it.
+    """
+
+    name: str
+    edges: Float
+    values: Float
+    whitening: Float
+    log_scale: float
+    cycles: int
+    step: float
+    V: float
+    W0: float
+    loading_slope: float
+    slip_duration: float
+    stick_duration: float
+    drop: float
+    spread: float
+    noise_spread: float
+
+    @property
+    def resolved(self) -> bool:
+        """Whether samples show the shape of the slip."""
+        return self.slip_duration >= _RESOLVED * self.step
+
+
+def averaged_cycle(measurement: StickSlipMeasurement, name: str = "recording") -> AveragedCycle:
+    """Average the cycles of regular stick-slip.
+
+    Parameters
+    ----------
+    measurement : StickSlipMeasurement
+        With the velocity of the drive and the load.
+    name : str
+
+    Raises
+    ------
+    InputError
+        If velocity or load are not known, or there are few regular cycles.
+    """
+    machine, events = measurement.machine, measurement.events
+    for field, value, example in (
+        ("V", machine.velocity, "V=42 um/s"), ("W0", machine.load, "W0=0.3 N"),
+    ):  # fmt: skip
+        if value is None:
+            raise InputError(
+                f"{name} must have {field} for a fit of its cycles, got none; give it, as "
+                f"--fix '{example}'"
+            )
+    regular = [r for r in measurement.regimes if r.kind == REGULAR]
+    if not regular:
+        raise InputError(
+            f"{name} must be regular stick-slip for a fit of its cycles, got {measurement.kind}; "
+            "an average of unlike cycles is no cycle of a law: fit a window in which they are "
+            "alike"
+        )
+    longest = max(regular, key=lambda r: r.stop - r.first)
+    kept = slice(longest.first, longest.stop)
+    if longest.stop - longest.first <= _FEWEST:
+        raise InputError(
+            f"{name} must have more than {_FEWEST} regular cycles, got "
+            f"{longest.stop - longest.first}; record for longer"
+        )
+    time, force = measurement.time, measurement.friction
+    step = float(time[-1] - time[0]) / (time.size - 1)
+    onset, end, drop = (getattr(events, n)[kept] for n in ("onset", "end", "drop"))
+    slip = float(np.median(end - onset))
+    levels = (events.force_before + events.force_after)[kept] / 2
+    middle, samples = _middles(time, force, (onset + end) / 2, levels, slip / 6)
+    stick = float(np.min(middle[1:] - end[:-1]))
+    after = min(_FOLLOWED * slip, float(np.min(onset[1:] - middle[:-1])))
+    edges = _edges(_COVERED * stick, slip, after, step)
+    middle = middle[(middle + edges[0] >= time[0]) & (middle + edges[-1] <= time[-1])]
+    integral = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(time))])
+    at = middle[1:, None] + edges
+    means = np.diff(_integral(time, force, integral, at), axis=1) / np.diff(edges)
+    rows = np.column_stack([means, np.diff(middle)])
+    noise = measurement.noise
+    steepness = np.pi / 2 * float(np.mean(drop)) / slip
+    scales = np.append(
+        noise * np.sqrt(step / np.diff(edges)), noise / steepness * np.sqrt(2 / samples)
+    )
+    whitening, log_scale = _whitening(rows, scales)
+    return AveragedCycle(
+        name, edges, rows.mean(0), whitening, log_scale, len(rows), step,
+        float(machine.velocity or np.nan), float(machine.load or np.nan),
+        measurement.loading_slope, slip, float(np.median(events.stick_duration[kept][1:])),
+        float(np.mean(drop)), float(np.std(drop) / np.mean(drop)),
+        float(np.sqrt(np.mean(events.drop_uncertainty[kept] ** 2)) / np.mean(drop)),
+    )  # fmt: skip
+
+
+def _middles(
+    time: Float, force: Float, about: Float, levels: Float, reach: float
+) -> tuple[Float, int]:
+    """Times at which lines through the middle of each slip cross its level, and their samples."""
+    step = float(time[1] - time[0])
+    result = about.copy()
+    for n, (t, level) in enumerate(zip(about, levels, strict=True)):
+        i, j = np.searchsorted(time, [t - reach, t + reach])
+        if j - i < 3:
+            i, j = np.searchsorted(time, t - step), np.searchsorted(time, t + step)
+        slope, at = np.polyfit(time[i:j] - t, force[i:j], 1)
+        # The crossing of a line that does not fall is none.
+        result[n] += float(np.clip((level - at) / slope, -reach, reach)) if slope < 0 else 0.0
+    return result, max(2, int(2 * reach / step))
+
+
+def _edges(stick: float, slip: float, after: float, step: float) -> Float:
+    """Edges of bins: long in the stick, short in the slip, no shorter than a sample."""
+    nearest = min(max(slip, step), stick / 2)
+    before = -np.geomspace(stick, nearest, _STICK + 1)
+    count = int(min(2 * _SLIP, max(2, np.floor((nearest + min(slip, after)) / step))))
+    inside = np.linspace(-nearest, min(slip, after), count + 1)
+    beyond = (
+        np.linspace(inside[-1], after, _AFTER + 1) if after > inside[-1] + step else inside[-1:]
+    )
+    edges = np.concatenate([before[:-1], inside, beyond[1:]])
+    # Bins shorter than a sample join the one before.
+    kept = [edges[0]]
+    for edge in edges[1:]:
+        if edge - kept[-1] > 0.999 * step:
+            kept.append(edge)
+    return np.array(kept)
+
+
+def _integral(time: Float, force: Float, integral: Float, at: Float) -> Float:
+    """Integral of the force, straight between its samples, up to some times."""
+    i = np.clip(np.searchsorted(time, at) - 1, 0, time.size - 2)
+    since, step = at - time[i], time[i + 1] - time[i]
+    slope = (force[i + 1] - force[i]) / step
+    return np.asarray(integral[i] + since * (force[i] + slope * since / 2))
+
+
+def _whitening(rows: Float, scales: Float) -> tuple[Float, float]:
+    """Whitening matrix of the mean of the rows, and half its log determinant."""
+    n, size = rows.shape
+    off = (rows - rows.mean(0)) / scales
+    lags = round(n ** (1 / 3))
+    covariance = off.T @ off / (n - 1)
+    for lag in range(1, lags + 1):
+        product = off[lag:].T @ off[:-lag] / (n - 1)
+        covariance += (1 - lag / (lags + 1)) * (product + product.T)
+    values, vectors = np.linalg.eigh(covariance)
+    # Eigenvalues of white noise in so few rows reach this far (Marchenko and Pastur, 1967); the
+    # weights above leave fewer of them to each element.
+    edge = (1 + np.sqrt(size * (1 + 2 * lags / 3) / n)) ** 2
+    excess = values > edge * max(1.0, float(np.median(values)))
+    # What the noise of the gauge explains is known: no direction scatters less.
+    others = max(1.0, float(np.mean(values[~excess])))
+    values = np.where(excess, values, others)
+    whitening = np.sqrt(n) * (vectors / np.sqrt(values)) @ vectors.T / scales
+    log_scale = float(np.log(scales).sum() + 0.5 * np.log(values / n).sum())
+    return whitening, log_scale

@@ -1,0 +1,184 @@
+"""The averaged cycle in the likelihood: the limit cycle of the law with inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.errors import InputError
+from asperity.inference.cycles.cycle import AveragedCycle
+from asperity.inference.objective import Likelihood, Residuals
+from asperity.inference.unknowns import Unknown
+from asperity.laws import Law
+from asperity.slider.named import slider_from
+from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
+
+Float = NDArray[np.float64]
+
+CYCLE = "cycle"
+#: Relative change of a parameter to either side for a derivative: of cycles that are accurate to
+#: 1e-8, and of recurrences that are measured to 1e-5.
+_CHANGE = 1e-4
+#: Instants in a bin, and in the slip of the model; rounds of the shift in time.
+_IN_BIN, _IN_SLIP, _ROUNDS = 8, 400, 8
+#: Share of a slip by which a last change of the shift is none.
+_NO_SHIFT = 1e-6
+#: Spread of the drops over that of the noise from which cycles differ by themselves.
+_IRREGULAR = 2.0
+
+
+class CycleTerm:
+    """The averaged cycle of a recording as a `DataTerm` of an objective.
+
+    A constant friction and a shift in time are fitted within: neither the level of the gauge nor
+    the instant that the events are laid over each other by is known as well as the shape is.
+
+    Parameters
+    ----------
+    cycle : AveragedCycle
+    law : type of Law
+    fixed : mapping of str to float
+        Parameters of law and machine that are not free, in SI.
+    """
+
+    nuisances: tuple[Unknown, ...] = ()
+    searches = None
+    affordable = 256
+    observables = (CYCLE,)
+    profiled = 0
+    failure = (
+        "no start has stick-slip that repeats itself; give start values nearer to those of the "
+        "interface"
+    )
+
+    def __init__(self, cycle: AveragedCycle, law: type[Law], fixed: Mapping[str, Any]) -> None:
+        self.cycle, self.law = cycle, law
+        self._fixed = {n: float(v) for n, v in fixed.items() if np.ndim(v) == 0}
+        widths = np.diff(cycle.edges)
+        shares = (np.arange(_IN_BIN) + 0.5) / _IN_BIN
+        self._times = (cycle.edges[:-1, None] + widths[:, None] * shares).ravel()
+        self._seen: dict[tuple[tuple[str, float], ...], Float | None] = {}
+
+    @property
+    def name(self) -> str:
+        """Name of the recording."""
+        return self.cycle.name
+
+    @property
+    def noise(self) -> Mapping[str, Any]:
+        """Scatter of the cycles about their mean."""
+        return {
+            "model": "normal, with the covariance of the cycles",
+            "effective_samples": len(self.cycle.values) - 2,
+            "cycles": self.cycle.cycles,
+            "spread_of_drops": self.cycle.spread,
+            "spread_by_noise": self.cycle.noise_spread,
+        }
+
+    def limit_cycle(self, values: Mapping[str, float]) -> LimitCycle:
+        """The cycle of the law at values of its parameters."""
+        numbers = {**self._fixed, **values, "W0": self.cycle.W0}
+        return limit_cycle(slider_from(self.law, numbers), self.cycle.V)
+
+    def _off(self, values: Mapping[str, float]) -> Float | None:
+        """Whitened residuals without level and shift, in the space that they leave."""
+        key = tuple(values.items())
+        if key not in self._seen:
+            if len(self._seen) > 64:
+                self._seen.clear()
+            self._seen[key] = self._whitened(values)
+        return self._seen[key]
+
+    def _whitened(self, values: Mapping[str, float]) -> Float | None:
+        data = self.cycle
+        cycle = self.limit_cycle(values)
+        if cycle.end is not CycleEnd.REPEATS:
+            return None
+        falling = np.linspace(0, cycle.slip_duration, _IN_SLIP)
+        middle = float(np.interp(-(cycle.peak + cycle.lowest) / 2, -cycle.force(falling), falling))
+        level = np.append(np.ones(len(data.values) - 1), 0.0)
+        shift = 0.0
+        for _ in range(_ROUNDS):
+            # Samples are joined by straight lines: h^2/12 of the curvature is added.
+            before, at, after = (
+                self._of(cycle, middle + shift + k * data.step) for k in (-1, 0, 1)
+            )
+            mean = (before + 10 * at + after) / 12
+            slope = np.append((after - before) / (2 * data.step), 0.0)
+            off = data.whitening @ (np.append(mean, cycle.period / cycle.slips) - data.values)
+            columns = data.whitening @ np.column_stack([level, slope])
+            change = np.linalg.lstsq(columns, -off, rcond=None)[0][1]
+            change = float(np.clip(change, -data.slip_duration, data.slip_duration))
+            if abs(change) < _NO_SHIFT * data.slip_duration:
+                break
+            shift += change
+        # What level and shift leave: two residuals fewer.
+        return np.asarray(np.linalg.qr(columns, mode="complete")[0][:, 2:].T @ off)
+
+    def _of(self, cycle: LimitCycle, t: float) -> Float:
+        return np.asarray(cycle.force(t + self._times).reshape(-1, _IN_BIN).mean(1))
+
+    def residuals(
+        self, values: Mapping[str, float], *, search: bool | None = None
+    ) -> Residuals | None:
+        """Residuals in standard uncertainties; None where the law has no cycle."""
+        off = self._off(values)
+        if off is None:
+            return None
+        columns = np.empty((off.size, len(values)))
+        for i, (name, value) in enumerate(values.items()):
+            change = _CHANGE * abs(value) or _CHANGE
+            sides = [self._off({**values, name: value + side * change}) for side in (1, -1)]
+            if sides[0] is None or sides[1] is None:
+                return None
+            columns[:, i] = (sides[0] - sides[1]) / (2 * change)
+        rows = np.arange(off.size)
+        return Residuals(off, columns, np.full(off.size, CYCLE), rows, self.cycle.log_scale)
+
+    def chi2_of_many(
+        self, values: Sequence[Mapping[str, float]], *, near: bool = False, least: float = 1.0
+    ) -> Float:
+        """Sums of squared residuals at many sets of parameters; see `DataTerm`."""
+        found = [self._off(v) for v in values]
+        return np.array([np.inf if off is None else float(off @ off) for off in found])
+
+    def likelihood(self, names: tuple[str, ...]) -> tuple[Likelihood, Any]:
+        """Not there: compiled samplers take gradients that a limit cycle has not."""
+        raise InputError(
+            f"a posterior must be of lock-in readings or recordings of sliding, got the stick-slip "
+            f"of {self.name}; take intervals by profile likelihood (profile=True, --profile)"
+        )
+
+    def thinned(self, rows: int, data: int = 0) -> None:
+        """Nothing: one cycle is evaluated as a whole."""
+        return
+
+    def uncertainty_of_noise(
+        self, values: Mapping[str, float], slopes: Float, covariance: Float
+    ) -> tuple[Float, Float]:
+        """Nothing: the scatter of the cycles is known without the law."""
+        return np.zeros_like(covariance), np.zeros(len(covariance))
+
+    def observed(self) -> Mapping[str, Float]:
+        """Bins of the averaged cycle."""
+        middles = (self.cycle.edges[1:] + self.cycle.edges[:-1]) / 2
+        return {"time": middles, CYCLE: self.cycle.values[:-1]}
+
+    def use_search(self, always: bool) -> None:
+        """There is one method."""
+
+    def warnings(
+        self, residuals: Residuals, information: Float, outliers: Sequence[int] = ()
+    ) -> Sequence[str]:
+        """Whether cycles differ by more than the noise of the gauge."""
+        cycle = self.cycle
+        if cycle.spread <= _IRREGULAR * cycle.noise_spread:
+            return ()
+        return (
+            f"{cycle.name}: its drops differ by {100 * cycle.spread:.2g} % where the noise of the "
+            f"gauge explains {100 * cycle.noise_spread:.2g} %: the uncertainties are those of "
+            "irregular cycles, whose mean is compared with a regular cycle",
+        )

@@ -1,0 +1,123 @@
+"""A bad value is one sentence at every door, but for the name that the door has for the field."""
+
+import re
+
+import pytest
+from click.testing import CliRunner
+
+import asperity as asp
+from asperity.cli.main import main
+from asperity.errors import InputError
+from asperity.laws import RiceRuina
+from asperity.parameters import DRIVE, MACHINE, law_parameters
+from asperity.study import load_plan, run_sweep
+from asperity.units import KINDS
+
+POINT = {"V": "1 um/s", "epsilon": "0.2", "frequency": "120 Hz"}
+NAMES = ("V", "epsilon", "frequency", "K", "W0", "M", "A", "B", "D0", "V0")
+KNOWN = {**law_parameters(RiceRuina), **MACHINE, **DRIVE}
+RIGHT = {
+    n: f"{asp.materials.load('bureau2000')[n].si!r} {KNOWN[n].unit}" for n in NAMES[3:]
+} | POINT
+
+
+def wrong_numbers():
+    """Of each number: another unit, a value that breaks its rule, no number, and no unit."""
+    for name in NAMES:
+        unit = KINDS[KNOWN[name].kind].si
+        wrong = [f"-2 {unit}", "2 s" if unit != "s" else "2 m", "fast", f"nan {unit}", "1e400"]
+        for value in [*wrong, *(["2"] if unit else [])]:
+            yield name, value.strip()
+
+
+def python(name, value):
+    numbers = {**RIGHT, name: value}
+    law = RiceRuina(mu0=0.5, **{n: numbers[n] for n in ("A", "B", "D0", "V0")})
+    slider = asp.Slider(law, spring=numbers["K"], load=numbers["W0"], mass=numbers["M"])
+    asp.periodic_response(
+        slider,
+        velocity=numbers["V"],
+        epsilon=numbers["epsilon"],
+        frequency=numbers["frequency"],
+        inertia=True,
+    )
+
+
+def command(*arguments):
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 2
+    assert result.stderr.count("\n") == 1
+    return result.stderr.removeprefix("asperity: ").strip()
+
+
+def response_command(name, value):
+    short = {"V": "-V", "epsilon": "-e", "frequency": "-f"}
+    numbers = {**POINT, name: value}
+    options = [
+        o
+        for n, v in numbers.items()
+        for o in ((short[n], v) if n in short else ("--set", f"{n}={v}"))
+    ]
+    return command("response", "--law", "rice-ruina", "--material", "bureau2000", *options)
+
+
+def sweep(name, value, folder):
+    numbers = {**POINT, name: value}
+    lines = [f'{n} = "{v}"' for n, v in numbers.items()]
+    plan = folder / "plan.toml"
+    plan.write_text(
+        'law = "rice-ruina"\nmaterial = "bureau2000"\n[axes]\nmu0 = { values = ["0.5"] }\n'
+        "[parameters]\n" + "\n".join(lines), encoding="utf-8",
+    )  # fmt: skip
+    run_sweep(load_plan(plan), folder / "sweep.zarr", workers=1)
+
+
+def sentence(call, *arguments):
+    with pytest.raises(InputError) as caught:
+        call(*arguments)
+    return re.sub(r" \(in '.*'\)$", "", str(caught.value))
+
+
+@pytest.mark.parametrize(("name", "value"), list(wrong_numbers()))
+def test_a_number_of_a_point(ask, tmp_path, name, value):
+    label, options = KNOWN[name].label, KNOWN[name].options
+    numbers = {**POINT, name: value}
+    page = ask("explore", {"law": "rice-ruina", "numbers": numbers, "laws": []})
+    said = {
+        options[0] if options else f"--set {name}": response_command(name, value),
+        f"parameters.{name}": sentence(sweep, name, value, tmp_path),
+        name: page.json["error"],
+    }
+    if value != "2":  # SI in Python
+        said[label] = sentence(python, name, value)
+    ends = {text.removeprefix(f"{field} must ") for field, text in said.items()}
+    assert all(text.startswith(f"{field} must ") for field, text in said.items()), said
+    assert len(ends) == 1, said
+
+
+#: By field of a measurement: the option, the label of the page, and values that it may not have.
+MEASURED = {
+    "harmonics": ("--harmonics", "Harmonics", [0, 65, -1, "some"]),
+    "detrend": ("--detrend", "Drift", ["cubic", ""]),
+    "frequency": ("--frequency", "Frequency", ["-1 Hz", "0 Hz", "2 kg", "fast", "120 rad/s"]),
+    "window": ("--window", "Window", ["5", "a:9", "1:2 kg"]),
+}
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [(name, value) for name, (*_, values) in MEASURED.items() for value in values],
+)
+def test_a_field_of_a_measurement(ask, tmp_path, name, value):
+    option, label, _ = MEASURED[name]
+    recording = tmp_path / "recording.csv"
+    recording.write_text("time (s),normal force (N)\n0,1\n1,1\n", encoding="utf-8")
+    page = ask("data/measure", {"recording": "0" * 32, "options": {name: value}})
+    said = {
+        option: command("measure", str(recording), option, str(value)),
+        label: page.json["error"],
+    }
+    if value != "some":  # a `TypeError` in Python
+        said[f"measure.{name}"] = sentence(lambda: asp.measure(recording, **{name: value}))
+    assert all(text.startswith(f"{field} must ") for field, text in said.items()), said
+    assert len({text.removeprefix(f"{field} must ") for field, text in said.items()}) == 1, said

@@ -1,0 +1,104 @@
+"""The averaged cycle of stick-slip against the limit cycle that made the recording."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+import asperity as asp
+from asperity.errors import InputError
+from asperity.inference.cycles.cycle import averaged_cycle
+from asperity.inference.cycles.term import CycleTerm
+from asperity.inference.fitting.fit import fit
+from asperity.laws import RiceRuina
+from asperity.measurement.stick_slip.measure import Machine, measure_stick_slip
+from asperity.recording import Channel, Trace
+from asperity.transients.limit_cycle import limit_cycle
+
+W0, V, RATE, CYCLES = 1.0, 1e-4, 200.0, 40
+LAW = {"A": 0.01, "B": 0.015, "D0": 1e-6}
+MACHINE = {"K": 300.0, "M": 0.3}
+FIXED = {"mu0": 0.5, "V0": V}
+TRUTH = {**LAW, **MACHINE}
+
+
+@cache
+def made():
+    slider = asp.Slider(RiceRuina(**FIXED, **LAW), spring=300.0, load=W0, mass=0.3)
+    return limit_cycle(slider, V)
+
+
+def measured(seed, noise=0.02, spread=0.0, rate=RATE, **machine):
+    """The cycle over and over, its level and size normal from slip to slip, with white noise."""
+    cycle, rng = made(), np.random.default_rng(seed)
+    t = np.arange(0, CYCLES * cycle.period, 1 / rate)
+    place = t + rng.uniform() * cycle.period
+    force = cycle.force(place)
+    size = 1 + spread * rng.standard_normal(CYCLES + 2)
+    force = cycle.lowest + (force - cycle.lowest) * size[(place // cycle.period).astype(int)]
+    force = force + noise * cycle.drop * rng.standard_normal(t.size)
+    trace = Trace(t, {"friction": Channel(force, "dimensionless", "1", "friction")})
+    return measure_stick_slip(trace, machine=Machine(**{"velocity": V, "load": W0} | machine))
+
+
+def test_residuals_at_the_truth_are_chi_squared():
+    """Sums over recordings, of noise that is 2 % of the drop, and of cycles that are unlike too."""
+    for spread in (0.0, 0.03):
+        total, count = 0.0, 0
+        for seed in range(5):
+            term = CycleTerm(averaged_cycle(measured(seed, spread=spread)), RiceRuina, FIXED)
+            residuals = term.residuals({**TRUTH}).values if seed == 0 else term._off(TRUTH)
+            total, count = total + float(residuals @ residuals), count + residuals.size
+        assert 1e-3 < chi2.sf(total, count) < 1 - 1e-9
+
+
+def test_a_level_and_an_instant_do_not_count():
+    measurement = measured(1)
+    residuals = CycleTerm(averaged_cycle(measurement), RiceRuina, FIXED)._off(TRUTH)
+    moved = CycleTerm(averaged_cycle(measurement), RiceRuina, FIXED | {"mu0": 0.53})._off(TRUTH)
+    np.testing.assert_allclose(moved, residuals, atol=1e-2)
+
+
+def test_derivatives_are_those_of_the_residuals():
+    term = CycleTerm(averaged_cycle(measured(2)), RiceRuina, FIXED)
+    jacobian = term.residuals(TRUTH).jacobian
+    for i, (name, value) in enumerate(TRUTH.items()):
+        change = 1e-5 * value
+        up, down = (term._off({**TRUTH, name: value + s * change}) for s in (1, -1))
+        slope = (up - down) / (2 * change)
+        np.testing.assert_allclose(jacobian[:, i], slope, atol=2e-3 * np.linalg.norm(slope))
+
+
+def test_what_is_irregular_is_said_and_what_is_not_there_is_asked_for():
+    term = CycleTerm(averaged_cycle(measured(3, spread=0.05)), RiceRuina, FIXED)
+    (warning,) = term.warnings(None, None)
+    assert "irregular cycles" in warning
+    assert CycleTerm(averaged_cycle(measured(3)), RiceRuina, FIXED).warnings(None, None) == ()
+    with pytest.raises(InputError, match="must have V for a fit of its cycles"):
+        averaged_cycle(measured(3, velocity=None))
+    with pytest.raises(InputError, match="must be regular stick-slip"):
+        averaged_cycle(measured(3, spread=0.4))
+    coarse = averaged_cycle(measured(3, rate=20.0))
+    assert not coarse.resolved
+    with pytest.raises(InputError, match="M must be fixed where a slip is shorter"):
+        fit(coarse, "rice-ruina", fixed={"K": 300.0})
+    with pytest.raises(InputError, match="free must be what the shape of a cycle shows"):
+        fit(coarse, "rice-ruina", ["mu0"], fixed=TRUTH)
+    with pytest.raises(InputError, match="M must be free or fixed"):
+        fit(coarse, "rice-ruina", ["A"], fixed={"B": 0.015, "D0": 1e-6, "K": 300.0})
+
+
+@pytest.mark.long
+def test_a_fit_gives_the_truth_within_its_intervals():
+    cycle = averaged_cycle(measured(4))
+    result = fit(
+        cycle, "rice-ruina", ["B", "D0"], fixed={"A": 0.01, **MACHINE}, starts=2,
+        start={"B": 0.0155, "D0": 1.2e-6},
+    )  # fmt: skip
+    assert result.converged
+    assert result.p_value > 1e-3
+    for name in ("B", "D0"):
+        estimate = result.parameters[name]
+        assert abs(estimate.value - TRUTH[name]) < 4 * estimate.se
+        assert estimate.se < 0.1 * estimate.value
