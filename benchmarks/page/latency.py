@@ -30,7 +30,7 @@ def opened(browser: Any, port: int, view: str = VIEW) -> Any:
     page = browser.new_page(viewport={"width": 1280, "height": 900})
     page.set_default_timeout(300_000)
     page.goto(f"http://127.0.0.1:{port}/{view}")
-    page.locator(".sentence", has_text="able;").wait_for()
+    page.locator(".sentence", has_text="able:").wait_for()
     while "Preparing" in page.locator("#state").inner_text():
         page.wait_for_timeout(200)
     return page
