@@ -91,7 +91,7 @@ export class Figure {
     if (!this.ownLabel) this.plot.setAttribute("aria-label", `${this.heading.textContent}: arrow keys read its values`);
     const width = printing ? this.#printedWidth() : this.plot.clientWidth;
     // While the layout changes a panel may be narrower than its margins.
-    if (width <= 2 * (LEFT + RIGHT)) return;
+    if (width <= 10 * RIGHT) return;
     const drawn = drawChart(chart, width, height, description);
     this.plot.innerHTML = drawn.svg;
     this.frames = drawn.frames;
