@@ -90,7 +90,8 @@ export class Figure {
     this.plot.style.minHeight = `${height}px`;
     if (!this.ownLabel) this.plot.setAttribute("aria-label", `${this.heading.textContent}: arrow keys read its values`);
     const width = printing ? this.#printedWidth() : this.plot.clientWidth;
-    if (!width) return;
+    // While the layout changes a panel may be narrower than its margins.
+    if (width <= 10 * RIGHT) return;
     const drawn = drawChart(chart, width, height, description);
     this.plot.innerHTML = drawn.svg;
     this.frames = drawn.frames;
