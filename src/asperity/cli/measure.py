@@ -394,7 +394,7 @@ def _cycles(
             for k, series in enumerate(campaign.series)
         }
         modelled = [k for k, machine in machines.items() if np.isfinite(machine).all()]
-        V = np.concatenate([series.column("V") for series in campaign.series] or [[np.nan]])
+        V = np.array([v for series in campaign.series for v in series.column("V")])
         V = V[np.isfinite(V)]
         if not modelled or not V.size:
             click.echo(
@@ -512,7 +512,7 @@ def _catalogue(result: Any, path: Path) -> None:
     write_catalogue(result, path)
 
 
-def _machine(given: dict[str, str], strict: bool) -> dict[str, str]:
+def _machine(given: dict[str, str], strict: bool) -> dict[str, Any]:
     """What ``--set`` says of the machine, by the fields of the question."""
     from asperity.measurement.conditions import MACHINE_FIELDS
 
