@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from asperity.figures.plot import NORMAL
 from asperity.figures.recording import band
 from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, new_figure
-from asperity.measurement.stick_slip.campaign import REPEATED
+from asperity.measurement.stick_slip.regimes import REPEATED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

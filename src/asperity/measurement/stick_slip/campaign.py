@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.measurement.stick_slip.healing import StickSlipHealing, of_campaign
+from asperity.measurement.stick_slip.regimes import REPEATED
 from asperity.parameters.parameter import Drawn, SummaryLine
 from asperity.units import format_si
 
@@ -18,8 +19,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Regimes whose mean drop is that of a cycle.
-REPEATED = ("regular stick-slip", "irregular stick-slip")
 #: Shares by which stiffnesses and loads of one machine differ at most.
 _SAME = 0.05
 
