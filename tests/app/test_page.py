@@ -69,7 +69,7 @@ def test_the_keyboard_reads_the_values_of_a_chart(visit, explored):
     chart.press("ArrowRight")
     assert spoken.inner_text() == f"F/W₀: {float(f'{force[0]:.4g}'):g} at 0"
     chart.press("ArrowDown")
-    assert spoken.inner_text().startswith("slip velocity / V: ")
+    assert spoken.inner_text().startswith("slip rate / V: ")
     assert page.locator(".panel.period .readout").is_visible()
     chart.press("Escape")
     assert spoken.inner_text() == ""

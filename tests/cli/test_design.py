@@ -70,7 +70,7 @@ def test_a_recipe_needs_its_measurements(asperity, tmp_path):
     )
     result = asperity("recipe", "bureau2000", readings, "--thresholds", thresholds)
     assert result.exit_code == 2
-    assert "must have the column mean_friction" in result.stderr
+    assert "must have rows with epsilon = 0 and mean_friction" in result.stderr
     result = asperity("recipe", "bureau1999", readings, "--thresholds", thresholds)
     assert result.exit_code == 2
     assert "bureau2000" in result.stderr

@@ -52,7 +52,7 @@ def test_every_example_is_valid(form) -> None:
         ("modulat 5 % at 8 Hz for 1 s", ["'modulate 24 % at 120 Hz for 20 s'"]),
         ("ramp 5 N", ["'ramp load to 9 N in 5 s' or 'ramp velocity to 100 um/s in 5 s'"]),
         ("step velocity to 1 um/s", ["'step load to 9 N'"]),
-        ("slide 10 s", ["whole step", "'slide at 10 um/s for 60 s'"]),
+        ("slide 10 s", ["complete step", "'slide at 10 um/s for 60 s'"]),
         ("modulate 24 % for 20 s", ["'modulate 24 % at 120 Hz for 20 s'"]),
         ("hold 10", ["step 4.duration", "unit", "'10'", "'hold 10 s'"]),
         ("slide at 10 um for 1 s", ["step 4.velocity", "'10 um'", "'slide at 10 um/s for 60 s'"]),

@@ -129,7 +129,7 @@ def test_the_loss_of_contact_is_not_searched_for_ages(ringing, rise) -> None:
 def test_more_rows_than_memory_holds_are_refused_at_once(ringing) -> None:
     programme = Programme(Slide(1.0), load=W0, velocity=V)
     for rate in 10.0 ** np.random.default_rng(3).uniform(12, 308, 20):
-        with pytest.raises(InputError, match="sampling must give"):
+        with pytest.raises(InputError, match="sampling must fit into the free space"):
             transient(ringing.slider, programme, sampling=float(rate))
 
 

@@ -138,13 +138,13 @@ def _stick_slip(
     """The averaged cycle of a recording of stick-slip; None of any other."""
     if data.steps is not None or data.velocities is not None:
         return None
-    given = {n: MACHINE[n].check(fixed[n]) for n in ("K", "M", "W0") if n in fixed}
-    V = float(DRIVE["V"].check(fixed["V"])) if "V" in fixed else None
-    machine = Machine(given.get("K"), V, given.get("M"), given.get("W0"))
     try:
+        given = {n: MACHINE[n].check(fixed[n]) for n in ("K", "M", "W0") if n in fixed}
+        V = float(DRIVE["V"].check(fixed["V"])) if "V" in fixed else None
+        machine = Machine(given.get("K"), V, given.get("M"), given.get("W0"))
         measurement = measure_stick_slip(trace, window=data.window, machine=machine)
     except InputError:
-        # What a run needs is asked for by the reader of runs.
+        # The reader of runs checks the numbers again; it also takes K over the load.
         return None
     if not measurement.clear:
         return None

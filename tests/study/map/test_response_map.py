@@ -120,7 +120,7 @@ def test_a_point_that_fails_says_why_and_costs_no_other(numbers, monkeypatch) ->
     for name in SHOWN:
         assert (np.isnan(found[name].values) == failed).all(), name
     reasons = found["result"].values
-    assert all("no periodic orbit found" in text for text in reasons[failed])
+    assert all("no method found a periodic orbit" in text for text in reasons[failed])
     assert (reasons[~failed] == "converged").all()
     assert not found["stable"].values[failed].any()
     assert found["boundary_epsilon"].max() <= 0.3

@@ -2,10 +2,10 @@
 
 import errno
 import json
+import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,6 @@ import numpy as np
 import pytest
 import xarray
 
-import asperity.study.run as run_module
 from asperity.errors import InputError
 from asperity.study import (
     export_store,
@@ -108,18 +107,16 @@ def killed_at(step: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Everything stops at the `step`-th time that something has to reach the disk."""
     count = 0
 
-    def dying(real: Callable[[Path], None]) -> Callable[[Path], None]:
-        def sync(path: Path) -> None:
-            nonlocal count
-            count += 1
-            if count == step:
-                raise Killed
-            real(path)
+    real = os.fsync
 
-        return sync
+    def dying(descriptor: int) -> None:
+        nonlocal count
+        count += 1
+        if count == step:
+            raise Killed
+        real(descriptor)
 
-    for name in ("sync_file", "sync_folder"):
-        monkeypatch.setattr(durable, name, dying(getattr(durable, name)))
+    monkeypatch.setattr(os, "fsync", dying)
 
 
 def test_killed_at_any_step_the_next_run_ends_with_the_same_bits(
@@ -172,14 +169,14 @@ def test_a_full_disk_is_a_sentence_and_costs_nothing(
     out = tmp_path / "s.zarr"
     written = 0
 
-    def full(path: Path) -> None:
+    def full(file: Path) -> None:
         nonlocal written
         written += 1
         if written > 60:
             raise OSError(errno.ENOSPC, "No space left on device")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(durable, "sync_file", full)
+        patch.setattr(durable, "sync_folder", full)
         with pytest.raises(InputError, match=r"the disk is full.*continues from there"):
             run(out)
     assert store_status(out).done < POINTS
@@ -191,14 +188,14 @@ def test_a_full_disk_is_a_sentence_and_costs_nothing(
 def test_a_refused_start_leaves_no_store(tmp_path: Path, closed_form: ClosedForm) -> None:
     out = tmp_path / "s.zarr"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_module, "_bytes_left", lambda store: 1e30)
+        patch.setattr(SweepStore, "share_done", lambda store: -1e30)
         with pytest.raises(InputError, match="fit into the free space"):
             run(out)
         assert not out.exists()
     assert run(out).points == POINTS
     before = files_of(out)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(run_module, "_bytes_left", lambda store: 1e30)
+        patch.setattr(SweepStore, "share_done", lambda store: -1e30)
         with pytest.raises(InputError, match="fit into the free space"):
             run(out)
     assert files_of(out) == before

@@ -258,8 +258,8 @@ export function create(page) {
     const { point } = answer;
     const x = { label: "time over the period", range: [0, 1] };
     if (!point.converged) return figures.period.draw(nothing(x), "No orbit.");
-    const rows = [["F/W₀", point.force], ["slip velocity / V", point.slip]];
-    if (point.age) rows.push(["age / steady age", point.age]);
+    const rows = [["F/W₀", point.force], ["slip rate / V", point.slip]];
+    if (point.age) rows.push(["age / steady", point.age]);
     return figures.period.draw({
       x,
       rows: rows.map(([label, y]) => ({ y: { label }, lines: [{ x: point.phase, y, cls: series(0), thick: true }] })),
