@@ -114,6 +114,7 @@ def test_a_campaign_is_drawn_with_the_cycles_of_a_law(asperity, campaign, tmp_pa
         (["--thresholds", "t.csv"], "--thresholds must go with --stick-slip"),
         (["--law", "rice-ruina"], "--law and --material must go with --out, --stick-slip and"),
         (["--plot", "c.png"], "--plot, --events, --steps and --holds must go with one recording"),
+        (["--stick-slip", "--plot", "c.png", "--material", "bureau2000"], "--law must be given"),
         (
             ["--stick-slip", "--plot", "c.png", "--law", "rice-ruina"],
             "rice-ruina must have all its numbers",

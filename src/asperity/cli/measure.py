@@ -12,6 +12,7 @@ import click
 from asperity.cli.options import (
     Count,
     json_option,
+    law_named,
     law_option,
     material_named,
     material_option,
@@ -370,8 +371,9 @@ def _cycles(
     law: str | None, material: str | None, given: dict[str, str], conditions: str | None
 ) -> Cycles:
     """What adds the cycles of the law to a campaign; its numbers are checked at once."""
-    if law is None:
+    if law is None and material is None:
         return lambda campaign: campaign
+    law = law_named(law)
     from asperity.laws import get_law
     from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
     from asperity.parameters import point_parameters
