@@ -48,6 +48,8 @@ def in_python(argument: Argument) -> str:
         if key and "." in name:  # a method
             return f"{name}('{key}')"
         return f"{name}['{key}']" if key else name
+    if name == "numbers" and key:
+        return f"'{key}={value}'"
     shown = value if value.isdigit() or value == "..." else f"'{value}'"
     return f"{name}={{'{key}': {shown}}}" if key else f"{name}={shown}"
 

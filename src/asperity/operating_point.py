@@ -115,6 +115,7 @@ def numbers_for(
     numbers: Mapping[str, SourcedNumber],
     among: Mapping[str, Parameter] | None = None,
     needed: tuple[str, ...] = (),
+    place: str = "",
 ) -> dict[str, SourcedNumber]:
     """The numbers of a point with this law, selected from `numbers`.
 
@@ -126,6 +127,8 @@ def numbers_for(
         Parameters that count; by default all of a point with this law.
     needed : tuple of str
         Those that must be there, besides the ones without a default.
+    place : str
+        Table of a file that states them, as of `sourced_numbers`.
 
     Raises
     ------
@@ -140,10 +143,11 @@ def numbers_for(
         if name not in numbers and (parameter.default is None or name in needed)
     ]
     if missing:
-        example = f"{missing[0]}={known[missing[0]].example}"
+        name, example = missing[0], known[missing[0]].example
+        like = f"{place}.{name} = '{example}'" if place else Argument("numbers", name, example)
         raise InputError(
             f"{law_name} must have all its numbers, got none for {', '.join(missing)}; "
-            f"name a material that has them or give each one, like '{example}'"
+            f"name a material that has them or give each one, like {like}"
         )
     return {name: numbers[name] for name in known if name in numbers}
 

@@ -227,7 +227,8 @@ def test_without_the_extra_there_is_a_sentence(monkeypatch):
     monkeypatch.setattr(server, "_PACKAGES", ("no_such_package_anywhere",))
     result = CliRunner().invoke(main, ["serve"])
     assert result.exit_code == 2
-    assert "pip install 'asperity[app]'" in result.stderr
+    assert "make app in a clone" in result.stderr
+    assert "pip install 'asperity[app]' in an environment" in result.stderr
 
 
 def test_the_link_of_a_view_restores_it(visit):

@@ -73,7 +73,60 @@ def test_a_bad_option(asperity, option: str, value: str, parts: list[str]) -> No
 
 def test_a_missing_option(asperity) -> None:
     refused(asperity("response"), "--law must be given", "rice-ruina")
-    refused(asperity(*OF, "--law", "rice-ruina"), "got none for V, epsilon;", "V=1 um/s")
+    refused(asperity(*OF, "--law", "rice-ruina"), "got none for V, epsilon;", '-V "1 um/s"')
+    point = (part for pair in POINT.items() for part in pair)
+    refused(asperity("response", *point), "got none for mu0, A, B", "like --set mu0=")
+
+
+@pytest.mark.parametrize(
+    ("command", "header", "advice"),
+    [
+        (
+            "measure",
+            "time (s),displacement (um),shear force (N)",
+            [
+                "a second channel, the normal load, is missing: choose one of displacement, give",
+                '--channel "load = 1200 N", or name F/W, like --column "friction=mu"',
+            ],
+        ),
+        (
+            "measure",
+            "time (s),displacement (um),normal force (N)",
+            ["a second channel, the shear force, is missing: choose one of displacement, or name"],
+        ),
+        (
+            "measure",
+            "time (s),shear stress (MPa),normal force (N)",
+            ["got 'Pa' for 'F' and 'N' for 'W'; give the area", 'like --area "25 cm^2"'],
+        ),
+        (
+            "fit",
+            "time (s),temperature (degC),friction",
+            ['like --column "displacement=x"', "or give --steps and --velocities"],
+        ),
+    ],
+)
+def test_what_a_recording_lacks_is_named_with_its_option(
+    asperity, tmp_path: Path, command: str, header: str, advice: list[str]
+) -> None:
+    path = tmp_path / "recording.csv"
+    draw = random.Random(1)
+    rows = [f"{i / 50:g},{20 + i / 50:g},{0.6 + draw.gauss(0, 1e-3):.5f}" for i in range(600)]
+    path.write_text("\n".join([header, *rows]) + "\n", encoding="utf-8")
+    refused(asperity(command, path), *advice)
+
+
+def test_friction_without_motion_says_which_options_give_it(asperity, tmp_path: Path) -> None:
+    path = tmp_path / "recording.csv"
+    draw = random.Random(1)
+    after = [0.0207 - 0.0276 * (1 - math.exp(-i / 40)) for i in range(2500)]
+    rows = [
+        f"{i / 50:g},{i / 50:g},{0.62 + change + draw.gauss(0, 2e-4):.5f}"
+        for i, change in enumerate([0.0] * 2500 + after)
+    ]
+    path.write_text("\n".join(["time (s),position,friction", *rows]) + "\n", encoding="utf-8")
+    advice = ('like --column "displacement=x"', 'like --unit "x=um"', "or give --steps")
+    refused(asperity("measure", path), *advice)
 
 
 @pytest.mark.parametrize(

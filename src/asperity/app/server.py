@@ -103,7 +103,7 @@ def require_extra() -> None:
     if missing:
         raise InputError(
             f"the extra 'app' must be installed to serve the page, got no {', '.join(missing)}; "
-            "write pip install 'asperity[app]'"
+            "write make app in a clone, or pip install 'asperity[app]' in an environment"
         )
 
 

@@ -33,6 +33,7 @@ _LABELS: Mapping[str, str] = {
     "columns": "Role",
     "units": "Unit",
     "stress_to_force.area": "Area",
+    "read.area": "Area",
     "recording.path": "The recording",
     "slice.start and slice.end": "Window",
     "free": "Free parameters",
@@ -67,6 +68,8 @@ def in_labels(argument: Argument) -> str:
         label = _ROLES.get(key, f"Role {key}")
     elif name == "units" and key:
         label = f"Unit of {key}"
+    elif name == "channels" and key:
+        label = f"Channel {key}"
     elif name == "modulated":
         return "Velocity steps and holds"
     else:

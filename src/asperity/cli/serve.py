@@ -15,7 +15,8 @@ Examples:
 
 \b
 The page listens on this machine only and fetches nothing from elsewhere. Ctrl-C
-ends it. It needs the extra: pip install 'asperity[app]'
+ends it. It needs the extra: make app in a clone, pip install 'asperity[app]' in
+an environment.
 """
 
 

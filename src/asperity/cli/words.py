@@ -47,7 +47,12 @@ def in_options(argument: Argument, own: Mapping[str, str] | None = None) -> str:
         return f'--column "{key}={value}"' if value else f"--column {key}=NAME"
     if name == "numbers":
         named = {**DRIVE, **MACHINE}.get(key)
-        return named.options[0] if named and named.options else f"--set {key}".rstrip()
+        if named and named.options:
+            return f"{named.options[0]} {_quoted(value) if value else ''}".rstrip()
+        pair = _quoted(f"{key}={value}", also="=") if value else key
+        return f"{(own or {}).get(name, '--set')} {pair}".rstrip()
+    if name == "channels" and value:
+        return f'--channel "{key} = {value}"'
     if name == "units" and key and value:
         return f'--unit "{key}={"UNIT" if value == "..." else value}"'
     known = {**_OPTIONS, **SOURCE_OPTIONS, **(own or {})}
@@ -60,8 +65,8 @@ def in_options(argument: Argument, own: Mapping[str, str] | None = None) -> str:
     return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])
 
 
-def _quoted(value: str) -> str:
-    return value if all(c.isalnum() or c in "_." for c in value) else f'"{value}"'
+def _quoted(value: str, also: str = "") -> str:
+    return value if all(c.isalnum() or c in "_." + also for c in value) else f'"{value}"'
 
 
 @contextmanager

@@ -269,7 +269,7 @@ def modulated_or_sliding(
         return measurement, f"{what}: velocity steps and holds are read, not a modulation."
     steady = events is not None and events.kind == "steady sliding"
     if not (plain or steady):
-        raise reason
+        raise reason if constant or measurement.velocity_from else _without_motion()
     return measurement, f"{what}: steady sliding is read, not a modulation."
 
 
@@ -301,6 +301,16 @@ def _which_force(trace: Trace) -> InputError:
         f"'{name}'",
         f"where it is F/W write {friction}; where it is the force write {force} and give the load "
         "too",
+    )
+
+
+def _without_motion() -> InputError:
+    name, unit = Argument("columns", "displacement", "x"), Argument("units", "x", "um")
+    return InputError(
+        "measure.trace",
+        "have a modulated load, velocity steps or holds",
+        "friction without a displacement or velocity of a known unit",
+        f"name it, like {name}, give its unit, like {unit}, or give {Argument('measure.steps')}",
     )
 
 

@@ -98,6 +98,33 @@ def shear_channel(trace: Trace, force: str, load: Channel | None) -> tuple[Chann
     return friction, True
 
 
+def require_one_dimension(W: Channel, F: Channel, load: str, force: str) -> None:
+    """Refuse a load and a shear that cannot be divided.
+
+    Parameters
+    ----------
+    W, F : Channel
+    load, force : str
+        Their names, or roles.
+
+    Raises
+    ------
+    InputError
+        If one is a force and the other a stress, or a unit is not known.
+    """
+    if W.kind == F.kind:
+        return
+    area = Argument("read.area", value="25 cm^2")
+    raise InputError(
+        "measure.force",
+        "have the dimension of the load",
+        f"{_dimension_text(F)} for '{force}' and {_dimension_text(W)} for '{load}'",
+        f"give the area that makes the stress a force, like {area}"
+        if {W.kind, F.kind} == {"force", "pressure"}
+        else "name the units when reading",
+    )
+
+
 def refuse_contradiction(trace: Trace, force: str, shear: Channel, friction: Array) -> None:
     """Refuse a recorded friction that is not F/W, where the user has chosen neither.
 
@@ -240,13 +267,7 @@ def usable(trace: Trace, load: str, force: str) -> Samples:
     """
     W = trace.channel(load)
     F, name = _force(trace, force, W)
-    if W.kind != F.kind:
-        raise InputError(
-            "measure.force",
-            "have the dimension of the load",
-            f"{_dimension_text(F)} for '{force}' and {_dimension_text(W)} for '{load}'",
-            "name the units when reading",
-        )
+    require_one_dimension(W, F, load, force)
     names = (_name(trace, W), name)
     if names[0] == names[1]:
         raise InputError(

@@ -71,7 +71,7 @@ def numbers_of(
         known_name(name, known, f"parameters.{name}")
     source = materials.load_from(folder, material) if material else None
     numbers = sourced_numbers(stated, source, "protocol", law_name, "parameters")
-    return numbers_for(law_name, numbers, known, ("M",) if inertia else ())
+    return numbers_for(law_name, numbers, known, ("M",) if inertia else (), "parameters")
 
 
 def slider_of(law_name: str, values: Mapping[str, float]) -> Slider:

@@ -49,6 +49,7 @@ FIT_OPTIONS: Mapping[str, str] = {
         )
     },
     "fixed": "--fix",
+    "numbers": "--fix",
 }
 
 #: Units of fields that are numbers in SI.

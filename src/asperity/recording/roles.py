@@ -11,7 +11,7 @@ import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from asperity.errors import Argument, InputError, closest
+from asperity.errors import Argument, InputError, closest, listed
 
 
 @dataclass(frozen=True)
@@ -199,5 +199,24 @@ def find_channel(name: str, kinds: Mapping[str, str | None], chosen: Mapping[str
         Argument("Trace.channel", role or name),
         "name a channel",
         f"none like '{name}'",
-        closest(name, kinds) if kinds else "the recording has none",
+        _second(role, kinds) or (closest(name, kinds) if kinds else "the recording has none"),
+    )
+
+
+def _second(role: str | None, kinds: Mapping[str, str | None]) -> str:
+    """What to do where one of load and shear force is recorded and `role`, the other, is not."""
+    other = {"W": "F", "F": "W"}.get(role or "")
+    present = candidates(other, kinds) if other else []
+    others = sorted({*kinds} - {*present})
+    if len(present) != 1 or not others:
+        return ""
+    friction = Argument("columns", "friction", "mu")
+    if role == "W":
+        missing = "normal load"
+        ways = f"give a constant one, like {Argument('channels', 'load', '1200 N')}, or name F/W"
+    else:
+        missing, ways = "shear force", "or name F/W"
+    return (
+        f"a second channel, the {missing}, is missing: choose one of {listed(others)}, "
+        f"{ways}, like {friction}"
     )

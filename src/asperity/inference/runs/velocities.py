@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity.errors import InputError
+from asperity.errors import Argument, InputError
 from asperity.measurement.sliding.segments import (
     Cut,
     Partition,
@@ -107,7 +107,9 @@ def _given_or_measured(
     if displacement is None:
         raise InputError(
             f"{name} must have the displacement or velocity of the drive, got none: "
-            f"{signals.no_motion}; name a channel, or give steps and velocities"
+            f"{signals.no_motion}; name a channel, like "
+            f"{Argument('columns', 'displacement', 'x')}, or give {Argument('steps')} and "
+            f"{Argument('velocities')}"
         )
     result = (
         partition(time, displacement, signals.friction)

@@ -15,6 +15,7 @@ from asperity.measurement.samples import (
     load_channel,
     refuse_contradiction,
     require_computable,
+    require_one_dimension,
     shear_channel,
 )
 from asperity.recording.defects.rounded_time import even_times
@@ -188,13 +189,7 @@ def _friction(
         if is_friction:
             borne, _, turned = compressive(W.values, F.values * W.values)
             return F.values, borne, unit, read, turned
-        if W.kind != F.kind:
-            raise InputError(
-                "measure.force",
-                "have the dimension of the load",
-                f"'{F.unit}' for '{force}' and '{unit}' for '{load}'",
-                "name the units when reading",
-            )
+        require_one_dimension(W, F, load, force)
         borne, shear, turned = compressive(W.values, F.values)
         known = np.isfinite(borne) & (borne != 0)
         friction = shear / np.where(known, borne, np.nan)
