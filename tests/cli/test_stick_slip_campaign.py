@@ -87,6 +87,22 @@ def test_no_threshold_where_one_side_is_missing(asperity, campaign, tmp_path) ->
     assert refused.exit_code == 2
 
 
+def test_a_campaign_is_drawn_with_the_cycles_of_a_law(asperity, campaign, tmp_path) -> None:
+    out, picture = tmp_path / "c.csv", tmp_path / "c.png"
+    files = sorted(campaign.glob("run_*.csv"), key=lambda f: float(f.stem[5:].split("_")[0]))[:2]
+    law = [f"{name}={value}" for name, value in (TRUTH | {"D0": "0.5 um", "V0": "1 um/s"}).items()]
+    result = asperity(
+        "measure", *files, "--stick-slip", "--conditions", "run_k{K N/m}_v{V um/s}", "--out", out,
+        "--plot", picture, "--law", "rice-ruina", "--jobs", 1, "--json",
+        *(x for one in (f"W0={W0} N", "M=10 g", "mu0=0.4", *law) for x in ("--set", one)),
+    )  # fmt: skip
+    assert result.exit_code == 0, result.stderr
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    (series,) = json.loads(result.stdout)["healing"]
+    assert series["K"] == pytest.approx(RATIOS[0] * CRITICAL, rel=1e-5)
+    assert series["reason"] == "2 recordings are too few; 3 can tell"
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
@@ -96,6 +112,13 @@ def test_no_threshold_where_one_side_is_missing(asperity, campaign, tmp_path) ->
         (["--conditions", "absent.csv"], "--conditions must be a CSV that can be read"),
         (["--set", "V=1 um/s", "--conditions", "run_k{K N/m}_v{V um/s}"], "V must be given once"),
         (["--thresholds", "t.csv"], "--thresholds must go with --stick-slip"),
+        (["--law", "rice-ruina"], "--law and --material must go with --out, --stick-slip and"),
+        (["--plot", "c.png"], "--plot, --events, --steps and --holds must go with one recording"),
+        (["--stick-slip", "--plot", "c.png", "--material", "bureau2000"], "--law must be given"),
+        (
+            ["--stick-slip", "--plot", "c.png", "--law", "rice-ruina"],
+            "rice-ruina must have all its numbers",
+        ),
     ],
 )
 def test_bad_conditions_are_one_sentence(asperity, campaign, tmp_path, options, message) -> None:

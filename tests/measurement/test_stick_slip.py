@@ -160,6 +160,25 @@ def test_the_same_names_without_these_defects_are_ok() -> None:
     assert {c.verdict for c in checks if c.name != "saturation"} == {"ok"}
 
 
+def test_what_the_sticks_lack_to_their_slope_is_creep_and_missed_events() -> None:
+    def loading(truth):
+        result = measure_stick_slip(truth.trace())
+        return result, next(c for c in result.checks if c.name == "loading")
+
+    assert abs(loading(saw(0))[1].number) < 0.01
+    # Sticks take longer by the share of the creep; the line before the onset cuts its tip.
+    assert loading(saw(0, creep=0.1))[1].number == pytest.approx(0.1 / 1.1, abs=0.02)
+    # Drops are read 10 % too small, and two fifths of the events are not seen.
+    truth = saw(
+        73, 56, cycle=343, slip=7, small=0.358, small_size=0.4, noise=0.138, impulses=9.4e-3,
+        ringing=0.265,
+    )  # fmt: skip
+    result, check_ = loading(truth)
+    unread = 1 - result.events.drop.sum() / truth.drop.sum()
+    assert unread > 0.2
+    assert check_.verdict == "suspicious"
+
+
 def test_uneven_sampling_is_resampled_and_a_gap_is_one_sentence() -> None:
     truth = saw(0, noise=0.02, impulses=0.0)
     # Up to two fifths of the interval early or late.

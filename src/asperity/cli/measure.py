@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,10 @@ import click
 from asperity.cli.options import (
     Count,
     json_option,
+    law_named,
+    law_option,
+    material_named,
+    material_option,
     names_option,
     plot_option,
     set_option,
@@ -21,6 +26,7 @@ from asperity.cli.words import in_options
 from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
+    from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.verdicts.verdict import Check
     from asperity.parameters import Names
     from asperity.questions.recording import Measurement as Question
@@ -28,6 +34,11 @@ if TYPE_CHECKING:
 
 
 Rows = list[dict[str, Any]]
+#: Adds the cycles of a law to a campaign.
+Cycles = Callable[["StickSlipCampaign"], "StickSlipCampaign"]
+
+#: Velocities of a curve of a law.
+_POINTS = 13
 
 
 @dataclass(frozen=True)
@@ -111,6 +122,12 @@ Examples:
   asperity measure day1/*.csv --out campaign.csv
   asperity measure run_*.csv --stick-slip --set "W0=7 N" --out campaign.csv \\
       --conditions "run_k{K N/m}_v{V um/s}" --thresholds bifurcation.csv
+  asperity measure run_*.csv --stick-slip --set "W0=7 N" --out campaign.csv \\
+      --conditions "run_k{K N/m}_v{V um/s}" --plot campaign.png \\
+      --law rice-ruina --material bureau2000
+  asperity measure run_*.csv --stick-slip --set "W0=7 N" --set "M=1 kg" \\
+      --conditions "run_k{K N/m}_v{V um/s}" --out campaign.csv --plot campaign.png \\
+      --law rice-ruina --material bureau2000
 
 \b
 Convention: W/W0 = 1 + epsilon cos phi, phi from the measured load,
@@ -169,7 +186,12 @@ in place of numbers; 2: bad input.
     is_flag=True,
     help="Slip events; by default, those of a recording that is stick-slip and not modulated.",
 )
-@set_option('--set "K=168 N/m" --set "V=42 um/s"', "K, V, M or W0 of the machine, for slip events")
+@set_option(
+    '--set "K=168 N/m" --set "V=42 um/s"',
+    "K, V, M or W0 of the machine, for slip events; with --law its parameters too",
+)
+@law_option("With --out, --stick-slip and --plot: the law whose cycles are drawn with the drops.")
+@material_option()
 @click.option(
     "--conditions",
     metavar="CSV|PATTERN",
@@ -219,6 +241,8 @@ def measure(
     holds: str | None,
     stick_slip: bool,
     settings: tuple[str, ...],
+    law: str | None,
+    material: str | None,
     conditions: str | None,
     events: Path | None,
     amplitudes: bool,
@@ -249,19 +273,28 @@ def measure(
         "steps": None if steps is None else listed_times(steps, "--steps"),
         "holds": None if holds is None else listed_times(holds, "--holds"),
         "stick_slip": True if stick_slip else None,
-        **_machine(settings),
     }
-    question = Question(**fields)
+    given = settings_of(settings)
+    question = Question(**fields, **_machine(given, law is None))
+    if (law or material) and not (out and plot and stick_slip):
+        raise InputError(
+            "--law and --material must go with --out, --stick-slip and --plot, got them without; "
+            "add what is missing: they are drawn with a campaign"
+        )
     if stick_slip and amplitudes:
         raise InputError("--stick-slip must go without --amplitudes, got both; leave one out")
     if out is not None:
-        if plot is not None or events is not None or steps or holds:
+        if (plot is not None and not stick_slip) or events is not None or steps or holds:
             raise InputError(
                 "--plot, --events, --steps and --holds must go with one recording without --out, "
-                "got both; measure that recording by itself"
+                "got both; measure that recording by itself, or draw a campaign of --stick-slip"
             )
         rows_of = _file_rows(recordings, source, question, conditions)
-        return _campaign(recordings, rows_of, out, thresholds, resume, jobs, as_json)
+        require_picture(plot, *recordings)
+        cycles = _cycles(law, material, given, conditions)
+        return _campaign(
+            recordings, rows_of, out, thresholds, plot, cycles, resume, jobs, as_json, names
+        )
     if len(recordings) > 1:
         raise InputError(
             f"--out must be given with several recordings, got {len(recordings)} without; name "
@@ -334,33 +367,86 @@ def _file_rows(
     return rows_of
 
 
+def _cycles(
+    law: str | None, material: str | None, given: dict[str, str], conditions: str | None
+) -> Cycles:
+    """What adds the cycles of the law to a campaign; its numbers are checked at once."""
+    if law is None and material is None:
+        return lambda campaign: campaign
+    law = law_named(law)
+    from asperity.laws import get_law
+    from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
+    from asperity.parameters import point_parameters
+
+    refuse_foreign(law, given)
+    chosen = get_law(law)
+    sourced = sourced_numbers(given, material_named(material), "command line", law)
+    among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}
+    needed = ("M",) if conditions is None else ()
+    values = {n: x.value for n, x in numbers_for(law, sourced, among, needed).items()}
+
+    def added(campaign: StickSlipCampaign) -> StickSlipCampaign:
+        import numpy as np
+
+        from asperity.experiment import stick_slip_response
+        from asperity.slider.named import slider_from
+
+        machines = {
+            k: (series.K, series.W0, series.mass(values.get("M", np.nan)))
+            for k, series in enumerate(campaign.series)
+        }
+        modelled = [k for k, machine in machines.items() if np.isfinite(machine).all()]
+        V = np.array([v for series in campaign.series for v in series.column("V")])
+        V = V[np.isfinite(V)]
+        if not modelled or not V.size:
+            click.echo(
+                "asperity: no curve of the law: K, W0, M and V must be known; give them by --set "
+                "or --conditions",
+                err=True,
+            )
+            return campaign
+        columns = np.array([machines[k] for k in modelled]).T[:, :, None]
+        machine = dict(zip(("K", "W0", "M"), columns, strict=True))
+        # The ends lie a little beyond the recordings.
+        speeds = np.geomspace(V.min() / 1.2, V.max() * 1.2, _POINTS)
+        model = stick_slip_response(slider_from(chosen, {**values, **machine}), velocity=speeds)
+        return replace(campaign, model=model, modelled=tuple(modelled))
+
+    return added
+
+
 def _campaign(
     recordings: tuple[Path, ...],
     rows_of: FileRows,
     out: Path,
     thresholds: Path | None,
+    plot: Path | None,
+    with_cycles: Cycles,
     resume: bool,
     jobs: int | None,
     as_json: bool,
+    names: Names,
 ) -> int:
     import os
 
+    from asperity.cli.measurement_text import healing_text
     from asperity.cli.progress import bar
-    from asperity.cli.report import to_json
+    from asperity.cli.report import to_json, write_picture
     from asperity.measurement.campaign import run_campaign
+    from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.stick_slip.threshold import thresholds as ends_of_stick_slip
     from asperity.measurement.stick_slip.threshold import write_thresholds
     from asperity.outputs import output_files, written_file
 
     question = rows_of.question
-    if thresholds is not None:
-        if not question.stick_slip:
-            raise InputError(
-                "--thresholds must go with --stick-slip, got it without; add it: where stick-slip "
-                "ends, steady sliding counts too"
-            )
+    if thresholds is not None and not question.stick_slip:
+        raise InputError(
+            "--thresholds must go with --stick-slip, got it without; add it: where stick-slip "
+            "ends, steady sliding counts too"
+        )
+    if thresholds is not None or plot is not None:
         output_files(
-            {"--thresholds": thresholds, "--out": out},
+            {"--thresholds": thresholds, "--plot": plot, "--out": out},
             inputs={f"recording '{f}'": f for f in recordings},
         )
     with bar("file", "measurements") as update:
@@ -373,9 +459,17 @@ def _campaign(
             jobs=jobs or os.cpu_count() or 1,
             progress=update,
         )
+    campaign = StickSlipCampaign.of(done.table)
     if as_json:
-        numbers = {"files": done.files, "rows": done.rows, "failed": done.failed}
-        click.echo(to_json({**numbers, "out": str(out)}))
+        record: dict[str, Any] = {"files": done.files, "rows": done.rows, "failed": done.failed}
+        record["out"] = str(out)
+        if campaign.series:
+            record["healing"] = campaign.healing_record()
+        click.echo(to_json(record))
+    elif campaign.series:
+        click.echo(healing_text(campaign, names))
+    if plot is not None:
+        write_picture(with_cycles(campaign), plot, names)
     untold = []
     if thresholds is not None:
         ends = ends_of_stick_slip(done.table)
@@ -420,17 +514,17 @@ def _catalogue(result: Any, path: Path) -> None:
     write_catalogue(result, path)
 
 
-def _machine(settings: tuple[str, ...]) -> dict[str, str]:
+def _machine(given: dict[str, str], strict: bool) -> dict[str, Any]:
     """What ``--set`` says of the machine, by the fields of the question."""
-    fields = {"K": "stiffness", "V": "velocity", "M": "mass", "W0": "normal_load"}
-    given = settings_of(settings)
+    from asperity.measurement.conditions import MACHINE_FIELDS
+
     for name in given:
-        if name not in fields:
+        if strict and name not in MACHINE_FIELDS:
             raise InputError(
-                f"--set must name one of {', '.join(fields)}, got '{name}'; write it like "
+                f"--set must name one of {', '.join(MACHINE_FIELDS)}, got '{name}'; write it like "
                 '--set "K=168 N/m"'
             )
-    return {fields[name]: text for name, text in given.items()}
+    return {MACHINE_FIELDS[name]: given[name] for name in given if name in MACHINE_FIELDS}
 
 
 def _print(

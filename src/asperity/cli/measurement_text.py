@@ -12,6 +12,7 @@ from asperity.parameters import Names, display_name, in_names
 if TYPE_CHECKING:
     from asperity.measurement.measure import Measurement
     from asperity.measurement.sliding.measure import SlidingMeasurement
+    from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
     from asperity.measurement.verdicts.verdict import Check
     from asperity.recording.finding import Finding
@@ -184,6 +185,25 @@ def stick_slip_text(measurement: StickSlipMeasurement, name: str, names: Names =
             "slip events",
             _named(rows, names),
             *_quality(measurement.checks),
+        ]
+    )
+
+
+def healing_text(campaign: StickSlipCampaign, names: Names = "friction") -> str:
+    """Healing of each machine of a campaign, as the command prints it.
+
+    Parameters
+    ----------
+    campaign : StickSlipCampaign
+    names : {"friction", "geophysics"}
+    """
+    _, lines = campaign.summary()
+    twice = "(B - A)" if names == "friction" else "(b - a)"
+    return "\n".join(
+        [
+            "drop per e-fold of stick time; about 2 "
+            f"{twice} of a rate-and-state law, far below the critical stiffness",
+            aligned([(line.name, line.value) for line in lines], "  "),
         ]
     )
 

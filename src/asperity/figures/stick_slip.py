@@ -1,4 +1,4 @@
-"""Figure of a stick-slip recording: the signal with its regimes, events at close range, drops."""
+"""Figures of stick-slip: a recording with its regimes and drops, and a campaign over V and K."""
 
 from __future__ import annotations
 
@@ -7,16 +7,21 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from asperity.figures.plot import NORMAL
 from asperity.figures.recording import band
 from asperity.figures.style import ELASTO_PLASTIC, GREY, STATED_FILL, new_figure
+from asperity.measurement.stick_slip.regimes import REPEATED
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.stick_slip.measure import StickSlipMeasurement
 
 #: Number of enlarged events.
 _CLOSE = 8
+#: Of the series of a campaign, in turn.
+_MARKS = "osD^vP"
 _LETTER: dict[str, Any] = {"va": "top", "ha": "left", "fontsize": 10}
 
 
@@ -111,3 +116,55 @@ def _draw_drops(axis: Axes, measurement: StickSlipMeasurement) -> None:
     axis.set_xscale("log")
     axis.margins(x=0.04)
     axis.set_ylim(bottom=0)
+
+
+def draw_campaign(campaign: StickSlipCampaign) -> Figure:
+    """Drop and recurrence against the velocity, a colour for each stiffness and load.
+
+    Bars are 95 % intervals of means. Open marks are means over growing or dying cycles, or over
+    several regimes; crosses are recordings that end in steady sliding.
+
+    Parameters
+    ----------
+    campaign : StickSlipCampaign
+    """
+    from matplotlib import colormaps
+
+    figure = new_figure(5.0, 6.2)
+    drops, times = figure.subplots(2, 1, sharex=True)
+    drops.set(ylabel="drop of $F/W$", xscale="log")
+    times.set(xlabel="$V$ (m/s)", ylabel="recurrence (s)", yscale="log")
+    # Stiffness has an order, and so have the colours.
+    colours = colormaps["viridis"](np.linspace(0, 0.85, len(campaign.series)))
+    steady = False
+    for k, series in enumerate(campaign.series):
+        V, look = series.column("V"), {"color": colours[k], "markersize": 4.5}
+        ends = np.array([row["regime"].endswith("steady sliding") for row in series.rows], bool)
+        clear = np.array([row["regime"] in REPEATED for row in series.rows], bool)
+        for axis, name in ((drops, "drop"), (times, "recurrence")):
+            y, doubt = series.column(name), series.column(f"{name}_uncertainty")
+            for some, face in ((clear, colours[k]), (~clear & ~ends, "white")):
+                if some.any():
+                    bars = NORMAL * np.nan_to_num(doubt[some])
+                    axis.errorbar(
+                        V[some], y[some], bars, fmt=_MARKS[k % len(_MARKS)], linewidth=0.9,
+                        markerfacecolor=face, **look,
+                    )  # fmt: skip
+        drops.plot(V[ends], np.zeros(int(ends.sum())), "x", zorder=5, **look)
+        steady |= bool(ends.any())
+        drops.plot([], [], _MARKS[k % len(_MARKS)], label=series.name, **look)
+    if campaign.model is not None:
+        for row, k in enumerate(campaign.modelled):
+            line = {"color": colours[k], "linewidth": 1.2}
+            drops.plot(campaign.model.velocity[row], campaign.model.drop[row], **line)
+            times.plot(campaign.model.velocity[row], campaign.model.period[row], **line)
+        name = campaign.model.slider.law.name
+        drops.plot([], [], color=GREY, linewidth=1.2, label=name)
+    if steady:
+        drops.plot([], [], "x", color=GREY, markersize=4.5, label="steady sliding")
+    drops.set_ylim(bottom=-0.03 * drops.get_ylim()[1])
+    for axis in (drops, times):
+        axis.margins(x=0.06)
+    if campaign.series:
+        drops.legend(ncols=2, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return figure

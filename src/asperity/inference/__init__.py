@@ -1,6 +1,7 @@
 """From data to verdict: which law, which numbers, and how sure."""
 
 from asperity.inference.comparison.compare import Comparison, Judged, compare
+from asperity.inference.cycles.cycle import AveragedCycle, averaged_cycle
 from asperity.inference.design import Design, DesignPlan, design, plan_of, read_plan
 from asperity.inference.fitting.fit import fit
 from asperity.inference.fitting.intervals import bounded_interval
@@ -17,6 +18,7 @@ from asperity.inference.tables.table import LockInTable, read_table, table_of
 from asperity.inference.unknowns import Prior
 
 __all__ = [
+    "AveragedCycle",
     "Comparison",
     "DataTerm",
     "Design",
@@ -35,6 +37,7 @@ __all__ = [
     "RunOptions",
     "WindowEstimate",
     "WindowedFit",
+    "averaged_cycle",
     "bounded_interval",
     "compare",
     "design",

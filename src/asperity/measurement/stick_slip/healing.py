@@ -27,7 +27,9 @@ class StickSlipHealing:
     ----------
     drop_per_efold, drop_uncertainty : float
         Of F/W for a factor e of stick time, and its standard uncertainty; NaN with too few
-        recordings. 2 B where a slip overshoots, B where it does not.
+        recordings. With a strength that depends on the stick time alone 2 B where a slip overshoots
+        and B where it does not; of a rate-and-state law, as the velocity changes the stick time,
+        2.0 to 2.4 times B - A for stiffnesses up to a third of the critical one, and less above.
     interval_95 : (float, float)
     recordings : int
     reason : str
@@ -79,7 +81,7 @@ def of_campaign(stick_durations: Array, drops: Array, uncertainties: Array) -> S
         extra = max(extra + excess / float((weight**2) @ squares), 0.0)
     spread = 1 / np.sqrt(power)
     half = float(student.ppf(0.975, n - 2)) * spread
-    interval = slope - half, slope + half
+    interval = float(slope - half), float(slope + half)
     reason = ""
     if np.ptp(x) < 1:
         reason = f"stick times range over {np.ptp(x):.2g} e-folds; one or more can tell"

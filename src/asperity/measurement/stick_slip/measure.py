@@ -18,7 +18,7 @@ from asperity.measurement.sliding.signals import (
 from asperity.measurement.stick_slip.detection import Falls, find_falls
 from asperity.measurement.stick_slip.events import SlipEvents, read_events, steepest_fall
 from asperity.measurement.stick_slip.noise import estimate, without_impulses
-from asperity.measurement.stick_slip.regimes import Regime, regimes
+from asperity.measurement.stick_slip.regimes import REPEATED, Regime, regimes
 from asperity.measurement.verdicts.checks import findings
 from asperity.measurement.verdicts.verdict import Check, Verdict, judged, percent, worst
 from asperity.parameters.parameter import Drawn, SummaryLine
@@ -44,6 +44,7 @@ LIMITS = {
     "sampling": (0.05, 0.5),
     "threshold": (0.5, np.inf),
     "drift": (3.0, 30.0),
+    "loading": (0.2, np.inf),
     "stiffness": (0.05, 0.3),
     "impulses": (0.05, 0.3),
 }
@@ -349,6 +350,29 @@ def _recorded_slip(time: Array, displacement: Array, events: SlipEvents) -> tupl
     return slip, steepest_fall(-forward, onset, end, slip) / step
 
 
+def _lacking(result: StickSlipMeasurement) -> tuple[float, float]:
+    """Share of the loading that the rises between events lack, and its standard error.
+
+    Of sticks at the slope of their first halves. An event that is not seen lowers what a stick
+    loads, and so does a drop that is read too small; NaN with few sticks.
+    """
+    events = result.events
+    rises, loads = [], []
+    for regime in result.regimes:
+        if regime.kind in REPEATED and np.isfinite(result.loading_slope):
+            after = slice(regime.first + 1, regime.stop)
+            rises.append(
+                events.force_before[after] - events.force_after[regime.first : regime.stop - 1]
+            )
+            loads.append(result.loading_slope * events.stick_duration[after])
+    rise, load = np.concatenate([[], *rises]), np.concatenate([[], *loads])
+    if rise.size < LIMITS["events"][1] or not load.sum() > 0:
+        return np.nan, np.nan
+    lack = 1 - float(rise.sum() / load.sum())
+    off = rise - (1 - lack) * load
+    return lack, float(np.std(off, ddof=1) * np.sqrt(rise.size) / load.sum())
+
+
 def _checks(result: StickSlipMeasurement) -> list[Check]:
     events, count = result.events, len(result.events)
     checks = [
@@ -397,6 +421,23 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
             f"the middle of the drops varies along the track by {drift:.2g} drops",
         ),
     ]
+    lack, error = _lacking(result)
+    if np.isfinite(lack):
+        checks.append(
+            judged(
+                "loading",
+                lack,
+                LIMITS["loading"],
+                f"the sticks load by {percent(abs(lack))} {'less' if lack > 0 else 'more'} than "
+                "their slope says"
+                + (
+                    ": small events may be missed and drops read too small, or the slider creeps"
+                    if lack > LIMITS["loading"][0]
+                    else ""
+                ),
+                significant=lack > 3 * error,
+            )
+        )
     stiffness, doubt = result.stiffness_from_slope
     given = result.machine.stiffness
     if given is not None and np.isfinite(stiffness):

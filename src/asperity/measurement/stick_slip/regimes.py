@@ -16,6 +16,10 @@ from scipy.stats import kendalltau
 from asperity.measurement.stick_slip.events import SlipEvents
 
 Array = NDArray[np.float64]
+
+#: Regimes whose mean drop is that of a cycle.
+REPEATED = ("regular stick-slip", "irregular stick-slip")
+
 Kind = Literal[
     "regular stick-slip",
     "irregular stick-slip",

@@ -1,0 +1,140 @@
+"""A campaign of stick-slip: recordings of one machine in one series, and what their drops tell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from asperity.measurement.stick_slip.healing import StickSlipHealing, of_campaign
+from asperity.measurement.stick_slip.regimes import REPEATED
+from asperity.parameters.parameter import Drawn, SummaryLine
+from asperity.units import format_si
+
+if TYPE_CHECKING:
+    from asperity.experiment import StickSlip
+
+Array = NDArray[np.float64]
+
+#: Shares by which stiffnesses and loads of one machine differ at most.
+_SAME = 0.05
+
+
+@dataclass(frozen=True)
+class StickSlipSeries:
+    """Recordings at one stiffness and one load.
+
+    Attributes
+    ----------
+    K, W0 : float
+        Medians (N/m, N); NaN where they are not known.
+    rows : tuple of mapping
+        Of the campaign's table, in the order of V.
+    """
+
+    K: float
+    W0: float
+    rows: tuple[Mapping[str, Any], ...]
+
+    @property
+    def name(self) -> str:
+        """The machine in words."""
+        known = (("K", self.K, "stiffness"), ("W0", self.W0, "force"))
+        parts = [f"{name} = {format_si(v, kind, 4)}" for name, v, kind in known if np.isfinite(v)]
+        return ", ".join(parts) or "K and W0 not known"
+
+    def column(self, name: str) -> Array:
+        """Numbers of the rows; NaN where they are not known."""
+        values = [row.get(name) for row in self.rows]
+        return np.array([np.nan if value is None else value for value in values], float)
+
+    def mass(self, default: float) -> float:
+        """Median M of the rows (kg); the default where it is not known."""
+        known = self.column("M")
+        known = known[np.isfinite(known)]
+        return float(np.median(known)) if known.size else default
+
+    def healing(self) -> StickSlipHealing:
+        """Growth of the drop with the stick time that the velocity sets.
+
+        Recordings that are not stick-slip of one regime are left out, and those with a bad check
+        but that of the sampling: slips between two samples have their drops.
+        """
+        doubts = [row["checks"].replace("sampling: bad", "") for row in self.rows]
+        clear = np.array(
+            [
+                r["regime"] in REPEATED and "bad" not in d
+                for r, d in zip(self.rows, doubts, strict=True)
+            ]
+        )
+        numbers = ("stick_duration", "drop", "drop_uncertainty")
+        stick, drop, doubt = (self.column(name) for name in numbers)
+        kept = clear & (doubt > 0) & (stick > 0)
+        return of_campaign(stick[kept], drop[kept], doubt[kept])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class StickSlipCampaign(Drawn):
+    """Recordings by their machine.
+
+    Attributes
+    ----------
+    series : tuple of StickSlipSeries
+        In rising stiffness.
+    model : StickSlip or None
+        Cycles of a law to draw with them: a row for each of `modelled`, over the velocity.
+    modelled : tuple of int
+        Series that the model has.
+    """
+
+    series: tuple[StickSlipSeries, ...]
+    model: StickSlip | None = None
+    modelled: tuple[int, ...] = ()
+
+    _drawn_by = "asperity.figures.stick_slip:draw_campaign"
+
+    @classmethod
+    def of(cls, table: Iterable[Mapping[str, Any]]) -> StickSlipCampaign:
+        """The campaign of a table; rows without a regime are left out."""
+        rows = [row for row in table if row.get("regime")]
+        machine = np.array([[_known(row.get(name)) for name in ("K", "W0")] for row in rows])
+        machine = machine.reshape(-1, 2)
+        groups: list[list[int]] = []
+        for n in np.lexsort(machine.T[::-1]):
+            for group in groups:
+                if np.allclose(machine[n], machine[group[0]], rtol=_SAME, atol=0, equal_nan=True):
+                    group.append(int(n))
+                    break
+            else:
+                groups.append([int(n)])
+        series = []
+        for group in groups:
+            K, W0 = np.median(machine[group], axis=0)
+            ordered = sorted((rows[n] for n in group), key=lambda row: row.get("V") or 0.0)
+            series.append(StickSlipSeries(float(K), float(W0), tuple(ordered)))
+        return cls(tuple(series))
+
+    def healing_record(self) -> list[dict[str, Any]]:
+        """Healing of each series, with K and W0, as numbers and texts."""
+        return [{"K": s.K, "W0": s.W0, **asdict(s.healing())} for s in self.series]
+
+    def summary(self) -> tuple[str, list[SummaryLine]]:
+        """Healing of each series."""
+        count = sum(len(s.rows) for s in self.series)
+        lines = []
+        for one in self.series:
+            healing = one.healing()
+            low, high = healing.interval_95
+            value = f"{healing.drop_per_efold:.2g} +- {healing.drop_uncertainty:.1g}"
+            value += f" (95 %: {low:.2g} to {high:.2g}), {healing.recordings} recordings"
+            if healing.reason:
+                value = f"cannot tell: {healing.reason}"
+            lines.append(SummaryLine(one.name, value, "drop per e-fold of stick time"))
+        return f"StickSlipCampaign, {count} recordings", lines
+
+
+def _known(value: Any) -> float:
+    return float("nan") if value is None else float(value)
