@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, law_named, material_named, point_options
+from asperity.cli.options import json_option, point_options
 from asperity.errors import InputError, closest
 
 if TYPE_CHECKING:
     import xarray
+
+    from asperity.questions.point import Point
 
 _EPILOG = """\b
 Examples:
@@ -51,9 +53,7 @@ def map(
     y: str | None,
     log_x: bool,
     log_y: bool,
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
+    point: Point,
     out: Path | None,
     plot: Path | None,
     show: str,
@@ -66,7 +66,7 @@ def map(
     of the mode at each of its points.
     """
     _check_outputs(out, plot, show)
-    result = _solve(law, material, given, (x, log_x), (y, log_y), out, resume)
+    result = _solve(point, (x, log_x), (y, log_y), out, resume)
     if plot is not None:
         _plot(result, plot, show)
     _print(result, out, as_json)
@@ -88,19 +88,16 @@ def map(
 
 
 def _solve(
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
+    point: Point,
     x: tuple[str | None, bool],
     y: tuple[str | None, bool],
     out: Path | None,
     resume: bool,
 ) -> xarray.Dataset:
     from asperity.cli.progress import bar
-    from asperity.operating_point import refuse_foreign, sourced_numbers
+    from asperity.operating_point import offered_numbers
     from asperity.study.map import Axis, write_map
 
-    law = law_named(law)
     axes = []
     for option, (text, log) in (("--x", x), ("--y", y)):
         if text is None:
@@ -109,15 +106,18 @@ def _solve(
                 "'epsilon=0.01:0.5:200'"
             )
         axes.append(Axis.parse(text, log))
-    refuse_foreign(law, given)
-    numbers = sourced_numbers(given, material_named(material), "command line", law)
     # A material's number gives way to an axis; one that was given for this map does not.
-    numbers = {n: s for n, s in numbers.items() if n in given or n not in {a.name for a in axes}}
+    kept, varied = point.parameters, {axis.name for axis in axes}
+    numbers = {
+        name: number
+        for name, number in offered_numbers(point, "command line").items()
+        if name in kept or name not in varied
+    }
     assert out is not None
     with bar("point", "map") as update:
         return write_map(
             out,
-            law,
+            point.law,
             numbers,
             x=axes[0],
             y=axes[1],

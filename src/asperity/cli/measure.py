@@ -12,17 +12,16 @@ import click
 from asperity.cli.options import (
     Count,
     json_option,
-    law_named,
     law_option,
-    material_named,
     material_option,
     names_option,
     plot_option,
+    point_of,
     set_option,
     settings_of,
 )
 from asperity.cli.recording import listed_times, source_options
-from asperity.cli.words import in_options
+from asperity.cli.words import fields_as_options, in_options
 from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
@@ -373,17 +372,17 @@ def _cycles(
     """What adds the cycles of the law to a campaign; its numbers are checked at once."""
     if law is None and material is None:
         return lambda campaign: campaign
-    law = law_named(law)
     from asperity.laws import get_law
-    from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
+    from asperity.operating_point import numbers_for, offered_numbers
     from asperity.parameters import point_parameters
 
-    refuse_foreign(law, given)
-    chosen = get_law(law)
-    sourced = sourced_numbers(given, material_named(material), "command line", law)
-    among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}
-    needed = ("M",) if conditions is None else ()
-    values = {n: x.value for n, x in numbers_for(law, sourced, among, needed).items()}
+    with fields_as_options({"law": "--law"}):
+        offered = offered_numbers(point_of(law, material, given), "command line")
+        chosen = get_law(str(law))
+        among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}
+        needed = ("M",) if conditions is None else ()
+        numbers = numbers_for(chosen.name, offered, among, needed)
+    values = {name: number.value for name, number in numbers.items()}
 
     def added(campaign: StickSlipCampaign) -> StickSlipCampaign:
         import numpy as np

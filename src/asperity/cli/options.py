@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from asperity.cli.words import fields_as_options
 from asperity.errors import InputError
 from asperity.parameters import DRIVE, MACHINE, NAMES, Parameter
 
 if TYPE_CHECKING:
     from asperity.materials import Material
+    from asperity.questions.point import Point
 
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
@@ -78,22 +80,21 @@ def plot_option() -> Decorator:
 
 
 def point_options(command: Command) -> Command:
-    """Options of an operating point: law, material, and numbers.
-
-    The command is called with `law` and `material` as they were given, and with `given`, the texts
-    of the numbers by their names.
-    """
+    """Options of an operating point; the command gets `point`, a `Point`."""
     named = [p for p in (*DRIVE.values(), *MACHINE.values()) if p.options]
 
     @wraps(command)
-    def gathered(*, settings: tuple[str, ...], **others: Any) -> Any:
+    def gathered(
+        *, law: str | None, material: str | None, settings: tuple[str, ...], **others: Any
+    ) -> Any:
         given = settings_of(settings)
         for parameter in named:
             value = others.pop(parameter.argument)
             if parameter.rule == "switch":
                 value = "1" if value else None
             add_setting(given, parameter.name, value)
-        return command(given=given, **others)
+        with fields_as_options({"law": "--law"}):
+            return command(point=point_of(law, material, given), **others)
 
     result: Command = set_option('--set A=0.013 --set "K=0.3 N/um"')(gathered)
     for parameter in reversed(named):
@@ -179,15 +180,11 @@ def add_setting(settings: dict[str, str], name: str, value: str | None) -> None:
     settings[name] = value
 
 
-def law_named(name: str | None) -> str:
-    """Name of the law, which must be given."""
-    from asperity.laws import registered
+def point_of(law: str | None, material: str | None, given: dict[str, str]) -> Point:
+    """The operating point of options."""
+    from asperity.questions.point import Point
 
-    if name is None:
-        raise InputError(
-            f"--law must be given, got nothing; choose one of {', '.join(sorted(registered()))}"
-        )
-    return name
+    return Point(law=law or "", material=material or "", parameters=given)
 
 
 def material_named(name: str | None) -> Material | None:

@@ -10,8 +10,8 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.laws import get_law
 from asperity.parameters import Output
+from asperity.questions.sweep import Sweep
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.plan import SweepPlan
 from asperity.study.points import Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
@@ -40,7 +40,7 @@ class ThresholdSolve(SolveKind):
     defaults = tuple(output.name for output in outputs)
     supplies = ("K",)
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
         super().settings(plan)
         low, high = plan.threshold.between
