@@ -127,7 +127,7 @@ def run(
 @contextmanager
 def _after_the_motion(files: list[Path]) -> Iterator[None]:
     """On Ctrl-C, say that the motion is finished and which other files are."""
-    from asperity.cli.interrupt import interruptible
+    from asperity.cli.progress import interruptible
 
     try:
         with interruptible():

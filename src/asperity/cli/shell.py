@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 import click
 
-from asperity.cli.interrupt import INTERRUPTED, MESSAGE, ending_at_once
+from asperity.cli.progress import INTERRUPTED, MESSAGE, ending_at_once
 from asperity.cli.words import in_options
 from asperity.errors import InputError, closest, naming, printable
 

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.interrupt import interruptible
 from asperity.cli.options import Count, json_option
+from asperity.cli.progress import interruptible
 from asperity.errors import InputError
 
 if TYPE_CHECKING:

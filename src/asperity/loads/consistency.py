@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from asperity.errors import InputError, printable
-from asperity.loads.modulation import Excitation, Harmonic, Modulation
-from asperity.loads.periodic import Periodic
+from asperity.loads.modulation import Excitation, Harmonic, Modulation, Periodic
 from asperity.parameters.arguments import shown
 
 #: Numbers of samples of the period; a fault counts if it remains with more samples.
