@@ -148,8 +148,10 @@ def numbers_for(
         name, example = missing[0], known[missing[0]].example
         like = f"{place}.{name} = '{example}'" if place else Argument("numbers", name, example)
         raise InputError(
-            f"{law_name} must have all its numbers, got none for {', '.join(missing)}; "
-            f"name a material that has them or give each one, like {like}"
+            law_name,
+            "have all its numbers",
+            f"none for {', '.join(missing)}",
+            f"name a material that has them or give each one, like {like}",
         )
     return {name: numbers[name] for name in known if name in numbers}
 
@@ -163,8 +165,10 @@ def refuse_foreign(law_name: str, given: Mapping[str, Any]) -> None:
         ]
         if canonical_name(name, own) is None and owners:
             raise InputError(
-                f"{law_name} must be given its own parameters, got '{name}', which belongs to "
-                f"{', '.join(owners)}; leave it out or choose another law"
+                law_name,
+                "be given its own parameters",
+                f"'{name}', which belongs to {', '.join(owners)}",
+                "leave it out or choose another law",
             )
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
-    Count,
+    field_option,
     json_option,
     law_option,
     material_option,
@@ -21,14 +21,14 @@ from asperity.cli.options import (
     settings_of,
 )
 from asperity.cli.recording import listed_times, source_options
-from asperity.cli.words import fields_as_options, in_options
+from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming
+from asperity.questions.recording import Measurement as Question
 
 if TYPE_CHECKING:
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.verdicts.verdict import Check
     from asperity.parameters import Names
-    from asperity.questions.recording import Measurement as Question
     from asperity.questions.recording import Source
 
 
@@ -84,13 +84,10 @@ class FileRows:
 
     def question_of(self, path: Path) -> Question:
         """The question with the conditions of a file."""
-        own = self.conditions.get(path)
-        return (
-            type(self.question)(**{**self.question.model_dump(), **own}) if own else self.question
-        )
+        return self.question.model_copy(update=self.conditions.get(path))
 
     def inputs(self) -> dict[str, Any]:
-        """All that rows depend on besides the files, as JSON values.
+        """Everything except the files that rows depend on, as JSON values.
 
         Of a reduction file its contents: a campaign is not resumed with another one.
 
@@ -143,28 +140,19 @@ in place of numbers; 2: bad input.
 @plot_option()
 @names_option()
 @source_options
-@click.option(
-    "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
-    help='Where to look for the modulation, like "120 Hz"; it is fitted.',
+@field_option(
+    Question, "frequency",
+    'Where to look for the modulation, like "120 Hz", which is fitted; found if not given.',
+    "VALUE", "-f",
 )  # fmt: skip
-@click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
-@click.option(
-    "--harmonics", metavar="N", type=Count(), default=4, show_default=True,
-    help="How many.",
+@field_option(Question, "exact_frequency", "Take --frequency as it is.")
+@field_option(Question, "harmonics", "How many.", "N")
+@field_option(
+    Question, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
+    "START:END",
 )  # fmt: skip
-@click.option(
-    "--window",
-    metavar="START:END",
-    help="Seconds to read, like 10:60; chosen by the program if not given.",
-)
-@click.option("--whole-periods", is_flag=True, help="Cut the window to whole periods.")
-@click.option(
-    "--detrend",
-    metavar="none|linear|quadratic",
-    default="linear",
-    show_default=True,
-    help="Drift that is fitted together with the harmonics.",
-)
+@field_option(Question, "whole_periods", "Cut the window to whole periods.")
+@field_option(Question, "detrend", "Drift that is fitted together with the harmonics.")
 @click.option(
     "--no-modulation",
     is_flag=True,
@@ -229,7 +217,7 @@ in place of numbers; 2: bad input.
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
-    frequency: str,
+    frequency: str | None,
     exact_frequency: bool,
     harmonics: int,
     window: str | None,
@@ -259,7 +247,6 @@ def measure(
     are measured into one table with --out.
     """
     from asperity.cli.report import require_picture, write_picture
-    from asperity.questions.recording import Measurement as Question
 
     fields: dict[str, Any] = {
         "modulated": False if no_modulation else None,
@@ -376,7 +363,7 @@ def _cycles(
     from asperity.operating_point import numbers_for, offered_numbers
     from asperity.parameters import point_parameters
 
-    with fields_as_options({"law": "--law"}):
+    with fields_as_options(POINT_OPTIONS):
         offered = offered_numbers(point_of(law, material, given), "command line")
         chosen = get_law(str(law))
         among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}

@@ -5,15 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
-from asperity.cli.words import fields_as_options
+from asperity.cli.words import POINT_OPTIONS, fields_as_options
 from asperity.errors import InputError
 from asperity.parameters import DRIVE, MACHINE, NAMES, Parameter
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from asperity.materials import Material
     from asperity.questions.point import Point
 
@@ -36,13 +38,38 @@ class Count(click.ParamType):
             raise InputError(option, rule, f"'{value}'", "correct the value") from None
 
 
+def field_option(
+    record: type[BaseModel], field: str, help_text: str, metavar: str = "", short: str = ""
+) -> Decorator:
+    """The option of a field of a question, with its default, its choices and its name.
+
+    Parameters
+    ----------
+    record : type of Record
+    field : str
+    help_text : str
+    metavar : str
+        By default the choices of the field.
+    short : str
+        A second name of the option.
+    """
+    about = record.model_fields[field]
+    names = [*([short] if short else []), f"--{field.replace('_', '-')}"]
+    if about.default is False:
+        return click.option(*names, field, is_flag=True, help=help_text)
+    shown = {"default": about.default, "show_default": True} if about.default is not None else {}
+    kind = Count() if isinstance(about.default, int) else str
+    choices = metavar or "|".join(map(str, get_args(about.annotation)))
+    return click.option(*names, field, type=kind, metavar=choices, help=help_text, **shown)
+
+
 def material_option() -> Decorator:
     """``--material``."""
     return click.option(
         "--material",
         metavar="NAME",
         help="Take the numbers that are not given from a material, such as bureau2000, or from "
-        "a TOML file of your own.",
+        "a TOML file.",
     )
 
 
@@ -93,7 +120,7 @@ def point_options(command: Command) -> Command:
             if parameter.rule == "switch":
                 value = "1" if value else None
             add_setting(given, parameter.name, value)
-        with fields_as_options({"law": "--law"}):
+        with fields_as_options(POINT_OPTIONS):
             return command(point=point_of(law, material, given), **others)
 
     result: Command = set_option('--set A=0.013 --set "K=0.3 N/um"')(gathered)
@@ -105,7 +132,7 @@ def point_options(command: Command) -> Command:
 
 def law_option(
     help_text: str = (
-        "Friction law, such as elasto-plastic, or one of your own as module:Name or file.py:Name."
+        "Friction law, such as elasto-plastic, or a law of yours as module:Name or file.py:Name."
     ),
 ) -> Decorator:
     """``--law``; a law given by its place is imported and registered, and its name passed on."""
@@ -122,7 +149,7 @@ def law_options() -> Decorator:
         callback=lambda context, option, texts: tuple(
             str(_named_law(context, option, text)) for text in texts
         ),
-        help="Friction law, such as rice-ruina, or one of your own as module:Name or file.py:Name; "
+        help="Friction law, such as rice-ruina, or a law of yours as module:Name or file.py:Name; "
         "of a comparison, repeatable.",
     )
 
@@ -132,7 +159,8 @@ def _named_law(context: click.Context, option: click.Parameter, text: str | None
         return text
     from asperity.laws import known_law
 
-    return known_law(text)
+    with fields_as_options(POINT_OPTIONS):
+        return known_law(text)
 
 
 def _option(parameter: Parameter) -> Decorator:
@@ -191,4 +219,5 @@ def material_named(name: str | None) -> Material | None:
     """Load the material, if one is named."""
     from asperity import materials
 
-    return None if name is None else materials.load(name)
+    with fields_as_options(POINT_OPTIONS):
+        return None if name is None else materials.load(name)

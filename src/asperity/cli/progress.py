@@ -93,7 +93,7 @@ Handler = Callable[[int, Any], Any]
 def ending_at_once() -> Iterator[None]:
     """Leave the process on Ctrl-C without unwinding.
 
-    Python's own way, an exception between any two steps, crashes compiled modules that are just
+    Python's default, an exception between any two steps, crashes compiled modules that are just
     being loaded, and JAX's callbacks swallow it.
     """
     with _handling(_leave):

@@ -72,7 +72,7 @@ def response_record(
     response : PeriodicResponse
         Of a single point.
     numbers : mapping of str to SourcedNumber
-        What was asked, by name.
+        Inputs by name.
     """
     converged = bool(response.converged)
 

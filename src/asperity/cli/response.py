@@ -76,7 +76,7 @@ def response(
     """Periodic response to a modulated normal load.
 
     Mean friction, harmonics of the force and Floquet multipliers of the periodic orbit, be it
-    stable or not; without inertia unless it is asked for.
+    stable or not; without inertia by default.
     """
     if stick_slip:
         if table is not None or out is not None or plot is not None or resume:

@@ -240,7 +240,8 @@ def hold_response(
     Parameters
     ----------
     slider : Slider or Law
-        A law alone takes `stiffness`. Its parameters may be arrays, which broadcast with the rest.
+        A law alone takes `stiffness`. Its parameters may be arrays, which broadcast with the
+        other arguments.
     hold_time : array or str
         Seconds, positive.
     velocity : array or str

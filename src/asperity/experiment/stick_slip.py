@@ -57,12 +57,12 @@ class StickSlip(Labelled):
     slips : int array
         In a period; 0 where no cycle repeats itself.
     steady : bool array
-        Whether the motion comes to steady sliding.
+        Whether the motion ends in steady sliding.
     stable : bool array
         Whether steady sliding is stable against small disturbances. Where it is, and there is
         stick-slip all the same, the beginning of the motion decides.
     result : str array
-        What the motion comes to.
+        Sentence on how the motion ends: stick-slip, steady sliding, or why neither.
     slider : Slider
     """
 
@@ -99,7 +99,7 @@ def stick_slip_response(
     radiation_damping: float | str | None = None,
     rtol: float = 1e-9,
 ) -> StickSlip:
-    """What a slider pulled at a constant velocity comes to: stick-slip, or steady sliding.
+    """Long-term motion of a slider pulled at a constant velocity: stick-slip or steady sliding.
 
     Parameters
     ----------

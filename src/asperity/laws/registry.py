@@ -48,8 +48,10 @@ def register(law: type[Law]) -> type[Law]:
         _LAWS[law.name] = law
     elif known is not law:
         raise InputError(
-            f"law.name must be unique, got '{law.name}', which {known.__module__} already has; "
-            "choose another name"
+            "law.name",
+            "be unique",
+            f"'{law.name}', which {known.__module__} already has",
+            "choose another name",
         )
     return law
 
@@ -88,9 +90,7 @@ def get_law(name: str) -> type[Law]:
     if name not in _LAWS and name in installed():
         register(load_installed(installed()[name]))
     if name not in _LAWS:
-        raise InputError(
-            f"law must be a registered law, got {shown(name)}; {closest(name, registered())}"
-        )
+        raise InputError("law", "be a registered law", shown(name), closest(name, registered()))
     return _LAWS[name]
 
 
@@ -134,14 +134,18 @@ def load_installed(point: EntryPoint) -> type[Law]:
         result = point.load()
     except Exception as error:  # code of others may raise anything
         raise InputError(
-            f"law must be importable, got {where} ({type(error).__name__}: {error}); "
-            "repair or uninstall the package that has it"
+            "law",
+            "be importable",
+            f"{where} ({type(error).__name__}: {error})",
+            "repair or uninstall the package that has it",
         ) from error
     law = _checked(result, where)
     if law.name != point.name:
         raise InputError(
-            f"law must have the name of its entry point, got {where} and the name '{law.name}'; "
-            "change one of the two"
+            "law",
+            "have the name of its entry point",
+            f"{where} and the name '{law.name}'",
+            "change one of the two",
         )
     return law
 
@@ -162,15 +166,19 @@ def law_at(place: str) -> type[Law]:
     where, _, name = place.rpartition(":")
     if not where or not name:
         raise InputError(
-            f"law must be a place like 'module:Name' or 'path/to/file.py:Name', got '{place}'"
-            "; give both parts"
+            "law",
+            "be a place like 'module:Name' or 'path/to/file.py:Name'",
+            f"'{place}'",
+            "give both parts",
         )
     module = _module(where, place)
     if not hasattr(module, name):
         laws = [n for n, value in vars(module).items() if _is_law(value)]
         raise InputError(
-            f"law must be in '{where}', got '{name}', which is not there; "
-            + (closest(name, laws) if laws else "define a subclass of asperity.laws.Law in it")
+            "law",
+            f"be in '{where}'",
+            f"'{name}', which is not there",
+            closest(name, laws) if laws else "define a subclass of asperity.laws.Law in it",
         )
     return _checked(getattr(module, name), f"'{place}'")
 
@@ -180,15 +188,19 @@ def _module(where: str, place: str) -> ModuleType:
         return _from_file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
     except (FileNotFoundError, ModuleNotFoundError) as error:
         raise InputError(
-            f"law must be in a module or file that exists, got '{place}' ({error}); "
-            "correct the path, or install the module"
+            "law",
+            "be in a module or file that exists",
+            f"'{place}' ({error})",
+            "correct the path, or install the module",
         ) from None
     except InputError:
         raise
     except Exception as error:  # code of others may raise anything
         raise InputError(
-            f"law must be in code that runs, got '{place}' ({type(error).__name__}: {error}); "
-            "mend the module"
+            "law",
+            "be in code that runs",
+            f"'{place}' ({type(error).__name__}: {error})",
+            "mend the module",
         ) from error
 
 
@@ -220,7 +232,9 @@ def _is_law(value: object) -> bool:
 def _checked(result: object, where: str) -> type[Law]:
     if not (isinstance(result, type) and issubclass(result, Law) and result is not Law):
         raise InputError(
-            f"law must be a subclass of asperity.laws.Law, got {where}, a "
-            f"{type(result).__name__}; see the page 'Write your own law'"
+            "law",
+            "be a subclass of asperity.laws.Law",
+            f"{where}, a {type(result).__name__}",
+            "see the page 'Write your own law'",
         )
     return checked_class(result, where)

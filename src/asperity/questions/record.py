@@ -289,9 +289,6 @@ def _mistakes(
     if isinstance(raised, InputError):
         # Types of values do not know where they are used.
         return (raised if raised.field.name else raised.about(field),)
-    if raised is not None:
-        # Raised by a validator of the record, which leaves only the field to be named.
-        return (InputError(f"{field} must {raised}"),)
     if reported["type"] == "missing":
         return (InputError(field, "be given", "nothing", "add it"),)
     value = shown(reported["input"])
