@@ -53,7 +53,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "study": _RESULTS | {"operating_point", "protocol", "inference"},  # varies all of these
     "figures": _BASE | _SIGNALS | _STUDIES,  # turns numbers into pictures, solves nothing
     "fit_report": _RESULTS | {"inference", "figures"},  # a fit as a folder: page, draws, material
-    "ledger": _BASE | {"materials", "figures"},  # knows no paper: papers are users of the library
+    "ledger": _BASE | {"materials", "figures", "questions"},  # knows no paper
     "app": _RESULTS
     | _STUDIES
     | {"inference", "figures", "operating_point", "ledger", "fit_report"},

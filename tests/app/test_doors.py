@@ -10,6 +10,7 @@ from asperity.cli.main import main
 from asperity.errors import InputError
 from asperity.laws import RiceRuina
 from asperity.parameters import DRIVE, MACHINE, law_parameters
+from asperity.protocol import load_protocol
 from asperity.study import load_plan, run_sweep
 from asperity.units import KINDS
 
@@ -93,6 +94,24 @@ def test_a_number_of_a_point(ask, tmp_path, name, value):
     ends = {text.removeprefix(f"{field} must ") for field, text in said.items()}
     assert all(text.startswith(f"{field} must ") for field, text in said.items()), said
     assert len(ends) == 1, said
+
+
+@pytest.mark.parametrize("law", ["rice", "a b"])
+def test_an_unknown_law(ask, tmp_path, law):
+    protocol = f'law = "{law}"\nsteps = ["slide for 1 s"]\n[start]\nvelocity = "1 um/s"\n'
+    path = tmp_path / "protocol.toml"
+    path.write_text(protocol, encoding="utf-8")
+    page = ask("explore", {"law": law, "numbers": POINT, "laws": []})
+    said = [
+        command("response", "--law", law).removeprefix("--"),
+        command("map", "--law", law, "--out", "a.nc", "--x", "V=1:2:3 m/s", "--y", "K=1:2:3 N/m")
+        .removeprefix("--"),
+        page.json["error"],
+        sentence(load_protocol, path),
+        sentence(asp.laws.get_law, law),
+    ]  # fmt: skip
+    assert set(said) == {said[0]}
+    assert said[0].startswith("law must be ")
 
 
 #: By field of a measurement: the option, the label of the page, and values that it may not have.

@@ -217,12 +217,6 @@ in place of numbers; 2: bad input.
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
-    frequency: str | None,
-    exact_frequency: bool,
-    harmonics: int,
-    window: str | None,
-    whole_periods: bool,
-    detrend: str,
     no_modulation: bool,
     steps: str | None,
     holds: str | None,
@@ -240,6 +234,7 @@ def measure(
     as_json: bool,
     plot: Path | None,
     names: Names,
+    **fields: Any,
 ) -> int:
     """Harmonics of the friction force against the measured load, with uncertainties and verdicts.
 
@@ -248,14 +243,10 @@ def measure(
     """
     from asperity.cli.report import require_picture, write_picture
 
-    fields: dict[str, Any] = {
+    if fields["frequency"] == "auto":
+        fields["frequency"] = None
+    fields |= {
         "modulated": False if no_modulation else None,
-        "frequency": None if frequency == "auto" else frequency,
-        "exact_frequency": exact_frequency,
-        "harmonics": harmonics,
-        "window": window,
-        "whole_periods": whole_periods,
-        "detrend": detrend,
         "steps": None if steps is None else listed_times(steps, "--steps"),
         "holds": None if holds is None else listed_times(holds, "--holds"),
         "stick_slip": True if stick_slip else None,
