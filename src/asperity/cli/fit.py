@@ -21,8 +21,6 @@ from asperity.cli.recording import listed_times, source_options
 from asperity.cli.words import fields_as_options
 from asperity.errors import InputError
 from asperity.outputs import require_folder
-from asperity.questions.fit import Comparison, Fit
-from asperity.questions.options import FIT_OPTIONS
 
 if TYPE_CHECKING:
     from asperity.inference import Fit as FitResult
@@ -63,7 +61,7 @@ More than 20,000 samples are compared as means over blocks (--fit-rate).
 """
 
 #: Options that are fields of the question, by the name of the field: text, and name of the value.
-_FIELDS = {
+_FIELDS: dict[str, tuple[str, ...]] = {
     "free": (
         "Free parameters: a,b,c; by default all of the law that the data may show.",
         "NAMES",
@@ -78,7 +76,7 @@ _FIELDS = {
         "START:END",
     ),
     "trend": ("Trend of the friction of a recording over slip.", ""),
-    "drift": ("Let the friction drift over time too.", ""),
+    "drift": ("Let the friction drift over time too.",),
     "initial": ("State at the beginning of a recording.", ""),
     "gauge": ('Low-pass of the force gauge, like "50 Hz".', "HZ"),
     "gauge_order": ("Its order.", "N"),
@@ -87,14 +85,14 @@ _FIELDS = {
         "as many as it needs where it has more than 20,000 samples.",
         "HZ|full",
     ),
-    "profile": ("Intervals by profile likelihood.", ""),
-    "inertia": ("The mass of the slider counts.", ""),
-    "radiation_damping": ("The damping eta counts.", ""),
+    "profile": ("Intervals by profile likelihood.",),
+    "inertia": ("The mass of the slider counts.",),
+    "radiation_damping": ("The damping eta counts.",),
 }
 
 
 def _field(name: str) -> Any:
-    return field_option(Fit, name, *_FIELDS[name])
+    return field_option("asperity.questions.fit:Fit", name, *_FIELDS[name])
 
 
 #: Options of the data and of what is estimated, what is needed first before the others.
@@ -150,6 +148,8 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
             velocities: str | None,
             **others: Any,
         ) -> Any:
+            from asperity.questions.options import FIT_OPTIONS
+
             with fields_as_options(FIT_OPTIONS):
                 of_run = {
                     "window": window,
@@ -161,7 +161,7 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
                     "fixed": settings_of(fixed, "--fix"),
                     "start": settings_of(start, "--start"),
                     "prior": prior,
-                    **{n: others.pop(n) for n in _FIELDS if n in others},
+                    **{n: v for n in _FIELDS if (v := others.pop(n, None)) is not None},
                 }
                 return command(fields=fields, **others)
 
@@ -225,6 +225,7 @@ def fit(
     from asperity.inference.answers import answer_fit
     from asperity.inference.fitting.result import fit_record
     from asperity.inference.report import fit_report, posterior_sections, windows_sections
+    from asperity.questions.fit import Fit
 
     if len(laws) > 1:
         raise InputError(
@@ -350,6 +351,8 @@ def compare(
         require_folder(report, "--report")
     require_picture(plot, *(d["file"] for d in fields["data"]))
     fields["laws"] = laws or listed
+    from asperity.questions.fit import Comparison
+
     question = Comparison(**fields)
     with bar("%", raising=False) as update:
 

@@ -23,12 +23,12 @@ from asperity.cli.options import (
 from asperity.cli.recording import listed_times, source_options
 from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming
-from asperity.questions.recording import Measurement as Question
 
 if TYPE_CHECKING:
     from asperity.measurement.stick_slip.campaign import StickSlipCampaign
     from asperity.measurement.verdicts.verdict import Check
     from asperity.parameters import Names
+    from asperity.questions.recording import Measurement as Question
     from asperity.questions.recording import Source
 
 
@@ -36,6 +36,8 @@ Rows = list[dict[str, Any]]
 #: Adds the cycles of a law to a campaign.
 Cycles = Callable[["StickSlipCampaign"], "StickSlipCampaign"]
 
+#: The record that the options fill.
+_QUESTION = "asperity.questions.recording:Measurement"
 #: Velocities of a curve of a law.
 _POINTS = 13
 
@@ -141,18 +143,18 @@ in place of numbers; 2: bad input.
 @names_option()
 @source_options
 @field_option(
-    Question, "frequency",
+    _QUESTION, "frequency",
     'Where to look for the modulation, like "120 Hz", which is fitted; found if not given.',
     "VALUE", "-f",
 )  # fmt: skip
-@field_option(Question, "exact_frequency", "Take --frequency as it is.")
-@field_option(Question, "harmonics", "How many.", "N")
+@field_option(_QUESTION, "exact_frequency", "Take --frequency as it is.")
+@field_option(_QUESTION, "harmonics", "How many.", "N")
 @field_option(
-    Question, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
+    _QUESTION, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
     "START:END",
 )  # fmt: skip
-@field_option(Question, "whole_periods", "Cut the window to whole periods.")
-@field_option(Question, "detrend", "Drift that is fitted together with the harmonics.")
+@field_option(_QUESTION, "whole_periods", "Cut the window to whole periods.")
+@field_option(_QUESTION, "detrend", "Drift that is fitted together with the harmonics.", "")
 @click.option(
     "--no-modulation",
     is_flag=True,
@@ -242,6 +244,7 @@ def measure(
     are measured into one table with --out.
     """
     from asperity.cli.report import require_picture, write_picture
+    from asperity.questions.recording import Measurement as Question
 
     if fields["frequency"] == "auto":
         fields["frequency"] = None
@@ -252,7 +255,8 @@ def measure(
         "stick_slip": True if stick_slip else None,
     }
     given = settings_of(settings)
-    question = Question(**fields, **_machine(given, law is None))
+    known = {name: value for name, value in fields.items() if value is not None}
+    question = Question(**known, **_machine(given, law is None))
     if (law or material) and not (out and plot and stick_slip):
         raise InputError(
             "--law and --material must go with --out, --stick-slip and --plot, got them without; "

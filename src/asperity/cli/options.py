@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
@@ -14,8 +15,6 @@ from asperity.errors import InputError
 from asperity.parameters import DRIVE, MACHINE, NAMES, Parameter
 
 if TYPE_CHECKING:
-    from pydantic import BaseModel
-
     from asperity.materials import Material
     from asperity.questions.point import Point
 
@@ -38,29 +37,49 @@ class Count(click.ParamType):
             raise InputError(option, rule, f"'{value}'", "correct the value") from None
 
 
+class FieldOption(click.Option):
+    """An option with the default and the choices of a field of a question, which its help shows.
+
+    The record is imported for the help only; without the option the default of the record applies.
+    """
+
+    def __init__(self, *names: Any, record: str = "", **look: Any) -> None:
+        super().__init__(*names, **look)
+        self.record = record
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Option and text, as click prints them."""
+        module, _, name = self.record.partition(":")
+        about = getattr(importlib.import_module(module), name).model_fields[self.name]
+        if about.default is not None and not self.is_flag:
+            self.default, self.show_default = about.default, True
+        self.metavar = self.metavar or "|".join(map(str, get_args(about.annotation)))
+        return super().get_help_record(ctx)
+
+
 def field_option(
-    record: type[BaseModel], field: str, help_text: str, metavar: str = "", short: str = ""
+    record: str, field: str, help_text: str, metavar: str | None = None, short: str = ""
 ) -> Decorator:
-    """The option of a field of a question, with its default, its choices and its name.
+    """The option of a field of a question.
 
     Parameters
     ----------
-    record : type of Record
+    record : str
+        Its place, as ``module:Name``.
     field : str
     help_text : str
-    metavar : str
-        By default the choices of the field.
+    metavar : str, optional
+        What is given: empty for the choices of the field, "N" for a whole number; None for a
+        switch.
     short : str
         A second name of the option.
     """
-    about = record.model_fields[field]
-    names = [*([short] if short else []), f"--{field.replace('_', '-')}"]
-    if about.default is False:
-        return click.option(*names, field, is_flag=True, help=help_text)
-    shown = {"default": about.default, "show_default": True} if about.default is not None else {}
-    kind = Count() if isinstance(about.default, int) else str
-    choices = metavar or "|".join(map(str, get_args(about.annotation)))
-    return click.option(*names, field, type=kind, metavar=choices, help=help_text, **shown)
+    names = [*([short] if short else []), f"--{field.replace('_', '-')}", field]
+    kind = Count() if metavar == "N" else None
+    return click.option(
+        *names, cls=FieldOption, record=record, help=help_text, metavar=metavar, type=kind,
+        is_flag=metavar is None,
+    )  # fmt: skip
 
 
 def material_option() -> Decorator:

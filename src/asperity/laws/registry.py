@@ -22,7 +22,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError, closest, code_of_others
 from asperity.laws.consistency import checked_class
 from asperity.laws.law import Law
 from asperity.parameters.arguments import shown, typed
@@ -130,15 +130,8 @@ def load_installed(point: EntryPoint) -> type[Law]:
         If it cannot be imported, is no law, or has another name than the entry point.
     """
     where = f"entry point '{point.name}' of {point.value}"
-    try:
+    with code_of_others("law", advice="repair or uninstall the package", where=where):
         result = point.load()
-    except Exception as error:  # code of others may raise anything
-        raise InputError(
-            "law",
-            "be importable",
-            f"{where} ({type(error).__name__}: {error})",
-            "repair or uninstall the package that has it",
-        ) from error
     law = _checked(result, where)
     if law.name != point.name:
         raise InputError(
@@ -184,24 +177,17 @@ def law_at(place: str) -> type[Law]:
 
 
 def _module(where: str, place: str) -> ModuleType:
-    try:
-        return _from_file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
-    except (FileNotFoundError, ModuleNotFoundError) as error:
-        raise InputError(
-            "law",
-            "be in a module or file that exists",
-            f"'{place}' ({error})",
-            "correct the path, or install the module",
-        ) from None
-    except InputError:
-        raise
-    except Exception as error:  # code of others may raise anything
-        raise InputError(
-            "law",
-            "be in code that runs",
-            f"'{place}' ({type(error).__name__}: {error})",
-            "mend the module",
-        ) from error
+    file = where.endswith(".py")
+    with code_of_others("law", where=f"'{place}'"):
+        try:
+            return _from_file(Path(where)) if file else importlib.import_module(where)
+        except (FileNotFoundError, ModuleNotFoundError) as error:
+            raise InputError(
+                "law",
+                "be in a module or file that exists",
+                f"'{place}' ({error})",
+                "correct the path, or install the module",
+            ) from None
 
 
 def _from_file(path: Path) -> ModuleType:
