@@ -46,8 +46,7 @@ DRAWN: Mapping[str, Callable[[FigureNumbers], Figure]] = {
 }
 #: Figures without numbers.
 SCHEMATICS: Mapping[str, Callable[[], Figure]] = {
-    "figure-01": schematics.draw_1,
-    "figure-10": schematics.draw_10,
+    name: partial(schematics.draw, name) for name in ("figure-01", "figure-10")
 }
 
 
