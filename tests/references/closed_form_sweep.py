@@ -45,7 +45,7 @@ class ClosedForm(SolveKind):
 class InClosedForm(Workers):
     """Other workers, on which every task uses the closed form.
 
-    The first task with the third chunk kills its process, which leaves the file `mark`.
+    The first task of the third chunk kills its process, which leaves the file `mark`.
     """
 
     def __init__(self, workers: Workers, mark: str) -> None:
@@ -62,16 +62,16 @@ class InClosedForm(Workers):
         self.workers.close(kill=kill)
 
 
-def _in_closed_form(mark: str, task: Callable[..., Any], chunks: Any, *args: Any) -> Any:
+def _in_closed_form(mark: str, task: Callable[..., Any], chunk: int, *args: Any) -> Any:
     SOLVES["periodic"] = ClosedForm()
-    if 2 in chunks:
+    if chunk == 2:
         try:
             os.close(os.open(mark, os.O_CREAT | os.O_EXCL))
         except FileExistsError:
             pass
         else:
             os.kill(os.getpid(), signal.SIGKILL)
-    return task(chunks, *args)
+    return task(chunk, *args)
 
 
 class _Slow(ClosedForm):

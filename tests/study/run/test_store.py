@@ -285,7 +285,7 @@ def test_a_worker_of_an_older_driver_writes_nothing(
     digest = json.loads((out / "zarr.json").read_text())["attributes"]["plan_sha256"]
     reset(out, SweepStore(out).grid, 0)
     with StoreLock(out), pytest.raises(SupersededError):
-        Job(str(out), digest, "the token of another driver")((0,), 1.0)
+        Job(str(out), digest, "the token of another driver")(0)
     assert not SweepStore(out).is_done(0)
 
 
