@@ -211,7 +211,7 @@ def solve_here(
     total: int,
     size: int,
     solve: Callable[[int, int, Callable[[int], None]], None],
-    progress: Callable[[int, int], None],
+    progress: Callable[[int, int], None] | None = None,
     done: int = 0,
 ) -> None:
     """Solve chunks of at most `size` points in this process, in order.
@@ -224,15 +224,16 @@ def solve_here(
     solve : callable
         ``solve(start, stop, advance)`` solves and keeps the points from `start` to before `stop`,
         and calls ``advance`` with the number of points finished since its last call.
-    progress : callable
+    progress : callable, optional
         Called with the number of points done so far and of all points.
     """
 
     def advance(points: int) -> None:
         nonlocal done
         done += points
-        progress(done, total)
+        if progress is not None:
+            progress(done, total)
 
-    progress(done, total)
+    advance(0)
     for start in range(done, total, size):
         solve(start, min(start + size, total), advance)

@@ -12,7 +12,7 @@ from asperity.errors import InputError
 from asperity.operating_point import SourcedNumber, respond
 from asperity.orbit import Outcome
 from asperity.outputs import Interrupted, targets
-from asperity.study import responses, threshold
+from asperity.study import crossings, responses
 from asperity.study.map import SHOWN, Axis, response_map, write_map
 
 EPS = Axis("epsilon", 0.0, 0.4, 7)
@@ -78,7 +78,7 @@ def test_chords_between_the_points_stay_on_the_boundary(rigid, pmma) -> None:
 
 
 def test_a_planted_mistake_in_the_search_is_seen(numbers, pmma, monkeypatch) -> None:
-    monkeypatch.setattr(threshold, "TOLERANCE", 0.3)
+    monkeypatch.setattr(crossings, "TOLERANCE", 0.3)
     found = response_map("rice-ruina", numbers, x=Axis("epsilon", 0.0, 0.4, 2), y=K)
     Kc = (pmma.B - pmma.A) * pmma.W0 / pmma.D0
     eps, stiffness = found["boundary_epsilon"].values, found["boundary_K"].values
