@@ -14,7 +14,28 @@ from asperity.parameters import OUTPUTS
 from asperity.study import SweepPlan, run_sweep
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.solve import SOLVES, SolveKind
-from asperity.study.workers import ThisProcess, Workers
+from asperity.study.workers import Workers
+
+
+class ThisProcess(Workers):
+    """The process of the driver: `submit` runs the task before it returns."""
+
+    count = 1
+    about = "this process"
+    lost = ()
+    gone = ()
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        """As in `Workers`; Ctrl-C is raised at once."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(task(*args))
+        except Exception as error:  # an executor stores exceptions in the future, too
+            future.set_exception(error)
+        return future
+
+    def close(self, *, kill: bool) -> None:
+        """As in `Workers`."""
 
 
 class ClosedForm(SolveKind):

@@ -205,15 +205,6 @@ def test_an_interrupted_map_goes_on_to_the_same_result(numbers, tmp_path) -> Non
     assert sorted(path.name for path in tmp_path.iterdir()) == ["parts.nc", "whole.nc"]
 
 
-def test_an_interruption_before_the_first_block_leaves_nothing(numbers, tmp_path) -> None:
-    def stop(done: int, total: int) -> None:
-        raise KeyboardInterrupt
-
-    with pytest.raises(Interrupted, match="nothing was written"):
-        write_map(tmp_path / "m.nc", "rice-ruina", numbers, x=EPS, y=K, progress=stop)
-    assert list(tmp_path.iterdir()) == []
-
-
 @pytest.mark.parametrize(
     ("law", "more", "axes", "parts"),
     [

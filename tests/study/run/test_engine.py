@@ -119,9 +119,9 @@ def test_a_cluster_that_ends_is_a_sentence(tmp_path: Path, closed_form: ClosedFo
 
 
 @pytest.mark.parametrize(
-    "error", [RuntimeError("Nanny failed to start."), TimeoutError(), OSError(9, "x")]
+    ("step", "error"),
+    [("LocalCluster", RuntimeError("Nanny failed to start.")), ("Client", TimeoutError())],
 )
-@pytest.mark.parametrize("step", ["LocalCluster", "Client"])
 def test_a_worker_of_dask_that_ends_while_it_starts_is_a_sentence(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, step: str, error: Exception
 ) -> None:
