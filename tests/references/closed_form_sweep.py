@@ -14,7 +14,28 @@ from asperity.parameters import OUTPUTS
 from asperity.study import SweepPlan, run_sweep
 from asperity.study.outcome import Answers, SweepOutcome
 from asperity.study.solve import SOLVES, SolveKind
-from asperity.study.workers import ThisProcess, Workers
+from asperity.study.workers import Workers
+
+
+class ThisProcess(Workers):
+    """The process of the driver: `submit` runs the task before it returns."""
+
+    count = 1
+    about = "this process"
+    lost = ()
+    gone = ()
+
+    def submit(self, task: Callable[..., Any], *args: Any) -> Future[Any]:
+        """As in `Workers`; Ctrl-C is raised at once."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(task(*args))
+        except Exception as error:  # an executor stores exceptions in the future, too
+            future.set_exception(error)
+        return future
+
+    def close(self, *, kill: bool) -> None:
+        """As in `Workers`."""
 
 
 class ClosedForm(SolveKind):
@@ -45,7 +66,7 @@ class ClosedForm(SolveKind):
 class InClosedForm(Workers):
     """Other workers, on which every task uses the closed form.
 
-    The first task with the third chunk kills its process, which leaves the file `mark`.
+    The first task of the third chunk kills its process, which leaves the file `mark`.
     """
 
     def __init__(self, workers: Workers, mark: str) -> None:
@@ -62,16 +83,16 @@ class InClosedForm(Workers):
         self.workers.close(kill=kill)
 
 
-def _in_closed_form(mark: str, task: Callable[..., Any], chunks: Any, *args: Any) -> Any:
+def _in_closed_form(mark: str, task: Callable[..., Any], chunk: int, *args: Any) -> Any:
     SOLVES["periodic"] = ClosedForm()
-    if 2 in chunks:
+    if chunk == 2:
         try:
             os.close(os.open(mark, os.O_CREAT | os.O_EXCL))
         except FileExistsError:
             pass
         else:
             os.kill(os.getpid(), signal.SIGKILL)
-    return task(chunks, *args)
+    return task(chunk, *args)
 
 
 class _Slow(ClosedForm):
