@@ -15,7 +15,6 @@ from asperity.study.outcome import Answers
 from asperity.study.plan import SweepPlan
 from asperity.study.points import POINT_BYTES, Points
 
-
 #: Number of chunks of a small plan, so that several workers share it.
 _SHARES = 8
 
