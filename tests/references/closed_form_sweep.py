@@ -51,10 +51,10 @@ class ClosedForm(SolveKind):
     def chunk_points(self, points: int, record: Any) -> int:
         return 10
 
-    def solve(self, points: Any, record: Any) -> Answers:
+    def solve_law(self, law: Any, points: Any, record: Any) -> Answers:
         epsilon, K = points.values["epsilon"], points.values["K"]
         self.solved |= set(zip(K.tolist(), epsilon.tolist(), strict=True))
-        answers = Answers.empty(("mu1", "mu2"), len(points))
+        answers = Answers.empty(self.defaults, len(points))
         answers.numbers["mu1"][:], answers.numbers["mu2"][:] = epsilon * K, epsilon**2 * K
         answers.outcome[:] = SweepOutcome.CONVERGED
         # A whole chunk without one answer, and a few single ones.
