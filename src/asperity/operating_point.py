@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from asperity import materials
 from asperity.errors import Argument, InputError
 from asperity.laws import Law, get_law, registered
 from asperity.loads.modulated import lowest_load, modulated
+from asperity.materials import load_from
 from asperity.orbit import PeriodicResponse, periodic_response
 from asperity.parameters import (
     MODULATION,
@@ -219,7 +219,7 @@ def offered_numbers(
 
 def material_of(point: Point) -> Material | None:
     """The material that a point names, if any."""
-    return materials.load_from(point.folder, point.material) if point.material else None
+    return load_from(point.folder, point.material) if point.material else None
 
 
 def respond(

@@ -96,22 +96,28 @@ def test_a_number_of_a_point(ask, tmp_path, name, value):
     assert len(ends) == 1, said
 
 
-@pytest.mark.parametrize("law", ["rice", "a b"])
-def test_an_unknown_law(ask, tmp_path, law):
-    protocol = f'law = "{law}"\nsteps = ["slide for 1 s"]\n[start]\nvelocity = "1 um/s"\n'
+@pytest.mark.parametrize(
+    ("field", "name"), [("law", "rice"), ("law", "a b"), ("material", "bureau1999")]
+)
+def test_an_unknown_name(ask, tmp_path, field, name):
+    point = {"law": "rice-ruina", "material": "bureau2000", field: name}
+    options = [text for n, value in point.items() for text in (f"--{n}", value)]
+    axes = ("--x", "V=1:2:3 m/s", "--y", "K=1:2:3 N/m", "--out", str(tmp_path / "map.nc"))
     path = tmp_path / "protocol.toml"
-    path.write_text(protocol, encoding="utf-8")
-    page = ask("explore", {"law": law, "numbers": POINT, "laws": []})
+    fields = "".join(f"{n} = '{value}'\n" for n, value in point.items())
+    path.write_text(fields + "steps = ['slide for 1 s']\n[start]\nvelocity = '1 um/s'\n")
     said = [
-        command("response", "--law", law).removeprefix("--"),
-        command("map", "--law", law, "--out", "a.nc", "--x", "V=1:2:3 m/s", "--y", "K=1:2:3 N/m")
-        .removeprefix("--"),
-        page.json["error"],
+        command("response", *options).removeprefix("--"),
+        command("map", *options, *axes).removeprefix("--"),
         sentence(load_protocol, path),
-        sentence(asp.laws.get_law, law),
-    ]  # fmt: skip
+    ]
+    if field == "law":
+        page = ask("explore", {"law": name, "numbers": POINT, "laws": []})
+        said += [page.json["error"], sentence(asp.laws.get_law, name)]
+    else:  # the page has the materials of the package only
+        said.append(sentence(asp.materials.load, name))
     assert set(said) == {said[0]}
-    assert said[0].startswith("law must be ")
+    assert said[0].startswith(f"{field} must be a ")
 
 
 #: By field of a measurement: the option, the label of the page, and values that it may not have.

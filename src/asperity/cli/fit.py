@@ -340,8 +340,9 @@ def compare(
     from asperity.inference.answers import answer_comparison
     from asperity.inference.comparison.record import comparison_record
     from asperity.inference.report import comparison_report
+    from asperity.questions.fit import Comparison
 
-    if fields.pop("windows") is not None:
+    if fields.pop("windows", None) is not None:
         raise InputError(
             "--windows must go with asperity fit, got it with compare: windows of one recording "
             "overlap, so that what they say against a law does not add up; compare with --window "
@@ -350,10 +351,7 @@ def compare(
     if report is not None:
         require_folder(report, "--report")
     require_picture(plot, *(d["file"] for d in fields["data"]))
-    fields["laws"] = laws or listed
-    from asperity.questions.fit import Comparison
-
-    question = Comparison(**fields)
+    question = Comparison(**fields, laws=laws or listed)
     with bar("%", raising=False) as update:
 
         def progress(done: int, total: int) -> None:

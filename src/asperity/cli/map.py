@@ -68,7 +68,10 @@ def map(
     _check_outputs(out, plot, show)
     result = _solve(point, (x, log_x), (y, log_y), out, resume)
     if plot is not None:
-        _plot(result, plot, show)
+        from asperity.cli.report import save_figure
+        from asperity.figures.map import draw_map
+
+        save_figure(lambda: draw_map(result, show), plot)
     _print(result, out, as_json)
     unresolved = int(result.attrs["boundary_unresolved_chords"])
     if unresolved:
@@ -140,15 +143,6 @@ def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
     if plot is not None and plot.suffix.lower() != ".png":
         raise InputError(f"--plot must be a PNG file, got '{plot}'; write it like --plot map.png")
     output_files({"--out": out, "--plot": plot})
-
-
-def _plot(dataset: xarray.Dataset, path: Path, show: str) -> None:
-    from asperity.figures.map import draw_map
-    from asperity.figures.style import style
-    from asperity.outputs import written_file
-
-    with style(), written_file(path, "--plot") as file:
-        draw_map(dataset, show).savefig(file, metadata={"Software": None})
 
 
 def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool) -> None:

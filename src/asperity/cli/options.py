@@ -75,11 +75,10 @@ def field_option(
         A second name of the option.
     """
     names = [*([short] if short else []), f"--{field.replace('_', '-')}", field]
+    # Click takes an option that is said to be no switch for one whose value may be left out.
+    look: dict[str, Any] = {"is_flag": True} if metavar is None else {"metavar": metavar}
     kind = Count() if metavar == "N" else None
-    return click.option(
-        *names, cls=FieldOption, record=record, help=help_text, metavar=metavar, type=kind,
-        is_flag=metavar is None,
-    )  # fmt: skip
+    return click.option(*names, cls=FieldOption, record=record, help=help_text, type=kind, **look)
 
 
 def material_option() -> Decorator:

@@ -64,8 +64,9 @@ def in_options(argument: Argument, options: Mapping[str, str] | None = None) -> 
     option = known.get(name)
     if option is None:
         whole, _, part = name.partition(".")
-        pair = whole in _PAIRS and whole in (options or {})
-        option, key = (known[whole], part) if pair else (name, key)
+        option = name
+        if whole in _PAIRS and whole in (options or {}):
+            option, key = known[whole], part
     return " ".join([option, *([key] if key else []), *([_quoted(value)] if value else [])])
 
 
