@@ -246,11 +246,10 @@ def status(store: Path, as_json: bool) -> int:
     from asperity.outputs import size_text
     from asperity.outputs.tables import aligned
     from asperity.study import store_status
-    from asperity.study.results import status_record
 
     result = store_status(store)
     if as_json:
-        click.echo(to_json(status_record(result)))
+        click.echo(to_json({**vars(result), "store": str(result.store)}))
         return 0
     done = result.done / result.points
     rows = [

@@ -15,7 +15,7 @@ from asperity.laws import get_law
 from asperity.parameters import Parameter, all_parameters
 from asperity.parameters.arguments import shown
 from asperity.questions.sweep import PlanError, Sweep
-from asperity.study.axes import TEXTS, Column, DrawnAxis, ListedAxis, Spread, SweepAxis
+from asperity.study.axes import Column, SweepAxis
 from asperity.study.points import RATIOS, Points
 from asperity.study.record import plan_record
 from asperity.study.solve import SOLVES
@@ -48,7 +48,7 @@ class SweepGrid:
 
     def __init__(self, record: Mapping[str, Any], chunks: Sequence[int] | None = None) -> None:
         self.record = dict(record)
-        self.axes = tuple(_axis(name, axis) for name, axis in record["axes"].items())
+        self.axes = tuple(SweepAxis(name, axis) for name, axis in record["axes"].items())
         self.shape = tuple(axis.length for axis in self.axes)
         self.chunks = tuple(chunks) if chunks is not None else self._chunks()
 
@@ -167,16 +167,3 @@ class SweepGrid:
             wanted = wanted // length
             lengths.append(length)
         return tuple(reversed(lengths))
-
-
-def _axis(name: str, record: Mapping[str, Any]) -> SweepAxis:
-    if "columns" in record:
-        return ListedAxis(name, {n: _values(n, v) for n, v in record["columns"].items()})
-    spreads = {n: Spread(**spread) for n, spread in record["over"].items()}
-    return DrawnAxis(name, record["draw"], record["seed"], record["count"], spreads)
-
-
-def _values(name: str, values: Sequence[Any]) -> Column:
-    if name in TEXTS:
-        return np.array(values, dtype=object)
-    return np.array([math.nan if value is None else value for value in values], dtype=float)

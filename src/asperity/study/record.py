@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import sys
 from collections.abc import Iterator, Mapping, Sequence, Set
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -58,25 +59,20 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         mistakes.append("axes must have at least one axis, got none; add a table like [axes.K]")
     numbers: dict[str, float] = {}
     origins: dict[str, str] = {}
-    try:
-        numbers, origins = _numbers(plan, axes, laws, known)
-    except InputError as error:
-        mistakes.append(str(error))
-    solve = SOLVES[plan.solve]
     settings: dict[str, Any] = {}
     outputs: tuple[str, ...] = ()
     supplied: tuple[str, ...] = ()
-    try:
+    with _noted(mistakes):
+        numbers, origins = _numbers(plan, axes, laws, known)
+    with _noted(mistakes):
+        solve = SOLVES[plan.solve]
         named = plan.model_copy(update={"law": laws[0]}) if plan.law and laws else plan
         settings = solve.settings(named)
         outputs = solve.chosen_outputs(named)
         supplied = solve.supplied(named)
-    except InputError as error:
-        mistakes.append(str(error))
     if not mistakes:
         mistakes += _missing(laws, axes, numbers, supplied)
-        mistakes += _repeated_columns(axes)
-        mistakes += _misnamed(axes, {*known, *outputs, *_RESERVED})
+        mistakes += _mistakes_of_names(axes, {*known, *outputs, *_RESERVED})
     if mistakes:
         raise PlanError(mistakes)
     return {
@@ -90,6 +86,15 @@ def plan_record(plan: Sweep) -> dict[str, Any]:
         "outputs": list(outputs),
         **({"chunk": plan.chunk} if plan.chunk else {}),
     }
+
+
+@contextmanager
+def _noted(mistakes: list[str | InputError]) -> Iterator[None]:
+    """Add an `InputError` to the mistakes of a plan, which are reported together."""
+    try:
+        yield
+    except InputError as error:
+        mistakes.append(str(error))
 
 
 def known_names(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
@@ -118,10 +123,8 @@ def laws_named(plan: Sweep, mistakes: list[str | InputError]) -> list[str]:
     """Laws of the plan, without repetition, in their order."""
     names = []
     for law in dict.fromkeys(plan.laws):
-        try:
+        with _noted(mistakes):
             names.append(law_name(law, plan.folder))
-        except InputError as error:
-            mistakes.append(str(error))
     if not plan.laws:
         mistakes.append(
             "law must be given, got nothing; add law = 'elasto-plastic' or an axis of laws"
@@ -218,34 +221,29 @@ def _present(axis: Mapping[str, Any], law: str) -> set[str]:
     return present
 
 
-def _misnamed(axes: Mapping[str, Any], taken: Set[str]) -> Iterator[str]:
-    """Mistakes of axes of several columns whose name is invalid or belongs to a variable."""
-    for name, axis in axes.items():
-        if columns_of(axis) == (name,):
-            continue
-        if not name.isidentifier():
-            yield (
-                f"axes.{name} must have a name of letters, digits and underscores, got '{name}'; "
-                "rename it"
-            )
-        elif name in taken:
-            yield (
-                f"axes.{name} must have a name of its own, got '{name}', the name of a variable of "
-                "the store; rename it, like 'sample'"
-            )
-
-
-def _repeated_columns(axes: Mapping[str, Any]) -> Iterator[str]:
-    """Mistakes of columns that two axes have."""
+def _mistakes_of_names(axes: Mapping[str, Any], taken: Set[str]) -> Iterator[str]:
+    """Mistakes of columns that two axes have, and of axes whose name is invalid or taken."""
     owners: dict[str, str] = {}
     for name, axis in axes.items():
-        for column in columns_of(axis):
+        columns = columns_of(axis)
+        for column in columns:
             if column in owners:
                 yield (
                     f"axes.{name} must have columns of its own, got '{column}', which "
                     f"axes.{owners[column]} has too; leave one out"
                 )
             owners[column] = name
+        # An axis with the name of its only column labels the dimension.
+        if columns != (name,) and not name.isidentifier():
+            yield (
+                f"axes.{name} must have a name of letters, digits and underscores, got '{name}'; "
+                "rename it"
+            )
+        elif columns != (name,) and name in taken:
+            yield (
+                f"axes.{name} must have a name of its own, got '{name}', the name of a variable of "
+                "the store; rename it, like 'sample'"
+            )
 
 
 def is_extension(old: Mapping[str, Any], new: Mapping[str, Any]) -> bool:

@@ -69,8 +69,8 @@ def test_points_without_response_are_hatched_and_named() -> None:
     assert "no response found" not in [entry.get_label() for entry in keys(planted())]
 
 
-@pytest.mark.parametrize("show", sorted(SHOWN))
-def test_every_quantity_can_be_drawn(show, tmp_path) -> None:
+@pytest.mark.parametrize("show", ["phase1", "growth_rate", "delta_mu", "mu1"])
+def test_a_quantity_of_each_kind_of_colours_can_be_drawn(show, tmp_path) -> None:
     with style():
         draw_map(planted(), show).savefig(tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 10_000

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from asperity.errors import InputError, closest
-from asperity.laws import get_law, registered
+from asperity.laws import Law, get_law, registered
 from asperity.operating_point import respond
 from asperity.parameters import (
     MODULATION,
@@ -124,18 +124,13 @@ class FitSolve(SolveKind):
         known = {**all_parameters(map(get_law, record["laws"])), **self.parameters()}
         return _outputs(record["settings"]["free"], known)
 
-    def chunk_points(self, points: int, record: Mapping[str, Any]) -> int:
-        """As in `SolveKind`."""
-        return max(1, min(64, points // 8))
-
-    def solve(self, points: Points, record: Mapping[str, Any]) -> Answers:
+    def solve_law(self, law: type[Law], points: Points, record: Mapping[str, Any]) -> Answers:
         """As in `SolveKind`."""
         answers = Answers.empty(record["outputs"], len(points))
-        for law, rows in points.by_law():
-            for row in rows:
-                point = {n: float(v[row]) for n, v in points.values.items() if np.isfinite(v[row])}
-                files = [] if points.data is None else [str(points.data[row])]
-                _fit_point(law, point, files, int(row), record, answers)
+        for row in range(len(points)):
+            point = {n: float(v[row]) for n, v in points.values.items() if np.isfinite(v[row])}
+            files = [] if points.data is None else [str(points.data[row])]
+            _fit_point(law, point, files, row, record, answers)
         return answers
 
 
@@ -248,7 +243,7 @@ def _read(path: str, digest: str, for_all: tuple[tuple[str, float], ...]) -> Loc
 
 
 def _fit_point(
-    law: str,
+    law: type[Law],
     values: dict[str, float],
     files: Sequence[str],
     row: int,
@@ -258,7 +253,7 @@ def _fit_point(
     from asperity.inference import Prior, fit
 
     settings = record["settings"]
-    known = {**point_parameters(get_law(law)), **FitSolve().parameters()}
+    known = {**point_parameters(law), **FitSolve().parameters()}
     # A free parameter of another law of the sweep does not concern this law.
     elsewhere = set(all_parameters(map(get_law, record["laws"])))
     free = [n for n in settings["free"] if n in known or n not in elsewhere]
@@ -275,7 +270,7 @@ def _fit_point(
         simulated = [_simulated(t, law, {**fixed, **truth}, inertia, noise) for t in tables]
         tables = [table for table in simulated if table is not None]
         if len(tables) < len(simulated):
-            answers.fail(np.array([row]), SweepOutcome.NO_READINGS)
+            answers.fail(row, SweepOutcome.NO_READINGS)
             return
     priors = {n: Prior(*p) for n, p in settings["prior"].items() if n in free}
     fitted = fit(
@@ -286,7 +281,7 @@ def _fit_point(
         check_stiffness=False,
     )  # fmt: skip
     if not fitted.converged:
-        answers.fail(np.array([row]), SweepOutcome.FIT_FAILED)
+        answers.fail(row, SweepOutcome.FIT_FAILED)
         return
     numbers = _numbers(fitted)
     for name in answers.numbers:
@@ -335,7 +330,7 @@ def _numbers(fitted: Fit) -> dict[str, float]:
 
 def _simulated(
     table: LockInTable,
-    law: str,
+    law: type[Law],
     truth: Mapping[str, float],
     inertia: bool,
     noise: np.random.Generator,
@@ -346,14 +341,13 @@ def _simulated(
     table. The error of a harmonic with a phase is added in the complex plane. None is returned if
     a row has no periodic response.
     """
-    known = point_parameters(get_law(law))
     at = {}
-    for name, parameter in known.items():
+    for name, parameter in point_parameters(law).items():
         value = truth.get(name, table.points.get(name, parameter.default))
         at[name] = np.broadcast_to(np.asarray(value, dtype=float), (table.rows,)).copy()
     at["epsilon"] *= truth.get("eps_ratio", 1.0)
     at["inertia"][:] = inertia
-    response = respond(get_law(law), at, workers=1)
+    response = respond(law, at, workers=1)
     if not np.all(response.converged):
         return None
     root = np.linalg.cholesky(table.correlations())
