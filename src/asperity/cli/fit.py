@@ -351,7 +351,8 @@ def compare(
     if report is not None:
         require_folder(report, "--report")
     require_picture(plot, *(d["file"] for d in fields["data"]))
-    question = Comparison(**fields, laws=laws or listed)
+    fields["laws"] = laws or listed
+    question = Comparison(**fields)
     with bar("%", raising=False) as update:
 
         def progress(done: int, total: int) -> None:

@@ -22,8 +22,8 @@ from asperity.parameters.parameter import Output, Parameter
 
 def _frozen(fields: Mapping[str, Any]) -> dict[str, Any]:
     """Fields of a frozen record: lists and tables of TOML that cannot be changed."""
-    kinds = {list: tuple, dict: MappingProxyType}
-    return {name: kinds.get(type(v), lambda v: v)(v) for name, v in fields.items()}
+    kinds: dict[type, Any] = {list: tuple, dict: MappingProxyType}
+    return {n: kinds[type(v)](v) if type(v) in kinds else v for n, v in fields.items()}
 
 
 def _parameters(part: str, **shared: Any) -> Mapping[str, Parameter]:

@@ -73,7 +73,8 @@ def _leaf(axis: Axes, start: Point, end: Point) -> None:
 
 def _line(axis: Axes, points: list[Point], **look: Any) -> None:
     """A broken line through the points."""
-    axis.plot(*np.array(points).T, **({"color": _INK, "linewidth": 1.1} | look))
+    chosen: dict[str, Any] = {"color": _INK, "linewidth": 1.1} | look
+    axis.plot(*np.array(points).T, **chosen)
 
 
 def _arrow(axis: Axes, start: Point, end: Point, **look: Any) -> None:
