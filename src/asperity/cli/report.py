@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -17,6 +17,8 @@ from asperity.parameters import OUTPUTS, Names, in_names
 from asperity.parameters.parameter import Drawn
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
 
@@ -47,11 +49,24 @@ def write_picture(drawn: Drawn, path: Path | None, names: Names) -> None:
     """Draw an answer where ``--plot`` was given."""
     if path is None:
         return
+    save_figure(lambda: drawn.plot(names), path)
+    click.echo(f"asperity: the figure is {path}", err=True)
+
+
+def save_figure(draw: Callable[[], Figure], path: Path, option: str = "--plot") -> None:
+    """Draw a figure in the style of the package, and write it as PNG.
+
+    Parameters
+    ----------
+    draw : callable
+    path : Path
+    option : str
+        That names the path, for messages.
+    """
     from asperity.figures.style import style
 
-    with style(), written_file(path, "--plot") as file:
-        drawn.plot(names).savefig(file, metadata={"Software": None})
-    click.echo(f"asperity: the figure is {path}", err=True)
+    with style(), written_file(path, option) as file:
+        draw().savefig(file, metadata={"Software": None})
 
 
 #: Outputs in the order of the JSON; complex ones are pairs of real and imaginary part.
@@ -72,7 +87,7 @@ def response_record(
     response : PeriodicResponse
         Of a single point.
     numbers : mapping of str to SourcedNumber
-        What was asked, by name.
+        Inputs by name.
     """
     converged = bool(response.converged)
 

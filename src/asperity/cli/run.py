@@ -74,10 +74,12 @@ def run(
     PROTOCOL is a TOML file; the motion is written as NetCDF, with all that it depends on.
     """
     from asperity.cli.progress import bar
+    from asperity.cli.report import save_figure
     from asperity.outputs import output_files
     from asperity.protocol import (
         ProtocolError,
         load_protocol,
+        outline,
         record_run,
         run_protocol,
         write_csv,
@@ -113,7 +115,10 @@ def run(
         if text is not None:
             files.append(write_csv(out, text))
         if picture is not None:
-            files.append(_draw(out, picture))
+            from asperity.figures.trajectory import draw_run
+
+            save_figure(lambda: draw_run(outline(out)), picture)
+            files.append(picture)
         if record is not None and setup is not None:
             files.append(write(record_run(setup, out), record))
     _report(wanted, done, files, as_json, statement)
@@ -127,7 +132,7 @@ def run(
 @contextmanager
 def _after_the_motion(files: list[Path]) -> Iterator[None]:
     """On Ctrl-C, say that the motion is finished and which other files are."""
-    from asperity.cli.interrupt import interruptible
+    from asperity.cli.progress import interruptible
 
     try:
         with interruptible():
@@ -182,17 +187,6 @@ def _setup_for(wanted: Protocol, record: Path) -> RecordingSetup:
         )
     check_path(record)
     return wanted.setup
-
-
-def _draw(run_file: Path, picture: Path) -> Path:
-    from asperity.figures.style import style
-    from asperity.figures.trajectory import draw_run
-    from asperity.outputs import written_file
-    from asperity.protocol import outline
-
-    with style(), written_file(picture, "--plot") as file:
-        draw_run(outline(run_file)).savefig(file, metadata={"Software": None})
-    return picture
 
 
 def _report(

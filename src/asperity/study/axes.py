@@ -19,7 +19,7 @@ from asperity.errors import InputError
 from asperity.laws import get_law, known_law
 from asperity.parameters import Parameter, canonical_name, obeying, suggestion
 from asperity.parameters.arguments import shown
-from asperity.study.plan import AxisTable, SweepPlan
+from asperity.questions.sweep import AxisTable, Sweep
 
 Column = NDArray[Any]
 
@@ -131,7 +131,7 @@ def columns_of(axis: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def axis_record(
-    name: str, table: AxisTable, known: Mapping[str, Parameter], plan: SweepPlan
+    name: str, table: AxisTable, known: Mapping[str, Parameter], plan: Sweep
 ) -> tuple[str, dict[str, Any]]:
     """Name of an axis, and the axis as JSON values in SI.
 

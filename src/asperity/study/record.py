@@ -18,8 +18,8 @@ from asperity.errors import InputError
 from asperity.laws import get_law, known_law
 from asperity.operating_point import known_parameters, sourced_numbers
 from asperity.parameters import Parameter, canonical_name, point_parameters
+from asperity.questions.sweep import PlanError, Sweep
 from asperity.study.axes import TEXTS, axis_record, checked_value, columns_of, law_name, law_place
-from asperity.study.plan import PlanError, SweepPlan
 from asperity.study.points import RATIOS
 from asperity.study.solve import SOLVES
 
@@ -31,7 +31,7 @@ ATTRIBUTES = "attributes"
 _RESERVED = (*OF_POINTS, *OF_CHUNKS, ATTRIBUTES, *TEXTS)
 
 
-def plan_record(plan: SweepPlan) -> dict[str, Any]:
+def plan_record(plan: Sweep) -> dict[str, Any]:
     """The record of a plan.
 
     Raises
@@ -103,13 +103,13 @@ def known_names(laws: Sequence[str], solve: str) -> dict[str, Parameter]:
     return {**parameters, **{name: ratio.parameter for name, ratio in RATIOS.items()}}
 
 
-def law_places(plan: SweepPlan) -> tuple[str, ...]:
+def law_places(plan: Sweep) -> tuple[str, ...]:
     """Laws that the plan names by module or file; a file by its absolute path."""
     named = dict.fromkeys(law_place(law, plan.folder) for law in plan.laws)
     return tuple(text for text in named if ":" in text)
 
 
-def _law_files(plan: SweepPlan) -> dict[str, str]:
+def _law_files(plan: Sweep) -> dict[str, str]:
     """SHA-256 of the file of each law that the plan names by module or file, by law name."""
     digests = {}
     for place in law_places(plan):
@@ -119,7 +119,7 @@ def _law_files(plan: SweepPlan) -> dict[str, str]:
     return digests
 
 
-def laws_named(plan: SweepPlan, mistakes: list[str | InputError]) -> list[str]:
+def laws_named(plan: Sweep, mistakes: list[str | InputError]) -> list[str]:
     """Laws of the plan, without repetition, in their order."""
     names = []
     for law in dict.fromkeys(plan.laws):
@@ -133,7 +133,7 @@ def laws_named(plan: SweepPlan, mistakes: list[str | InputError]) -> list[str]:
 
 
 def _numbers(
-    plan: SweepPlan,
+    plan: Sweep,
     axes: Mapping[str, Any],
     laws: Sequence[str],
     known: Mapping[str, Parameter],

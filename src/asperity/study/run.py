@@ -24,9 +24,9 @@ from asperity.outputs import differences, free_disk, require_disk, require_short
 from asperity.parameters.arguments import FilePath, at_least, typed
 from asperity.parameters.toml_file import file_content
 from asperity.study.engine import SweepProgress, WorkersGoneError, solve_chunks
-from asperity.study.grid import SweepGrid, load_plan
+from asperity.study.grid import SweepGrid
 from asperity.study.job import Job, numerics, package_version
-from asperity.study.plan import SweepPlan
+from asperity.study.plan import SweepPlan, load_plan
 from asperity.study.record import is_extension, law_places
 from asperity.study.store.layout import create, extend, fresh_folder, lay_out
 from asperity.study.store.lock import StoreLock, lock_file

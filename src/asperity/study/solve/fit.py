@@ -24,8 +24,8 @@ from asperity.parameters import (
 )
 from asperity.parameters.arguments import one_of
 from asperity.parameters.toml_file import file_content
+from asperity.questions.sweep import FitTable, Sweep
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.plan import FitTable, SweepPlan
 from asperity.study.points import Points
 from asperity.study.solve.kind import SolveKind
 
@@ -83,7 +83,7 @@ class FitSolve(SolveKind):
 
         return {parameter.name: parameter for parameter in (EPS_RATIO, NOISE_SEED)}
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
         super().settings(plan)
         table = _table(plan)
@@ -103,7 +103,7 @@ class FitSolve(SolveKind):
             "files": {name: _digest(plan.folder / name) for name in data_files(plan)},
         }
 
-    def supplied(self, plan: SweepPlan) -> tuple[str, ...]:
+    def supplied(self, plan: Sweep) -> tuple[str, ...]:
         """Columns that all tables have, and the free parameters if no readings are simulated."""
         table = _table(plan)
         columns = [set(_read(str(plan.folder / n), "", ()).points) for n in data_files(plan)]
@@ -112,7 +112,7 @@ class FitSolve(SolveKind):
         # A fit chooses missing start values; a simulation needs the true value of every parameter.
         return tuple(sorted(common | (set() if simulated else set(_free(table)))))
 
-    def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
+    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
         """As in `SolveKind`."""
         known = list(_outputs(_free(_table(plan)), {}))
         if plan.outputs is None:
@@ -134,7 +134,7 @@ class FitSolve(SolveKind):
         return answers
 
 
-def data_files(plan: SweepPlan) -> list[str]:
+def data_files(plan: Sweep) -> list[str]:
     """Files of data that a plan names, without repetition.
 
     Raises
@@ -157,7 +157,7 @@ def data_files(plan: SweepPlan) -> list[str]:
     return files
 
 
-def _table(plan: SweepPlan) -> FitTable:
+def _table(plan: Sweep) -> FitTable:
     if plan.fit is None:
         raise InputError(
             "fit must be given where solve is 'fit', got nothing; add the table [fit] with data "
@@ -166,7 +166,7 @@ def _table(plan: SweepPlan) -> FitTable:
     return plan.fit
 
 
-def _all_inertial(plan: SweepPlan) -> bool:
+def _all_inertial(plan: Sweep) -> bool:
     """Whether every point of a plan includes inertia."""
     values = plan.columns.get("inertia") or [plan.parameters.get("inertia", False)]
     return all(value in (True, "true", "yes", 1) for value in values)
@@ -188,7 +188,7 @@ def _free(table: FitTable) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def _priors(plan: SweepPlan, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
+def _priors(plan: Sweep, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
     """Mean, standard deviation (SI) and source of each prior."""
     from asperity.inference.fitting.inputs import priors_of
     from asperity.inference.unknowns import EPS_RATIO

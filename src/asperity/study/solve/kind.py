@@ -11,8 +11,8 @@ from asperity.laws import Law, get_law
 from asperity.outputs import require_memory
 from asperity.parameters import Output, Parameter
 from asperity.parameters.arguments import one_of
+from asperity.questions.sweep import Sweep
 from asperity.study.outcome import Answers
-from asperity.study.plan import SweepPlan
 from asperity.study.points import POINT_BYTES, Points
 
 #: Number of chunks of a small plan, so that several workers share it.
@@ -47,7 +47,7 @@ class SolveKind(ABC):
         """Numbers that a point may have in addition to the parameters of its law, by name."""
         return {}
 
-    def supplied(self, plan: SweepPlan) -> tuple[str, ...]:
+    def supplied(self, plan: Sweep) -> tuple[str, ...]:
         """Parameters of the law that a point of this plan need not have."""
         return self.supplies
 
@@ -55,7 +55,7 @@ class SolveKind(ABC):
         """Outputs of a plan with this record, by name."""
         return {output.name: output for output in self.outputs}
 
-    def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
+    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
         """Names of the outputs that the plan keeps.
 
         Raises
@@ -68,7 +68,7 @@ class SolveKind(ABC):
         known = [output.name for output in self.outputs]
         return tuple(dict.fromkeys(one_of(o, known, "outputs") for o in plan.outputs))
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """Settings of this kind of solve in a plan, as JSON values."""
         for other in ("transient", "fit"):
             if other != self.name and getattr(plan, other) is not None:

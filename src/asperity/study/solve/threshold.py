@@ -10,8 +10,8 @@ import numpy as np
 from asperity.errors import InputError
 from asperity.laws import Law
 from asperity.parameters import Output
+from asperity.questions.sweep import Sweep
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.plan import SweepPlan
 from asperity.study.points import Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
@@ -39,7 +39,7 @@ class ThresholdSolve(SolveKind):
     # Enough to share the fixed costs of a search.
     fewest, most = 24, 480
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
         super().settings(plan)
         low, high = plan.threshold.between

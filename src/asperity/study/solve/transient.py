@@ -15,9 +15,9 @@ from asperity.loads import Programme
 from asperity.parameters import EXPERIMENT, Output, all_parameters
 from asperity.parameters.arguments import number, one_of
 from asperity.protocol.steps import plan as planned_steps
+from asperity.questions.sweep import NumberTable, Sweep, TransientTable
 from asperity.slider.named import slider_from
 from asperity.study.outcome import Answers, SweepOutcome
-from asperity.study.plan import NumberTable, SweepPlan, TransientTable
 from asperity.study.points import Points
 from asperity.study.responses import solvable
 from asperity.study.solve.kind import SolveKind
@@ -53,7 +53,7 @@ class TransientSolve(SolveKind):
     # A load programme need not have a modulation.
     supplies = ("epsilon", "frequency")
 
-    def settings(self, plan: SweepPlan) -> dict[str, Any]:
+    def settings(self, plan: Sweep) -> dict[str, Any]:
         """As in `SolveKind`."""
         super().settings(plan)
         table = plan.transient
@@ -77,7 +77,7 @@ class TransientSolve(SolveKind):
             "numbers": numbers,
         }
 
-    def chosen_outputs(self, plan: SweepPlan) -> tuple[str, ...]:
+    def chosen_outputs(self, plan: Sweep) -> tuple[str, ...]:
         """The numbers that the plan names."""
         if plan.outputs is not None:
             raise InputError(
@@ -178,7 +178,7 @@ def _number(name: str, entry: NumberTable) -> dict[str, Any]:
     return {"of": entry.of, "take": entry.take, **times}
 
 
-def _check_steps(plan: SweepPlan, table: TransientTable) -> None:
+def _check_steps(plan: Sweep, table: TransientTable) -> None:
     """Check the names in braces, and the lines with a number in place of each brace."""
     known = {**all_parameters([get_law(plan.law)] if plan.law else []), **EXPERIMENT}
     for line in table.steps:
