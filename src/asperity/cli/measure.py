@@ -143,33 +143,11 @@ in place of numbers; 2: bad input.
 @click.argument("recordings", type=Path, nargs=-1, required=True)
 @plot_option()
 @names_option()
-@source_options
-@click.option(
-    "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
-    help='Where to look for the modulation, like "120 Hz"; it is fitted.',
-)  # fmt: skip
-@click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
-@click.option(
-    "--harmonics", metavar="N", type=Count(), default=4, show_default=True,
-    help="How many.",
-)  # fmt: skip
+@json_option()
 @click.option(
     "--window",
     metavar="START:END",
     help="Seconds to read, like 10:60; chosen by the program if not given.",
-)
-@click.option("--whole-periods", is_flag=True, help="Cut the window to whole periods.")
-@click.option(
-    "--detrend",
-    metavar="none|linear|quadratic",
-    default="linear",
-    show_default=True,
-    help="Drift that is fitted together with the harmonics.",
-)
-@click.option(
-    "--no-modulation",
-    is_flag=True,
-    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
 )
 @click.option(
     "--steps",
@@ -181,6 +159,32 @@ in place of numbers; 2: bad input.
     metavar="TIMES|FILE",
     help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
+@source_options
+@click.option(
+    "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
+    help='Where to look for the modulation, like "120 Hz"; it is fitted.',
+)  # fmt: skip
+@click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
+@click.option(
+    "--harmonics", metavar="N", type=Count(), default=4, show_default=True,
+    help="How many.",
+)  # fmt: skip
+@click.option("--whole-periods", is_flag=True, help="Cut the window to whole periods.")
+@click.option(
+    "--detrend",
+    metavar="none|linear|quadratic",
+    default="linear",
+    show_default=True,
+    help="Drift that is fitted together with the harmonics.",
+)
+@click.option(
+    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
+)
+@click.option(
+    "--no-modulation",
+    is_flag=True,
+    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
+)
 @click.option(
     "--stick-slip",
     is_flag=True,
@@ -190,22 +194,11 @@ in place of numbers; 2: bad input.
     '--set "K=168 N/m" --set "V=42 um/s"',
     "K, V, M or W0 of the machine, for slip events; with --law its parameters too",
 )
-@law_option("With --out, --stick-slip and --plot: the law whose cycles are drawn with the drops.")
-@material_option()
-@click.option(
-    "--conditions",
-    metavar="CSV|PATTERN",
-    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
-    'names like "run_k{K N/m}_v{V um/s}".',
-)
 @click.option(
     "--events",
     type=Path,
     metavar="CSV|NC|JSON",
     help="Where the catalogue of slip events goes.",
-)
-@click.option(
-    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
 )
 @click.option(
     "--out",
@@ -214,10 +207,10 @@ in place of numbers; 2: bad input.
     help="Measure all recordings into one table: a row for each amplitude, step and hold.",
 )
 @click.option(
-    "--thresholds",
-    type=Path,
-    metavar="CSV",
-    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+    "--conditions",
+    metavar="CSV|PATTERN",
+    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
+    'names like "run_k{K N/m}_v{V um/s}".',
 )
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
 @click.option(
@@ -226,7 +219,14 @@ in place of numbers; 2: bad input.
     type=click.IntRange(1),
     help="Processes of a table; as many as cores if not given.",
 )
-@json_option()
+@click.option(
+    "--thresholds",
+    type=Path,
+    metavar="CSV",
+    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+)
+@law_option("With --out, --stick-slip and --plot: the law whose cycles are drawn with the drops.")
+@material_option()
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
@@ -465,7 +465,7 @@ def _campaign(
         record["out"] = str(out)
         if campaign.series:
             record["healing"] = campaign.healing_record()
-        click.echo(to_json(record))
+        click.echo(to_json(record, names))
     elif campaign.series:
         click.echo(healing_text(campaign, names))
     if plot is not None:
@@ -546,7 +546,7 @@ def _print(
         record_of, text_of = sliding_record, sliding_text
     if as_json:
         provenance_record = {"recording": str(recording), "version": __version__, **provenance}
-        click.echo(to_json({**record_of(result), "provenance": provenance_record}))
+        click.echo(to_json({**record_of(result), "provenance": provenance_record}, names))
     else:
         click.echo(text_of(result, recording.name, names))
 

@@ -14,24 +14,35 @@ from asperity.errors import InputError
 from asperity.outputs import json, output_files, written_file
 from asperity.outputs.tables import Section, as_text
 from asperity.parameters import OUTPUTS, Names, in_names
+from asperity.parameters.names import plain_names
 from asperity.parameters.parameter import Drawn
 
 if TYPE_CHECKING:
+    from asperity.laws import Law
     from asperity.operating_point import SourcedNumber
     from asperity.orbit import PeriodicResponse
 
 
-def to_json(record: Mapping[str, Any]) -> str:
-    """JSON for people and programs, indented; a number that is not finite becomes null."""
+def to_json(record: Mapping[str, Any], names: Names = "friction", law: str = "") -> str:
+    """JSON for people and programs, indented; a number that is not finite becomes null.
+
+    Keys keep the one name of each parameter; ``names`` says what another set of names calls it.
+    """
+    if names != "friction":
+        record = {**record, "names": plain_names(_law_of(law))}
     return json.to_json(record, indent=2)
 
 
 def sections_text(sections: Iterable[Section], names: Names, law: str = "") -> str:
     """Sections as text, the parameters in a set of names."""
+    chosen = _law_of(law)
+    return as_text(s.worded(partial(in_names, names=names, law=chosen)) for s in sections)
+
+
+def _law_of(name: str) -> type[Law] | None:
     from asperity.laws import get_law
 
-    chosen = get_law(law) if law else None
-    return as_text(s.worded(partial(in_names, names=names, law=chosen)) for s in sections)
+    return get_law(name) if name else None
 
 
 def require_picture(path: Path | None, *inputs: Path) -> None:

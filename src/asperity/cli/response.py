@@ -58,17 +58,17 @@ _SHOWN = (
 
 @click.command(epilog=_EPILOG)
 @point_options
+@plot_option()
+@names_option()
+@json_option()
 @click.option(
     "--stick-slip",
     is_flag=True,
     help="Without a modulation: period, drop and durations of stick-slip, if there is any.",
 )
-@plot_option()
-@names_option()
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
 @click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
-@json_option()
 def response(
     law: str | None,
     material: str | None,
@@ -131,7 +131,7 @@ def _point(
     )
     result = respond(get_law(law), {name: number.value for name, number in numbers.items()})
     if as_json:
-        click.echo(to_json(response_record(result, numbers)))
+        click.echo(to_json(response_record(result, numbers), names, law))
     elif result.converged:
         click.echo(_text(law, result, numbers, names))
     if result.converged:
@@ -173,7 +173,7 @@ def _stick_slip(
     if as_json:
         record: dict[str, Any] = {name: value for name, value, _, _ in rows}
         record |= {"result": str(result.result), "asperity_version": __version__, "law": law}
-        click.echo(to_json({**record, "parameters": values}))
+        click.echo(to_json({**record, "parameters": values}, names, law))
     else:
         texts = [
             (name, f"{value:.9g} {unit}".removesuffix(" 1"), meaning)
