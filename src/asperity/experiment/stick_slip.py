@@ -16,7 +16,7 @@ from asperity.experiment.labelled import Shaped, labelled
 from asperity.loads import Excitation
 from asperity.parameters import MACHINE, obeying
 from asperity.parameters.arguments import number, typed
-from asperity.parameters.parameter import Displayed, SummaryLine, number_line
+from asperity.parameters.parameter import Drawn, SummaryLine, number_line
 from asperity.slider import Motion, Slider, equation_of_motion
 from asperity.slider.problem import flatten
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
@@ -42,7 +42,7 @@ _MEANINGS: dict[str, tuple[str, str]] = {
 
 
 @dataclass(frozen=True, repr=False)
-class StickSlip(Displayed):
+class StickSlip(Drawn):
     """Limit cycles under a drive of constant velocity; arrays of one shape.
 
     Numbers are NaN where no cycle repeats itself; `result` says why.
@@ -69,6 +69,8 @@ class StickSlip(Displayed):
         What the motion comes to.
     slider : Slider
     """
+
+    _drawn_by = "asperity.figures.response:draw_stick_slip_response"
 
     velocity: Float
     period: Float
