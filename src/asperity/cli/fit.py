@@ -97,6 +97,7 @@ def _field(name: str) -> Any:
 
 #: Options of the data and of what is estimated, what is needed first before the others.
 _FIRST = (
+    click.option("--window", metavar="START:END", help="Seconds of a recording to fit."),
     _field("free"),
     click.option("--fix", "fixed", multiple=True, metavar="NAME=VALUE", help="Fix a parameter."),
     click.option("--start", multiple=True, metavar="NAME=VALUE", help="Start value."),
@@ -107,7 +108,6 @@ _FIRST = (
         metavar="NAME|NAME=VALUE+-SD",
         help='Published uncertainties of a material, or "K=0.2+-0.01 N/um"; repeatable.',
     ),
-    click.option("--window", metavar="START:END", help="Seconds of a recording to fit."),
 )
 _THEN = (
     click.option(
@@ -125,13 +125,17 @@ _THEN = (
 )
 
 
-def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+def _question_options(
+    *further: Any, laws: str | None = None
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Options of data and estimation; the command gets `fields` of its question.
 
     Parameters
     ----------
     *further : click options
         Of this command alone, which follow those that are needed first.
+    laws : str, optional
+        The laws where none is named.
     """
 
     def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -165,25 +169,22 @@ def _question_options(*further: Any) -> Callable[[Callable[..., Any]], Callable[
                 }
                 return command(fields=fields, **others)
 
-        result = source_options(gathered)
-        for option in reversed(
-            (
-                click.argument("data", nargs=-1, required=True, type=Path),
-                law_options(),
-                plot_option(),
-                click.option(
-                    "--report",
-                    type=Path,
-                    metavar="DIR",
-                    help="Folder for a page with pictures, the numbers, and a material.",
-                ),
-                names_option(),
-                json_option(),
-                *_FIRST,
-                *further,
-                *_THEN,
-            )
-        ):
+        first = (
+            click.argument("data", nargs=-1, required=True, type=Path),
+            law_options(laws),
+            plot_option(),
+            click.option(
+                "--report",
+                type=Path,
+                metavar="DIR",
+                help="Folder for a page with pictures, the numbers, and a material.",
+            ),
+            names_option(),
+            json_option(),
+            *_FIRST,
+        )
+        result: Callable[..., Any] = gathered
+        for option in reversed((*first, source_options, *_THEN, *further)):
             result = option(result)
         return result
 
@@ -227,9 +228,9 @@ def fit(
     from asperity.inference.report import fit_report, posterior_sections, windows_sections
     from asperity.questions.fit import Fit
 
-    if len(laws) > 1:
+    if len(laws) > 1 or "all" in laws:
         raise InputError(
-            "--law", "be one law for a fit", len(laws), "compare several with asperity compare"
+            "--law", "be one law for a fit", ",".join(laws), "compare several: asperity compare"
         )
     sampling = {"chains": chains, "draws": draws, "seed": seed}
     _check_sampling(posterior, sampling, out)
@@ -249,7 +250,7 @@ def fit(
     if as_json:
         more = {"posterior": sampled.record()} if sampled else {}
         more |= {"windows": over.record()} if over else {}
-        click.echo(to_json({**fit_record(result), **more}))
+        click.echo(to_json({**fit_record(result), **more}, names, result.law))
     else:
         sections = fit_report(result)
         sections += windows_sections(over) if over else []
@@ -316,18 +317,11 @@ if its AICc exceeds the lowest by 10 or more.
 
 @click.command(epilog=_EPILOG_OF_COMPARE)
 @_question_options(
-    click.option(
-        "--laws",
-        "listed",
-        default="all",
-        metavar="NAMES",
-        help="The same as several --law: a,b,c or all.",
-    ),
     click.option("--windows", hidden=True, metavar="SPANS"),
+    laws="all",
 )
 def compare(
     laws: tuple[str, ...],
-    listed: str,
     fields: dict[str, Any],
     report: Path | None,
     plot: Path | None,
@@ -351,7 +345,7 @@ def compare(
     if report is not None:
         require_folder(report, "--report")
     require_picture(plot, *(d["file"] for d in fields["data"]))
-    fields["laws"] = laws or listed
+    fields["laws"] = laws
     question = Comparison(**fields)
     with bar("%", raising=False) as update:
 
@@ -364,7 +358,7 @@ def compare(
 
         comparison = answer_comparison(question, progress=progress)
     if as_json:
-        click.echo(to_json(comparison_record(comparison)))
+        click.echo(to_json(comparison_record(comparison), names, comparison.best))
     else:
         click.echo(sections_text(comparison_report(comparison), names, comparison.best))
     if report is not None and comparison.best:

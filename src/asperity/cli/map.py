@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import json_option, point_options
+from asperity.cli.options import json_option, names_option, plot_option, point_options
 from asperity.errors import InputError, closest
 
 if TYPE_CHECKING:
     import xarray
 
+    from asperity.parameters import Names
     from asperity.questions.point import Point
 
 _EPILOG = """\b
@@ -34,11 +35,11 @@ bifurcation and the frequency of its mode.
 @click.command(epilog=_EPILOG)
 @click.option("--x", "x", metavar="AXIS", help='Number along x, like "epsilon=0.01:0.5:200".')
 @click.option("--y", "y", metavar="AXIS", help='Number along y, like "K=0.05:0.5:200 N/um".')
-@click.option("--log-x", is_flag=True, help="Points along x at equal ratios.")
-@click.option("--log-y", is_flag=True, help="Points along y at equal ratios.")
 @point_options
+@plot_option()
+@names_option()
+@json_option()
 @click.option("--out", type=Path, metavar="NC", help="Where the map goes, as NetCDF.")
-@click.option("--plot", type=Path, metavar="PNG", help="Where a picture goes.")
 @click.option(
     "--show",
     metavar="QUANTITY",
@@ -46,8 +47,9 @@ bifurcation and the frequency of its mode.
     show_default=True,
     help="What the picture shows: mu1, delta_mu, floquet_max, ...",
 )
+@click.option("--log-x", is_flag=True, help="Points along x at equal ratios.")
+@click.option("--log-y", is_flag=True, help="Points along y at equal ratios.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted map.")
-@json_option()
 def map(
     x: str | None,
     y: str | None,
@@ -56,6 +58,7 @@ def map(
     point: Point,
     out: Path | None,
     plot: Path | None,
+    names: Names,
     show: str,
     resume: bool,
     as_json: bool,
@@ -71,8 +74,8 @@ def map(
         from asperity.cli.report import save_figure
         from asperity.figures.map import draw_map
 
-        save_figure(lambda: draw_map(result, show), plot)
-    _print(result, out, as_json)
+        save_figure(lambda: draw_map(result, show), plot, names)
+    _print(result, out, as_json, names)
     unresolved = int(result.attrs["boundary_unresolved_chords"])
     if unresolved:
         click.echo(
@@ -131,6 +134,7 @@ def _solve(
 
 def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
     """Check files and quantity before anything is solved."""
+    from asperity.cli.report import require_picture
     from asperity.outputs import output_files
     from asperity.study.map import SHOWN
 
@@ -140,25 +144,25 @@ def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
         )
     if out is None:
         raise InputError("--out must be given, got nothing; name the file, like --out map.nc")
-    if plot is not None and plot.suffix.lower() != ".png":
-        raise InputError(f"--plot must be a PNG file, got '{plot}'; write it like --plot map.png")
+    require_picture(plot)
     output_files({"--out": out, "--plot": plot})
 
 
-def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool) -> None:
+def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool, names: Names) -> None:
     from asperity.cli.report import to_json
     from asperity.outputs.tables import aligned
+    from asperity.parameters import display_name
 
     record = _record(dataset, out)
     if as_json:
-        click.echo(to_json(record))
+        click.echo(to_json(record, names, str(dataset.attrs["law"])))
         return
     rows = [(name, str(record[name])) for name in ("points", "stable", "unstable", "failed")]
     click.echo(aligned(rows))
     for line in record["boundaries"]:
         kinds = " and ".join(dict.fromkeys(line["kind"]))
         spans = ", ".join(
-            f"{name} {min(line[name]):.6g} to {max(line[name]):.6g}"
+            f"{display_name(name, names)} {min(line[name]):.6g} to {max(line[name]):.6g}"
             for name in (record["x"], record["y"])
         )
         click.echo(f"boundary  {kinds}, {len(line['kind'])} points: {spans}")

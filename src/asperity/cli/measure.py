@@ -141,25 +141,11 @@ in place of numbers; 2: bad input.
 @click.argument("recordings", type=Path, nargs=-1, required=True)
 @plot_option()
 @names_option()
-@source_options
-@field_option(
-    _QUESTION, "frequency",
-    'Where to look for the modulation, like "120 Hz", which is fitted; found if not given.',
-    "VALUE", "-f",
-)  # fmt: skip
-@field_option(_QUESTION, "exact_frequency", "Take --frequency as it is.")
-@field_option(_QUESTION, "harmonics", "How many.", "N")
+@json_option()
 @field_option(
     _QUESTION, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
     "START:END",
 )  # fmt: skip
-@field_option(_QUESTION, "whole_periods", "Cut the window to whole periods.")
-@field_option(_QUESTION, "detrend", "Drift that is fitted together with the harmonics.", "")
-@click.option(
-    "--no-modulation",
-    is_flag=True,
-    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
-)
 @click.option(
     "--steps",
     metavar="TIMES|FILE",
@@ -170,6 +156,24 @@ in place of numbers; 2: bad input.
     metavar="TIMES|FILE",
     help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
+@source_options
+@field_option(
+    _QUESTION, "frequency",
+    'Where to look for the modulation, like "120 Hz", which is fitted; determined if not given.',
+    "VALUE", "-f",
+)  # fmt: skip
+@field_option(_QUESTION, "exact_frequency", "Take --frequency as it is.")
+@field_option(_QUESTION, "harmonics", "How many.", "N")
+@field_option(_QUESTION, "whole_periods", "Cut the window to whole periods.")
+@field_option(_QUESTION, "detrend", "Drift that is fitted together with the harmonics.", "")
+@click.option(
+    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
+)
+@click.option(
+    "--no-modulation",
+    is_flag=True,
+    help="Velocity steps and holds; by default, those of a recording whose load is constant.",
+)
 @click.option(
     "--stick-slip",
     is_flag=True,
@@ -179,22 +183,11 @@ in place of numbers; 2: bad input.
     '--set "K=168 N/m" --set "V=42 um/s"',
     "K, V, M or W0 of the machine, for slip events; with --law its parameters too",
 )
-@law_option("With --out, --stick-slip and --plot: the law whose cycles are drawn with the drops.")
-@material_option()
-@click.option(
-    "--conditions",
-    metavar="CSV|PATTERN",
-    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
-    'names like "run_k{K N/m}_v{V um/s}".',
-)
 @click.option(
     "--events",
     type=Path,
     metavar="CSV|NC|JSON",
     help="Where the catalogue of slip events goes.",
-)
-@click.option(
-    "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
 )
 @click.option(
     "--out",
@@ -203,10 +196,10 @@ in place of numbers; 2: bad input.
     help="Measure all recordings into one table: a row for each amplitude, step and hold.",
 )
 @click.option(
-    "--thresholds",
-    type=Path,
-    metavar="CSV",
-    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+    "--conditions",
+    metavar="CSV|PATTERN",
+    help="K, V, M or W0 of each file: a table with a column file, or a pattern of the files' "
+    'names like "run_k{K N/m}_v{V um/s}".',
 )
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
 @click.option(
@@ -215,7 +208,14 @@ in place of numbers; 2: bad input.
     type=click.IntRange(1),
     help="Processes of a table; as many as cores if not given.",
 )
-@json_option()
+@click.option(
+    "--thresholds",
+    type=Path,
+    metavar="CSV",
+    help="With --out and --stick-slip: where stick-slip ends, K/W0 against V, for asperity recipe.",
+)
+@law_option("With --out, --stick-slip and --plot: the law whose cycles are drawn with the drops.")
+@material_option()
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
@@ -446,7 +446,7 @@ def _campaign(
         record["out"] = str(out)
         if campaign.series:
             record["healing"] = campaign.healing_record()
-        click.echo(to_json(record))
+        click.echo(to_json(record, names))
     elif campaign.series:
         click.echo(healing_text(campaign, names))
     if plot is not None:
@@ -527,7 +527,7 @@ def _print(
         record_of, text_of = sliding_record, sliding_text
     if as_json:
         provenance_record = {"recording": str(recording), "version": __version__, **provenance}
-        click.echo(to_json({**record_of(result), "provenance": provenance_record}))
+        click.echo(to_json({**record_of(result), "provenance": provenance_record}, names))
     else:
         click.echo(text_of(result, recording.name, names))
 

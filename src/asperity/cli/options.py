@@ -141,11 +141,13 @@ def point_options(command: Command) -> Command:
         with fields_as_options(POINT_OPTIONS):
             return command(point=point_of(law, material, given), **others)
 
-    result: Command = set_option('--set A=0.013 --set "K=0.3 N/um"')(gathered)
-    for parameter in reversed(named):
-        result = _option(parameter)(result)
-    result = material_option()(result)
-    return law_option()(result)
+    drive = [_option(parameter) for parameter in DRIVE.values() if parameter.options]
+    machine = [_option(parameter) for parameter in MACHINE.values() if parameter.options]
+    numbers = set_option('--set A=0.013 --set "K=0.3 N/um"')
+    result: Command = gathered
+    for option in reversed((law_option(), material_option(), *drive, numbers, *machine)):
+        result = option(result)
+    return result
 
 
 def law_option(
@@ -154,26 +156,58 @@ def law_option(
     ),
 ) -> Decorator:
     """``--law``; a law given by its place is imported and registered, and its name passed on."""
-    return click.option("--law", metavar="NAME", callback=_named_law, help=help_text)
-
-
-def law_options() -> Decorator:
-    """``--law`` that may be repeated, as `law_option`; the command gets `laws`."""
     return click.option(
         "--law",
-        "laws",
         metavar="NAME",
-        multiple=True,
-        callback=lambda context, option, texts: tuple(
-            str(_named_law(context, option, text)) for text in texts
-        ),
-        help="Friction law, such as rice-ruina, or a law of yours as module:Name or file.py:Name; "
-        "of a comparison, repeatable.",
+        callback=lambda context, option, text: None if text is None else known_place(text),
+        help=help_text,
     )
 
 
-def _named_law(context: click.Context, option: click.Parameter, text: str | None) -> str | None:
-    if text is None or ":" not in text:
+def law_options(default: str | None = None) -> Decorator:
+    """``--law``, which may be repeated, and ``--laws``; the command gets `laws`, a tuple of names.
+
+    Parameters
+    ----------
+    default : str, optional
+        Of ``--laws``, without either option.
+    """
+
+    def with_options(command: Command) -> Command:
+        @wraps(command)
+        def gathered(*, laws: tuple[str, ...], listed: str | None, **others: Any) -> Any:
+            if laws and listed is not None:
+                raise InputError(
+                    "--law must go without --laws, got both; they say the same, leave one out"
+                )
+            if not laws:
+                texts = (listed or default or "").split(",")
+                laws = tuple(known_place(text.strip()) for text in texts if text.strip())
+            return command(laws=laws, **others)
+
+        result: Command = click.option(
+            "--laws",
+            "listed",
+            metavar="NAMES",
+            help="The same as several --law: a,b,c or all"
+            + (f"; {default} if neither is given." if default else "."),
+        )(gathered)
+        return click.option(
+            "--law",
+            "laws",
+            metavar="NAME",
+            multiple=True,
+            callback=lambda context, option, texts: tuple(map(known_place, texts)),
+            help="Friction law, such as rice-ruina, or one of your own as module:Name or "
+            "file.py:Name; of a comparison, repeatable.",
+        )(result)
+
+    return with_options
+
+
+def known_place(text: str) -> str:
+    """Name of a law; one given by its place is imported and registered."""
+    if ":" not in text:
         return text
     from asperity.laws import known_law
 

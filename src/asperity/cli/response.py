@@ -52,17 +52,17 @@ _SHOWN = (
 
 @click.command(epilog=_EPILOG)
 @point_options
+@plot_option()
+@names_option()
+@json_option()
 @click.option(
     "--stick-slip",
     is_flag=True,
     help="Without a modulation: period, drop and durations of stick-slip, if there is any.",
 )
-@plot_option()
-@names_option()
 @click.option("--table", type=Path, metavar="CSV", help="Solve every row of a table.")
 @click.option("--out", type=Path, metavar="CSV", help="Where the table with its results goes.")
 @click.option("--resume", is_flag=True, help="Go on with an interrupted table.")
-@json_option()
 def response(
     point: Point,
     stick_slip: bool,
@@ -108,7 +108,7 @@ def _point(point: Point, as_json: bool, plot: Path | None, names: Names) -> int:
     values = {name: number.value for name, number in numbers.items()}
     result = respond(get_law(point.law), values)
     if as_json:
-        click.echo(to_json(response_record(result, numbers)))
+        click.echo(to_json(response_record(result, numbers), names, point.law))
     elif result.converged:
         click.echo(_text(point.law, result, numbers, names))
     if result.converged:
@@ -148,7 +148,7 @@ def _stick_slip(point: Point, as_json: bool, names: Names) -> int:
     if as_json:
         record: dict[str, Any] = {name: value for name, value, _, _ in rows}
         record |= {"result": str(result.result), "asperity_version": __version__, "law": law.name}
-        click.echo(to_json({**record, "parameters": values}))
+        click.echo(to_json({**record, "parameters": values}, names, law.name))
     else:
         texts = [
             (name, f"{value:.9g} {unit}".removesuffix(" 1"), meaning)

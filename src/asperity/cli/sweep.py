@@ -353,5 +353,5 @@ def plot(
                 "it like --at epsilon=0.1"
             ) from None
     target = output_file(out, "--out", example="slice.png")
-    save_figure(lambda: plot_slice(store, show, x=x, y=y, at=where), target, "--out")
+    save_figure(lambda: plot_slice(store, show, x=x, y=y, at=where), target, option="--out")
     return 0

@@ -16,6 +16,7 @@ from asperity.experiment.labelled import Labelled, Shaped
 from asperity.loads import Excitation
 from asperity.parameters import MACHINE, obeying
 from asperity.parameters.arguments import number, typed
+from asperity.parameters.parameter import Drawn
 from asperity.slider import Motion, Slider, equation_of_motion
 from asperity.slider.problem import flatten
 from asperity.transients.limit_cycle import CycleEnd, limit_cycle
@@ -38,7 +39,7 @@ _MEANINGS: dict[str, tuple[str, str]] = {
 
 
 @dataclass(frozen=True, repr=False)
-class StickSlip(Labelled):
+class StickSlip(Labelled, Drawn):
     """Limit cycles under a drive of constant velocity; arrays of one shape.
 
     Numbers are NaN where no cycle repeats itself; `result` says why.
@@ -69,6 +70,7 @@ class StickSlip(Labelled):
     meanings = _MEANINGS
     drive: ClassVar[dict[str, str]] = {"velocity": "m/s"}
     shown = ("period", "drop", "slip_duration", "peak_velocity")
+    _drawn_by = "asperity.figures.response:draw_stick_slip_response"
 
     velocity: Float
     period: Float

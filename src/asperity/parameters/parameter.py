@@ -315,12 +315,17 @@ class Drawn(Displayed):
         module, name = self._drawn_by.split(":")
         with import_module("asperity.figures.style").style():
             figure: Figure = getattr(import_module(module), name)(self)
-        if names == "geophysics":
-            in_symbols: Any = import_module("asperity.parameters.names").in_symbols
-            labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
-            for text in labels:
-                text.set_text(in_symbols(text.get_text()))
-        return figure
+        return labelled(figure, names)
+
+
+def labelled(figure: Figure, names: Names) -> Figure:
+    """The figure, its labels in a set of names."""
+    if names == "geophysics":
+        in_symbols: Any = import_module("asperity.parameters.names").in_symbols
+        labels: Any = figure.findobj(lambda artist: hasattr(artist, "set_text"))
+        for text in labels:
+            text.set_text(in_symbols(text.get_text()))
+    return figure
 
 
 def parameter_line(parameter: Parameter, value: Any) -> SummaryLine:
