@@ -239,11 +239,11 @@ def test_without_the_extra_there_is_a_sentence(monkeypatch):
 
 #: Scenes: a tab, and what its link holds.
 SCENES = {
-    "explore": "law=linker-dieterich&laws=rice-ruina,nagata&V=0.000003&epsilon=0.2&air=1&air.h0=0.000009"
-    "&K=300000&alpha=0.3&show=phases&names=geophysics&letters=large",
+    "explore": "law=linker-dieterich&laws=rice-ruina,nagata&V=0.000003&epsilon=0.2"
+    "&air=1&air.h0=0.000009&K=300000&alpha=0.3&show=phases&names=geophysics&letters=large",
     "map": "law=rice-ruina&count=16&show=mu1&x=V,1e-7,0.00001,log&y=epsilon,0.01,0.3,linear"
     "&inertia=1&M=2&names=geophysics",
-    "paper": "show=ledger&kind=test&search=Rice&names=friction",
+    "paper": "figure=figure-08&K=300000&names=friction",
     "data": "run=hold_step_modulate&names=geophysics",
 }
 
@@ -267,7 +267,7 @@ BUSY = re.compile("…|so far|Integrating|Compiling|finer grid")
 
 def settled(page, tab):
     """What the page shows once nothing is computed any more."""
-    page.locator(f"section.tab.{tab} .panel, section.tab.{tab} .claim, textarea").first.wait_for()
+    page.locator(f"section.tab.{tab} :is(.plot svg, .fine)").last.wait_for()
     seen, before = page.evaluate(DRAWN), None
     while seen != before or BUSY.search(page.locator("main").inner_text()):
         page.wait_for_timeout(1000)
