@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
@@ -118,5 +119,10 @@ class Number(Record):
         return " ".join([*parts, self.unit]).rstrip()
 
     def _to_si(self, value: float) -> float:
-        # The shortest text of a double is the decimal in the file, which is converted exactly.
-        return to_si(f"{value!r} {self.unit}", self.dimension, "number.value")
+        return _in_si(value, self.unit, self.dimension)
+
+
+@cache
+def _in_si(value: float, unit: str, dimension: str) -> float:
+    # The shortest text of a double is the decimal in the file, which is converted exactly.
+    return to_si(f"{value!r} {unit}", dimension, "number.value")
