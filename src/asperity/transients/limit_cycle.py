@@ -212,6 +212,9 @@ class _Run:
 class _Orbit:
     """A motion from one fall to another, with its return map about there.
 
+    The force and the period are those of the motion with Newton's step to first order, so that they
+    do not depend on where the motion began.
+
     Attributes
     ----------
     run : _Run
@@ -260,10 +263,15 @@ class _Orbit:
         """The equation of motion."""
         return self.run.parts[0].system.motion
 
+    @cached_property
+    def step(self) -> Float:
+        """Newton's step of the first states."""
+        return self.solve(self.last - self.first)
+
     @property
     def period(self) -> float:
         """Seconds."""
-        return self.end - self.begin
+        return float(self.end - self.begin + self.duration[: len(self.first)] @ self.step)
 
     @property
     def stable(self) -> bool:
@@ -272,12 +280,9 @@ class _Orbit:
         return bool(np.abs(np.linalg.eigvals(self.map[:, :size])).max() < 1)
 
     def solve(self, change: Float) -> Float:
-        """Changes of the first states that make up for changes of the last ones; NaN without."""
+        """Changes of the first states that make up for changes of the last ones."""
         size = len(self.first)
-        try:
-            return np.asarray(np.linalg.solve(np.eye(size) - self.map[:, :size], change))
-        except np.linalg.LinAlgError:
-            return np.full(change.shape, np.nan)
+        return np.asarray(np.linalg.solve(np.eye(size) - self.map[:, :size], change))
 
     def within(self, t: Float) -> tuple[Float, Float]:
         """Times of the motion at times (s) of any period, and the number of the period."""
@@ -299,7 +304,8 @@ class _Orbit:
     def force_and_rate(self, t: Float) -> tuple[Float, Float]:
         """F/W0, and K (V - v)/W0 (1/s), at times of the motion."""
         now = self.run.samples(t)
-        return now.force, float(self.motion.kappa) * (1 - now.velocity)
+        later = self.variation.evaluate(t, 0)[:, : len(self.first)] @ self.step
+        return now.force + later, float(self.motion.kappa) * (1 - now.velocity)
 
     def fastest(self) -> float:
         """Largest velocity (m/s): the motion between steps is smooth."""
@@ -446,9 +452,11 @@ def _closed(
         run = _motion(integration, Y, max(end - _LONGER * period, 0.0), slips)
         if isinstance(run, LimitCycle) or len(run.cycles) < slips:
             return None
-        orbit = _Orbit.of(run, run.cycles[0].begin, run.cycles[slips - 1].end)
-        step = orbit.solve(orbit.last - orbit.first)
-        size = _size(integration.motion, step, orbit.first)
+        try:
+            orbit = _Orbit.of(run, run.cycles[0].begin, run.cycles[slips - 1].end)
+            size = _size(integration.motion, orbit.step, orbit.first)
+        except np.linalg.LinAlgError:  # of rates that are not finite, or at a fold
+            return None
         if not size < _NEAR:
             return None
         if size < tolerance:
@@ -456,7 +464,7 @@ def _closed(
             if fewer < slips:
                 return _closed(integration, orbit.first, fewer, period * fewer / slips)
             return _described(orbit, slips) if orbit.stable else None
-        Y, period = orbit.first + step, orbit.period
+        Y, period = orbit.first + orbit.step, orbit.period
     return None
 
 

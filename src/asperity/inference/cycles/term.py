@@ -24,7 +24,7 @@ _RTOL = 1e-8
 #: Instants in a bin, and in the slip of the model; rounds of the shift in time.
 _IN_BIN, _IN_SLIP, _ROUNDS = 8, 400, 8
 #: Share of a slip by which a last change of the shift is none.
-_NO_SHIFT = 1e-6
+_NO_SHIFT = 1e-4
 #: Spread of the drops over that of the noise from which cycles differ by themselves.
 _IRREGULAR = 2.0
 
