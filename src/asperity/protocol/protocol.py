@@ -16,7 +16,6 @@ from asperity.loads import Programme
 from asperity.loads.programme.steps import LoadAndVelocity
 from asperity.operating_point import SourcedNumber, known_parameters, point_numbers
 from asperity.parameters import MACHINE, law_parameters
-from asperity.parameters.arguments import FilePath, typed
 from asperity.protocol.recording import RecordingSetup, setup_of
 from asperity.protocol.steps import PlannedStep, check_levels, plan
 from asperity.questions.experiment import Experiment, ProtocolError
@@ -170,19 +169,5 @@ class Protocol(Experiment):
         }
 
 
-@typed
-def load_protocol(path: FilePath) -> Protocol:
-    """Read a protocol from a TOML file.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or is not TOML.
-    ProtocolError
-        An `InputError` that lists all mistakes, with file, step and a valid example.
-    """
-    return Protocol.from_file(path)
+#: Reads a protocol from a TOML file; raises `InputError`, with all mistakes a `ProtocolError`.
+load_protocol = Protocol.from_file

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -30,21 +29,8 @@ class SweepPlan(Sweep):
         return self
 
 
-def load_plan(path: str | os.PathLike[str]) -> SweepPlan:
-    """Read a plan from a TOML file, in which every quantity carries its unit.
-
-    Parameters
-    ----------
-    path : str or path
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or is not TOML.
-    PlanError
-        An `InputError` with all mistakes.
-    """
-    return SweepPlan.from_file(path)
+#: Reads a plan from a TOML file; raises `InputError`, with all mistakes a `PlanError`.
+load_plan = SweepPlan.from_file
 
 
 def _quantities(plan: Sweep) -> Iterator[tuple[str, str, Any]]:

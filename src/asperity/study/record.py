@@ -13,10 +13,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from asperity import materials
 from asperity.errors import InputError
 from asperity.laws import get_law, known_law
-from asperity.operating_point import known_parameters, sourced_numbers
+from asperity.operating_point import known_parameters, material_of, sourced_numbers
 from asperity.parameters import Parameter, canonical_name, point_parameters
 from asperity.questions.sweep import PlanError, Sweep
 from asperity.study.axes import TEXTS, axis_record, checked_value, columns_of, law_name, law_place
@@ -139,7 +138,7 @@ def _numbers(
     known: Mapping[str, Parameter],
 ) -> tuple[dict[str, float], dict[str, str]]:
     """Numbers that are the same at every point, in SI, and the origin of each."""
-    material = materials.load_from(plan.folder, plan.material) if plan.material else None
+    material = material_of(plan)
     ratios = {
         ratio: checked_value(RATIOS[ratio].parameter, value)
         for name, value in plan.parameters.items()
