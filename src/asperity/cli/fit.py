@@ -82,7 +82,7 @@ _THEN = (
     click.option(
         "--steps",
         metavar="TIMES|FILE",
-        help="Times (s) at which the velocity of the drive changes.",
+        help="Times (s) at which the velocity of the drive changes, where no channel has it.",
     ),
     click.option(
         "--velocities",
@@ -101,7 +101,7 @@ _THEN = (
         show_default=True,
         help="Trend of the friction of a recording over slip.",
     ),
-    click.option("--drift", is_flag=True, help="Let the friction drift over time too."),
+    click.option("--drift", is_flag=True, help="Add a linear drift of the friction over time."),
     click.option(
         "--initial",
         metavar="steady|free",
@@ -118,8 +118,8 @@ _THEN = (
         "as many as it needs where it has more than 20,000 samples.",
     ),
     click.option("--profile", is_flag=True, help="Intervals by profile likelihood."),
-    click.option("--inertia", is_flag=True, help="The mass of the slider counts."),
-    click.option("--radiation-damping", is_flag=True, help="The damping eta counts."),
+    click.option("--inertia", is_flag=True, help="Include the inertia of the slider."),
+    click.option("--radiation-damping", is_flag=True, help="Include the radiation damping eta."),
 )
 #: Options that are fields of the question under the same name.
 _FIELDS = (
@@ -222,10 +222,10 @@ def fit(
     names: Names,
     as_json: bool,
 ) -> int:
-    """Fit a friction law to tables of lock-in readings and to recordings.
+    """Fit a friction law to recordings, to tables of readings, or to holds.
 
     Estimates with intervals, correlations, what the data cannot determine, and whether the law
-    describes them.
+    describes the data.
     """
     from asperity.cli.progress import bar
     from asperity.cli.report import require_picture, sections_text, to_json, write_picture
@@ -335,7 +335,7 @@ def compare(
     names: Names,
     as_json: bool,
 ) -> int:
-    """Fit several laws to the same readings and say which the data exclude."""
+    """Fit several laws to the same data and say which of them the data exclude."""
     from asperity.cli.progress import bar
     from asperity.cli.report import require_picture, sections_text, to_json, write_picture
     from asperity.inference.answers import answer_comparison

@@ -236,7 +236,7 @@ DRIVE = _by_name(
         "inertia",
         "dimensionless",
         "switch",
-        "the mass of the slider counts",
+        "include the inertia of the slider",
         "",
         "motion",
         default=0.0,

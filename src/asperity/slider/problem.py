@@ -60,7 +60,7 @@ def equation_of_motion(
         return QuasiStatic(slider, V, omega)
     if not slider.law.rate_dependent:
         raise InputError(
-            f"law must depend on the velocity where inertia or radiation damping counts, got "
+            f"law must depend on the velocity with inertia or radiation damping, got "
             f"{slider.law.name}; leave both out or choose another law"
         )
     if inertia:
@@ -87,8 +87,8 @@ def _elastic(slider: Slider) -> bool:
     length = np.asarray(slider.law.elastic_length)
     if np.any(length > 0) and np.any(length == 0):
         raise InputError(
-            "law.lambda must be positive at all points or 0 at all points when inertia or "
-            "radiation damping counts, got both: the states differ; solve the two groups separately"
+            "law.lambda must be positive at all points or 0 at all points with inertia or "
+            "radiation damping, got both: the states differ; solve the two groups separately"
         )
     return bool(np.all(length > 0))
 
