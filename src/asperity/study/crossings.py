@@ -18,8 +18,8 @@ from asperity.study.points import Float
 #: Accuracy of the position of a crossing, in fractions of an axis.
 TOLERANCE = 1e-6
 #: ln|m| jumps over zero, and does not cross it, where |ln|m|| at the end of the search exceeds this
-#: fraction of the difference of ln|m| between the ends of the line: on a line shorter than 1 a
-#: steep crossing leaves `TOLERANCE` times the slope.
+#: fraction of the difference of ln|m| between the ends of the line. A crossing leaves about
+#: `TOLERANCE` over the length of the line, less than this on every line longer than 1e-4.
 _JUMP = 1e-2
 
 #: Outputs that a search for crossings needs.

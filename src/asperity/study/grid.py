@@ -22,7 +22,8 @@ from asperity.study.solve import SOLVES
 
 Slices = tuple[slice, ...]
 
-#: Up to this length an axis of laws is not divided: a chunk has points of all laws.
+#: Up to this length an axis of laws is not divided: each worker then compiles every law once, and
+#: chunks take equal times. A longer one would leave a chunk too few points of each law.
 _LAWS_APART = 64
 
 #: Largest number of points, a 64-bit integer.

@@ -34,11 +34,12 @@ from asperity.study.store.root import read_root
 from asperity.study.store.store import SweepStore
 from asperity.study.workers import Workers, local_cluster, local_processes, scheduler
 
-#: Seconds between updates of the lock file, which show that the driver runs.
+#: Seconds between updates of the lock file, which show that the driver runs: a twelfth of the time
+#: after which the lock counts as left behind.
 _REFRESH = 5.0
 _TIME = "%Y-%m-%dT%H:%M:%S%z"
-#: Packages whose versions the store records.
-_PACKAGES = ("jax", "jaxlib", "numpy", "scipy", "zarr", "loky", "distributed")
+#: Packages whose versions a run records, besides those of `numerics`.
+_PACKAGES = ("zarr", "loky", "distributed")
 
 
 @dataclass(frozen=True)
@@ -323,7 +324,7 @@ def _started(workers: Workers) -> dict[str, Any]:
         "host": socket.gethostname(),
         "machine": f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores",
         "workers": workers.about,
-        "asperity": __version__,
+        **numerics(),
         "python": platform.python_version(),
         **{name: number for name in _PACKAGES if (number := package_version(name))},
     }

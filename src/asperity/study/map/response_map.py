@@ -28,7 +28,7 @@ from asperity.units import KINDS
 if TYPE_CHECKING:
     import xarray
 
-#: Points of a chunk.
+#: Points of a chunk, the most that an interruption loses: five batches of the fast method.
 _CHUNK = 4800
 #: Memory of a point with its share of the boundary and of the file (bytes); without these measured
 #: 250 to 300 (largest resident memory, 250,000 to 2,250,000 points).

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from asperity.errors import InputError, closest
+from asperity.errors import InputError
 from asperity.laws import Law, get_law, registered
 from asperity.operating_point import respond
 from asperity.parameters import (
@@ -20,6 +20,7 @@ from asperity.parameters import (
     Parameter,
     all_parameters,
     canonical_name,
+    known_name,
     point_parameters,
 )
 from asperity.parameters.arguments import one_of
@@ -172,17 +173,17 @@ def _all_inertial(plan: Sweep) -> bool:
     return all(value in (True, "true", "yes", 1) for value in values)
 
 
-def _free(table: FitTable) -> list[str]:
-    """Canonical names of the free parameters."""
+def _known() -> dict[str, Parameter]:
+    """Parameters of which a plan may free one or give a prior."""
     from asperity.inference.unknowns import EPS_RATIO
 
-    known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
-    names = []
-    for name in table.free or ():
-        canonical = canonical_name(name, known)
-        if canonical is None:
-            raise InputError(f"fit.free must name parameters, got '{name}'; {closest(name, known)}")
-        names.append(canonical)
+    return {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
+
+
+def _free(table: FitTable) -> list[str]:
+    """Canonical names of the free parameters."""
+    known = _known()
+    names = [known_name(name, known, "fit.free") for name in table.free or ()]
     if not names:
         raise InputError("fit.free must name parameters, got none; write it like ['A', 'B']")
     return list(dict.fromkeys(names))
@@ -191,9 +192,8 @@ def _free(table: FitTable) -> list[str]:
 def _priors(plan: Sweep, table: FitTable, free: Sequence[str]) -> dict[str, list[Any]]:
     """Mean, standard deviation (SI) and source of each prior."""
     from asperity.inference.fitting.inputs import priors_of
-    from asperity.inference.unknowns import EPS_RATIO
 
-    known = {**all_parameters(registered().values()), EPS_RATIO.name: EPS_RATIO}
+    known = _known()
     written: dict[str, Any] = {}
     for name, prior in table.prior.items():
         canonical = canonical_name(name, known)

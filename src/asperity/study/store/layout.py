@@ -34,7 +34,8 @@ NOT_DONE = -1
 #: Long names of the columns of texts.
 _TEXT_NAMES = {"law": "friction law", "data": "file of the readings"}
 
-#: Largest number of values of a stored coordinate that follows from a ratio.
+#: Largest number of values of a stored coordinate that follows from a ratio: readers load all
+#: coordinates, and this one is made in memory (8 MB).
 _MOST_DERIVED = 1_000_000
 
 #: Zarr leaves out files of fill values by default; such a chunk would look as if not computed.
