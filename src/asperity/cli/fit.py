@@ -76,7 +76,7 @@ _FIELDS: dict[str, tuple[str, ...]] = {
         "START:END",
     ),
     "trend": ("Trend of the friction of a recording over slip.", ""),
-    "drift": ("Let the friction drift over time too.",),
+    "drift": ("Add a linear drift of the friction over time.",),
     "initial": ("State at the beginning of a recording.", ""),
     "gauge": ('Low-pass of the force gauge, like "50 Hz".', "HZ"),
     "gauge_order": ("Its order.", "N"),
@@ -86,8 +86,8 @@ _FIELDS: dict[str, tuple[str, ...]] = {
         "HZ|full",
     ),
     "profile": ("Intervals by profile likelihood.",),
-    "inertia": ("The mass of the slider counts.",),
-    "radiation_damping": ("The damping eta counts.",),
+    "inertia": ("Include the inertia of the slider.",),
+    "radiation_damping": ("Include the radiation damping eta.",),
 }
 
 
@@ -113,7 +113,7 @@ _THEN = (
     click.option(
         "--steps",
         metavar="TIMES|FILE",
-        help="Times (s) at which the velocity of the drive changes.",
+        help="Times (s) at which the velocity of the drive changes, where no channel has it.",
     ),
     click.option(
         "--velocities",
@@ -215,10 +215,10 @@ def fit(
     names: Names,
     as_json: bool,
 ) -> int:
-    """Fit a friction law to tables of lock-in readings and to recordings.
+    """Fit a friction law to recordings, to tables of readings, or to holds.
 
     Estimates with intervals, correlations, what the data cannot determine, and whether the law
-    describes them.
+    describes the data.
     """
     from asperity.cli.progress import bar
     from asperity.cli.report import require_picture, sections_text, to_json, write_picture
@@ -328,7 +328,7 @@ def compare(
     names: Names,
     as_json: bool,
 ) -> int:
-    """Fit several laws to the same readings and say which the data exclude."""
+    """Fit several laws to the same data and say which of them the data exclude."""
     from asperity.cli.progress import bar
     from asperity.cli.report import require_picture, sections_text, to_json, write_picture
     from asperity.inference.answers import answer_comparison

@@ -238,10 +238,11 @@ def measure(
     names: Names,
     **fields: Any,
 ) -> int:
-    """Harmonics of the friction force against the measured load, with uncertainties and verdicts.
+    """Friction in a recording: velocity steps, holds, slip events, or response to a modulated load.
 
-    RECORDINGS are files of a laboratory: CSV or other text, HDF5, MATLAB, TDMS or LOOK. Several
-    are measured into one table with --out.
+    What the recording is, is recognised from its load and velocity. RECORDINGS are files of a
+    laboratory: CSV or other text, HDF5, NetCDF, MATLAB, TDMS or LOOK. Several are
+    measured into one table with --out.
     """
     from asperity.cli.report import require_picture, write_picture
     from asperity.questions.recording import Measurement as Question
@@ -422,8 +423,8 @@ def _campaign(
     question = rows_of.question
     if thresholds is not None and not question.stick_slip:
         raise InputError(
-            "--thresholds must go with --stick-slip, got it without; add it: where stick-slip "
-            "ends, steady sliding counts too"
+            "--thresholds must go with --stick-slip, got it without; add it: the end "
+            "of stick-slip needs the recordings of steady sliding too"
         )
     if thresholds is not None or plot is not None:
         output_files(

@@ -120,7 +120,7 @@ def sliding_text(measurement: SlidingMeasurement, name: str, names: Names = "fri
     if (load := measurement.load) is not None:
         rows.append(_row("load", load.value, load.uncertainty, measurement.load_unit, "mean"))
     head = (
-        f"{name}: {friction.start:.10g} s to {friction.end:.10g} s, "
+        f"{name}: {_time(friction.start)} s to {_time(friction.end)} s, "
         f"{measurement.time.size} samples at {rates}"
     )
     lines = [
@@ -147,7 +147,9 @@ def stick_slip_text(measurement: StickSlipMeasurement, name: str, names: Names =
 
     time = measurement.time
     rate = (time.size - 1) / float(time[-1] - time[0])
-    head = f"{name}: {time[0]:.10g} s to {time[-1]:.10g} s, {time.size} samples at {rate:.4g} Hz"
+    head = (
+        f"{name}: {_time(time[0])} s to {_time(time[-1])} s, {time.size} samples at {rate:.4g} Hz"
+    )
     parts = [(f"{r.start:.6g}", f"{r.end:.6g}", r.kind, r.evidence) for r in measurement.regimes]
     slope, doubt = measurement.loading_slope, measurement.loading_slope_uncertainty
     rows = [
@@ -191,14 +193,19 @@ def healing_text(campaign: StickSlipCampaign, names: Names = "friction") -> str:
     )
 
 
+def _time(seconds: float) -> str:
+    """A time of a recording, to a nanosecond: what a fit of the clock leaves about zero is zero."""
+    return f"{round(float(seconds), 9) + 0.0:.10g}"
+
+
 def _segments(measurement: SlidingMeasurement) -> list[str]:
     table = [("from (s)", "to (s)", "velocity", "mean friction", "drift (1/s)", "scatter")]
     for s in measurement.segments:
         steady = _number(s.steady.value, s.steady.uncertainty)
         table.append(
             (
-                f"{s.start:.10g}",
-                f"{s.end:.10g}",
+                _time(s.start),
+                _time(s.end),
                 "hold" if s.hold else velocity_text(s.velocity),
                 steady,
                 f"{s.slope:.2g}",

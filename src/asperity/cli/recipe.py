@@ -45,7 +45,7 @@ def recipe(
     fixes: tuple[str, ...],
     as_json: bool,
 ) -> int:
-    """Numbers by the procedure of a PAPER, step by step, next to the published ones.
+    """Parameters by the steps of a PAPER, compared with the numbers that it prints.
 
     For bureau2000: A, B and D0 from steady sliding and its bifurcation, eps_ratio from the drop of
     the mean, lambda from mu1, a bound on alpha from the drop; uncertainties of all steps.

@@ -44,8 +44,16 @@ def listed_times(text: str, option: str) -> list[str]:
 
 
 _OPTIONS = (
-    click.option("--load", metavar="NAME", help="Column of the normal load; found if it is one."),
-    click.option("--force", metavar="NAME", help="Column of the shear force; found if it is one."),
+    click.option(
+        "--load",
+        metavar="NAME",
+        help="Column of the normal load; by default recognised by name and unit.",
+    ),
+    click.option(
+        "--force",
+        metavar="NAME",
+        help="Column of the shear force; by default recognised by name and unit.",
+    ),
     click.option("--time", metavar="NAME", help="Column of the time."),
     click.option(
         "--column",

@@ -46,7 +46,7 @@ _STEP = 0.02
 _SENTENCES = {
     End.STEADY: "comes back to steady sliding",
     End.RUNAWAY: (
-        "runs away after the extremum: steady sliding is stable, but the disturbance is too large "
+        "accelerates without bound after the extremum: steady sliding is stable, but the disturbance is too large "
         "for this spring and law; take a stiffer spring, or inertia in asperity.transient"
     ),
     End.TOO_MANY_STEPS: "was not solved: no step was accurate, or more steps than allowed",
@@ -54,7 +54,7 @@ _SENTENCES = {
 }
 _RINGING = "did not settle within the steps that are allowed; the extremum is as it should be"
 _UNSTABLE = (
-    "runs away after the extremum: the spring is softer than the critical stiffness; take a "
+    "accelerates without bound after the extremum: the spring is softer than the critical stiffness; take a "
     "stiffer spring, or inertia in asperity.transient"
 )
 

@@ -61,7 +61,7 @@ RULES: Mapping[str, Rule] = MappingProxyType(
         "switch": Rule(
             "be 1 or 0",
             lambda x: np.isin(x, (0.0, 1.0)),
-            "write 1 where it counts, 0 elsewhere",
+            "write 1 to include it, 0 to leave it out",
         ),
     }
 )

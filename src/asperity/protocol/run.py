@@ -102,9 +102,9 @@ def _linearised(protocol: Protocol, numbers: dict[str, Any]) -> str:
     if not rate > _ROUND_OFF * level.velocity:
         return ""
     return (
-        f"steady sliding at {level.velocity:g} m/s is unstable at the start: a disturbance grows "
-        f"by a factor e in {1 / rate:.3g} s; without a perturbation, such as a step of the load, "
-        "the run stays on it until rounding errors have grown"
+        f"steady sliding at {level.velocity:g} m/s is unstable at the start: a disturbance "
+        f"doubles in {math.log(2) / rate:.3g} s; without a perturbation, such as a step of the "
+        "load, the run stays on it until rounding errors have grown"
     )
 
 

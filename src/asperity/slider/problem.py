@@ -61,7 +61,7 @@ def equation_of_motion(
     if not slider.law.rate_dependent:
         raise InputError(
             "law",
-            "depend on the velocity where inertia or radiation damping counts",
+            "depend on the velocity with inertia or radiation damping",
             slider.law.name,
             "leave both out or choose another law",
         )
@@ -90,7 +90,7 @@ def _elastic(slider: Slider) -> bool:
     if np.any(length > 0) and np.any(length == 0):
         raise InputError(
             "law.lambda",
-            "be positive at all points or 0 at all points when inertia or radiation damping counts",
+            "be positive at all points or 0 at all points with inertia or radiation damping",
             "both: the states differ",
             "solve the two groups separately",
         )

@@ -331,10 +331,10 @@ def _without(whole: Comparison, rest: Comparison, rows: Sequence[str]) -> Compar
     def excluded(comparison: Comparison) -> list[str]:
         return sorted(name for name, j in comparison.laws.items() if j.excluded)
 
-    beside = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
+    which = "the same laws" if excluded(whole) == excluded(rest) else "other laws"
     said = (
         f"No law describes {_listed(rows)} together with the other rows; check that measurement. "
-        f"With it, {beside} would be excluded. Without: "
+        f"With it, {which} are excluded. Without it: "
     )
     return replace(rest, verdict=said + rest.verdict, left_out=tuple(rows))
 

@@ -541,8 +541,9 @@ def _why_undetermined(fit: Fit, name: str) -> str:
     ]
     if partners:
         return (
-            f"{name} is not determined by these data beside {' and '.join(partners)}: they change "
-            "the predictions together; fix one, give a prior, or measure what tells them apart"
+            f"{name} is not determined by these data together with {' and '.join(partners)}: they "
+            "change the predictions in the same way; fix one, give a prior, or measure what tells "
+            "them apart"
         )
     return (
         f"{name} is not determined by these data; fix it or give a prior: the intervals of the "

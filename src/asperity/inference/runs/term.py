@@ -374,8 +374,8 @@ class RunTerm:
         those = f"{len(times)} samples" if len(times) > 1 else "a sample"
         return (
             f"{those} of {self.name}, at {shown} s after the first sample, "
-            f"{'stand' if len(times) > 1 else 'stands'} out of both neighbours as no motion does, "
-            "and the line between these was read instead"
+            f"{'are spikes' if len(times) > 1 else 'is a spike'}, which no motion of the slider "
+            "makes; replaced by the line between the neighbours"
         )
 
     def inner(self, name: str) -> str | None:
