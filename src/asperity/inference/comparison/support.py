@@ -1,4 +1,4 @@
-"""What a verdict on recordings rests on: the stretch that tells two laws apart, and its doubts."""
+"""The stretch of a recording that decides between two laws, and doubts about it."""
 
 from __future__ import annotations
 
