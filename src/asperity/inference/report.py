@@ -1,4 +1,4 @@
-"""What fits and comparisons say, described once: text, page, notebook and JSON render it."""
+"""Fits and comparisons as sections of sentences and tables, which every report renders."""
 
 from __future__ import annotations
 

@@ -48,7 +48,7 @@ from asperity.parameters.parameter import Drawn, SummaryLine
 
 #: Called with how many laws are done, parts of one included.
 Report = Callable[[float], None]
-#: Parts that the fit of a law, and what is said beside it, count as in the progress.
+#: Parts that the fit of a law, and its evidence, count as in the progress.
 _STEPS = 100
 #: Drawn starts of a fit that is repeated without outliers.
 _STARTS_AGAIN = 16
@@ -188,7 +188,7 @@ def compare(
         raise InputError(
             f"laws must be two or more, got {', '.join(laws) or 'none'}; name those to compare"
         )
-    # Those of laws alone; others are of the machine, the runs or unknown, which the fit says.
+    # Parameters of laws; those of machine and runs, and unknown names, are checked by the fit.
     nobodys = [
         p for p in free or () if p in _of_any_law() and not any(p in _parameters(n) for n in laws)
     ]
@@ -282,7 +282,7 @@ def compare(
 
 
 def _support(comparison: Comparison) -> tuple[str, str]:
-    """What the verdict on the best law that is not as good as the best rests on."""
+    """Doubts and deciding stretches of the verdict on the best disfavoured law."""
     for judged in comparison.laws.values():
         best = comparison.laws[comparison.best].fit if comparison.best else judged.fit
         if judged.fit.converged and judged.fit.aicc - best.aicc >= DISFAVOURED:
@@ -291,7 +291,7 @@ def _support(comparison: Comparison) -> tuple[str, str]:
 
 
 def _without_numbers(not_compared: Mapping[str, str]) -> str:
-    """That laws were not compared: the verdict is not about them."""
+    """A sentence on laws that were not compared."""
     if not not_compared:
         return ""
     names = list(not_compared)
@@ -303,7 +303,7 @@ def _within_law(report: Report, laws: int, done: int, total: int) -> None:
 
 
 def _freed(comparison: Comparison) -> str:
-    """What a free stiffness would change, where no law describes the data."""
+    """A sentence on the law that describes the data with a free stiffness, where none does."""
     fits = [j.fit for j in comparison.laws.values() if j.fit.converged]
     if any(f.dof <= 0 or f.p_value >= IMPOSSIBLE for f in fits):
         return ""
@@ -364,7 +364,7 @@ def _examined(comparison: Comparison, report: Report) -> Comparison:
 
 
 def _second_opinion(judged: Mapping[str, Judged], best: str) -> str:
-    """What evidence and cross-validation say beside the rule, about laws that are left."""
+    """Sentences on evidence and cross-validation of the laws that are not excluded."""
     said = ""
     left = [n for n, j in judged.items() if not j.excluded and j.evidence and n != best]
     top = judged[best].evidence if best in judged else None

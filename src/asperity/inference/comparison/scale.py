@@ -1,4 +1,4 @@
-"""The scale of verdicts on laws, which all doors use: excluded, disfavoured, cannot tell.
+"""The scale of verdicts on laws: excluded, disfavoured, cannot tell.
 
 Each word stands with the number that decides and the thresholds that it is compared with.
 """
@@ -19,7 +19,7 @@ Word = Literal["excluded", "disfavoured", "cannot tell", "no fit"]
 
 
 class Standing(NamedTuple):
-    """Where a law stands beside the best one.
+    """Where a law stands relative to the best one.
 
     Attributes
     ----------

@@ -1,4 +1,4 @@
-"""What a verdict on recordings rests on: stretch and half that decide between two laws, doubts."""
+"""The stretch and the half of a recording that decide between two laws, and doubts about them."""
 
 from __future__ import annotations
 

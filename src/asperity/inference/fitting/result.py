@@ -1,4 +1,4 @@
-"""What a fit says: estimates with intervals, its quality and warnings, and all as a record."""
+"""The result of a fit: estimates with intervals, quality and warnings, and all as a record."""
 
 from __future__ import annotations
 
