@@ -57,7 +57,7 @@ def test_a_mistake_in_a_real_process_is_one_line_and_exit_2() -> None:
     done = python("-m", "asperity", "response", "--law", "elasto-plastc")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr == (
-        "asperity: law must be a registered law, got 'elasto-plastc'; "
+        "asperity: --law must be a registered law, got 'elasto-plastc'; "
         "did you mean 'elasto-plastic'?\n"
     )
 

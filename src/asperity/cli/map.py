@@ -7,20 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from asperity.cli.options import (
-    json_option,
-    law_named,
-    material_named,
-    names_option,
-    plot_option,
-    point_options,
-)
+from asperity.cli.options import json_option, names_option, plot_option, point_options
 from asperity.errors import InputError, closest
 
 if TYPE_CHECKING:
     import xarray
 
     from asperity.parameters import Names
+    from asperity.questions.point import Point
 
 _EPILOG = """\b
 Examples:
@@ -61,9 +55,7 @@ def map(
     y: str | None,
     log_x: bool,
     log_y: bool,
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
+    point: Point,
     out: Path | None,
     plot: Path | None,
     names: Names,
@@ -77,9 +69,12 @@ def map(
     of the mode at each of its points.
     """
     _check_outputs(out, plot, show)
-    result = _solve(law, material, given, (x, log_x), (y, log_y), out, resume)
+    result = _solve(point, (x, log_x), (y, log_y), out, resume)
     if plot is not None:
-        _plot(result, plot, show, names)
+        from asperity.cli.report import save_figure
+        from asperity.figures.map import draw_map
+
+        save_figure(lambda: draw_map(result, show), plot, names)
     _print(result, out, as_json, names)
     unresolved = int(result.attrs["boundary_unresolved_chords"])
     if unresolved:
@@ -99,19 +94,16 @@ def map(
 
 
 def _solve(
-    law: str | None,
-    material: str | None,
-    given: dict[str, str],
+    point: Point,
     x: tuple[str | None, bool],
     y: tuple[str | None, bool],
     out: Path | None,
     resume: bool,
 ) -> xarray.Dataset:
     from asperity.cli.progress import bar
-    from asperity.operating_point import refuse_foreign, sourced_numbers
+    from asperity.operating_point import offered_numbers
     from asperity.study.map import Axis, write_map
 
-    law = law_named(law)
     axes = []
     for option, (text, log) in (("--x", x), ("--y", y)):
         if text is None:
@@ -120,15 +112,18 @@ def _solve(
                 "'epsilon=0.01:0.5:200'"
             )
         axes.append(Axis.parse(text, log))
-    refuse_foreign(law, given)
-    numbers = sourced_numbers(given, material_named(material), "command line", law)
     # A material's number gives way to an axis; one that was given for this map does not.
-    numbers = {n: s for n, s in numbers.items() if n in given or n not in {a.name for a in axes}}
+    kept, varied = point.parameters, {axis.name for axis in axes}
+    numbers = {
+        name: number
+        for name, number in offered_numbers(point, "command line").items()
+        if name in kept or name not in varied
+    }
     assert out is not None
     with bar("point", "map") as update:
         return write_map(
             out,
-            law,
+            point.law,
             numbers,
             x=axes[0],
             y=axes[1],
@@ -151,16 +146,6 @@ def _check_outputs(out: Path | None, plot: Path | None, show: str) -> None:
         raise InputError("--out must be given, got nothing; name the file, like --out map.nc")
     require_picture(plot)
     output_files({"--out": out, "--plot": plot})
-
-
-def _plot(dataset: xarray.Dataset, path: Path, show: str, names: Names) -> None:
-    from asperity.figures.map import draw_map
-    from asperity.figures.style import style
-    from asperity.outputs import written_file
-    from asperity.parameters.parameter import labelled
-
-    with style(), written_file(path, "--plot") as file:
-        labelled(draw_map(dataset, show), names).savefig(file, metadata={"Software": None})
 
 
 def _print(dataset: xarray.Dataset, out: Path | None, as_json: bool, names: Names) -> None:

@@ -10,19 +10,18 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from asperity.cli.options import (
-    Count,
+    field_option,
     json_option,
-    law_named,
     law_option,
-    material_named,
     material_option,
     names_option,
     plot_option,
+    point_of,
     set_option,
     settings_of,
 )
 from asperity.cli.recording import listed_times, source_options
-from asperity.cli.words import in_options
+from asperity.cli.words import POINT_OPTIONS, fields_as_options, in_options
 from asperity.errors import InputError, naming
 
 if TYPE_CHECKING:
@@ -37,6 +36,8 @@ Rows = list[dict[str, Any]]
 #: Adds the cycles of a law to a campaign.
 Cycles = Callable[["StickSlipCampaign"], "StickSlipCampaign"]
 
+#: The record that the options fill.
+_QUESTION = "asperity.questions.recording:Measurement"
 #: Velocities of a curve of a law.
 _POINTS = 13
 
@@ -85,13 +86,10 @@ class FileRows:
 
     def question_of(self, path: Path) -> Question:
         """The question with the conditions of a file."""
-        own = self.conditions.get(path)
-        return (
-            type(self.question)(**{**self.question.model_dump(), **own}) if own else self.question
-        )
+        return self.question.model_copy(update=self.conditions.get(path))
 
     def inputs(self) -> dict[str, Any]:
-        """All that rows depend on besides the files, as JSON values.
+        """Everything except the files that rows depend on, as JSON values.
 
         Of a reduction file its contents: a campaign is not resumed with another one.
 
@@ -144,11 +142,10 @@ in place of numbers; 2: bad input.
 @plot_option()
 @names_option()
 @json_option()
-@click.option(
-    "--window",
-    metavar="START:END",
-    help="Seconds to read, like 10:60; chosen by the program if not given.",
-)
+@field_option(
+    _QUESTION, "window", "Seconds to read, like 10:60; chosen by the program if not given.",
+    "START:END",
+)  # fmt: skip
 @click.option(
     "--steps",
     metavar="TIMES|FILE",
@@ -160,23 +157,15 @@ in place of numbers; 2: bad input.
     help="Holds as START:END in seconds, like 100:110,200:300, or a file of them, one a line.",
 )
 @source_options
-@click.option(
-    "-f", "--frequency", metavar="VALUE", default="auto", show_default=True,
-    help='Where to look for the modulation, like "120 Hz"; it is fitted.',
+@field_option(
+    _QUESTION, "frequency",
+    'Where to look for the modulation, like "120 Hz", which is fitted; determined if not given.',
+    "VALUE", "-f",
 )  # fmt: skip
-@click.option("--exact-frequency", is_flag=True, help="Take --frequency as it is.")
-@click.option(
-    "--harmonics", metavar="N", type=Count(), default=4, show_default=True,
-    help="How many.",
-)  # fmt: skip
-@click.option("--whole-periods", is_flag=True, help="Cut the window to whole periods.")
-@click.option(
-    "--detrend",
-    metavar="none|linear|quadratic",
-    default="linear",
-    show_default=True,
-    help="Drift that is fitted together with the harmonics.",
-)
+@field_option(_QUESTION, "exact_frequency", "Take --frequency as it is.")
+@field_option(_QUESTION, "harmonics", "How many.", "N")
+@field_option(_QUESTION, "whole_periods", "Cut the window to whole periods.")
+@field_option(_QUESTION, "detrend", "Drift that is fitted together with the harmonics.", "")
 @click.option(
     "--amplitudes", is_flag=True, help="Read every modulated stretch, and print them as a table."
 )
@@ -230,12 +219,6 @@ in place of numbers; 2: bad input.
 def measure(
     recordings: tuple[Path, ...],
     source: Source,
-    frequency: str,
-    exact_frequency: bool,
-    harmonics: int,
-    window: str | None,
-    whole_periods: bool,
-    detrend: str,
     no_modulation: bool,
     steps: str | None,
     holds: str | None,
@@ -253,6 +236,7 @@ def measure(
     as_json: bool,
     plot: Path | None,
     names: Names,
+    **fields: Any,
 ) -> int:
     """Friction in a recording: velocity steps, holds, slip events, or response to a modulated load.
 
@@ -263,20 +247,17 @@ def measure(
     from asperity.cli.report import require_picture, write_picture
     from asperity.questions.recording import Measurement as Question
 
-    fields: dict[str, Any] = {
+    if fields["frequency"] == "auto":
+        fields["frequency"] = None
+    fields |= {
         "modulated": False if no_modulation else None,
-        "frequency": None if frequency == "auto" else frequency,
-        "exact_frequency": exact_frequency,
-        "harmonics": harmonics,
-        "window": window,
-        "whole_periods": whole_periods,
-        "detrend": detrend,
         "steps": None if steps is None else listed_times(steps, "--steps"),
         "holds": None if holds is None else listed_times(holds, "--holds"),
         "stick_slip": True if stick_slip else None,
     }
     given = settings_of(settings)
-    question = Question(**fields, **_machine(given, law is None))
+    known = {name: value for name, value in fields.items() if value is not None}
+    question = Question(**known, **_machine(given, law is None))
     if (law or material) and not (out and plot and stick_slip):
         raise InputError(
             "--law and --material must go with --out, --stick-slip and --plot, got them without; "
@@ -374,17 +355,17 @@ def _cycles(
     """What adds the cycles of the law to a campaign; its numbers are checked at once."""
     if law is None and material is None:
         return lambda campaign: campaign
-    law = law_named(law)
     from asperity.laws import get_law
-    from asperity.operating_point import numbers_for, refuse_foreign, sourced_numbers
+    from asperity.operating_point import numbers_for, offered_numbers
     from asperity.parameters import point_parameters
 
-    refuse_foreign(law, given)
-    chosen = get_law(law)
-    sourced = sourced_numbers(given, material_named(material), "command line", law)
-    among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}
-    needed = ("M",) if conditions is None else ()
-    values = {n: x.value for n, x in numbers_for(law, sourced, among, needed).items()}
+    with fields_as_options(POINT_OPTIONS):
+        offered = offered_numbers(point_of(law, material, given), "command line")
+        chosen = get_law(str(law))
+        among = {n: p for n, p in point_parameters(chosen).items() if p.place == "law" or n == "M"}
+        needed = ("M",) if conditions is None else ()
+        numbers = numbers_for(chosen.name, offered, among, needed)
+    values = {name: number.value for name, number in numbers.items()}
 
     def added(campaign: StickSlipCampaign) -> StickSlipCampaign:
         import numpy as np

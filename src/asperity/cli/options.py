@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import importlib
 from collections.abc import Callable, Iterable
 from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, get_args
 
 import click
 
+from asperity.cli.words import POINT_OPTIONS, fields_as_options
 from asperity.errors import InputError
 from asperity.parameters import DRIVE, MACHINE, NAMES, Parameter
 
 if TYPE_CHECKING:
     from asperity.materials import Material
+    from asperity.questions.point import Point
 
 Command = Callable[..., Any]
 Decorator = Callable[[Command], Command]
@@ -34,13 +37,57 @@ class Count(click.ParamType):
             raise InputError(option, rule, f"'{value}'", "correct the value") from None
 
 
+class FieldOption(click.Option):
+    """An option with the default and the choices of a field of a question, which its help shows.
+
+    The record is imported for the help only; without the option the default of the record applies.
+    """
+
+    def __init__(self, *names: Any, record: str = "", **look: Any) -> None:
+        super().__init__(*names, **look)
+        self.record = record
+
+    def get_help_record(self, ctx: click.Context) -> tuple[str, str] | None:
+        """Option and text, as click prints them."""
+        module, _, name = self.record.partition(":")
+        about = getattr(importlib.import_module(module), name).model_fields[self.name]
+        if about.default is not None and not self.is_flag:
+            self.default, self.show_default = about.default, True
+        self.metavar = self.metavar or "|".join(map(str, get_args(about.annotation)))
+        return super().get_help_record(ctx)
+
+
+def field_option(
+    record: str, field: str, help_text: str, metavar: str | None = None, short: str = ""
+) -> Decorator:
+    """The option of a field of a question.
+
+    Parameters
+    ----------
+    record : str
+        Its place, as ``module:Name``.
+    field : str
+    help_text : str
+    metavar : str, optional
+        What is given: empty for the choices of the field, "N" for a whole number; None for a
+        switch.
+    short : str
+        A second name of the option.
+    """
+    names = [*([short] if short else []), f"--{field.replace('_', '-')}", field]
+    # Click takes an option that is said to be no switch for one whose value may be left out.
+    look: dict[str, Any] = {"is_flag": True} if metavar is None else {"metavar": metavar}
+    kind = Count() if metavar == "N" else None
+    return click.option(*names, cls=FieldOption, record=record, help=help_text, type=kind, **look)
+
+
 def material_option() -> Decorator:
     """``--material``."""
     return click.option(
         "--material",
         metavar="NAME",
         help="Take the numbers that are not given from a material, such as bureau2000, or from "
-        "a TOML file of your own.",
+        "a TOML file.",
     )
 
 
@@ -78,22 +125,21 @@ def plot_option() -> Decorator:
 
 
 def point_options(command: Command) -> Command:
-    """Options of an operating point: law, material, and numbers.
-
-    The command is called with `law` and `material` as they were given, and with `given`, the texts
-    of the numbers by their names.
-    """
+    """Options of an operating point; the command gets `point`, a `Point`."""
     named = [p for p in (*DRIVE.values(), *MACHINE.values()) if p.options]
 
     @wraps(command)
-    def gathered(*, settings: tuple[str, ...], **others: Any) -> Any:
+    def gathered(
+        *, law: str | None, material: str | None, settings: tuple[str, ...], **others: Any
+    ) -> Any:
         given = settings_of(settings)
         for parameter in named:
             value = others.pop(parameter.argument)
             if parameter.rule == "switch":
                 value = "1" if value else None
             add_setting(given, parameter.name, value)
-        return command(given=given, **others)
+        with fields_as_options(POINT_OPTIONS):
+            return command(point=point_of(law, material, given), **others)
 
     drive = [_option(parameter) for parameter in DRIVE.values() if parameter.options]
     machine = [_option(parameter) for parameter in MACHINE.values() if parameter.options]
@@ -106,7 +152,7 @@ def point_options(command: Command) -> Command:
 
 def law_option(
     help_text: str = (
-        "Friction law, such as elasto-plastic, or one of your own as module:Name or file.py:Name."
+        "Friction law, such as elasto-plastic, or a law of yours as module:Name or file.py:Name."
     ),
 ) -> Decorator:
     """``--law``; a law given by its place is imported and registered, and its name passed on."""
@@ -165,7 +211,8 @@ def known_place(text: str) -> str:
         return text
     from asperity.laws import known_law
 
-    return known_law(text)
+    with fields_as_options(POINT_OPTIONS):
+        return known_law(text)
 
 
 def _option(parameter: Parameter) -> Decorator:
@@ -213,19 +260,16 @@ def add_setting(settings: dict[str, str], name: str, value: str | None) -> None:
     settings[name] = value
 
 
-def law_named(name: str | None) -> str:
-    """Name of the law, which must be given."""
-    from asperity.laws import registered
+def point_of(law: str | None, material: str | None, given: dict[str, str]) -> Point:
+    """The operating point of options."""
+    from asperity.questions.point import Point
 
-    if name is None:
-        raise InputError(
-            f"--law must be given, got nothing; choose one of {', '.join(sorted(registered()))}"
-        )
-    return name
+    return Point(law=law or "", material=material or "", parameters=given)
 
 
 def material_named(name: str | None) -> Material | None:
     """Load the material, if one is named."""
     from asperity import materials
 
-    return None if name is None else materials.load(name)
+    with fields_as_options(POINT_OPTIONS):
+        return None if name is None else materials.load(name)

@@ -1,4 +1,4 @@
-"""``asperity recipe``: a paper's own way from measurements to numbers."""
+"""``asperity recipe``: a paper's procedure from measurements to numbers."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def recipe(
 
 
 def recipe_text(result: RecipeResult) -> str:
-    """Numbers beside the paper's, as a person reads them."""
+    """The numbers next to the published ones, as text."""
     from asperity.outputs.tables import aligned
 
     rows = [("step", "", "here", "paper", "", "from")]

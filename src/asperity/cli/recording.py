@@ -86,7 +86,7 @@ _OPTIONS = (
     click.option(
         "--group", metavar="NAME", help="Group of an HDF5, MATLAB or TDMS file of several."
     ),
-    click.option("--format", metavar="NAME", help="Format of the file, or a reader's of your own."),
+    click.option("--format", metavar="NAME", help="Format of the file, or name of a reader."),
     click.option("--delimiter", metavar="SIGN", help="Of a text: a character, tab or blank."),
     click.option("--decimal", metavar="SIGN", help="Decimal mark of a text: . or ,"),
 )

@@ -77,11 +77,12 @@ def run(
     PROTOCOL is a TOML file; the motion is written as NetCDF, with all that it depends on.
     """
     from asperity.cli.progress import bar
-    from asperity.cli.report import require_picture
+    from asperity.cli.report import require_picture, save_figure
     from asperity.outputs import output_files
     from asperity.protocol import (
         ProtocolError,
         load_protocol,
+        outline,
         record_run,
         run_protocol,
         write_csv,
@@ -117,7 +118,10 @@ def run(
         if text is not None:
             files.append(write_csv(out, text))
         if plot is not None:
-            files.append(_draw(out, plot, names))
+            from asperity.figures.trajectory import draw_run
+
+            save_figure(lambda: draw_run(outline(out)), plot, names)
+            files.append(plot)
         if record is not None and setup is not None:
             files.append(write(record_run(setup, out), record))
     _report(wanted, done, files, as_json, statement)
@@ -131,7 +135,7 @@ def run(
 @contextmanager
 def _after_the_motion(files: list[Path]) -> Iterator[None]:
     """On Ctrl-C, say that the motion is finished and which other files are."""
-    from asperity.cli.interrupt import interruptible
+    from asperity.cli.progress import interruptible
 
     try:
         with interruptible():
@@ -186,18 +190,6 @@ def _setup_for(wanted: Protocol, record: Path) -> RecordingSetup:
         )
     check_path(record)
     return wanted.setup
-
-
-def _draw(run_file: Path, picture: Path, names: Names) -> Path:
-    from asperity.figures.style import style
-    from asperity.figures.trajectory import draw_run
-    from asperity.outputs import written_file
-    from asperity.parameters.parameter import labelled
-    from asperity.protocol import outline
-
-    with style(), written_file(picture, "--plot") as file:
-        labelled(draw_run(outline(run_file)), names).savefig(file, metadata={"Software": None})
-    return picture
 
 
 def _report(

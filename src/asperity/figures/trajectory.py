@@ -8,7 +8,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from asperity.figures.style import ELASTO_PLASTIC, GREY, LINKER_DIETERICH, RICE_RUINA, new_figure
+from asperity.figures.style import (
+    ELASTO_PLASTIC,
+    GREY,
+    LINKER_DIETERICH,
+    RICE_RUINA,
+    letter_panels,
+    new_figure,
+)
 
 if TYPE_CHECKING:
     from asperity.protocol import RunOutline
@@ -47,8 +54,7 @@ def draw_run(run: RunOutline) -> Figure:
     _mark_events(force, run)
     if run.title:
         load.set_title(run.title)
-    for axis, letter in zip(panels, "abcd", strict=False):
-        axis.text(0.015, 0.94, f"({letter})", transform=axis.transAxes, va="top", fontsize=10)
+    letter_panels(panels)
     velocity.set_xlim(run.time[0], run.time[-1])
     return figure
 

@@ -18,6 +18,7 @@ from jax import Array
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from asperity.inference import levenberg_marquardt
 from asperity.inference.unknowns import Unknown
 from asperity.laws import Law
 
@@ -255,6 +256,8 @@ class Objective:
         Parameters that are not free, in SI.
     tolerance : float
         Relative change of the coordinates at which a minimum is reached.
+    curved : bool
+        Whether chi-squared has narrow valleys that bend (`asperity.inference.levenberg_marquardt`).
     unsolved : int
         Evaluations so far at which a term had no solution.
     """
@@ -264,6 +267,7 @@ class Objective:
     unknowns: tuple[Unknown, ...]
     fixed: Mapping[str, Any]
     tolerance: float = 1e-10
+    curved: bool = False
     unsolved: int = field(default=0, init=False, repr=False)
     # Of this objective alone: `dataclasses.replace` leaves it out.
     _last: tuple[bytes, tuple[Float, Float]] | None = field(default=None, init=False, repr=False)
@@ -408,6 +412,15 @@ class Objective:
             full = point.copy()
             full[moving] = part
             return full
+
+        if self.curved:
+
+            def of_moving(part: Float) -> tuple[Float, Float]:
+                r, jacobian = self.residuals(whole(part))
+                return r, jacobian[:, moving]
+
+            end = whole(levenberg_marquardt.minimised(of_moving, inside, low, high, evaluations))
+            return Minimum(end, self.chi2(end))
 
         # SciPy asks for the Jacobian where it has just asked for the residuals.
         @functools.lru_cache(1)

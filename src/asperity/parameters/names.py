@@ -45,7 +45,7 @@ def display_name(name: str, names: Names = "friction", law: Any = None) -> str:
         As ``D0``, ``K/W0`` or ``A - B``; words that are no parameter stay as they are.
     names : {"friction", "geophysics"}
     law : type of Law, optional
-        Whose parameters have names too, besides those that several laws share.
+        Whose parameters have names too, in addition to those that several laws share.
     """
     if names == "friction":
         return name
@@ -65,7 +65,7 @@ def in_names(text: str, names: Names = "friction", law: Any = None) -> str:
     return _WORDS.sub(renamed, text)
 
 
-#: Symbols of figures in geophysics, besides those of `INTERFACE`.
+#: Symbols of figures in geophysics, in addition to those of `INTERFACE`.
 _SYMBOLS = {"F": r"\tau", "W": r"\sigma_n", "W_0": r"\bar\sigma_n", "K": "k", r"\Phi": r"\theta"}
 
 

@@ -133,11 +133,11 @@ class Parameter:
     label : str
         What messages call it.
     argument : str
-        Keyword of the Python functions that take it; empty for a law's own.
+        Keyword of the Python functions that take it; empty for a parameter of one law.
     options : tuple of str
-        Options of the command line, besides ``--set NAME=VALUE``.
+        Options of the command line, in addition to ``--set NAME=VALUE``.
     aliases : tuple of str
-        Other names that are understood where a name is asked for.
+        Other names that are accepted.
     meant : tuple of str
         Names, in lower case, that are refused with this one as the suggestion: of something
         near, or too short to be safe.
@@ -168,7 +168,7 @@ class Parameter:
     angle: bool = False
 
     def __post_init__(self) -> None:
-        # A mistake here is one of the programmer, found when the module is imported.
+        # A mistake in the declaration, reported when the module is imported.
         for word, known in ((self.kind, KINDS), (self.rule, RULES)):
             if word not in known:
                 raise ValueError(f"{self.name} must have a known kind and rule, got '{word}'")
@@ -196,7 +196,7 @@ class Parameter:
         value : str, number, array or sequence of these
             A text carries its unit, a number is SI.
         label : str
-            What messages call the value; the parameter's own label by default.
+            What messages call the value; the parameter's label by default.
 
         Returns
         -------

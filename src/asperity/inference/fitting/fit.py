@@ -334,8 +334,12 @@ def _cycle_objective(
         law, names, largest_epsilon=0.0, start={n: v for n, v in begun.items() if n in names},
         priors=priors, usual=usual,
     )  # fmt: skip
+    # A cycle needs a mass.
+    unknowns = tuple(
+        replace(u, logarithmic=True, scale=1.0) if u.name == "M" else u for u in unknowns
+    )
     terms = tuple(CycleTerm(cycle, law, constants) for cycle in cycles)
-    return Objective(terms, law, unknowns, constants, tolerance=1e-6)
+    return Objective(terms, law, unknowns, constants, curved=True)
 
 
 def _fit_alone(
