@@ -46,16 +46,16 @@ _STEP = 0.02
 _SENTENCES = {
     End.STEADY: "comes back to steady sliding",
     End.RUNAWAY: (
-        "accelerates without bound after the extremum: steady sliding is stable, but the disturbance is too large "
-        "for this spring and law; take a stiffer spring, or inertia in asperity.transient"
+        "accelerates without bound after the extremum: steady sliding is stable, but the "
+        "disturbance is too large for this spring and law; take a stiffer spring, or inertia in asperity.transient"
     ),
     End.TOO_MANY_STEPS: "was not solved: no step was accurate, or more steps than allowed",
     End.CROSSING: "was followed to the extremum only",
 }
 _RINGING = "did not settle within the steps that are allowed; the extremum is as it should be"
 _UNSTABLE = (
-    "accelerates without bound after the extremum: the spring is softer than the critical stiffness; take a "
-    "stiffer spring, or inertia in asperity.transient"
+    "accelerates without bound after the extremum: the spring is softer than the critical "
+    "stiffness; take a stiffer spring, or inertia in asperity.transient"
 )
 
 

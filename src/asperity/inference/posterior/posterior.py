@@ -267,7 +267,8 @@ def _warnings(marginals: Mapping[str, Marginal], stats: Transitions) -> list[str
         said.append(
             f"{failed} of {stats.failed.size} trajectories ended where the law has no motion that "
             "the program can compute (at some row of a table the fast method finds no periodic "
-            "orbit, or in a recording sliding accelerates without bound); the posterior is cut off there"
+            "orbit, or in a recording sliding accelerates without bound); the posterior is cut off "
+            "there"
         )
     return said
 
