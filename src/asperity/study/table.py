@@ -204,14 +204,24 @@ class TableSource:
                     "give one operating point a row"
                 )
             self.columns = _checked_header(self.header, str(path))
-            of_rows = Counter(self.law_of(row) for row in rows)
-        self.rows = of_rows.total()
+            laws: Counter[str] = Counter()
+            #: First text, and its row, of the columns in which no row so far has a number.
+            texts = {name: ("", 0) for name in self.columns if name != "law"}
+            for count, row in enumerate(rows, 1):
+                laws[self.law_of(row)] += 1
+                for name in tuple(texts):
+                    cell = "".join(row[self.columns[name] :][:1]).strip()
+                    if math.isfinite(_number(cell, known_parameters()[name], math.nan)):
+                        del texts[name]
+                    elif cell and not texts[name][0]:
+                        texts[name] = cell, count
+        self.rows = laws.total()
         if not self.rows:
             raise InputError(
                 f"{path} must have rows of data, got only column names; give one operating point "
                 "a row"
             )
-        self._require_columns(list(of_rows))
+        self._require_columns(list(laws), texts)
         with path.open("rb") as file:
             self.digest = hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -227,8 +237,8 @@ class TableSource:
         place = self.columns.get("law", len(row))
         return (row[place].strip() if place < len(row) else "") or self.law
 
-    def _require_columns(self, laws: Sequence[str]) -> None:
-        """Refuse a table in which no row can be solved."""
+    def _require_columns(self, laws: Sequence[str], texts: Mapping[str, tuple[str, int]]) -> None:
+        """Refuse a table in which no row can be solved; `texts` of the columns without a number."""
         if not any(laws):
             raise InputError(
                 f"{self.path} must name the law of its rows, got no column 'law'; add it or give "
@@ -238,7 +248,13 @@ class TableSource:
         if not known:
             get_law(max(laws))
         everywhere = set.intersection(*(set(required(law)) for law in known))
-        missing = everywhere - set(self.columns) - set(self.filled)
+        for name, (text, row) in texts.items():
+            if name in everywhere and text:
+                raise InputError(
+                    f"{self.path} must have finite numbers in column '{name}', got '{text}' in "
+                    f"row {row} and none in any other; write SI numbers without units"
+                )
+        missing = everywhere - (set(self.columns) - set(texts)) - set(self.filled)
         if missing:
             raise InputError(
                 f"{self.path} must have the columns that its laws need, got none for "
