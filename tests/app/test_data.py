@@ -476,8 +476,8 @@ def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(visit, saw
     page.mouse.down()
     page.mouse.move(box["x"] + 0.7 * box["width"], box["y"] + 60, steps=4)
     page.mouse.up()
-    page.get_by_role("button", name="Measure the whole recording again").wait_for()
-    begin, end = (float(t) for t in page.get_by_label("Window (s)").input_value().split(" to "))
+    page.get_by_role("button", name="Measure the whole recording").wait_for()
+    begin, end = map(float, page.get_by_label("Window (s)").input_value().split(":"))
     assert 0 < begin < end < 30
     onsets = page.locator(".catalogue tbody td:nth-child(2)").all_inner_texts()
     assert len(onsets) < count
@@ -592,13 +592,13 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
         "#data-files",
         [{"name": "steps.csv", "mimeType": "text/csv", "buffer": stepped}],
     )
-    page.get_by_label("Fit the recording as a whole").wait_for()
+    page.get_by_label("Fit the whole recording").wait_for()
     form = page.locator(".fit-form")
     for label, on in (("elasto-plastic", False), ("rice-ruina", True)):
         form.get_by_label(label, exact=True).set_checked(on)
     for label in ("eps_ratio", "A", "B", "D0"):
         form.get_by_label(label, exact=True).set_checked(label != "eps_ratio")
-    form.get_by_label("Means a second of long recordings").fill("full")
+    form.get_by_label("Mean values per second for long recordings").fill("full")
     form.get_by_label("Intervals by profile likelihood").check()
     fit = page.locator("section.fit")
     fit.get_by_role("button", name="Fit", exact=True).click()

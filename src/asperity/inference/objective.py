@@ -175,7 +175,8 @@ class DataTerm(Protocol):
         ----------
         values : sequence of mapping of str to float
         near : bool
-            Whether solutions are like those of the last call of `residuals`, and begun there.
+            Whether solutions are like those of the last call of `residuals`, and begun there. The
+            sums may then be those of a coarser model: differences between them count.
         least : float
             Share of a table's rows that must have a periodic orbit; with some, the sum is that of
             these rows, scaled to all. Infinite with fewer, and where there is no motion.
@@ -183,17 +184,17 @@ class DataTerm(Protocol):
         ...
 
     def thinned(self, rows: int, data: int = 0) -> DataTerm | None:
-        """The same data without most of their rows, to look for minima with.
+        """The same data with fewer rows and a coarser model, to look for minima with.
 
         Parameters
         ----------
         rows, data : int
-            That are kept at least, spread over all.
+            Rows that are kept, spread over all, and readings that these hold at least.
 
         Returns
         -------
         DataTerm or None
-            None for data that have no rows, or so few that it saves little.
+            None for data without rows.
         """
         ...
 
@@ -478,7 +479,7 @@ class Objective:
         return all(term.profiled == 0 for term in self.terms)
 
     def thinned(self, rows: int, data: int = 0) -> Objective | None:
-        """The objective of few rows of its table; None for other data, or few rows."""
+        """The objective of `DataTerm.thinned` data; None for other data than one table."""
         term = self.terms[0].thinned(rows, data) if len(self.terms) == 1 else None
         return None if term is None else replace(self, terms=(term,))
 

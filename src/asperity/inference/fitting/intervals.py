@@ -1,4 +1,4 @@
-"""Confidence intervals: by the parabola about a minimum, beside a bound, and by profile likelihood.
+"""Confidence intervals: by the parabola about a minimum, at a bound, and by profile likelihood.
 
 Near a bound the interval of the likelihood ratio with the usual thresholds covers too often or too
 rarely. The thresholds of Feldman and Cousins (Phys. Rev. D 57, 3873, 1998) hold the coverage, and
@@ -191,7 +191,7 @@ def parabola_of(objective: Objective, u: Float, chi2: float) -> Parabola | None:
     data = objective.data_residuals(u)
     if data is None:
         return None
-    # A delay whose range the pieces of the drive leave no room in is as good as known.
+    # A delay at its bound, as the pieces of the drive leave no room, counts as known.
     J = np.where(_held(objective, u), 0.0, J)
     covariance, missing = inverse_information(J.T @ J)
     total, freedom = _with_estimated_noise(objective, u, covariance, missing)
@@ -341,7 +341,7 @@ class Profile:
         self.objective, self.i, self.u, self.chi2 = objective, i, u, chi2
         self.search = search
         self.most = objective.unsolved + most
-        # No farther at once than a factor of e, where the approximation may be worth nothing.
+        # At most a factor of e in one step: the approximation may fail beyond.
         self.sd = min(float(np.sqrt(covariance[i, i])), 1.0)
         self.along = covariance[:, i] / covariance[i, i]
         self.path = {float(u[i]): (u, chi2)}
