@@ -57,7 +57,7 @@ def averaged(truth, V, V0, rng, spread=0.0):
 
 
 def judged(seed, free, spread, velocities):
-    """Whether each interval holds the truth, whether it is bounded, and the seconds that it took."""
+    """Whether each interval holds the truth, its width, and the seconds that the fit took."""
     rng = np.random.default_rng([seed, 5])
     truth, V = random_machine(rng)
     cycles = [averaged(truth, V * 8**i, V, rng, spread) for i in range(velocities)]
@@ -101,12 +101,19 @@ def main():
             print(f"| {seed} | no regular stick-slip |", flush=True)
             continue
         read.append(one)
-        print(f"| {seed} | " + " | ".join(f"{k} {v}" for k, v in one.items() if k != "seed") + " |", flush=True)
+        print(
+            f"| {seed} | " + " | ".join(f"{k} {v}" for k, v in one.items() if k != "seed") + " |",
+            flush=True,
+        )
     for name in free:
         count = sum(one["held"][name] for one in read)
         width = np.median([one["width"][name] for one in read])
-        print(f"| {name} | held by {count} of {len(read)} | median width {width:.3g} of a logarithm |")
-    print(f"| warned of irregular cycles | {sum(one['irregular'] for one in read)} of {len(read)} |")
+        print(
+            f"| {name} | held by {count} of {len(read)} | median width {width:.3g} of a logarithm |"
+        )
+    print(
+        f"| warned of irregular cycles | {sum(one['irregular'] for one in read)} of {len(read)} |"
+    )
     print(f"| p below 0.01 | {sum(one['p'] < 0.01 for one in read)} of {len(read)} |")
     print(f"| seconds of processor time | {np.median([one['seconds'] for one in read]):.3g} |")
 

@@ -30,5 +30,7 @@ def test_bounds_and_places_without_residuals_are_kept_off():
         r = np.array([u[0] + 2.0, u[1] - 1.0])
         return (r if u[1] < 1.5 else np.array([np.nan])), np.eye(2)
 
-    end = minimised(residuals, np.array([5.0, 0.0]), np.array([1.0, -9.0]), np.array([9.0, 9.0]), 50)
+    end = minimised(
+        residuals, np.array([5.0, 0.0]), np.array([1.0, -9.0]), np.array([9.0, 9.0]), 50
+    )
     np.testing.assert_allclose(end, [1.0, 1.0], atol=0.01)
