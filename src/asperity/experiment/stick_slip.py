@@ -131,9 +131,10 @@ def stick_slip_response(
     Notes
     -----
     The motion begins after sliding at a thousandth of the velocity, so that of a cycle and stable
-    steady sliding the cycle is reached. It is followed until its states repeat themselves to 1e-8,
-    after up to eight slips; `drop`, `peak` and `period` are accurate to about 1e-8 relatively. One
-    point after the other takes some hundredths of a second each.
+    steady sliding the cycle is reached. Near its end Newton's method closes the cycle, of up to
+    eight slips, which is taken where all its multipliers lie within the unit circle; `drop`, `peak`
+    and `period` are accurate to about 1e-8 relatively. One point after the other takes some
+    hundredths of a second each: steps of stiff motions differ too much to be taken together.
     """
     if not slider.law.rate_dependent:
         raise InputError(

@@ -63,11 +63,13 @@ def minimised(
 
     while used < evaluations and damping < _LAST:
         scale = np.maximum(scale, np.linalg.norm(J, axis=0))
+        # Without damping, and without the coordinates that a bound holds.
+        free = np.where(J.T @ r > 0, u > low, u < high)
+        if np.sum((np.linalg.qr(J[:, free])[0].T @ r) ** 2) < _DECREASE:
+            break
         step = np.clip(u + damped(r, J), low, high) - u
         target = r + J @ step
         expected = float(r @ r - target @ target)
-        if expected < _DECREASE and damping <= _FIRST:
-            break
         length = _LONGEST * np.linalg.norm(scale * step)
         point, lower = u + step, False
         for left in reversed(range(_CORRECTIONS + 1)):

@@ -19,7 +19,7 @@ from asperity.transients.limit_cycle import CycleEnd, LimitCycle, limit_cycle
 Float = NDArray[np.float64]
 
 CYCLE = "cycle"
-#: Tolerated error of a step: the period is then good to 1e-6, where recurrences are measured to 1e-5.
+#: Tolerated error of a step: the period is then good to 1e-7, recurrences are measured to 1e-5.
 _RTOL = 1e-8
 #: Instants in a bin, and in the slip of the model; rounds of the shift in time.
 _IN_BIN, _IN_SLIP, _ROUNDS = 8, 400, 8
@@ -129,8 +129,8 @@ class CycleTerm:
     ) -> Residuals | None:
         """Residuals in standard uncertainties; None where the law has no cycle.
 
-        The Jacobian leaves out that level and shift follow (Kaufman, BIT 15, 49, 1975): the gradient
-        of the sum of squares is exact.
+        The Jacobian leaves out that level and shift follow (Kaufman, BIT 15, 49, 1975): the
+        gradient of the sum of squares is exact.
         """
         cycle = self.limit_cycle(values)
         if cycle.end is not CycleEnd.REPEATS:
