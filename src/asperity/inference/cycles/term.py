@@ -104,7 +104,9 @@ class CycleTerm:
         middle = float(np.interp(-(cycle.peak + cycle.lowest) / 2, -cycle.force(falling), falling))
         level = np.append(np.ones(len(data.values) - 1), 0.0)
         for _ in range(_ROUNDS):
-            mean, slope = (self._means(a) for a in cycle.force_and_rate(self._instants(middle)))
+            mean, slope = (
+                self._means(a) for a in cycle.force_and_rate(self._instants(middle))
+            )
             off = data.whitening @ (np.append(mean, cycle.period / cycle.slips) - data.values)
             columns = data.whitening @ np.column_stack([level, np.append(slope, 0.0)])
             change = np.linalg.lstsq(columns, -off, rcond=None)[0][1]
