@@ -263,12 +263,13 @@ _SHAPES = (_Shape(_half_cosine, 2.65), _Shape(_straight, 2.0), _Shape(_relaxing,
 def _shape(sums: _Sums, part: Index, bounds: list[Index]) -> tuple[_Shape, float]:
     """The shape of slips, which all fall alike, and what is open of it.
 
-    Half a cosine unless the squares of another are smaller by more than their scatter over the
-    events, with odds of `FALSE_ALARM`. Of shapes that are as good as the one chosen their distance
+    Half a cosine unless the squares of another are smaller, by their mean logarithm over the events,
+    with a probability of `FALSE_ALARM` that it is by chance. Of shapes that are as good as the one chosen their distance
     from it counts: of onset or end, over the duration.
     """
     fits = [_onset_and_end(sums, part, *bounds, shape.fall) for shape in _SHAPES]
-    squares = np.array([fit[2] for fit in fits])
+    # Large events, of large misfit, count no more than small ones.
+    squares = np.log(np.maximum([fit[2] for fit in fits], 1e-300))
     chosen = 0
     for k in range(1, len(_SHAPES)):
         if _excess(squares[chosen] - squares[k]) > -ndtri(FALSE_ALARM):
