@@ -101,7 +101,7 @@ def read_data(
     Raises
     ------
     InputError
-        If a file cannot be read, or what is said of one recording meets several.
+        If a file cannot be read, or an argument for one recording meets several.
     """
     tables = [is_table(data) for data in question.data]
     recordings = tables.count(False)

@@ -14,14 +14,10 @@ from asperity.app.endpoints import Question
 from asperity.errors import InputError, closest
 from asperity.laws import Law, get_law, registered
 from asperity.materials import Material
-from asperity.operating_point import (
-    SourcedNumber,
-    known_parameters,
-    numbers_for,
-    sourced_numbers,
-)
+from asperity.operating_point import SourcedNumber, known_parameters, point_numbers
 from asperity.orbit import PeriodicResponse, periodic_response
 from asperity.parameters import obeying, point_parameters
+from asperity.questions.point import Point
 from asperity.slider.named import slider_from
 from asperity.units import KINDS
 
@@ -75,12 +71,12 @@ class OperatingPoint(Question):
         return self._sourced[law]
 
     def _checked(self, law: str) -> dict[str, SourcedNumber]:
-        material = self.chosen_material()
         known = point_parameters(get_law(law))
         others = {n for result in registered().values() for n in point_parameters(result)}
-        numbers = {n: v for n, v in self.numbers.items() if n in known or n not in others}
-        result = numbers_for(law, sourced_numbers(numbers, material, "page", law))
-        for name in numbers:
+        given = {n: v for n, v in self.numbers.items() if n in known or n not in others}
+        material = self.chosen_material().name
+        result = point_numbers(Point(law=law, material=material, parameters=given), "page")
+        for name in given:
             if name in result:
                 self.check_reach(name, result[name].value)
         return result

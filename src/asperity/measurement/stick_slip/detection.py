@@ -22,6 +22,8 @@ _LOADING = 0.75
 #: Share of the rises that last longer than the falls next to them in symmetrical noise: a half. An
 #: excess of so many standard deviations is loading and slip.
 _ASYMMETRY = 3.0
+#: Evidence of many sticks that are longer than slips.
+_STICKS = 3
 
 #: Cycles of an oscillation scatter by less than this share; those of a noise by half and more.
 _REGULAR, _FEWEST_CYCLES = 0.25, 8
@@ -115,19 +117,19 @@ def find_falls(force: Array, noise: Noise) -> Falls:
     searched together. Of falls that overlap at different widths those of the width that tells most
     of them apart are kept.
     """
-    most = noise.octaves.size - 1
-    regular = None
+    most, best, first = noise.longest, 0, None
     for octave in range(most + 1):
         scatter = noise.of_means(octave, octave)
         peak, trough = _at_width(force, octave, scatter[octave], noise, 0.0)
         if not peak.size or _cycle(peak, trough, force.size) < _PER_CYCLE << octave:
             continue
-        if _loads_and_slips(peak, trough):
-            return _at_all_widths(force, noise, octave, (peak, trough))
-        if regular is None and _returns(peak):
-            regular = octave, (peak, trough)
-    if regular is not None:
-        return _at_all_widths(force, noise, *regular)
+        evidence = _evidence(peak, trough)
+        if evidence > best:
+            best, first = evidence, (octave, (peak, trough))
+        if best == _STICKS:
+            break
+    if first is not None:
+        return _at_all_widths(force, noise, *first)
     empty = np.empty(0, dtype=np.intp)
     scatter = noise.of_means(most, most)
     return Falls(empty, empty, scatter, _thresholds(noise, scatter))
@@ -144,17 +146,23 @@ def _cycle(peak: Index, trough: Index, samples: int) -> float:
     return float(min(peak[0], samples - trough[0]))
 
 
-def _loads_and_slips(peak: Index, trough: Index) -> bool:
-    """Whether rises last longer than the falls that follow, significantly."""
-    if not peak.size:
-        return False
+def _evidence(peak: Index, trough: Index) -> int:
+    """What speaks for loading and slip: `_STICKS`, less the lower, none at 0.
+
+    Noise that is faster than its second differences show has falls too, as long as its rises but
+    for the loading under it: sticks are twice as long as slips in many events.
+    """
     fall = trough - peak
     rise = peak - np.concatenate([[0], trough[:-1]])
-    longer = int((rise > fall).sum())
+    ratio = float(np.median(rise)) / float(np.median(fall))
+    many = peak.size >= _ASYMMETRY**2
+    longer = int((rise > fall).sum()) - peak.size / 2 > _ASYMMETRY * np.sqrt(peak.size) / 2
+    if many and longer and ratio > 2:
+        return _STICKS
     # A single event has a rise on each side.
-    if peak.size < _ASYMMETRY**2:
-        return bool(np.median(rise) > 4 * np.median(fall))
-    return longer - peak.size / 2 > _ASYMMETRY * np.sqrt(peak.size) / 2
+    if longer if many else ratio > 4:
+        return 2
+    return 1 if _returns(peak) else 0
 
 
 def _returns(peak: Index) -> bool:
@@ -197,7 +205,7 @@ def _at_width(
 
 def _at_all_widths(force: Array, noise: Noise, octave: int, first: tuple[Index, Index]) -> Falls:
     """Falls at all widths up to an eighth of a cycle, which is longer the fewer falls are false."""
-    most, longest, (peak, trough) = noise.octaves.size - 1, -1, first
+    most, longest, (peak, trough) = noise.longest, -1, first
     while True:
         cycle = _cycle(peak, trough, force.size)
         wider = min(max(octave, _octave(cycle / _PER_CYCLE)), most)
@@ -214,7 +222,42 @@ def _at_all_widths(force: Array, noise: Noise, octave: int, first: tuple[Index, 
             peak = trough = np.empty(0, dtype=np.intp)
             break
         peak, trough = _without_ringing(force, *_most_resolved(sets))
-    return Falls(peak, trough, scatter, _thresholds(noise, scatter))
+    thresholds = _thresholds(noise, scatter)
+    return Falls(*_steep_part(force, peak, trough, thresholds), scatter, thresholds)
+
+
+def _steep_part(
+    force: Array, peak: Index, trough: Index, thresholds: Array
+) -> tuple[Index, Index]:
+    """Falls from where they leave their upper quarter to where they reach their lower, and around.
+
+    The highest mean of a stick that loads slowly may be far before the fall. Means are the
+    shortest that show it: between the quarters lies half of their threshold.
+    """
+    peak, trough = peak.copy(), trough.copy()
+    octave = np.full(peak.size, -1)
+    for k in range(thresholds.size):
+        means, hop = _means(force, k)
+        half = ((1 << k) - 1) // 2
+        last = means.size - 1
+        high, low = (
+            np.clip((at - half) // hop, 0, last) for at in (peak, trough)
+        )
+        drop = means[high] - means[low]
+        new = np.flatnonzero((octave < 0) & (drop > thresholds[k]) & (low > high))
+        if not new.size:
+            continue
+        octave[new] = k
+        high, low, drop = high[new], low[new], drop[new]
+        owner = np.clip(np.searchsorted(high, np.arange(means.size), side="right") - 1, 0, None)
+        below = np.flatnonzero(means <= (means[low] + drop / 4)[owner])
+        below = below[np.searchsorted(below, high)]
+        above = np.flatnonzero(means >= (means[high] - drop / 4)[owner])
+        above = above[np.searchsorted(above, below) - 1]
+        reach = (below - above) // 2 + 1
+        peak[new] = np.maximum((above - reach) * hop + half, peak[new])
+        trough[new] = np.minimum((below + reach) * hop + half, trough[new])
+    return peak, trough
 
 
 def _octave(samples: float) -> int:

@@ -6,13 +6,16 @@ a straight line again: a slider that slips at constant friction falls so.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from asperity.measurement.stick_slip.detection import Falls
+from asperity.measurement.stick_slip.noise import FALSE_ALARM
 
 Array = NDArray[np.float64]
 Index = NDArray[np.intp]
@@ -28,10 +31,8 @@ _ZOOMS = 4
 _TOGETHER = 256
 #: Readings of the falls, each without those that the one before has not confirmed.
 _READINGS = 4
-#: Standard uncertainty of an onset or end of half a cosine of d samples and drop D in white noise
-#: s: this times sqrt(d) s/D samples (inverse of Fisher's information of both). Of correlated noise
-#: s sqrt(2/d) is the scatter of means over half of the slip. And what sampling adds (samples).
-_TIMING, _SAMPLING = 2.65, 0.45
+#: What sampling adds to the uncertainty of an onset or end (samples).
+_SAMPLING = 0.45
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,17 +156,26 @@ def _read(time: Array, force: Array, falls: Falls) -> SlipEvents:
     first = np.maximum(edges[:-1], peak - length)
     stop = np.minimum(edges[1:], trough + length)
     onset, end, squares = np.empty(k), np.empty(k), np.empty(k)
+    bounds = peak, trough, first, stop
+    large = np.sort(np.argsort(-drop, kind="stable")[:_TOGETHER])
+    shape, shift = _shape(sums, large, [b[large] for b in bounds])
     for part in np.array_split(np.arange(k), -(-k // _TOGETHER)):
         onset[part], end[part], squares[part] = _onset_and_end(
-            sums, part, peak[part], trough[part], first[part], stop[part]
+            sums, part, *(b[part] for b in bounds), shape.fall
         )
     # The usual residual, as correlated as the noise that detection has seen.
     scatter = falls.scatter * np.sqrt(np.median(squares)) / falls.scatter[0]
-    return _measured(time, force, scatter, sums, (onset, end), first, stop)
+    return _measured(time, force, scatter, sums, (onset, end), first, stop, (shape.timing, shift))
 
 
 def _onset_and_end(
-    sums: _Sums, part: Index, peak: Index, trough: Index, first: Index, stop: Index
+    sums: _Sums,
+    part: Index,
+    peak: Index,
+    trough: Index,
+    first: Index,
+    stop: Index,
+    shape: Callable[[Array], Array],
 ) -> tuple[Array, Array, Array]:
     """Onset and end by least squares, on grids that zoom in, and the mean square of residuals."""
     length = (trough - peak).astype(float)
@@ -196,7 +206,7 @@ def _onset_and_end(
         weight = stops - begin
         length_here = np.maximum(off[pair[1]] - on[pair[0]], 0.25)
         u = np.clip(((begin + stops - 1) / 2 - on[pair[0]]) / length_here, 0.0, 1.0)
-        model = low[pair[1]] + _half_cosine(u) * (high[pair[0]] - low[pair[1]])
+        model = low[pair[1]] + shape(u) * (high[pair[0]] - low[pair[1]])
         misfit = (model * (weight * model - 2 * (sums.y[stops] - sums.y[begin]))).sum(-1)
         squares = sums.yy[since][:, None, :] - sums.yy[until][:, :, None]
         misfit += np.where(since[:, None, :] > until[:, :, None], squares, 0.0)
@@ -222,6 +232,63 @@ def _half_cosine(u: Array) -> Array:
     return np.asarray(0.5 - 0.5 * x * (1 - square / 6 * (1 - square / 20 * (1 - square / 42))))
 
 
+def _straight(u: Array) -> Array:
+    """1 - u."""
+    return 1.0 - u
+
+
+def _relaxing(u: Array) -> Array:
+    """Exponential decay over four time constants."""
+    tail = np.exp(-4.0)
+    return np.asarray((np.exp(-4.0 * u) - tail) / (1 - tail))
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """A way to fall from 1 to 0 as u goes from 0 to 1.
+
+    The standard uncertainty of onset or end, the larger of both, of a slip of d samples and drop D
+    in white noise s is `timing` sqrt(d) s/D samples (inverse of Fisher's information of both). Of
+    correlated noise s sqrt(2/d) is the scatter of means over half of the slip.
+    """
+
+    fall: Callable[[Array], Array]
+    timing: float
+
+
+#: How a slider slips on a spring: freely at constant friction, at a constant velocity, and damped.
+_SHAPES = (_Shape(_half_cosine, 2.65), _Shape(_straight, 2.0), _Shape(_relaxing, 4.97))
+
+
+def _shape(sums: _Sums, part: Index, bounds: list[Index]) -> tuple[_Shape, float]:
+    """The shape of slips, which all fall alike, and what is open of it.
+
+    Half a cosine unless the squares of another are smaller by more than their scatter over the
+    events, with odds of `FALSE_ALARM`. Of shapes that are as good as the one chosen their distance
+    from it counts: of onset or end, over the duration.
+    """
+    fits = [_onset_and_end(sums, part, *bounds, shape.fall) for shape in _SHAPES]
+    squares = np.array([fit[2] for fit in fits])
+    chosen = 0
+    for k in range(1, len(_SHAPES)):
+        if _excess(squares[chosen] - squares[k]) > -ndtri(FALSE_ALARM):
+            chosen = k
+    onset, end, _ = fits[chosen]
+    away = [
+        np.median(np.maximum(np.abs(fit[0] - onset), np.abs(fit[1] - end)) / (end - onset))
+        for k, fit in enumerate(fits)
+        if k != chosen and not _excess(squares[k] - squares[chosen]) > -ndtri(FALSE_ALARM)
+    ]
+    return _SHAPES[chosen], float(max(away, default=0.0))
+
+
+def _excess(values: Array) -> float:
+    """Mean over its standard error; NaN of fewer than two values."""
+    if values.size < 2:
+        return float("nan")
+    return float(values.mean() / max(values.std(ddof=1) / np.sqrt(values.size), 1e-300))
+
+
 def _measured(
     time: Array,
     force: Array,
@@ -230,6 +297,7 @@ def _measured(
     slips: tuple[Array, Array],
     first: Index,
     stop: Index,
+    timing_of: tuple[float, float],
 ) -> SlipEvents:
     onset, end = slips
     n, k = force.size, onset.size
@@ -245,10 +313,9 @@ def _measured(
     doubt = 2 * np.hypot(_of_mean(scatter, until - first), _of_mean(scatter, stop - since))
     duration = end - onset
     long = np.maximum(duration, 2.0)
-    timing = np.hypot(
-        _TIMING / np.sqrt(2.0) * long * _of_mean(scatter, long / 2) / np.maximum(drop, scatter[0]),
-        _SAMPLING,
-    )
+    fisher, shift = timing_of
+    timing = fisher / np.sqrt(2.0) * _of_mean(scatter, long / 2) / np.maximum(drop, scatter[0])
+    timing = np.hypot(long * np.hypot(timing, shift), _SAMPLING)
     rates = np.hypot(left[1], right[1])
     doubt = np.hypot(doubt, rates * timing)
     # Sticks: from the end of one event to the onset of the next.

@@ -34,6 +34,10 @@ Array = NDArray[np.float64]
 _FEW = 2
 #: Share of the displacement in the slips above which it is the slider's.
 SLIDER = 0.5
+#: Ratio to the smallest drop that is seen within which events may have smaller companions.
+_NEAR = 1.5
+#: Differences of means within sticks that say what is usual.
+_FEWEST_DIFFERENCES = 50
 #: Usual intervals of uneven times up to which the force between two samples is a straight line.
 _LONGEST_GAP = 4.0
 #: Standard gravity (m/s^2), by which F/(m g) is a friction coefficient.
@@ -42,7 +46,8 @@ GRAVITY = 9.80665
 LIMITS = {
     "events": (10.0, 3.0),
     "sampling": (0.05, 0.5),
-    "threshold": (0.5, np.inf),
+    "threshold": (0.1, np.inf),
+    "hidden events": (0.05, np.inf),
     "drift": (3.0, 30.0),
     "loading": (0.2, np.inf),
     "stiffness": (0.05, 0.3),
@@ -373,6 +378,40 @@ def _lacking(result: StickSlipMeasurement) -> tuple[float, float]:
     return lack, float(np.std(off, ddof=1) * np.sqrt(rise.size) / load.sum())
 
 
+def _hidden(result: StickSlipMeasurement) -> tuple[float, float]:
+    """Share of the usual loading that the mean loading within sticks lacks, and its standard error.
+
+    Of differences of neighbouring means the median is that of the loading, as noise is symmetrical,
+    and the mean counts what falls in between too. Of all widths of means the most significant; NaN
+    with few sticks. The last part of a stick is left out, in which a slider creeps.
+    """
+    events, friction = result.events, result.friction
+    rate = (result.time.size - 1) / float(result.time[-1] - result.time[0])
+    end, stick = (events.end[:-1] - result.time[0]) * rate, events.stick_duration[1:] * rate
+    first, stop = end + 0.1 * stick + 1, end + 0.6 * stick - 1
+    best = np.nan, np.nan
+    if end.size < LIMITS["events"][1]:
+        return best
+    length = np.median(stop - first)
+    total = np.concatenate([[0.0], np.cumsum(friction - friction.mean())])
+    width = max(4, 1 << int(np.log2(max(length / 64, 1.0))))
+    while width <= length / 8:
+        at = np.arange(0, friction.size - 2 * width, width // 4)
+        owner = np.searchsorted(first, at, side="right") - 1
+        at = at[(owner >= 0) & (at + 2 * width < stop[owner])]
+        if at.size >= _FEWEST_DIFFERENCES:
+            change = (total[at + 2 * width] - 2 * total[at + width] + total[at]) / width
+            usual, spread = np.median(change), np.diff(np.quantile(change, [0.16, 0.84]))[0] / 2
+            # The median of n normal values less their mean scatters by sqrt((pi/2 - 1)/n); four
+            # differences of the same two widths are about one.
+            error = spread * np.sqrt((np.pi / 2 - 1) * 8 / at.size)
+            lack = usual - change.mean()
+            if usual > 0 and not lack * best[1] <= best[0] * error:
+                best = float(lack / usual), float(error / usual)
+        width *= 2
+    return best
+
+
 def _checks(result: StickSlipMeasurement) -> list[Check]:
     events, count = result.events, len(result.events)
     checks = [
@@ -395,17 +434,19 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
         return checks
     drop = float(np.median(events.drop))
     step = float(result.time[-1] - result.time[0]) / (result.time.size - 1)
-    blind = result.smallest_drop / drop
+    least = result.smallest_drop
+    near = float(np.mean(events.drop < _NEAR * least))
     fast = float(np.mean(events.slip_duration < 2 * step))
     level = (events.force_before + events.force_after) / 2
     drift = float(np.ptp(level)) / drop
     checks += [
         judged(
             "threshold",
-            blind,
+            near,
             LIMITS["threshold"],
-            f"a drop below {result.smallest_drop:.2g}, {percent(blind)} of the median, may not "
-            "have been seen",
+            f"a drop below {least:.2g}, {percent(least / drop)} of the median, may not have been "
+            f"seen; {percent(near)} of the events are smaller than {_NEAR:g} times that"
+            + (": some below it may be missing" if near > LIMITS["threshold"][0] else ""),
         ),
         judged(
             "sampling",
@@ -421,6 +462,19 @@ def _checks(result: StickSlipMeasurement) -> list[Check]:
             f"the middle of the drops varies along the track by {drift:.2g} drops",
         ),
     ]
+    hidden, error = _hidden(result)
+    if np.isfinite(hidden):
+        checks.append(
+            judged(
+                "hidden events",
+                hidden,
+                LIMITS["hidden events"],
+                f"within the sticks the force falls back by {percent(max(hidden, 0.0))} of what it "
+                "usually loads, too little at a time to be seen"
+                + (": small events are missing" if hidden > LIMITS["hidden events"][0] else ""),
+                significant=hidden > 3 * error,
+            )
+        )
     lack, error = _lacking(result)
     if np.isfinite(lack):
         checks.append(

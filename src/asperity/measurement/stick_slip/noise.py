@@ -27,25 +27,32 @@ _QUANTILE, _MOST = 0.25, 0.99
 #: times the root of their number.
 _FEWEST_BLOCKS, _MANY_BLOCKS = 32, 256
 _QUANTILE_ERROR = 1.8
+#: Second differences that give a scatter to a percent; of more every so many is taken.
+_MOST_BENDS = 1 << 15
 #: Probability of a false event in a recording of Gaussian noise.
 FALSE_ALARM = 0.01
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Scatter of means over 1, 2, 4, ... samples.
+    """Scatter of means, from their second differences.
 
     Attributes
     ----------
-    octaves : array, (m,)
-        Standard deviation of the part of the noise that means over 2^k samples keep and means over
-        2^(k+1) samples remove, in the unit of the force.
+    scatter : array, (m, m)
+        Entry (k, j), j >= k: standard deviation of means over 2^k samples, by second differences at
+        a lag of 2^j samples, in the unit of the force. Noise counts that is faster than the lag.
     samples : int
         Of the recording.
     """
 
-    octaves: Array
+    scatter: Array
     samples: int
+
+    @property
+    def longest(self) -> int:
+        """k of the longest means, over 2^k samples."""
+        return self.scatter.shape[0] - 1
 
     def of_means(self, longest: int, noisy: int) -> Array:
         """Standard deviation of means over 1, 2, 4, ... 2^longest samples.
@@ -54,20 +61,17 @@ class Noise:
         ----------
         longest : int
         noisy : int
-            k of the longest means, over 2^k samples, whose octave holds noise alone: those of
-            longer ones hold the motion too.
+            log2 of the longest lag at which noise alone is seen; at a longer one the motion is too.
 
         Returns
         -------
         array, (longest + 1,)
         """
         noisy = min(noisy, longest)
-        power = self.octaves[: noisy + 1] ** 2
-        # White noise beyond the last octave has as much power as the last octave.
-        scatter = np.sqrt(np.cumsum(power[::-1])[::-1] + power[-1])
-        beyond = np.sqrt(2.0) * self.octaves[noisy + 1 : longest + 1]
+        scatter = np.diagonal(self.scatter)[: longest + 1].copy()
+        scatter[: noisy + 1] = self.scatter[: noisy + 1, : noisy + 1].max(1)
         # Longer means of a noise scatter less.
-        return np.asarray(np.minimum.accumulate(np.concatenate([scatter, beyond])))
+        return np.asarray(np.minimum.accumulate(scatter))
 
     def threshold(self, scatter: float, width: int) -> float:
         """Fall between two means that noise exceeds anywhere with probability `FALSE_ALARM`.
@@ -88,32 +92,38 @@ class Noise:
 
 
 def estimate(force: Array) -> Noise:
-    """Noise from second differences of block means, in which straight loading cancels.
+    """Noise from second differences of means, in which straight loading cancels.
 
     Parameters
     ----------
     force : array, (n,)
         Without impulses, evenly sampled.
     """
+    n = force.size
     # Numbers below this are rounding.
     floor = 4 * np.finfo(float).eps * float(np.abs(force).max(initial=0.0))
-    octaves: list[float] = []
-    means = force
-    while means.size >= _FEWEST_BLOCKS or not octaves:
-        bends = np.abs(means[2:] - 2 * means[1:-1] + means[:-2])
-        # The variance of the bend of white means is six times theirs; half of a mean's variance is
-        # in its octave.
-        scatter = _deviation(bends) / np.sqrt(6.0)
-        # Two standard errors more: a threshold from a scatter that came out small is none.
-        scatter *= 1 + 2 * _QUANTILE_ERROR / np.sqrt(bends.size)
-        octave = max(scatter / np.sqrt(2.0), floor)
-        if octaves and bends.size < _MANY_BLOCKS:
+    total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
+    size = max(int(np.log2(max(n // _FEWEST_BLOCKS, 1))) + 1, 1)
+    scatter = np.zeros((size, size))
+    for j in range(size):
+        lag = 1 << j
+        stop = n - 3 * lag + 1
+        first = np.arange(0, stop, max(1, min(lag // 4, stop // _MOST_BENDS)))
+        # Bends whose first mean is within a lag share samples.
+        count = min(first.size, n / lag)
+        for k in range(j + 1):
+            width = 1 << k
+            before, here, after = (
+                total[first + step + width] - total[first + step] for step in (0, lag, 2 * lag)
+            )
+            # The variance of the bend of white means is six times theirs.
+            one = _deviation(np.abs(after - 2 * here + before)) / (np.sqrt(6.0) * width)
+            # Two standard errors more: a threshold from a scatter that came out small is none.
+            scatter[k, j] = max(one * (1 + 2 * _QUANTILE_ERROR / np.sqrt(count)), floor)
+        if j and n / lag < _MANY_BLOCKS:
             # Few blocks may scatter little by chance: noise falls no faster than white noise does.
-            octave = max(octave, octaves[-1] / np.sqrt(2.0))
-        octaves.append(octave)
-        pairs = means.size // 2
-        means = (means[: 2 * pairs : 2] + means[1 : 2 * pairs : 2]) / 2
-    return Noise(np.array(octaves), force.size)
+            scatter[j, j] = max(scatter[j, j], scatter[j - 1, j - 1] / np.sqrt(2.0))
+    return Noise(scatter, n)
 
 
 def _deviation(sizes: Array) -> float:
