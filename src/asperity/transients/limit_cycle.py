@@ -318,8 +318,8 @@ class _Orbit:
         around = times[max(at - 1, 0)], times[min(at + 1, len(times) - 1)]
         scale = around[1] - around[0]
         best = minimize_scalar(
-            lambda share: -float(
-                self.run.samples(np.array([around[0] + share * scale])).velocity[0]
+            lambda share: (
+                -float(self.run.samples(np.array([around[0] + share * scale])).velocity[0])
             ),
             bounds=(0.0, 1.0),
             method="bounded",
@@ -441,9 +441,7 @@ def _motion(
     return run
 
 
-def _closed(
-    integration: Integration, Y: Float, slips: int, period: float
-) -> LimitCycle | None:
+def _closed(integration: Integration, Y: Float, slips: int, period: float) -> LimitCycle | None:
     """The stable cycle of so many slips near states at a fall, by Newton's method."""
     tolerance = _CLOSED * integration.tolerances.rtol
     end = integration.programme.duration

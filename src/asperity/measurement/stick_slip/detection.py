@@ -226,9 +226,7 @@ def _at_all_widths(force: Array, noise: Noise, octave: int, first: tuple[Index, 
     return Falls(*_steep_part(force, peak, trough, thresholds), scatter, thresholds)
 
 
-def _steep_part(
-    force: Array, peak: Index, trough: Index, thresholds: Array
-) -> tuple[Index, Index]:
+def _steep_part(force: Array, peak: Index, trough: Index, thresholds: Array) -> tuple[Index, Index]:
     """Falls from where they leave their upper quarter to where they reach their lower, and around.
 
     The highest mean of a stick that loads slowly may be far before the fall. Means are the
@@ -240,9 +238,7 @@ def _steep_part(
         means, hop = _means(force, k)
         half = ((1 << k) - 1) // 2
         last = means.size - 1
-        high, low = (
-            np.clip((at - half) // hop, 0, last) for at in (peak, trough)
-        )
+        high, low = (np.clip((at - half) // hop, 0, last) for at in (peak, trough))
         drop = means[high] - means[low]
         new = np.flatnonzero((octave < 0) & (drop > thresholds[k]) & (low > high))
         if not new.size:
