@@ -145,3 +145,11 @@ def test_known_orbits_that_do_not_fit_are_refused(model, known, message):
         model(at(), known)
     with pytest.raises(InputError, match=message):
         model.value_and_jacobian(at(), known)
+
+
+def test_the_coarse_search_has_the_orbits_of_smooth_sliding():
+    """SciPy's orbit where the modulation sets off no slip event, to the error of 72 intervals."""
+    values = response_function("rice-ruina", search="coarse")(at(epsilon=EPSILON[:1]))
+    mean, harmonics = integrated(EPSILON[0])
+    assert values.mean_friction[0] == pytest.approx(mean, rel=1e-6)
+    np.testing.assert_allclose(values.harmonics[0], harmonics, rtol=1e-5)
