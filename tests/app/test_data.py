@@ -428,10 +428,12 @@ def test_a_wrong_fit_gets_a_sentence(ask, changed, word):
     assert " must " in error
 
 
-def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modulated, tmp_path):
+def test_a_recording_is_dropped_measured_and_restored_from_its_link(
+    visit, barriers, modulated, tmp_path
+):
     (tmp_path / "good.csv").write_bytes(modulated)
     (tmp_path / "bad.csv").write_bytes(b"PK\x03\x04" + b"\0" * 500)
-    page = visit("#data")
+    page = visit("#data", bypass_csp=True)
     page.locator(".drop").wait_for()
     page.set_input_files("#data-files", [tmp_path / "bad.csv", tmp_path / "good.csv"])
     good, bad = (
@@ -441,6 +443,7 @@ def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modul
     bad.locator(".message", has_text="must").wait_for()
     good.locator(".sentence", has_text="Modulated at 20 Hz by 20 %").wait_for()
     assert good.locator("figure").count() == 4
+    assert barriers(page) == []
     page.get_by_role("button", name="Remove bad.csv").click()
     page.wait_for_url(lambda url: "good.csv" in url and "bad.csv" not in url)
     again = visit(page.url.split("/")[-1])
@@ -451,8 +454,10 @@ def test_a_recording_is_dropped_measured_and_restored_from_its_link(visit, modul
     good.locator(".message", has_text="must").wait_for()
 
 
-def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(visit, sawtooth, tmp_path):
-    page = visit("#data")
+def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(
+    visit, barriers, sawtooth, tmp_path
+):
+    page = visit("#data", bypass_csp=True)
     page.locator(".drop").wait_for()
     page.set_input_files(
         "#data-files", [{"name": "events.csv", "mimeType": "text/csv", "buffer": sawtooth}]
@@ -462,6 +467,7 @@ def test_stick_slip_on_the_page_has_a_catalogue_and_a_window_by_mouse(visit, saw
     count = int(sentence.inner_text().split(": ")[1].split()[0])
     table = page.get_by_role("region", name="Catalogue of events")
     assert table.locator("tbody tr").count() == count
+    assert barriers(page) == []
     assert page.locator(".panel.drops .plot .point").count() == count - 1
     with page.expect_download() as waited:
         page.get_by_role("button", name="Catalogue as CSV").click()
@@ -585,8 +591,8 @@ def test_a_recording_that_cannot_be_fitted_gets_a_sentence(steps, asked, run, wo
     assert "0123" not in str(refused.value)
 
 
-def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit, stepped):
-    page = visit("#data")
+def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit, barriers, stepped):
+    page = visit("#data", bypass_csp=True)
     page.locator(".drop").wait_for()
     page.set_input_files(
         "#data-files",
@@ -617,6 +623,20 @@ def test_a_recording_is_fitted_on_the_page_after_a_fit_that_was_cancelled(visit,
     assert found["A"] - found["B"] == pytest.approx(PLANTED["A"] - PLANTED["B"], rel=0.02)
     assert fit.locator(".panel.run-1 svg path.line").count() == 3
     assert not fit.get_by_role("button", name="Cancel").is_visible()
+    # The numbers of the fit are moved by hand, and the link restores them.
+    page.locator("summary", has_text="by hand").click()
+    page.locator(".by-hand .plot svg").wait_for()
+    assert barriers(page) == []
+    field = page.locator(".by-hand").get_by_label("memory length, with its unit")
+    field.fill("0.5 um")
+    field.press("Enter")
+    page.wait_for_url(lambda url: "5e-7" in url)
+    again = visit("#" + page.url.split("#", 1)[1])
+    again.locator(".by-hand .plot svg").wait_for()
+    values = "(all) => all.map((e) => e.type === 'checkbox' ? e.checked : e.value)"
+    controls = ".fit-form :is(input, select, textarea), .by-hand input"
+    first, second = (p.locator(controls).evaluate_all(values) for p in (page, again))
+    assert first == second
 
 
 def number(text):

@@ -47,7 +47,8 @@ _SENTENCES = {
     End.STEADY: "comes back to steady sliding",
     End.RUNAWAY: (
         "accelerates without bound after the extremum: steady sliding is stable, but the "
-        "disturbance is too large for this spring and law; take a stiffer spring, or inertia in asperity.transient"
+        "disturbance is too large for this spring and law; take a stiffer spring, or "
+        "inertia in asperity.transient"
     ),
     End.TOO_MANY_STEPS: "was not solved: no step was accurate, or more steps than allowed",
     End.CROSSING: "was followed to the extremum only",

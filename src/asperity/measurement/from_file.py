@@ -255,7 +255,7 @@ def modulated_or_sliding(
             raise
         reason = error
     what = "The normal load is constant" if constant else "No channel is the normal load"
-    events = _events(stick_slip)
+    events, unread = _events(stick_slip)
     try:
         measurement = sliding()
     except InputError as error:
@@ -269,15 +269,20 @@ def modulated_or_sliding(
         return measurement, f"{what}: velocity steps and holds are read, not a modulation."
     steady = events is not None and events.kind == "steady sliding"
     if not (plain or steady):
-        raise reason if constant or measurement.velocity_from else _without_motion()
+        if constant or measurement.velocity_from:
+            raise reason
+        raise unread or _without_motion(events)
     return measurement, f"{what}: steady sliding is read, not a modulation."
 
 
-def _events(read: Callable[[], StickSlipMeasurement] | None) -> StickSlipMeasurement | None:
+def _events(
+    read: Callable[[], StickSlipMeasurement] | None,
+) -> tuple[StickSlipMeasurement | None, InputError | None]:
+    """Slip events, or why they cannot be read."""
     try:
-        return None if read is None else read()
-    except InputError:
-        return None
+        return (None if read is None else read()), None
+    except InputError as error:
+        return None, error
 
 
 def _rather_events(events: StickSlipMeasurement, changes: int) -> bool:
@@ -304,7 +309,14 @@ def _which_force(trace: Trace) -> InputError:
     )
 
 
-def _without_motion() -> InputError:
+def _without_motion(events: StickSlipMeasurement | None) -> InputError:
+    if events is not None and events.kind == "cannot tell":
+        return InputError(
+            "measure.trace",
+            "have a modulated load, velocity steps, holds, slips or steady friction",
+            f"friction of which this is seen: {events.regimes[0].evidence}",
+            f"{Argument('measure.stick_slip')} reads it nevertheless",
+        )
     name, unit = Argument("columns", "displacement", "x"), Argument("units", "x", "um")
     return InputError(
         "measure.trace",

@@ -286,5 +286,5 @@ assert set(_CURVES) <= set(OUTPUTS)
 ENDPOINTS = (
     Answer("explore", Explored, explore),
     Answer("explore/text", Explored, text),
-    Job("explore/search", Explored, "asperity.app.api.explore:search", lane="search", seconds=120),
+    Job("explore/search", Explored, "asperity.app.api.explore:search", lane="search", seconds=300),
 )

@@ -223,5 +223,5 @@ def _record(
 
 
 ENDPOINTS = (
-    Job("explore/motion", Motion, "asperity.app.api.motion:motion", lane="motion", seconds=60),
+    Job("explore/motion", Motion, "asperity.app.api.motion:motion", lane="motion", seconds=180),
 )

@@ -130,14 +130,16 @@ def _followed(
     objective: Objective,
     starts: Sequence[Float],
     progress: Callable[[int, int], None] | None,
-    **options: float,
+    *,
+    tolerance: float | None = None,
+    evaluations: int = 100,
 ) -> list[Minimum]:
     """Minima that are reached from the starts, best first."""
     advance = counted(progress, len(starts))
     advance(0)
     minima = []
     for start in starts:
-        minima.append(objective.minimise(start, **options))
+        minima.append(objective.minimise(start, tolerance=tolerance, evaluations=evaluations))
         advance(1)
     return sorted((m for m in minima if math.isfinite(m.chi2)), key=_CHI2)
 
@@ -158,8 +160,8 @@ def _by_few_rows(
     starts = _best(drawn, screened.chi2_of_many(np.array(drawn), least=_LEAST))
     starts = [*known, *starts, *_without_extensions(screened, starts)]
     ends = _followed(coarse, starts, progress, tolerance=_NEARBY, evaluations=_FIRST_EVALUATIONS)
-    ends = [end.u for end in distinct(ends, _SAME_COARSE)[:_FOLLOWED]]
-    ends = _followed(coarse, ends, None, tolerance=_NEARBY, evaluations=_EVALUATIONS)
+    apart = [end.u for end in distinct(ends, _SAME_COARSE)[:_FOLLOWED]]
+    ends = _followed(coarse, apart, None, tolerance=_NEARBY, evaluations=_EVALUATIONS)
     minima = _on_all_rows(objective, _with_reweighted(coarse, ends))
     lowest = minima[0].chi2 if minima else math.inf
     again = [u for u in known if objective.chi2(u) < lowest]

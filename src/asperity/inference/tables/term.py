@@ -343,9 +343,10 @@ class Forward:
             left = np.flatnonzero(np.asarray(values.outcome) != Outcome.CONVERGED)
             if known is not None and not self.coarse and left.size:
                 more = self._direct({n: v[left] for n, v in part.items()}, last.picked(rows[left]))
-                values = ResponseValues(*map(np.array, values))
-                for whole, found in zip(values, more, strict=True):
-                    whole[left] = found
+                columns: list[Any] = [np.array(column) for column in values]
+                for column, searched in zip(columns, more, strict=True):
+                    column[left] = searched
+                values = ResponseValues(*columns)
             parts.append((values.mean_friction, mu_ss, values.harmonics, values.outcome))
         mean, steady, harmonics, outcome = (
             np.concatenate([np.asarray(p) for p in column]) for column in zip(*parts, strict=True)

@@ -22,8 +22,8 @@ _LOADING = 0.75
 #: Share of the rises that last longer than the falls next to them in symmetrical noise: a half. An
 #: excess of so many standard deviations is loading and slip.
 _ASYMMETRY = 3.0
-#: Evidence of many sticks that are longer than slips.
-_STICKS = 3
+#: Wider means make falls longer by up to this factor before another width tells them better.
+_BLUNTER = 3.0
 
 #: Cycles of an oscillation scatter by less than this share; those of a noise by half and more.
 _REGULAR, _FEWEST_CYCLES = 0.25, 8
@@ -117,19 +117,18 @@ def find_falls(force: Array, noise: Noise) -> Falls:
     searched together. Of falls that overlap at different widths those of the width that tells most
     of them apart are kept.
     """
-    most, best, first = noise.longest, 0, None
+    most, candidates = noise.longest, []
     for octave in range(most + 1):
         scatter = noise.of_means(octave, octave)
-        peak, trough = _at_width(force, octave, scatter[octave], noise, 0.0)
-        if not peak.size or _cycle(peak, trough, force.size) < _PER_CYCLE << octave:
-            continue
-        evidence = _evidence(peak, trough)
-        if evidence > best:
-            best, first = evidence, (octave, (peak, trough))
-        if best == _STICKS:
-            break
-    if first is not None:
-        return _at_all_widths(force, noise, *first)
+        falls = _at_width(force, octave, scatter[octave], noise, 0.0)
+        if falls[0].size and _cycle(*falls, force.size) >= _PER_CYCLE << octave:
+            candidates.append((*_evidence(*falls), octave, falls))
+    evidence = max((c[0] for c in candidates), default=0)
+    if evidence:
+        likely = [c for c in candidates if c[0] == evidence]
+        ratio = max(c[1] for c in likely)
+        _, _, octave, falls = next(c for c in likely if c[1] > ratio / _BLUNTER)
+        return _at_all_widths(force, noise, octave, falls)
     empty = np.empty(0, dtype=np.intp)
     scatter = noise.of_means(most, most)
     return Falls(empty, empty, scatter, _thresholds(noise, scatter))
@@ -146,11 +145,11 @@ def _cycle(peak: Index, trough: Index, samples: int) -> float:
     return float(min(peak[0], samples - trough[0]))
 
 
-def _evidence(peak: Index, trough: Index) -> int:
-    """What speaks for loading and slip: `_STICKS`, less the lower, none at 0.
+def _evidence(peak: Index, trough: Index) -> tuple[int, float]:
+    """What speaks for loading and slip, from 3 to 0, and how much longer rises are than falls.
 
-    Noise that is faster than its second differences show has falls too, as long as its rises but
-    for the loading under it: sticks are twice as long as slips in many events.
+    Falls of noise that is faster than its second differences show are as long as its rises, but for
+    the loading under it: sticks are twice as long as slips in many events.
     """
     fall = trough - peak
     rise = peak - np.concatenate([[0], trough[:-1]])
@@ -158,11 +157,11 @@ def _evidence(peak: Index, trough: Index) -> int:
     many = peak.size >= _ASYMMETRY**2
     longer = int((rise > fall).sum()) - peak.size / 2 > _ASYMMETRY * np.sqrt(peak.size) / 2
     if many and longer and ratio > 2:
-        return _STICKS
+        return 3, ratio
     # A single event has a rise on each side.
     if longer if many else ratio > 4:
-        return 2
-    return 1 if _returns(peak) else 0
+        return 2, ratio
+    return int(_returns(peak)), ratio
 
 
 def _returns(peak: Index) -> bool:
@@ -226,9 +225,7 @@ def _at_all_widths(force: Array, noise: Noise, octave: int, first: tuple[Index, 
     return Falls(*_steep_part(force, peak, trough, thresholds), scatter, thresholds)
 
 
-def _steep_part(
-    force: Array, peak: Index, trough: Index, thresholds: Array
-) -> tuple[Index, Index]:
+def _steep_part(force: Array, peak: Index, trough: Index, thresholds: Array) -> tuple[Index, Index]:
     """Falls from where they leave their upper quarter to where they reach their lower, and around.
 
     The highest mean of a stick that loads slowly may be far before the fall. Means are the
@@ -240,9 +237,7 @@ def _steep_part(
         means, hop = _means(force, k)
         half = ((1 << k) - 1) // 2
         last = means.size - 1
-        high, low = (
-            np.clip((at - half) // hop, 0, last) for at in (peak, trough)
-        )
+        high, low = (np.clip((at - half) // hop, 0, last) for at in (peak, trough))
         drop = means[high] - means[low]
         new = np.flatnonzero((octave < 0) & (drop > thresholds[k]) & (low > high))
         if not new.size:

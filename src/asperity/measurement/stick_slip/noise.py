@@ -103,12 +103,17 @@ def estimate(force: Array) -> Noise:
     # Numbers below this are rounding.
     floor = 4 * np.finfo(float).eps * float(np.abs(force).max(initial=0.0))
     total = np.concatenate([[0.0], np.cumsum(force - force.mean())])
+    # A saturated sample has no noise.
+    ends = (force == force.max()) | (force == force.min())
+    saturated = np.concatenate([[0], np.cumsum(ends)])
     size = max(int(np.log2(max(n // _FEWEST_BLOCKS, 1))) + 1, 1)
     scatter = np.zeros((size, size))
     for j in range(size):
         lag = 1 << j
         stop = n - 3 * lag + 1
         first = np.arange(0, stop, max(1, min(lag // 4, stop // _MOST_BENDS)))
+        inside = first[saturated[first + 3 * lag] == saturated[first]]
+        first = inside if inside.size >= _FEWEST_BLOCKS else first
         # Bends whose first mean is within a lag share samples.
         count = min(first.size, n / lag)
         for k in range(j + 1):

@@ -7,6 +7,7 @@ the force does not rise between two events as it does in the sticks, the slider 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Literal
 
 import numpy as np
@@ -52,7 +53,8 @@ _SYMMETRICAL, _STICKING = 1.5, 2.0
 _INERTIAL = 0.25
 #: Share of impulses above which they may be the motion.
 _MANY = 0.05
-#: Smallest drop that could be seen, over the mean friction, above which steady is not known.
+#: Smallest drop that could be seen, or trend, over the mean friction, above which steady is not
+#: known.
 _BLIND = 0.2
 
 
@@ -125,7 +127,22 @@ def regimes(
         parts.append(_train(events, first, stop, (begin, end), natural_period))
         edge, first = end, int(stop)
     usual = float(cycle[-1]), float(slope[-1])
-    return (*parts, *_between(time, force, (edge, float(time[-1])), first, *usual))
+    parts += _between(time, force, (edge, float(time[-1])), first, *usual)
+    return tuple(_without_single_events(parts))
+
+
+def _without_single_events(parts: list[Regime]) -> list[Regime]:
+    """Parts in which trains too short for a regime and sliding alternate are one that is open."""
+    merged: list[Regime] = []
+    for short, group in groupby(parts, lambda r: r.stop - r.first < _FEWEST):
+        run = list(group)
+        trains = sum(r.stop > r.first for r in run)
+        if short and trains > 1:
+            first, last = run[0], run[-1]
+            text = f"{last.stop - first.first} events in {trains} groups of fewer than {_FEWEST}"
+            run = [Regime("cannot tell", first.start, last.end, first.first, last.stop, text)]
+        merged += run
+    return merged
 
 
 def _windows(values: Array) -> Array:
@@ -179,6 +196,14 @@ def _without_events(time: Array, force: Array, smallest_drop: float, impulses: f
     kind: Kind = "steady sliding" if share < _BLIND else "cannot tell"
     if kind == "cannot tell":
         seen += f", which is {100 * share:.2g} % of the mean: smaller drops cannot be seen"
+    tenth = max(force.size // 10, 1)
+    change = float(np.mean(force[-tenth:]) - np.mean(force[:tenth])) / 0.9
+    if abs(change) > max(_BLIND * mean, smallest_drop):
+        kind = "cannot tell"
+        seen += (
+            f", and it {'rises' if change > 0 else 'falls'} by {100 * abs(change) / mean:.2g} % of "
+            "its mean throughout: sliding, or a stick longer than the recording"
+        )
     if impulses > _MANY:
         kind = "cannot tell"
         seen = (

@@ -78,4 +78,4 @@ def worst(checks: Iterable[Check]) -> Verdict:
 
 def percent(share: float) -> str:
     """A share in two digits, for a sentence."""
-    return f"{100 * share:.2g} %"
+    return f"{float(f'{100 * share:.2g}'):g} %"

@@ -4,10 +4,11 @@
 const KEY = "asperity-names";
 let chosen = "friction";
 let usual = {};
+let laws = {};
 
 /** Take the names of geophysics from the catalogue, and what was chosen on an earlier visit. */
 export function useNames(catalogue) {
-  usual = catalogue.geophysics;
+  ({ geophysics: usual, laws } = catalogue);
   try {
     chosen = localStorage.getItem(KEY) === "geophysics" ? "geophysics" : "friction";
   } catch {
@@ -46,7 +47,7 @@ export function worded(label) {
 /** A sentence with a capital at its beginning, unless it begins with the name of a number or a law. */
 export function capital(text) {
   const [first, second] = text.split(" ", 2);
-  const isName = !/^[a-z]{2,}[,:]?$/.test(first) || second === "must";
+  const isName = !/^[a-z]{2,}[,:]?$/.test(first) || second === "must" || first in laws;
   return isName ? text : text.charAt(0).toUpperCase() + text.slice(1);
 }
 

@@ -107,7 +107,11 @@ export function create(page) {
     stopSearch();
     latest.ask(question(), { since: performance.now() });
     clearTimeout(slow);
-    slow = setTimeout(() => page.say("Computing; where these numbers need a finer grid it is compiled first, once, which takes some seconds."), SLOW);
+    slow = setTimeout(() => {
+      const text = "Computing. Programs that these numbers need are compiled once, which takes some seconds.";
+      page.say(text);
+      if (!answer?.point) sentence.textContent = text;
+    }, SLOW);
   }
 
   function stopSearch() {

@@ -264,7 +264,7 @@ export class FitPanel {
     // The first sentence of the report stands next to the button, then the picture, then the numbers.
     const [first, ...others] = described;
     this.status.textContent = first.sentences.length ? first.sentences.map(ended).join(" ") : capital(first.title);
-    const ofLaws = Object.entries(laws || {}).map(([n, ofLaw]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(ofLaw, ` of ${n}`)));
+    const ofLaws = Object.entries(laws || {}).map(([n, ofLaw]) => el("details", { open: n === comparison.best }, el("summary", {}, n), ...sections(ofLaw.map((s) => ({ ...s, title: s.title === n ? "" : s.title })), ` of ${n}`)));
     fill(this.results, ...this.#runs(runs), ...this.#bands(bands), buttons,
       ...sections([{ ...first, sentences: [] }, ...others]), ...ofLaws, ...this.#posterior(posterior), this.#residuals(residuals));
     for (const draw of this.figures) draw();

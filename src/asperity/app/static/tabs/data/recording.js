@@ -189,6 +189,7 @@ export class RecordingCard {
         text("Sampling rate", source.rate, optional(source, "rate"), "from the file, or 10 kHz"),
         text("Area", source.area, optional(source, "area"), "turns stress into force, 25 cm^2"),
         text("Group", source.group, optional(source, "group"), "of HDF5, MATLAB, TDMS"),
+        text("File format", source.format, optional(source, "format"), "recognised, or text"),
         text("Delimiter", source.delimiter, optional(source, "delimiter"), "detected"),
         text("Decimal mark", source.decimal, optional(source, "decimal"), "detected"),
         text("Derived channels", Object.entries(source.channels).map(([n, e]) => `${n} = ${e}`).join("; "), (v) => {

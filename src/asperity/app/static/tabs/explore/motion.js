@@ -3,7 +3,7 @@
 import { Figure, series } from "../../lib/charts.js";
 import { Refused, run } from "../../lib/server.js";
 import { digits, quantity } from "../../lib/units.js";
-import { worded } from "../../lib/words.js";
+import { ended, worded } from "../../lib/words.js";
 
 /** Time (ms) without a movement of a control after which the motion is computed. */
 const PAUSE = 600;
@@ -53,7 +53,7 @@ export class MotionPanel {
     } catch (error) {
       if (error.name === "AbortError") return;
       if (!(error instanceof Refused)) throw error;
-      this.figure.note.textContent = error.message;
+      this.figure.note.textContent = ended(error.message);
     }
   }
 

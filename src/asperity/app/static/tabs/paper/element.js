@@ -1,6 +1,7 @@
 // Figure 10: the interface as a spring in series with a frictional joint, with its numbers.
 
 import { el, shape } from "../../lib/dom.js";
+import { scrolling } from "../../lib/tables.js";
 import { digits, quantity } from "../../lib/units.js";
 
 /** A spring between two points of a horizontal line, of so many teeth. */
@@ -31,6 +32,6 @@ export function elementDrawing({ asperities, spring: pulling, ratio, resonance }
     label(515, 36, "pulling spring"), label(515, 98, `K = ${quantity(pulling, "stiffness", 3)}`), label(605, 50, "V"),
   );
   return el("figure", { class: "panel", "aria-label": "The element" },
-    el("div", { class: "drawing" }, svg),
+    scrolling("Drawing of the element", [svg]),
     el("p", { class: "note" }, `λK/W₀ = ${digits(ratio, 3)}: while the joint sticks, the slider follows ${digits((100 * ratio) / (1 + ratio), 3)} % of the movement of the pulling end, and the pulling spring takes up the remainder. On its asperities the slider resonates at ${quantity(resonance, "frequency", 3)}. Redrawn from the text, with what the element does over one period at ε_eff = 0.24.`));
 }
