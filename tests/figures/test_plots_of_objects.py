@@ -62,3 +62,16 @@ def test_a_trajectory_keeps_its_extremes_however_many_rows_it_has() -> None:
     force = run.plot().axes[1]
     low, high = (line.get_ydata() for line in force.get_lines()[:2])
     assert (low.min(), high.max()) == (run.force.min(), run.force.max())
+
+
+def test_stick_slip_over_the_velocity_is_drawn_as_its_numbers_and_one_point_is_not() -> None:
+    law = asp.laws.get_law("rice-ruina")(mu0=0.6, A=0.009, B=0.0125, D0="8 um", V0="1 um/s")
+    soft = asp.Slider(law, spring="2 N/um", load="10 kN", mass="10 kg")
+    cycles = asp.experiment.stick_slip_response(soft, velocity=[1e-5, 1e-4])
+    drop, period, fastest = cycles.plot("geophysics").axes
+    np.testing.assert_array_equal(drop.lines[0].get_ydata(), cycles.drop)
+    np.testing.assert_array_equal(period.lines[0].get_ydata(), cycles.period)
+    np.testing.assert_allclose(fastest.lines[0].get_ydata(), 1e3 * cycles.peak_velocity)
+    assert r"\tau" in drop.get_ylabel()
+    with pytest.raises(InputError, match="give several velocities"):
+        asp.experiment.stick_slip_response(soft, velocity="10 um/s").plot()
