@@ -260,7 +260,7 @@ class _Shape:
 
 
 #: How a slider slips on a spring: freely at constant friction, at a constant velocity, and damped.
-#: Onsets of half a cosine and of a straight fall lie this share of the slip apart, by least squares.
+#: Onsets of half a cosine and of a straight fall are this share of the slip apart (least squares).
 _SHAPES = (_Shape(_half_cosine, 2.65), _Shape(_straight, 2.0), _Shape(_relaxing, 4.97))
 _DISTANCE = 0.13
 #: Of 26 made recordings the true shapes stand out by 3.4 to 46 standard errors, others by 2.1.
